@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from functools import partial
 from typing import ClassVar, Final, Protocol
 
@@ -49,6 +49,120 @@ class WireFaults(Protocol):
 
     def clear(self, name: str) -> None:
         """Let a fault end; one that is not armed is no error."""
+
+
+# The faults of several wires, and of nodes on them, under one roof.
+
+
+class AssemblyFaults(Copyable):
+    """The faults of several wires, and of CANopen nodes on them.
+
+    Those of a lone wire are called as they are, else `WIRE/fault`; those of a node `NODE/fault`,
+    but of a lone device those that its wire has not are called as they are.
+
+    Args:
+        wires: by name.
+        nodes: by name.
+        alone: the name of the only device, empty if there are several.
+    """
+
+    def __init__(
+        self,
+        wires: Mapping[str, WireFaults],
+        nodes: Mapping[str, WireFaults] | None = None,
+        alone: str = "",
+    ) -> None:
+        self._wires, self._nodes = dict(wires), dict(nodes or {})
+        self._bare = next(iter(self._wires.values())) if len(self._wires) == 1 else None
+        self._alone = self._nodes.get(alone)
+        self.fault_types: Mapping[str, FaultForm] = _FaultTable(self)
+
+    @property
+    def wires(self) -> tuple[str, ...]:
+        """Their names."""
+        return tuple(self._wires)
+
+    def of_wire(self, wire: str) -> dict[str, str]:
+        """Return the full names of the faults of a wire, by those that people use there."""
+        bare = self._bare is not None
+        return {
+            fault: fault if bare else f"{wire}/{fault}" for fault in self._wires[wire].fault_types
+        }
+
+    def of_node(self, node: str) -> dict[str, str]:
+        """Return the full names of the faults of a node, by those that people use there."""
+        held = self._nodes.get(node)
+        if held is None:
+            return {}
+        on_wire = self._bare.fault_types if self._bare else {}
+        bare = held is self._alone
+        return {
+            fault: fault if bare and fault not in on_wire else f"{node}/{fault}"
+            for fault in held.fault_types
+        }
+
+    def names(self) -> Iterator[str]:
+        """Give the full names of all."""
+        for wire in self._wires:
+            yield from self.of_wire(wire).values()
+        for node in self._nodes:
+            yield from self.of_node(node).values()
+
+    @property
+    def armed(self) -> tuple[str, ...]:
+        """Names of those that are."""
+        of_wires = [self.of_wire(name)[x] for name, one in self._wires.items() for x in one.armed]
+        of_nodes = [self.of_node(name)[x] for name, one in self._nodes.items() for x in one.armed]
+        return (*of_wires, *of_nodes)
+
+    def check(self, name: str, *arguments: str) -> None:
+        """Raise ValueError unless the fault can be armed like this."""
+        holder, fault = self.find(name)
+        holder.check(fault, *arguments)
+
+    def arm(self, name: str, *arguments: str) -> None:
+        """Let a fault begin; one of the same name is replaced."""
+        holder, fault = self.find(name)
+        holder.arm(fault, *arguments)
+
+    def acted(self, name: str) -> int:
+        """Return how often a fault has acted since it was armed last."""
+        holder, fault = self.find(name)
+        return holder.acted(fault)
+
+    def clear(self, name: str) -> None:
+        """Let a fault end; one that is not armed is no error."""
+        holder, fault = self.find(name)
+        holder.clear(fault)
+
+    def find(self, name: str) -> tuple[WireFaults, str]:
+        """Return where a fault of a full name is armed, and its name there; KeyError for none."""
+        owner, slash, fault = name.rpartition("/")
+        holders = [self._bare, self._alone]
+        if slash:
+            of_wire = None if self._bare else self._wires.get(owner)
+            holders = [of_wire, self._nodes.get(owner)]
+        for holder in holders:
+            if holder is not None and fault in holder.fault_types:
+                return holder, fault
+        raise KeyError(name)
+
+
+class _FaultTable(Mapping[str, FaultForm]):
+    """The faults by their full names, made when they are asked for: there may be many nodes."""
+
+    def __init__(self, faults: AssemblyFaults) -> None:
+        self._faults = faults
+
+    def __getitem__(self, name: str) -> FaultForm:
+        holder, fault = self._faults.find(name)
+        return holder.fault_types[fault]
+
+    def __iter__(self) -> Iterator[str]:
+        return self._faults.names()
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self._faults.names())
 
 
 def _ignore(text: str) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from tickrig.emulators.bench.operator import WireFaults
 from tickrig.emulators.bench.running_emulator import RunningEmulator
 from tickrig.emulators.can.bus_device import Accepted
 from tickrig.emulators.can.end import CanEnd
@@ -36,6 +37,7 @@ class CanEmulator(RunningEmulator):
         clock: a `VirtualClock` unless given.
         trace: the record, to be closed in the end.
         link: how people call the bus outside.
+        faults: where faults are armed; those of the bus unless given.
     """
 
     def __init__(  # noqa: PLR0913 - options, by keyword
@@ -50,8 +52,9 @@ class CanEmulator(RunningEmulator):
         clock: Clock | None = None,
         trace: CandumpFile | None = None,
         link: str = "",
+        faults: WireFaults | None = None,
     ) -> None:
-        super().__init__(name, physical, wire.faults, link, trace)
+        super().__init__(name, physical, faults or wire.faults, link, trace)
         self._wire, self._outside = wire, outside
         self._ends = [station.port for station in stations]
         self._host = self._open_end()

@@ -65,6 +65,11 @@ class ErrorCounters(Part):
         self.tec += _TRANSMIT_ERROR
         self._note()
 
+    def go_off(self) -> None:
+        """Become bus-off at once."""
+        self.tec = _BUS_OFF_LIMIT
+        self._note()
+
     def receive_failed(self) -> None:
         """Count an error while receiving; a passive receiver's counter stays where it is."""
         if not self._receiver_passive:

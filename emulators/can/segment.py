@@ -47,6 +47,7 @@ from typing import TYPE_CHECKING, Final
 
 from tickrig.device.twin import Cache, Listeners
 from tickrig.emulators.can.arbitration import dominant, first_difference
+from tickrig.emulators.can.fault_confinement import ErrorCounters
 from tickrig.emulators.can.faults import CanFaults, FaultVerdict
 from tickrig.emulators.can.transmission_outcomes import (
     RECESSIVE_BITS,
@@ -186,6 +187,17 @@ class CanSegment(TransmissionOutcomes):
         self._recovery.leave(end)
         self._recount(now_us)
 
+    def force_off(self, end: CanEnd, now_us: int) -> None:
+        """Let a node go bus-off, as after 32 errors in a row; its frame on the bus breaks off."""
+        self.disturb(now_us)
+        if end in self._winners:
+            self._withdraw()
+            self._arbiter.free = now_us * self.unit + (_ECHO_BITS + _ERROR_BITS) * self.bit
+        self._arbiter.leave(end)
+        self._arbiter.join(end)
+        self._confinement.count(now_us, end, ErrorCounters.go_off)
+        self._notify_changes()
+
     def recover(self, end: CanEnd, now_us: int) -> None:
         """Let a node that is bus-off wait for its return."""
         self.disturb(now_us)
@@ -272,7 +284,7 @@ class CanSegment(TransmissionOutcomes):
 
     def _suffer(self, bits: int) -> None:
         """Plan a transmission on a bus with faults."""
-        match self._faults.judge():
+        match self._faults.judge([end.number for end in self._winners]):
             case FaultVerdict.SENT:
                 self._settle(self._deliver, bits)
             case FaultVerdict.DROPPED:

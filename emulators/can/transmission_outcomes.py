@@ -184,7 +184,10 @@ class TransmissionOutcomes(SegmentFields):
 
     def _drop(self) -> None:
         """Let a frame be acknowledged, and lost."""
-        self._take_off(self._winners[0].next)
+        at_us, frame = self._due_us, self._winners[0].next
+        self._take_off(frame)
+        for hear in self._faults.listeners:
+            hear(at_us, frame)
 
     def _duplicate(self) -> None:
         """Hand a frame out that its sender will send again."""

@@ -175,6 +175,24 @@ class CanWire(Copyable):
         end.open(on_bus=True)
         apart.join(end, now_us)
 
+    def force_off(self, end: CanEnd) -> None:
+        """Let a node go bus-off and stay so until `release`.
+
+        Args:
+            end: the node's end.
+        """
+        end.auto_recovery = False
+        end.segment.force_off(end, self.bus.now_us)
+
+    def release(self, end: CanEnd) -> None:
+        """Let a node that was forced off come back as most drivers let it.
+
+        Args:
+            end: the node's end.
+        """
+        end.auto_recovery = True
+        end.recover(self.bus.now_us)
+
     def _fault_changed(self, name: str, armed: bool) -> None:
         now_us = self.bus.now_us
         if name == "short":

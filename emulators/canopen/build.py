@@ -12,12 +12,14 @@ from tickrig.device.canopen.device_rtc import application_of as application_of_c
 from tickrig.device.canopen.sdo import USUAL, SdoLimits
 from tickrig.device.canopen.slave import UNCONFIGURED
 from tickrig.device.canopen.stack import make_slave
+from tickrig.emulators.bench.operator import WireFaults
 from tickrig.emulators.can.emulator import CanEmulator
 from tickrig.emulators.can.outside.bridge import CountingPort
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.body import BodyOnDrives
 from tickrig.emulators.canopen.choices import AUTO, is_bus_node
 from tickrig.emulators.canopen.eds import DeviceDescription, EdsCache
+from tickrig.emulators.canopen.faults import NodeFaults
 from tickrig.emulators.canopen.models import MODELS
 from tickrig.emulators.canopen.node import NODE_INPUTS, Node, Nodes, SecondNodeAlarm
 from tickrig.emulators.canopen.node_spec import LSS, NodeSpec
@@ -205,9 +207,13 @@ def make_bench(  # noqa: PLR0913 - options, by keyword
     link: str = "",
     trace: CandumpFile | None = None,
     clock: Clock | None = None,
+    faults: WireFaults | None = None,
+    node_faults: Sequence[NodeFaults] = (),
 ) -> CanEmulator:
-    """Put nodes together with bodies, the bus outside, if there are such, and a clock."""
+    """Put nodes together with bodies, the bus outside, if there are such, a clock, and faults."""
     stations = [Station(node, node.port) for node in nodes]
+    for one, station in zip(node_faults, stations, strict=False):
+        one.station = station
     return CanEmulator(
         NAME,
         Nodes(nodes, bodies),
@@ -218,6 +224,7 @@ def make_bench(  # noqa: PLR0913 - options, by keyword
         clock=clock,
         trace=trace,
         link=link,
+        faults=faults,
     )
 
 

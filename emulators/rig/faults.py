@@ -227,11 +227,16 @@ class FaultTally(Part):
     def __init__(self, count: int | None = None) -> None:
         self.count, self.acted = count, 0
 
+    @property
+    def left(self) -> int:
+        """How often it may act yet."""
+        return _MOST if self.count is None else self.count - self.acted
+
     def allow(self, wanted: int = 1) -> int:
         """Return how many of so many actions are left, and count them."""
-        left = wanted if self.count is None else min(wanted, self.count - self.acted)
-        self.acted += left
-        return left
+        allowed = min(wanted, self.left)
+        self.acted += allowed
+        return allowed
 
 
 class FaultTrigger(Part):

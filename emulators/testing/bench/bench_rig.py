@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from tickrig.device.physical import InputSignal, OutputSignal, SignalType
 from tickrig.device.twin import Copyable
 from tickrig.emulators.bench.fault_spec import FaultOrder, FaultSpec
-from tickrig.emulators.bench.operator import Operator, WireFaults
+from tickrig.emulators.bench.operator import AssemblyFaults, Operator
 from tickrig.emulators.bench.running_emulator import RunningEmulator
 from tickrig.emulators.can.faults import CanFaults
 from tickrig.emulators.canopen.body import BodyOnDrives
@@ -190,68 +190,6 @@ class _Table(Mapping[str, InputSignal]):
         return sum(len(part.inputs.table) for part in self._assembly.parts.values())
 
 
-class AssemblyFaults(Copyable):
-    """The faults of several wires; those of one are called as they are, else `WIRE/fault`.
-
-    Args:
-        wires: by name.
-    """
-
-    def __init__(self, wires: Mapping[str, WireFaults]) -> None:
-        self._wires = dict(wires)
-        self._bare = len(self._wires) == 1
-
-    @property
-    def wires(self) -> tuple[str, ...]:
-        """Their names."""
-        return tuple(self._wires)
-
-    @property
-    def fault_types(self) -> Mapping[str, FaultForm]:
-        """The faults that can be armed."""
-        return {
-            self._full(name, fault): kind
-            for name, wire in self._wires.items()
-            for fault, kind in wire.fault_types.items()
-        }
-
-    @property
-    def armed(self) -> tuple[str, ...]:
-        """Names of those that are."""
-        return tuple(
-            self._full(name, fault) for name, wire in self._wires.items() for fault in wire.armed
-        )
-
-    def check(self, name: str, *arguments: str) -> None:
-        """Raise ValueError unless the fault can be armed like this."""
-        wire, fault = self._find(name)
-        wire.check(fault, *arguments)
-
-    def arm(self, name: str, *arguments: str) -> None:
-        """Let a fault begin; one of the same name is replaced."""
-        wire, fault = self._find(name)
-        wire.arm(fault, *arguments)
-
-    def acted(self, name: str) -> int:
-        """Return how often a fault has acted since it was armed last."""
-        wire, fault = self._find(name)
-        return wire.acted(fault)
-
-    def clear(self, name: str) -> None:
-        """Let a fault end; one that is not armed is no error."""
-        wire, fault = self._find(name)
-        wire.clear(fault)
-
-    def _full(self, wire: str, fault: str) -> str:
-        return fault if self._bare else f"{wire}/{fault}"
-
-    def _find(self, name: str) -> tuple[WireFaults, str]:
-        if self._bare:
-            return next(iter(self._wires.values())), name
-        wire, _, fault = name.partition("/")
-        return self._wires[wire], fault
-
-
 class BenchOperator(Operator):
     """The hands at several devices."""
 
@@ -315,8 +253,13 @@ class Parts:
 
     @property
     def faults(self) -> AssemblyFaults:
-        """The faults of all wires."""
-        return AssemblyFaults({mount.name: mount.faults for mount in self.mounts})
+        """The faults of all wires and nodes."""
+        buses = [mount for mount in self.mounts if isinstance(mount, BusMount)]
+        nodes = {name: one for bus in buses for name, one in bus.node_faults.items()}
+        devices = [name for mount in self.mounts for name in mount.parts]
+        names = [*devices, *(body.name for body in self.bodies)]
+        wires = {mount.name: mount.faults for mount in self.mounts}
+        return AssemblyFaults(wires, nodes, names[0] if len(names) == 1 else "")
 
 
 class RigState(Copyable):
@@ -414,12 +357,7 @@ class RigState(Copyable):
         if not owner:
             return {name: name for name in everything}
         wire = owner if owner in self.mounts else self.wire_of(owner)
-        prefixes = [f"{wire}/"] if len(self.mounts) > 1 else [""]
-        faults = {
-            name.removeprefix(prefixes[0]): name
-            for name in self.faults.fault_types
-            if name.startswith(prefixes[0])
-        }
+        faults = self.faults.of_wire(wire) | self.faults.of_node(owner)
         if (part := self.assembly.parts.get(owner)) is not None:
             full = self.assembly.full_name
             faults |= {name: full(owner, name) for name in part.inputs.names(SignalType.FAULT)}
@@ -487,6 +425,10 @@ class BenchDescription:
         return "\n".join(lines)
 
 
+_BUS_AND_NODE: Final = (b"bus", b"node")
+"""The ends of a node's filter, for people."""
+
+
 class BenchRig(RunningEmulator):
     """A rig with all devices of a bench; `EmulatorControl` answers requests about it.
 
@@ -519,13 +461,19 @@ class BenchRig(RunningEmulator):
                 mount.faults.listeners.append(self.journal.of_faults(mount.name))
             else:
                 mount.wire.observers.append(self.journal.of_bus(mount.name))
+                mount.wire.faults.listeners.append(self.journal.of_lost(mount.name))
+                for node, faults in mount.node_faults.items():
+                    faults.listeners.append(self.journal.of_faults(node, _BUS_AND_NODE))
 
     def _note(self, text: str) -> None:
         """Note what was done; the signals and faults of what is alone have no prefix."""
         source, slash, what = text.partition("/")
-        of_wire = text.partition("=")[0] in self.wire.fault_types
+        fault = text.partition("=")[0]
+        of_wire = fault in self.wire.fault_types
         if not slash:
-            places = self.state.mounts if of_wire else self.state.assembly.parts
+            first = next(iter(self.state.mounts))
+            bare = of_wire and fault in self.state.faults.of_wire(first)
+            places = self.state.mounts if bare else self.state.assembly.parts
             source, what = next(iter(places)), text
         if of_wire and self.state.recorder:
             self.state.recorder.wire_fault(self.effective_us, source, what)

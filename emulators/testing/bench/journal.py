@@ -11,7 +11,7 @@ from tickrig.emulators.record.wire_log import Splitter, WireLine, WireLog
 from tickrig.host.text.byte_text import escape
 from tickrig.host.text.trace import Mark
 from tickrig.host.text.values import format_time
-from tickrig.wire.can import CanFrame, ErrorFrame
+from tickrig.wire.can import CanFrame, ErrorFrame, Frames
 
 KEPT: Final = 10_000
 """So many lines are kept; of those before it is known how many there were."""
@@ -49,21 +49,36 @@ class Journal(WireLog):
         self._logs.append((source, log))
         return log.hear
 
-    def of_faults(self, source: str) -> Callable[[int, Mark, bytes, bytes], None]:
-        """Return what takes the bytes of a serial line as they were sent, and as they are heard."""
+    def of_faults(
+        self, source: str, ends: tuple[bytes, bytes] = _ENDS
+    ) -> Callable[[int, Mark, bytes | Frames, bytes | Frames], None]:
+        """Return what takes traffic as it was sent, and as it is heard.
 
-        def hear(at_us: int, mark: Mark, sent: bytes, received: bytes) -> None:
-            sender, receiver = _ENDS if mark is Mark.TO_DEVICE else _ENDS[::-1]
+        Args:
+            source: the line, or the node.
+            ends: who is at the far end, and who at the near one.
+        """
+
+        def hear(at_us: int, mark: Mark, sent: bytes | Frames, received: bytes | Frames) -> None:
+            sender, receiver = ends if mark is Mark.TO_DEVICE else ends[::-1]
             words = (
                 b"the",
                 receiver,
                 b"hears",
-                received or b"nothing",
+                _shown(received) or b"nothing",
                 b"where the",
                 sender,
                 b"sent",
             )
-            self.add(at_us, Mark.WIRE, b" ".join((*words, sent)), source)
+            self.add(at_us, Mark.WIRE, b" ".join((*words, _shown(sent))), source)
+
+        return hear
+
+    def of_lost(self, source: str) -> Callable[[int, CanFrame], None]:
+        """Return what takes the frames of a bus that nobody takes."""
+
+        def hear(at_us: int, frame: CanFrame) -> None:
+            self.add(at_us, Mark.WIRE, f"nobody takes {frame}".encode(), source)
 
         return hear
 
@@ -94,6 +109,10 @@ class Journal(WireLog):
         """Return the frames before those that are kept which say what PDOs carry."""
         first = self._count - KEPT
         return tuple(line for line in self._mappings if line.number <= first)
+
+
+def _shown(traffic: bytes | Frames) -> bytes:
+    return traffic if isinstance(traffic, bytes) else " ".join(map(str, traffic)).encode()
 
 
 def _maps(frame: CanFrame) -> bool:

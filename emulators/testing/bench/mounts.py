@@ -11,6 +11,7 @@ from tickrig.emulators.bench.operator import WireFaults
 from tickrig.emulators.can.end import CanEnd
 from tickrig.emulators.can.faults import CanFaults
 from tickrig.emulators.can.wire import CanWire
+from tickrig.emulators.canopen.faults import NodeFaults
 from tickrig.emulators.canopen.node import Node, Nodes
 from tickrig.emulators.record.recorder import TraceRecorder
 from tickrig.emulators.rig.emulated import Emulated, HasSignals
@@ -116,12 +117,14 @@ class BusMount(Copyable):
     Attributes:
         wire: the bus.
         nodes: by name.
+        node_faults: where faults of each node are armed, by its name.
         entries: what a trace says of each.
     """
 
     def __init__(self, name: str, bit_rate: int = BIT_RATE, seed: int = 0) -> None:
         self.name, self.wire = name, CanWire(bit_rate, seed)
         self.nodes: dict[str, Node] = {}
+        self.node_faults: dict[str, NodeFaults] = {}
         self.entries: dict[str, DeviceEntry] = {}
         self.open_end(frozenset())
 
@@ -133,7 +136,8 @@ class BusMount(Copyable):
             slave: the slave.
             entry: what a trace says of it, if it can be built again.
         """
-        self.nodes[name] = Node(name, slave, self.wire)
+        node = self.nodes[name] = Node(name, slave, self.wire)
+        self.node_faults[name] = NodeFaults(node, self.wire)
         self.entries[name] = entry or DeviceEntry(self.name)
 
     def open_end(self, accepts: frozenset[int] | None = None) -> CanEnd:
@@ -165,7 +169,9 @@ class BusMount(Copyable):
     def stations(self, recorder: TraceRecorder | None) -> Iterator[Station[Frames]]:
         """Return the nodes on the bus, recorded if that is wanted."""
         for name, node in self.nodes.items():
-            yield Station(recorder.device(name, node) if recorder else node, node.port)
+            station = Station(recorder.device(name, node) if recorder else node, node.port)
+            self.node_faults[name].station = station
+            yield station
 
     @property
     def lost(self) -> int:

@@ -12,7 +12,7 @@ import click
 
 from tickrig.device.canopen.sdo import USUAL, SdoLimits
 from tickrig.device.canopen.slave import UNCONFIGURED
-from tickrig.emulators.bench.operator import Operator
+from tickrig.emulators.bench.operator import AssemblyFaults, Operator
 from tickrig.emulators.bench.running_emulator import FrameTranscript, RunningEmulator
 from tickrig.emulators.can.emulator import CanEmulator
 from tickrig.emulators.can.outside.bridge import CountingPort
@@ -22,6 +22,7 @@ from tickrig.emulators.canopen import build
 from tickrig.emulators.canopen.body import BodyPlan
 from tickrig.emulators.canopen.choices import AUTO
 from tickrig.emulators.canopen.eds import EdsCache, profile_name
+from tickrig.emulators.canopen.faults import NodeFaults
 from tickrig.emulators.canopen.node import Nodes
 from tickrig.emulators.canopen.node_spec import NodeSpec, parse_ids, parse_node
 from tickrig.emulators.canopen.store_file import StoreError, StoreFile
@@ -153,7 +154,13 @@ class _CanopenRun(EmulatorRun):
         self._nodes = build.make_nodes(self._described, self._wire, self._store, self._options.sdo)
         self._bodies = [body.put_on(self._nodes)] if body else []
         device = Nodes(self._nodes, self._bodies)
-        operator = Operator(device.inputs, device.tick_us, EventQueue(), self._wire.faults)
+        self._node_faults = [NodeFaults(node, self._wire) for node in self._nodes]
+        self._faults = AssemblyFaults(
+            {"can": self._wire.faults},
+            {one.node.name: one for one in self._node_faults},
+            self._nodes[0].name if len(self._nodes) == 1 else "",
+        )
+        operator = Operator(device.inputs, device.tick_us, EventQueue(), self._faults)
         return operator, ScenarioParser(device, operator, senders={"send": parse_send})
 
     def _describe(self) -> list[build.Described]:
@@ -198,6 +205,8 @@ class _CanopenRun(EmulatorRun):
             link=link,
             trace=trace,
             clock=self._clock if outside else None,
+            faults=self._faults,
+            node_faults=self._node_faults,
         )
         if self._store:
             bench.after_step.append(build.store_keeper(self._store))

@@ -101,7 +101,7 @@ class Health:
         names = {name, f"{line.source}/{name}"}
         if line.source in self._wires and names & self._wire_faults:
             self._faulty |= {line.source}
-        elif names & self._faults:
+        elif names & (self._faults | self._wire_faults):
             self._faulty = self._wires
 
     def _on_bus(self, line: WireLine) -> None:

@@ -54,6 +54,7 @@ class EmulatorOperator:
             _names_of(described, key) for key in ("inputs", "outputs", "wire_faults")
         )
         self._prefix, self._wire = _prefix_of(plan, inputs | outputs, path), plan.wire
+        self._name = plan.name
         self._inputs, self._tick_us = inputs | wire_faults, int(str(described["tick_us"]))
         self._wire_faults = [name for name in wire_faults if self._is_of_wire(name)]
         self._begun_us = self._now_us
@@ -150,11 +151,16 @@ class EmulatorOperator:
         self._client.close()
 
     def _fault_name(self, name: str) -> str:
-        names = (self._prefix + name, f"{self._wire}/{name}", name)
+        own = f"{self._name}/"
+        if name.startswith(own):  # of the node alone, not of its bus
+            bare = name.removeprefix(own)
+            names: tuple[str, ...] = (self._prefix + bare, name, bare)
+        else:
+            names = (f"{self._wire}/{name}", name, self._prefix + name)
         return next((full for full in names if full in self._inputs), name)
 
     def _is_of_wire(self, fault: str) -> bool:
-        return "/" not in fault or fault.startswith(f"{self._wire}/")
+        return "/" not in fault or fault.startswith((f"{self._wire}/", self._prefix))
 
     @property
     def _power(self) -> str | None:

@@ -8,10 +8,9 @@ from typing import IO, Final
 
 from tickrig.device.physical import InputSignal, SignalType
 from tickrig.emulators.bench.fault_spec import FaultSpec
-from tickrig.emulators.bench.operator import Operator
+from tickrig.emulators.bench.operator import AssemblyFaults, Operator
 from tickrig.emulators.rig.emulated import HasSignals
 from tickrig.emulators.rig.event_queue import EventQueue
-from tickrig.emulators.testing.bench.bench_rig import AssemblyFaults
 from tickrig.emulators.testing.bench.errors import BenchBlocked, NotOnThisBench, OperatorRefused
 from tickrig.emulators.testing.rig_file.plan import PowerPlan
 from tickrig.host.links.ready import ready

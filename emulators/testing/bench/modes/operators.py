@@ -268,6 +268,8 @@ class Operators:
         if name not in self._like.state.faults.fault_types:
             return self._owner(name)
         wire, _, bare = name.rpartition("/")
+        if wire in self._plan.devices and wire not in self._plan.wires:
+            return wire, name
         on_wire = self._plan.devices_on(wire or next(iter(self._plan.wires)))
         quick = [device.name for device in on_wire if self._operators[device.name].quick]
         return (quick or [on_wire[0].name])[0], bare

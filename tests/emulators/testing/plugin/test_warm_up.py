@@ -121,5 +121,5 @@ def test_a_bus_knows_whether_anything_was_left_to_chance() -> None:
     faults = CanFaults(1, lambda name, begins: None)
     assert not faults.drawn
     faults.arm("corrupt", "0.5")
-    faults.judge()
+    faults.judge(())
     assert faults.drawn

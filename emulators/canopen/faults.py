@@ -1,0 +1,854 @@
+"""Faults of one CANopen node, by name: a filter between the slave and its end of the bus."""
+
+# Theory of operation.
+#
+# Nearly all that goes wrong with a node is something that its frames suffer: an answer is late, a
+# heartbeat missing, a PDO too short. So a fault is a line of `NODE_FAULTS`: which frames it acts
+# on (`NodeFrames`), and what is sent, or received, instead of one (a function that returns frames,
+# each with how much later it comes). The slave knows nothing of it, as a real one would not.
+#
+#   Station -> FaultyNode -> (TracedDevice) -> Node -> slave         port: CanEnd -> CanWire
+#                  |  rx: SYNC, SDO requests are lost or answered here
+#                  |  tx: SDO answers, heartbeats, boot-up, PDOs are changed, late, doubled, lost
+#
+# `NodeFaults` is what an operator arms. Only while a fault is armed, or a late frame waits, a
+# `FaultyNode` stands between the station and its device (`Station.device`): without faults nothing
+# costs time. A trace records the device itself, so a replay needs no faults.
+#
+# Three kinds act otherwise: those that act `by_itself` send frames, or restart the node, at their
+# times; `bus_off` is done to the CAN controller (`CanWire.force_off`); `NARROWED` are faults of the
+# bus that hit this node's frames alone.
+#
+# A block transfer has frames that look like any other: `_SdoBlocks` follows it, so that a segment
+# is not taken for a request. Time is that of the ticks, chance that of the bus: a fault is the same
+# in each run, dense or sparse, in forks and after snapshots.
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from enum import Flag, auto
+from functools import partial
+from heapq import heappop, heappush
+from typing import Any, Final
+
+from tickrig.device.canopen.slave import UNCONFIGURED
+from tickrig.device.horizon import Horizon
+from tickrig.device.physical import OutputSignal
+from tickrig.device.twin import Copyable, Listeners, Part
+from tickrig.emulators.can.bus_device import Accepted
+from tickrig.emulators.can.faults import CAN_FAULTS, NARROWED
+from tickrig.emulators.can.wire import CanWire
+from tickrig.emulators.canopen.node import Node
+from tickrig.emulators.rig.emulated import Inputs
+from tickrig.emulators.rig.faults import (
+    FaultArgument,
+    FaultArguments,
+    FaultForm,
+    FaultTally,
+    FaultTrigger,
+    bind_arguments,
+)
+from tickrig.emulators.rig.station import Station
+from tickrig.host.text.trace import Mark
+from tickrig.host.text.values import Setting
+from tickrig.wire.can import CanFrame, ErrorState, Frames, data_frame
+from tickrig.wire.canopen import sdo_frame
+from tickrig.wire.canopen.emcy import ErrorRegister
+from tickrig.wire.canopen.nmt import CAN_ID_MASK, ERROR_CONTROL_COB_ID, NmtState
+from tickrig.wire.instant import NEVER
+
+# Which frames there are.
+
+_EMCY_COB_ID: Final = 0x080
+_SYNC_COB_ID: Final = 0x080
+_LSS_ANSWER: Final = 0x7E4
+_TIME_COB_ID: Final = 0x100
+_MAX_DATA: Final = 8
+_BIT_US: Final = 1_000_000
+_SHORTEST_BITS: Final = 47
+"""Bits of a frame without data, with those to the next one."""
+
+
+class NodeFrames(Flag):
+    """What a frame of a node, or one for it, is."""
+
+    OTHER = auto()
+    BOOT_UP = auto()
+    HEARTBEAT = auto()
+    PDO = auto()
+    SDO_INDEX = auto()
+    SDO_SEGMENT = auto()
+    SDO_END = auto()
+    SDO_REST = auto()
+    FOR_SDO = auto()
+    FOR_SDO_START = auto()
+    FOR_SDO_END = auto()
+    SYNC = auto()
+
+    SDO = SDO_INDEX | SDO_SEGMENT | SDO_END | SDO_REST
+    SENT = OTHER | BOOT_UP | HEARTBEAT | PDO | SDO
+    REQUEST = FOR_SDO | FOR_SDO_START | FOR_SDO_END
+
+
+_NO_FRAMES: Final = NodeFrames(0)
+
+
+_ANSWERS: Final = {
+    int(sdo_frame.ServerCommand.UPLOAD): NodeFrames.SDO_INDEX,
+    int(sdo_frame.ServerCommand.DOWNLOAD): NodeFrames.SDO_INDEX,
+    int(sdo_frame.ServerCommand.BLOCK_UPLOAD): NodeFrames.SDO_INDEX,
+    int(sdo_frame.ServerCommand.UPLOAD_SEGMENT): NodeFrames.SDO_SEGMENT,
+    int(sdo_frame.ServerCommand.DOWNLOAD_SEGMENT): NodeFrames.SDO_SEGMENT,
+    0xE0: NodeFrames.SDO_REST,  # no service has it
+    0x80: NodeFrames.SDO_REST,
+}
+
+
+class _SdoBlocks(Part):
+    """Follows the block transfers of an SDO server, in which any byte may begin a frame."""
+
+    __slots__ = ("_last", "_of_client", "_of_server")
+
+    def __init__(self) -> None:
+        self._of_client = self._of_server = False  # whose segments are under way
+        self._last = 0  # sequence number of the last segment of all, if it has passed
+
+    def received(self, data: bytes) -> NodeFrames:
+        """Say what a request is."""
+        first = data[0] if data else sdo_frame.ClientCommand.ABORT
+        specifier = first & sdo_frame.SPECIFIER
+        if self._of_client and first != sdo_frame.ClientCommand.ABORT:
+            self._pass(first)
+            return NodeFrames.FOR_SDO
+        if first in (sdo_frame.BLOCK_START, sdo_frame.BLOCK_ACKNOWLEDGE):
+            ended = self._last and len(data) > 1 and data[1] == self._last
+            self._of_server, self._last = not ended, 0
+            return NodeFrames.FOR_SDO
+        self._of_client = self._of_server = False
+        if specifier == sdo_frame.ClientCommand.BLOCK_DOWNLOAD and first & 1:
+            return NodeFrames.FOR_SDO_END
+        starts = (
+            specifier in (sdo_frame.ClientCommand.DOWNLOAD, sdo_frame.ClientCommand.UPLOAD)
+            or specifier == sdo_frame.ClientCommand.BLOCK_DOWNLOAD
+            or (specifier == sdo_frame.ClientCommand.BLOCK_UPLOAD and not first & 3)
+        )
+        return NodeFrames.FOR_SDO_START if starts else NodeFrames.FOR_SDO
+
+    def sent(self, data: bytes) -> NodeFrames:
+        """Say what an answer is."""
+        first = data[0] if data else sdo_frame.ServerCommand.ABORT
+        if first == sdo_frame.ServerCommand.ABORT:
+            self._of_client = self._of_server = False
+            return NodeFrames.SDO_REST
+        if self._of_server:
+            self._pass(first)
+            return NodeFrames.SDO_REST
+        specifier = first & sdo_frame.SPECIFIER
+        if specifier == sdo_frame.ServerCommand.BLOCK_UPLOAD and first & 1:
+            return NodeFrames.SDO_END
+        if specifier != sdo_frame.ServerCommand.BLOCK_DOWNLOAD:
+            return _ANSWERS[specifier]
+        if not first & sdo_frame.BLOCK_SUBCOMMAND:  # a download by blocks begins
+            self._of_client, self._last = True, 0
+            return NodeFrames.SDO_INDEX
+        if first == sdo_frame.BLOCK_ACKNOWLEDGE:
+            ended = self._last and len(data) > 1 and data[1] == self._last
+            self._of_client, self._last = not ended, 0
+        return NodeFrames.SDO_REST
+
+    def _pass(self, first: int) -> None:
+        if first & sdo_frame.BLOCK_LAST:
+            self._last = first & sdo_frame.BLOCK_SEQNO
+
+
+# How faults are declared.
+
+_Sent = tuple[tuple[int, CanFrame], ...]
+"""What comes instead of a frame, each with how much later in us."""
+
+
+class ArmedNodeFault(Part):
+    """A fault of a node that is armed.
+
+    Attributes:
+        fault_type: its declaration.
+        arguments: with which it was armed.
+        trigger: decides when it acts.
+        kept: data that it keeps, by CAN-ID.
+        next_us: when it acts by itself; 0 for at once.
+    """
+
+    __slots__ = ("arguments", "fault_type", "kept", "next_us", "trigger")
+
+    def __init__(
+        self, fault_type: NodeFaultType, arguments: FaultArguments, trigger: FaultTrigger
+    ) -> None:
+        self.fault_type, self.arguments, self.trigger = fault_type, arguments, trigger
+        self.kept: dict[int, bytes] = {}
+        self.next_us = 0 if fault_type.by_itself else NEVER
+
+    def __getitem__(self, name: str) -> Any:
+        """Return an argument."""
+        return self.arguments[name]
+
+
+def _lost(fault: ArmedNodeFault, frame: CanFrame) -> _Sent:
+    return ()
+
+
+@dataclass(frozen=True, slots=True)
+class NodeFaultType(FaultForm):
+    """A fault of a node that can be armed by name.
+
+    Attributes:
+        frames: what it acts on.
+        instead: returns what comes instead of a frame.
+        meant: says whether it acts on a frame of that kind.
+        by_itself: what it does each `period` (an argument; each tick without it).
+        abort: it answers the request itself, with this function's frame.
+        controller: it is done to the CAN controller.
+        silent: the node neither sends nor hears until the frame that it holds has left.
+        boots: the node that it pretends to be sends a boot-up first.
+    """
+
+    frames: NodeFrames = field(default=_NO_FRAMES, kw_only=True)
+    instead: Callable[[ArmedNodeFault, CanFrame], _Sent] = field(default=_lost, kw_only=True)
+    meant: Callable[[NodeFaults, ArmedNodeFault, CanFrame], bool] | None = field(
+        default=None, kw_only=True
+    )
+    by_itself: Callable[[NodeFaults, ArmedNodeFault], Frames] | None = field(
+        default=None, kw_only=True
+    )
+    abort: Callable[[NodeFaults, ArmedNodeFault, CanFrame], CanFrame] | None = field(
+        default=None, kw_only=True
+    )
+    controller: bool = field(default=False, kw_only=True)
+    silent: bool = field(default=False, kw_only=True)
+    boots: bool = field(default=False, kw_only=True)
+
+
+# What each fault does to a frame.
+
+
+def _late(fault: ArmedNodeFault, frame: CanFrame) -> _Sent:
+    return ((fault["delay"], frame),)
+
+
+def _again(fault: ArmedNodeFault, frame: CanFrame) -> _Sent:
+    return ((0, frame), (fault["delay"], frame))
+
+
+def _with(frame: CanFrame, data: bytes) -> _Sent:
+    return ((0, data_frame(frame.can_id, data)),)
+
+
+def _other_index(fault: ArmedNodeFault, frame: CanFrame) -> _Sent:
+    index = (int.from_bytes(frame.data[1:3], "little") + fault["by"]) & 0xFFFF
+    return _with(frame, frame.data[:1] + index.to_bytes(2, "little") + frame.data[3:])
+
+
+def _other_toggle(fault: ArmedNodeFault, frame: CanFrame) -> _Sent:
+    return _with(frame, bytes([frame.data[0] ^ sdo_frame.TOGGLE]) + frame.data[1:])
+
+
+def _other_crc(fault: ArmedNodeFault, frame: CanFrame) -> _Sent:
+    turned = bytes(byte ^ 0xFF for byte in frame.data[1:3])
+    return _with(frame, frame.data[:1] + turned + frame.data[3:])
+
+
+def _other_state(fault: ArmedNodeFault, frame: CanFrame) -> _Sent:
+    return _with(frame, bytes([NmtState[fault["state"].upper()]]))
+
+
+def _shorter(fault: ArmedNodeFault, frame: CanFrame) -> _Sent:
+    return _with(frame, frame.data[: max(0, len(frame.data) - fault["bytes"])])
+
+
+def _longer(fault: ArmedNodeFault, frame: CanFrame) -> _Sent:
+    return _with(frame, (frame.data + bytes(fault["bytes"]))[:_MAX_DATA])
+
+
+def _stale(fault: ArmedNodeFault, frame: CanFrame) -> _Sent:
+    return _with(frame, fault.kept.setdefault(frame.can_id, frame.data))
+
+
+# Of which object, of which PDO.
+
+
+@dataclass(frozen=True, slots=True)
+class _Target:
+    """Objects whose transfer is aborted, and by which code.
+
+    Attributes:
+        index: None for all objects.
+        sub: None for all sub-indices.
+        code: the abort code.
+    """
+
+    index: int | None
+    sub: int | None
+    code: int | None
+
+
+def _parse_target(word: str) -> _Target:
+    """Read `any`, `6081h`, `6081h:0`, `6081h:0x06090030`, `6081h:0:0x06090030`, `0x06090030`.
+
+    >>> _parse_target("6081h:0x06090030")
+    _Target(index=24705, sub=None, code=101253168)
+    """
+    *parts, last = word.split(":")
+    code = None
+    if (number := _number(last)) is not None and number > 0xFFFF:
+        code = number
+    else:
+        parts.append(last)
+    index = sub = None
+    numbers = [_number(part) for part in parts]
+    if parts and parts != ["any"]:
+        index, sub = (*numbers, None)[:2]
+    wrong = parts != ["any"] and None in numbers
+    if wrong or len(parts) > 2 or max(index or 0, 0) > 0xFFFF or (sub or 0) > 0xFF:
+        form = "INDEX[:SUB][:CODE], any or CODE"
+        raise ValueError(f"{word!r} is not {form}, as 6081h:0x06090030")
+    if code is not None and code > 0xFFFF_FFFF:
+        raise ValueError(f"abort code {last} has more than 32 bits")
+    return _Target(index, sub, code)
+
+
+def _number(word: str) -> int | None:
+    """Read a number as CiA writes it, `8110h`, or as Python does; None for none."""
+    try:
+        return int(word[:-1], 16) if word[-1:] in ("h", "H") else int(word, 0)
+    except ValueError:
+        return None
+
+
+def _parse_hex(low: int, high: int, what: str, word: str) -> int:
+    number = _number(word)
+    if number is None or not low <= number <= high:
+        raise ValueError(f"{word!r} is not {what}, {low:X}h to {high:X}h")
+    return number
+
+
+def _parse_tpdo(word: str) -> int | None:
+    number = _number(word)
+    if word != "any" and (number is None or not 1 <= number <= 512):
+        raise ValueError(f"tpdo {word!r} is not any or a number 1 to 512")
+    return number
+
+
+_READS: Final = (sdo_frame.ClientCommand.UPLOAD, sdo_frame.ClientCommand.BLOCK_UPLOAD)
+
+
+def _is_object(faults: NodeFaults, fault: ArmedNodeFault, frame: CanFrame) -> bool:
+    """Say whether a request begins a transfer that is to be aborted."""
+    target, access = fault["object"], fault["access"]
+    reads = frame.data[0] & sdo_frame.SPECIFIER in _READS
+    if access not in ("both", "read" if reads else "write"):
+        return False
+    index, sub = sdo_frame.index_sub(frame.data)
+    return target.index in (None, index) and target.sub in (None, sub)
+
+
+def _is_tpdo(faults: NodeFaults, fault: ArmedNodeFault, frame: CanFrame) -> bool:
+    number = fault["tpdo"]
+    return number is None or faults.cob_id(0x1800 + number - 1, 1, -1) == frame.can_id
+
+
+def _aborted(faults: NodeFaults, fault: ArmedNodeFault, frame: CanFrame) -> CanFrame:
+    target = fault.arguments.values.get("object")
+    code = fault.arguments.values.get("code") if target is None else target.code
+    code = int(sdo_frame.AbortCode.GENERAL) if code is None else code
+    index, sub = sdo_frame.index_sub(frame.data)
+    data = sdo_frame.frame_at(sdo_frame.ServerCommand.ABORT, index, sub, code.to_bytes(4, "little"))
+    return data_frame(faults.sdo_answer_id, data)
+
+
+# What some do by themselves.
+
+
+def _restarted(faults: NodeFaults, fault: ArmedNodeFault) -> Frames:
+    faults.restart()
+    return ()
+
+
+def _emergencies(faults: NodeFaults, fault: ArmedNodeFault) -> Frames:
+    code = fault["code"]
+    register = ErrorRegister.GENERIC | (ErrorRegister.COMMUNICATION if code >> 12 == 8 else 0)
+    data = code.to_bytes(2, "little") + bytes([register]) + bytes(5)
+    return (data_frame(faults.emcy_id, data),)
+
+
+def _babbles(faults: NodeFaults, fault: ArmedNodeFault) -> Frames:
+    """Fill the queue for a tick with frames of the node's highest priority."""
+    wanted = faults.node.tick_us * faults.wire.bit_rate // (_BIT_US * _SHORTEST_BITS) + 1
+    return (data_frame(faults.emcy_id, b""),) * max(0, wanted - faults.node.port.waiting)
+
+
+# The faults.
+
+
+def _delay(default: str, text: str, low: int = 1_000) -> FaultArgument:
+    return FaultArgument("delay", text, default, "time", low, 3_600_000_000)
+
+
+_TPDO: Final = FaultArgument("tpdo", "which TPDO", "any", "any or 1 to 512", read=_parse_tpdo)
+_BYTES: Final = FaultArgument("bytes", "how many", "1", "bytes", 1, 8)
+_STATES: Final = ("stopped", "operational", "pre_operational", "initialising")
+
+NODE_FAULTS: Final[Mapping[str, NodeFaultType]] = {
+    "sdo_abort": NodeFaultType(
+        "the SDO server aborts transfers of an object, or of all",
+        arguments=(
+            FaultArgument(
+                "object",
+                "which object, and the abort code (08000000h without one)",
+                "any",
+                "INDEX[:SUB][:CODE], any or CODE",
+                read=_parse_target,
+            ),
+            FaultArgument("access", "which transfers", "both", choices=("both", "read", "write")),
+        ),
+        frames=NodeFrames.FOR_SDO_START,
+        meant=_is_object,
+        abort=_aborted,
+    ),
+    "sdo_busy": NodeFaultType(
+        "the SDO server refuses each new transfer: it has no connection free",
+        arguments=(
+            FaultArgument(
+                "code",
+                "abort code",
+                "0x060A0023",
+                "10000h to FFFFFFFFh",
+                read=partial(_parse_hex, 0x1_0000, 0xFFFF_FFFF, "an abort code"),
+            ),
+        ),
+        frames=NodeFrames.FOR_SDO_START,
+        abort=_aborted,
+    ),
+    "sdo_mute": NodeFaultType("the SDO server hears no request", frames=NodeFrames.REQUEST),
+    "sdo_slow": NodeFaultType(
+        "each SDO answer is late",
+        arguments=(_delay("800ms", "how much later it comes"),),
+        frames=NodeFrames.SDO,
+        instead=_late,
+    ),
+    "sdo_twice": NodeFaultType(
+        "each SDO answer comes twice",
+        arguments=(_delay("1ms", "how much later it comes again"),),
+        frames=NodeFrames.SDO,
+        instead=_again,
+    ),
+    "sdo_wrong_index": NodeFaultType(
+        "SDO answers name another object",
+        arguments=(FaultArgument("by", "what is added to the index", "1", low=1, high=0xFFFF),),
+        frames=NodeFrames.SDO_INDEX,
+        instead=_other_index,
+    ),
+    "sdo_toggle": NodeFaultType(
+        "SDO segments have the wrong toggle bit",
+        frames=NodeFrames.SDO_SEGMENT,
+        instead=_other_toggle,
+    ),
+    "sdo_crc": NodeFaultType(
+        "the CRC at the end of a block transfer is wrong, either way",
+        frames=NodeFrames.SDO_END | NodeFrames.FOR_SDO_END,
+        instead=_other_crc,
+    ),
+    "heartbeat_mute": NodeFaultType("heartbeats are missing", frames=NodeFrames.HEARTBEAT),
+    "heartbeat_state": NodeFaultType(
+        "heartbeats tell another state",
+        arguments=(FaultArgument("state", "which one", "stopped", choices=_STATES),),
+        frames=NodeFrames.HEARTBEAT,
+        instead=_other_state,
+    ),
+    "heartbeat_late": NodeFaultType(
+        "heartbeats come late",
+        arguments=(_delay("1s", "how much later they come"),),
+        frames=NodeFrames.HEARTBEAT,
+        instead=_late,
+    ),
+    "boot_late": NodeFaultType(
+        "the node starts slowly: until its boot-up it neither sends nor hears",
+        arguments=(_delay("3s", "how much later it boots"),),
+        frames=NodeFrames.BOOT_UP,
+        instead=_late,
+        silent=True,
+    ),
+    "boots_twice": NodeFaultType(
+        "each boot-up comes twice",
+        arguments=(_delay("10ms", "how much later it comes again"),),
+        frames=NodeFrames.BOOT_UP,
+        instead=_again,
+    ),
+    "boots_again": NodeFaultType(
+        "the node restarts by itself, at once and then each period",
+        arguments=(
+            FaultArgument("period", "from one to the next", "5s", "time", 1_000, 3_600_000_000),
+        ),
+        by_itself=_restarted,
+    ),
+    "pdo_short": NodeFaultType(
+        "TPDOs have bytes too few",
+        arguments=(_BYTES, _TPDO),
+        frames=NodeFrames.PDO,
+        meant=_is_tpdo,
+        instead=_shorter,
+    ),
+    "pdo_long": NodeFaultType(
+        "TPDOs have bytes too many, up to 8",
+        arguments=(_BYTES, _TPDO),
+        frames=NodeFrames.PDO,
+        meant=_is_tpdo,
+        instead=_longer,
+    ),
+    "pdo_mute": NodeFaultType(
+        "TPDOs are missing", arguments=(_TPDO,), frames=NodeFrames.PDO, meant=_is_tpdo
+    ),
+    "pdo_stale": NodeFaultType(
+        "TPDOs repeat the data of the first one since the fault began",
+        arguments=(_TPDO,),
+        frames=NodeFrames.PDO,
+        meant=_is_tpdo,
+        instead=_stale,
+    ),
+    "emcy_storm": NodeFaultType(
+        "an EMCY is sent over and over",
+        arguments=(
+            FaultArgument(
+                "code",
+                "emergency error code",
+                "0x8110",
+                "0h to FFFFh",
+                read=partial(_parse_hex, 0, 0xFFFF, "an emergency error code"),
+            ),
+            FaultArgument("period", "from one to the next", "10ms", "time", 1_000, 3_600_000_000),
+        ),
+        by_itself=_emergencies,
+    ),
+    "id_doubled": NodeFaultType(
+        "a second node has this node-ID: it boots, and sends each frame too",
+        arguments=(_delay("1ms", "how much later it sends"),),
+        frames=NodeFrames.SENT,
+        instead=_again,
+        boots=True,
+    ),
+    "sync_lost": NodeFaultType("the node hears no SYNC", frames=NodeFrames.SYNC),
+    "bus_off": NodeFaultType(
+        "its CAN controller is bus-off, and does not come back until the fault ends",
+        rated=False,
+        controller=True,
+    ),
+    "babble": NodeFaultType(
+        "the node sends frames on its EMCY CAN-ID without a pause", by_itself=_babbles
+    ),
+}
+
+
+class NodeFaults(Copyable):
+    """The faults of one node, where an operator arms them by name.
+
+    Args:
+        node: the node.
+        wire: its bus, whose faults are narrowed to its frames; chance comes from there too.
+
+    Attributes:
+        station: the station of the node, once it has one.
+        listeners: called with the time, the direction, what was sent and what faults left of it
+            at once, where that differs. Nobody listens to a twin.
+    """
+
+    fault_types: Mapping[str, FaultForm] = {
+        **{name: CAN_FAULTS[name] for name in NARROWED},
+        **NODE_FAULTS,
+    }
+
+    def __init__(self, node: Node, wire: CanWire) -> None:
+        self.node, self.wire = node, wire
+        self.station: Station[Frames] | None = None
+        self._armed: dict[str, ArmedNodeFault] = {}
+        self._tallies: dict[str, FaultTally] = {}
+        self._narrowed: tuple[str, ...] = ()
+        self._blocks = _SdoBlocks()
+        self._held: list[tuple[int, int, CanFrame]] = []  # a heap: when, which one, the frame
+        self._count, self._silent_us, self._now_us = 0, 0, 0
+        self.listeners: Listeners[Callable[[int, Mark, Frames, Frames], None]] = Listeners()
+
+    @property
+    def armed(self) -> tuple[str, ...]:
+        """Names of the faults that are armed."""
+        return (*self._narrowed, *self._armed)
+
+    def check(self, name: str, *arguments: str) -> None:
+        """Raise ValueError unless the fault can be armed like this."""
+        bind_arguments(name, self.fault_types[name], arguments)
+
+    def arm(self, name: str, *arguments: str) -> None:
+        """Let a fault begin; one of the same name is replaced.
+
+        Raises:
+            KeyError: no fault has this name.
+            ValueError: an argument that it does not take, or out of range.
+        """
+        self.clear(name)
+        if name in NARROWED:
+            self.wire.faults.arm(name, *arguments, number=self.node.port.number)
+            self._narrowed += (name,)
+            return
+        fault_type = NODE_FAULTS[name]
+        bound = bind_arguments(name, fault_type, arguments)
+        tally = self._tallies[name] = FaultTally(bound.count)
+        chance = self.wire.faults.chance(f"{self.node.name} {name}")
+        armed = ArmedNodeFault(fault_type, bound, FaultTrigger(chance, bound, tally))
+        self._armed[name] = armed
+        if fault_type.controller:
+            tally.allow()
+            self.wire.force_off(self.node.port)
+        if fault_type.boots and self.node.is_on:
+            self._hold(0, data_frame(self._error_control_id, bytes([NmtState.INITIALISING])))
+        if self.station is not None and not isinstance(self.station.device, FaultyNode):
+            self.station.device = FaultyNode(self.station.device, self)
+
+    def clear(self, name: str) -> None:
+        """Let a fault end; clearing one that is not armed is no error. What is late comes now."""
+        if name in self._narrowed:
+            self.wire.faults.clear(name, self.node.port.number)
+            self._narrowed = tuple(each for each in self._narrowed if each != name)
+            return
+        armed = self._armed.pop(name, None)
+        if armed is None:
+            return
+        if armed.fault_type.controller:
+            self.wire.release(self.node.port)
+        if armed.fault_type.silent:
+            self._silent_us = 0
+        self._held = [(0, count, frame) for _, count, frame in sorted(self._held)]
+
+    def acted(self, name: str) -> int:
+        """Return how often a fault has acted since it was armed last."""
+        if name in NARROWED:
+            return self.wire.faults.acted(name, self.node.port.number)
+        return self._tallies[name].acted if name in self._tallies else 0
+
+    @property
+    def due_us(self) -> int:
+        """When a fault acts by itself, or a late frame leaves."""
+        due_us = self._held[0][0] if self._held else NEVER
+        return min([due_us, *(armed.next_us for armed in self._armed.values())])
+
+    @property
+    def idle(self) -> bool:
+        """Whether nothing is armed or held."""
+        return not (self._armed or self._held)
+
+    def cob_id(self, index: int, sub: int, otherwise: int) -> int:
+        """Return the CAN-ID that an object of the node has, or another without the object."""
+        entry = self.node.slave.dictionary.find(index, sub)
+        return otherwise if entry is None else entry.number & CAN_ID_MASK
+
+    @property
+    def sdo_answer_id(self) -> int:
+        """CAN-ID of the answers of the SDO server."""
+        return self.cob_id(0x1200, 2, sdo_frame.RESPONSE_COB_ID + self.node.slave.node_id)
+
+    @property
+    def emcy_id(self) -> int:
+        """CAN-ID of the EMCY."""
+        return self.cob_id(0x1014, 0, _EMCY_COB_ID + self.node.slave.node_id)
+
+    @property
+    def _error_control_id(self) -> int:
+        return ERROR_CONTROL_COB_ID + self.node.slave.node_id
+
+    def restart(self) -> None:
+        """Let the node begin anew."""
+        if self.station is not None:
+            self.station.device.reset()
+
+    def before(self, now_us: int, received: Frames) -> tuple[Frames, Frames]:
+        """Return what the node receives in a tick, and what it sends apart from its own frames."""
+        self._now_us = now_us
+        if not self.node.is_on:
+            self._held.clear()
+            return received, ()
+        left, sent = list[CanFrame](), list[CanFrame]()
+        for frame in received:
+            left += self._receive(frame, sent)
+        for armed in tuple(self._armed.values()):
+            act = armed.fault_type.by_itself
+            if act is not None and armed.next_us <= now_us:
+                period_us = armed.arguments.values.get("period", self.node.tick_us)
+                armed.next_us = (armed.next_us or now_us) + period_us
+                named = self.node.slave.node_id != UNCONFIGURED
+                if named and armed.trigger.hit():
+                    sent += act(self, armed)
+        return tuple(left), tuple(sent)
+
+    def after(self, now_us: int, sent: Frames) -> Frames:
+        """Return what leaves in a tick of what the node sends, with what was late."""
+        left = list[CanFrame]()
+        for frame in sent:
+            left += self._send(frame)
+        while self._held and self._held[0][0] <= now_us:
+            left.append(heappop(self._held)[2])
+        return tuple(left)
+
+    def _receive(self, frame: CanFrame, sent: list[CanFrame]) -> Frames:
+        kind = self._kind_of_received(frame)
+        if self._now_us < self._silent_us:
+            return self._hear(Mark.TO_DEVICE, frame, ())
+        left: Frames = (frame,)
+        for armed in self._acting_on(kind, frame):
+            if armed.fault_type.abort is not None:
+                sent.append(armed.fault_type.abort(self, armed, frame))
+                return self._hear(Mark.TO_DEVICE, frame, ())
+            left = tuple(f for each in left for _, f in armed.fault_type.instead(armed, each))
+        return self._hear(Mark.TO_DEVICE, frame, left)
+
+    def _send(self, frame: CanFrame) -> Frames:
+        kind = self._kind_of_sent(frame)
+        if self._now_us < self._silent_us and kind is not NodeFrames.BOOT_UP:
+            return self._hear(Mark.FROM_DEVICE, frame, ())
+        coming: _Sent = ((0, frame),)
+        for armed in self._acting_on(kind, frame):
+            coming = tuple(
+                (before_us + after_us, each)
+                for before_us, first in coming
+                for after_us, each in armed.fault_type.instead(armed, first)
+            )
+            if armed.fault_type.silent:
+                self._silent_us = self._now_us + armed["delay"]
+        for late_us, each in coming:
+            if late_us:
+                self._hold(self._now_us + late_us, each)
+        at_once = tuple(each for late_us, each in coming if not late_us)
+        return self._hear(Mark.FROM_DEVICE, frame, at_once)
+
+    def _acting_on(self, kind: NodeFrames, frame: CanFrame) -> list[ArmedNodeFault]:
+        return [
+            armed
+            for armed in self._armed.values()
+            if kind & armed.fault_type.frames
+            and (armed.fault_type.meant is None or armed.fault_type.meant(self, armed, frame))
+            and armed.trigger.hit()
+        ]
+
+    def _hold(self, at_us: int, frame: CanFrame) -> None:
+        self._count += 1
+        heappush(self._held, (at_us, self._count, frame))
+
+    def _hear(self, mark: Mark, frame: CanFrame, left: Frames) -> Frames:
+        if left != (frame,):
+            for hear in self.listeners:
+                hear(self._now_us, mark, (frame,), left)
+        return left
+
+    def _kind_of_received(self, frame: CanFrame) -> NodeFrames:
+        if frame.remote or frame.extended:
+            return _NO_FRAMES
+        request_id = sdo_frame.REQUEST_COB_ID + self.node.slave.node_id
+        if frame.can_id == self.cob_id(0x1200, 1, request_id):
+            whole = len(frame.data) == sdo_frame.FRAME_BYTES
+            return self._blocks.received(frame.data) if whole else NodeFrames.FOR_SDO
+        sync = frame.can_id == self.cob_id(0x1005, 0, _SYNC_COB_ID)
+        return NodeFrames.SYNC if sync else _NO_FRAMES
+
+    def _kind_of_sent(self, frame: CanFrame) -> NodeFrames:
+        can_id = frame.can_id
+        if frame.remote or frame.extended:
+            return NodeFrames.OTHER
+        if can_id == self._error_control_id:
+            boots = frame.data == bytes([NmtState.INITIALISING])
+            return NodeFrames.BOOT_UP if boots else NodeFrames.HEARTBEAT
+        if can_id == self.sdo_answer_id:
+            return self._blocks.sent(frame.data)
+        others = (self.emcy_id, _SYNC_COB_ID, _TIME_COB_ID, _LSS_ANSWER)
+        return NodeFrames.OTHER if can_id in others else NodeFrames.PDO
+
+
+class FaultyNode(Copyable):
+    """A node whose frames suffer faults; a `Device[Frames]` that stands before it.
+
+    Args:
+        device: the node, or what records it.
+        faults: what is armed.
+    """
+
+    def __init__(self, device: Any, faults: NodeFaults) -> None:
+        self._device, self._faults = device, faults
+
+    @property
+    def tick_us(self) -> int:
+        """The device's period."""
+        return int(self._device.tick_us)
+
+    @property
+    def due_us(self) -> int:
+        """When the device is due, or a fault acts."""
+        return min(int(self._device.due_us), self._faults.due_us)
+
+    @property
+    def horizon(self) -> Horizon | None:
+        """How far the device may work ahead."""
+        horizon: Horizon | None = self._device.horizon
+        return horizon
+
+    @horizon.setter
+    def horizon(self, horizon: Horizon | None) -> None:
+        self._device.horizon = horizon
+
+    @property
+    def inputs(self) -> Inputs:
+        """The device's inputs."""
+        inputs: Inputs = self._device.inputs
+        return inputs
+
+    @property
+    def outputs(self) -> Mapping[str, OutputSignal]:
+        """The device's outputs."""
+        outputs: Mapping[str, OutputSignal] = self._device.outputs
+        return outputs
+
+    def read(self, name: str, /) -> Setting:
+        """Return an output of the device."""
+        value: Setting = self._device.read(name)
+        return value
+
+    @property
+    def accepts(self) -> Accepted:
+        """CAN-IDs that the device listens to."""
+        accepts: Accepted = self._device.accepts
+        return accepts
+
+    @property
+    def reconfigured_by(self) -> frozenset[int]:
+        """CAN-IDs of the frames that may change `accepts`."""
+        can_ids: frozenset[int] = self._device.reconfigured_by
+        return can_ids
+
+    @property
+    def on_accepts(self) -> list[Callable[[], None]]:
+        """Whom to call when these two have changed."""
+        listeners: list[Callable[[], None]] = self._device.on_accepts
+        return listeners
+
+    def bus_state(self, state: ErrorState, /) -> None:
+        """Hand on what the CAN controller reports."""
+        self._device.bus_state(state)
+
+    def reset(self) -> None:
+        """Reset the device."""
+        self._device.reset()
+
+    def tick(self, now_us: int, rx: Frames, /) -> Frames:
+        """Let the device have what faults leave, and send what they leave of its frames."""
+        received, extra = self._faults.before(now_us, rx)
+        sent: Frames = ()
+        if received or self._device.due_us <= now_us:
+            sent = self._device.tick(now_us, received)
+        left = self._faults.after(now_us, sent) + extra
+        if self._faults.idle and self._faults.station is not None:
+            self._faults.station.device = self._device
+        return left
