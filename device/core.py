@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Protocol, TypeVar
 
+from tickrig.wire.uart import UartSetting
+
 W = TypeVar("W")  # one tick's traffic: bytes on a line, tuple[CanFrame, ...] on CAN
 
 
@@ -43,5 +45,18 @@ class Device(Protocol[W]):
         Returns:
             What the device sends in this tick, in wire order. Bad input is
             answered as the real device answers it; it never raises.
+        """
+        ...
+
+
+class UartDevice(Device[bytes], Protocol):
+    """A device that changes the setting of its serial line while it runs."""
+
+    @property
+    def uart(self) -> UartSetting | None:
+        """The setting of its UART, as the latest tick or `reset` left it; None without a UART.
+
+        What a tick returns is still sent with the setting before that tick. The new one counts
+        when the last stop bit has passed; from then on the device also receives with it.
         """
         ...

@@ -53,10 +53,17 @@ _BIT_RATES: Final = (19_200, 38_400, 57_600, 115_200, 250_000, 500_000, 750_000)
 
 @dataclass(slots=True)
 class Settings:
-    """Bit rate and sensitivity; both are told, and change nothing that is emulated."""
+    """Bit rate and sensitivity; the sensitivity is told, and changes nothing that is emulated.
+
+    Attributes:
+        rate: bit rate of RS-232C in bit/s; on USB it is told, and changes nothing.
+        sensitive: whether it measures in the sensitive mode.
+        first_rate: bit rate after power-up.
+    """
 
     rate: int = BIT_RATE
     sensitive: bool = False
+    first_rate: int = BIT_RATE
 
     @property
     def mode(self) -> str:
@@ -66,7 +73,7 @@ class Settings:
     @property
     def rate_text(self) -> str:
         """The bit rate, as II tells it."""
-        return f"{self.rate}[bps]{BY_DEFAULT if self.rate == BIT_RATE else ''}"
+        return f"{self.rate}[bps]{BY_DEFAULT if self.rate == self.first_rate else ''}"
 
     def set_rate(self, text: str) -> str:
         """Set the bit rate; return the status."""

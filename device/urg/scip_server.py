@@ -10,7 +10,7 @@ from tickrig.device.body import Pose
 from tickrig.device.twin import Part
 from tickrig.device.urg import first_protocol
 from tickrig.device.urg.first_protocol import BY_DEFAULT, CONDITION, Capture, Settings, version
-from tickrig.device.urg.world import LAST_STEP, URG_04LX, UrgParameters, View, World
+from tickrig.device.urg.world import BIT_RATE, LAST_STEP, URG_04LX, UrgParameters, View, World
 from tickrig.wire import scip
 from tickrig.wire import scip as status
 from tickrig.wire.instant import NEVER
@@ -222,7 +222,7 @@ class ScipServer(Part):
     Until it is switched it obeys those of SCIP 1.1 (`first_protocol`).
 
     Not emulated: DB, the firmware update mode, the statuses 21..49 and 98 of a sensor that
-    checks itself; SS is obeyed and changes no line.
+    checks itself.
 
     Args:
         parameters: of the sensor.
@@ -266,7 +266,9 @@ class ScipServer(Part):
     def _begin(self, now_us: int) -> None:
         self.rotation = _Rotation(URG_04LX.speed_rpm)
         self.rotation.began_us = self._zero_us = now_us
-        self._adjusting, self.settings = False, Settings()
+        first_rate = self.parameters.rs232_baud or BIT_RATE
+        self._adjusting = False
+        self.settings = Settings(first_rate, first_rate=first_rate)
         self.stop()
 
     def stop(self) -> None:

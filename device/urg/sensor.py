@@ -13,6 +13,7 @@ from tickrig.device.urg.scip_server import ScipServer
 from tickrig.device.urg.world import Post, UrgParameters, World
 from tickrig.wire import scip as status
 from tickrig.wire.lines import LineSplitter
+from tickrig.wire.uart import UartSetting
 
 # The physical side of a sensor: where it is, who steps in its way, and what breaks.
 
@@ -55,13 +56,16 @@ _TICK_US: Final = 1_000
 
 
 class Urg(Copyable):
-    """A URG-04LX on USB; a `Device[bytes]`.
+    """A URG-04LX on USB or RS-232C; a `UartDevice`.
 
     In each tick: what the world does to it, the end of a scan, commands. A scan is seen
     from where the sensor is when the scan ends; the time stamp is that of its beginning.
 
-    Not emulated: RS-232C and its bit rates, warming up, current, the LED; see `View` for what
-    is not there of optics and `ScipServer` for what is not there of the protocol.
+    On RS-232C the reply to SS still has the old bit rate, and all behind it the new one; RS and a
+    power cut lead back to the first one.
+
+    Not emulated: warming up, current, the LED; see `View` for what is not there of optics and
+    `ScipServer` for what is not there of the protocol.
 
     Args:
         parameters: what it is like.
@@ -93,6 +97,13 @@ class Urg(Copyable):
         if self._restarted or self._switched:
             return 0
         return self._server.due_us
+
+    @property
+    def uart(self) -> UartSetting | None:
+        """The setting of its RS-232C line; None on USB."""
+        if self.parameters.rs232_baud is None:
+            return None
+        return UartSetting(self._server.settings.rate)
 
     @property
     def outputs(self) -> Mapping[str, OutputSignal]:

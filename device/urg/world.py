@@ -42,6 +42,7 @@ class UrgParameters(Immutable):
         seed: of the noise.
         scip: the protocol after power-up. 1.1 is that of the URG-04LX, whose laser is on then;
             2.0 that of sensors such as the URG-04LX-UG01, whose laser is off.
+        rs232_baud: bit rate of its RS-232C line after power-up, in bit/s; None on USB.
 
     Raises:
         ValueError: a value that cannot be.
@@ -51,6 +52,7 @@ class UrgParameters(Immutable):
     noise: float = 0.0
     seed: int = 0
     scip: str = "1.1"
+    rs232_baud: int | None = None
 
     def __post_init__(self) -> None:
         """Refuse what cannot be."""
@@ -60,6 +62,8 @@ class UrgParameters(Immutable):
             raise ValueError(f"noise {self.noise} is not in 0..1")
         if self.scip not in _PROTOCOLS:
             raise ValueError(f"scip {self.scip!r} is not one of {', '.join(_PROTOCOLS)}")
+        if self.rs232_baud is not None and self.rs232_baud < 1:
+            raise ValueError(f"rs232_baud {self.rs232_baud} bit/s is below 1")
 
 
 # A flat world of walls and round posts, and how far a ray goes in it.

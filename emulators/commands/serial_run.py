@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, fields
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -82,6 +83,7 @@ class _SerialRun(EmulatorRun):
         with refused_at("--serve"):
             self._urls = [parse_serve_url(url) for url in options.serve]
         self._places: list[str] = []
+        self._emulator: Emulator | None = None
 
     def _make(self) -> tuple[Operator, ScenarioParser]:
         if self._options.panel:
@@ -107,8 +109,9 @@ class _SerialRun(EmulatorRun):
     def _open(self, stack: ExitStack) -> Emulator:
         ports = self._open_ports(stack) if self._options.in_real_time else []
         for port in ports:
-            port.watch_setting(self._type.line.baud, self._show_setting)
-        return Emulator(
+            passes = not isinstance(port, NetworkPort)
+            port.watch_setting(self._type.line.baud, partial(self._show_setting, passes))
+        self._emulator = Emulator(
             self._type.name,
             self._device,
             outside=SerialHub(ports) if ports else None,
@@ -118,6 +121,7 @@ class _SerialRun(EmulatorRun):
             link=next(iter(self._places), ""),
             line=self._type.line,
         )
+        return self._emulator
 
     def _open_ports(self, stack: ExitStack) -> list[pty_port.PtyPort | NetworkPort]:
         """Open where hosts come in: a pty if one is named or there is nothing else."""
@@ -149,13 +153,13 @@ class _SerialRun(EmulatorRun):
         self._places.append(port.url)
         return port
 
-    def _show_setting(self, setting: str) -> None:
-        if not self._options.panel:
-            own = f"{self._type.line.baud} 8N1"
-            say(
-                f"The host has set its port to {setting}, the device has {own}:"
-                " on a real line they would not understand each other."
-            )
+    def _show_setting(self, passes: bool, setting: str) -> None:
+        """Tell that host and device differ; a pty passes the bytes unchanged, RFC 2217 does not."""
+        if not self._options.panel and self._emulator is not None:
+            own = self._emulator.line.b.uart.setting
+            ends = "on a real line they would" if passes else "they do"
+            differs = f"The host has set its port to {setting}, the device has {own}"
+            say(f"{differs}: {ends} not understand each other.")
 
     def _open_trace(self) -> TraceFile | None:
         if self._options.trace is None:

@@ -20,6 +20,7 @@ from tickrig.host.text.trace import RESET, Header, Mark, Record
 from tickrig.host.text.values import Setting
 from tickrig.host.text.whole_file import LineFile, write_whole
 from tickrig.wire.can import CanFrame, ErrorFrame, ErrorState, LogLine
+from tickrig.wire.uart import UartSetting
 
 
 class TraceFile(NonCopyable):
@@ -143,6 +144,11 @@ class TracedDevice(Generic[W]):
     def read(self, name: str, /) -> Setting:
         """Return an output of the device."""
         return self._device.read(name)  # type: ignore[no-any-return]  # if it has some
+
+    @property
+    def uart(self) -> UartSetting | None:
+        """The setting of its UART, if it changes that."""
+        return getattr(self._device, "uart", None)
 
     @property
     def horizon(self) -> Horizon | None:

@@ -29,6 +29,8 @@ from tickrig.emulators.rig.port import Port
 from tickrig.host.text.names import near
 from tickrig.host.text.trace import Mark
 from tickrig.host.text.values import parse_time_with_unit_us
+from tickrig.wire.instant import NEVER
+from tickrig.wire.uart import UartSetting
 
 _RATE, _COUNT = "rate", "count"
 _MOST: Final = 1_000_000
@@ -323,6 +325,7 @@ class FaultyPort(Copyable, Generic[W]):
         self, port: Port[W], fault_types: Mapping[str, FaultType[W]], seed: int = 0
     ) -> None:
         self._port, self.seed, self.drawn = port, seed, False
+        self._setting: UartSetting | None = None  # that of the device, behind what is held
         self.fault_types = fault_types
         self._to_device: dict[str, Fault[W]] = {}
         self._from_device: dict[str, Fault[W]] = {}
@@ -384,6 +387,8 @@ class FaultyPort(Copyable, Generic[W]):
         """Take what has arrived and survived."""
         if (held := _released(self._from_device, now_us)) is not None:
             self._port.send(now_us, held)
+        if self._setting is not None:
+            self.use_uart(now_us, self._setting)
         left = self._suffer(Mark.TO_DEVICE, self._to_device, now_us, self._port.poll(now_us))
         late = _released(self._to_device, now_us)
         return left if late is None else late + left  # type: ignore[operator] # bytes or frames
@@ -392,6 +397,21 @@ class FaultyPort(Copyable, Generic[W]):
         """Send what the faults leave of one tick's traffic."""
         left = self._suffer(Mark.FROM_DEVICE, self._from_device, now_us, traffic)
         self._port.send(now_us, left)
+
+    def use_uart(self, now_us: int, setting: UartSetting) -> None:
+        """Change the setting of the device, behind what faults hold of what it has sent.
+
+        Args:
+            now_us: the present.
+            setting: the new setting.
+        """
+        held = any(
+            isinstance(fault, HoldingFault) and fault.due_us < NEVER
+            for fault in self._from_device.values()
+        )
+        self._setting = setting if held else None
+        if not held:
+            self._port.use_uart(now_us, setting)  # type: ignore[attr-defined] # of a ByteEnd
 
     def _suffer(self, mark: Mark, faults: Mapping[str, Fault[W]], now_us: int, traffic: W) -> W:
         if not (faults and traffic):

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sized
+from dataclasses import dataclass, field
 from typing import Protocol
 
 from tickrig.device.core import W
+from tickrig.wire.uart import UartSetting
 
 
 class Port(Protocol[W]):
@@ -24,8 +26,35 @@ class Port(Protocol[W]):
         """Put one tick's traffic on the wire at `now_us`."""
 
 
+@dataclass(slots=True)
+class LineUart:
+    """The setting of the device on a line.
+
+    Attributes:
+        setting: the setting, with the latest change.
+        since_us: from when on it counts.
+        listeners: called with that time and the new setting; they are copied with the line.
+    """
+
+    setting: UartSetting
+    since_us: int = 0
+    listeners: list[Callable[[int, UartSetting], None]] = field(default_factory=list)
+
+
 class ByteEnd(Port[bytes], Protocol):
     """One end of an emulated serial line."""
+
+    @property
+    def uart(self) -> LineUart:
+        """The setting of the device on the line."""
+        ...
+
+    def use_uart(self, now_us: int, setting: UartSetting) -> None:
+        """Change the setting of the device at this end, behind the last stop bit it has sent."""
+
+    def withdraw(self, now_us: int) -> list[tuple[int, int]]:
+        """Take bytes sent from here that have not arrived off the line: start in ps, value."""
+        ...
 
     @property
     def idle_us(self) -> int:

@@ -6,10 +6,12 @@ from heapq import heappop, heappush
 from typing import Any, Generic
 
 from tickrig.device.core import Device, W
+from tickrig.device.twin import Copyable
 from tickrig.emulators.rig.kernel import StationFields, TimetableFields, in_kernel
 from tickrig.emulators.rig.port import Port
 from tickrig.emulators.rig.wire_port import is_wire_port
 from tickrig.wire.instant import NEVER
+from tickrig.wire.uart import UartSetting
 
 
 class Station(StationFields, Generic[W]):
@@ -22,6 +24,8 @@ class Station(StationFields, Generic[W]):
     __slots__ = ()
 
     def __init__(self, device: Device[W], port: Port[W]) -> None:
+        if hasattr(device, "uart"):
+            port = _UartPort(device, port)
         self.device, self.port, self.tick_us = device, port, device.tick_us
         self.at_us: int = NEVER
         self._timetable: Timetable | None = None
@@ -40,6 +44,35 @@ class Station(StationFields, Generic[W]):
     def wake_us(self, now_us: int) -> int:
         """Return the first tick after `now_us` at which this station has work."""
         return next_tick_us(now_us, min(self.device.due_us, self.port.due_us), self.tick_us)
+
+
+class _UartPort(Copyable, Generic[W]):
+    """The port of a device that may change the setting of its line (`UartDevice`)."""
+
+    def __init__(self, device: Any, port: Any) -> None:
+        self._device, self._port = device, port
+        self._setting: UartSetting | None = None
+        self._follow(0)
+
+    @property
+    def due_us(self) -> int:
+        """When the next traffic reaches the device."""
+        return self._port.due_us  # type: ignore[no-any-return] # a Port
+
+    def poll(self, now_us: int, /) -> W:
+        """Take what has arrived."""
+        return self._port.poll(now_us)  # type: ignore[no-any-return] # a Port
+
+    def send(self, now_us: int, traffic: W, /) -> None:
+        """Send the traffic of a tick, and use the setting that the tick has left behind it."""
+        self._port.send(now_us, traffic)
+        self._follow(now_us)
+
+    def _follow(self, now_us: int) -> None:
+        setting: UartSetting | None = self._device.uart
+        if setting is not None and setting != self._setting:
+            self._setting = setting
+            self._port.use_uart(now_us, setting)
 
 
 def next_tick_us(now_us: int, due_us: int, tick_us: int) -> int:

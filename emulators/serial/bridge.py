@@ -7,8 +7,9 @@ from typing import Final, Generic
 
 from tickrig.device.core import W
 from tickrig.device.twin import Copyable, Listeners, itself
-from tickrig.emulators.rig.port import ByteEnd, Port
+from tickrig.emulators.rig.port import ByteEnd, LineUart, Port
 from tickrig.host.text.trace import Mark
+from tickrig.wire.uart import UartSetting
 
 # What the hosts of a line have set their port to, where the device has something else.
 
@@ -20,7 +21,7 @@ class HostSetting:
 
     Args:
         read: returns the present setting, as `9600 8N1`.
-        wanted: the device's.
+        wanted: the device's; empty if any host is understood.
         notify: called with a setting that is not the device's.
 
     Attributes:
@@ -33,6 +34,16 @@ class HostSetting:
         self._next_us = 0
         self.differing = ""
 
+    def want(self, wanted: str) -> None:
+        """Judge hosts by another setting: the device has changed its own.
+
+        Args:
+            wanted: the device's; empty if any host is understood.
+        """
+        if wanted != self._wanted:
+            self._wanted, self._next_us = wanted, 0
+            self._notified.clear()
+
     def look(self, now_us: int, *, at_once: bool = False) -> None:
         """Look whether it differs: twice a second, or at once.
 
@@ -44,7 +55,7 @@ class HostSetting:
             return
         self._next_us = now_us + _LOOK_US
         setting = self._read()
-        self.differing = "" if setting == self._wanted else setting
+        self.differing = setting if self._wanted and setting != self._wanted else ""
         if self.differing and setting not in self._notified:
             self._notified.add(setting)
             self._notify(setting)
@@ -62,6 +73,8 @@ class Bridge:
         outside: where the host is.
         attend: called with the time instead of a poll, as long as the line has no room for
             what was taken before.
+        changed: called with the setting of the device, at first and when it has changed;
+            None if hosts of any setting understand it.
     """
 
     def __init__(
@@ -69,8 +82,11 @@ class Bridge:
         end: ByteEnd,
         outside: Port[bytes],
         attend: Callable[[int], object] = lambda now_us: None,
+        changed: Callable[[UartSetting], object] | None = None,
     ) -> None:
         self._end, self._outside, self._attend = end, outside, attend
+        self._changed, self._setting = changed or (lambda setting: None), end.uart.setting
+        self._changed(self._setting)
         self._pending = b""
         self._looked_us = 0
 
@@ -100,6 +116,12 @@ class Bridge:
 
     def give_out(self, now_us: int) -> None:
         """Hand what has arrived by now to the outside."""
+        uart = self._end.uart
+        if uart.setting != self._setting and uart.since_us <= now_us:
+            if before := self._end.poll(uart.since_us):
+                self._outside.send(now_us, before)
+            self._setting = uart.setting
+            self._changed(uart.setting)
         if data := self._end.poll(now_us):
             self._outside.send(now_us, data)
 
@@ -137,6 +159,19 @@ class HostEnd:
     def arrival_us(self, count: int) -> int:
         """Return when so many bytes will have arrived, or when to look again; `NEVER` for none."""
         return self._end.arrival_us(count)
+
+    @property
+    def uart(self) -> LineUart:
+        """The setting of the device on the line."""
+        return self._end.uart
+
+    def use_uart(self, now_us: int, setting: UartSetting) -> None:
+        """Change the setting of the device at this end."""
+        self._end.use_uart(now_us, setting)
+
+    def withdraw(self, now_us: int) -> list[tuple[int, int]]:
+        """Take bytes of the host that have not arrived off the line: start in ps, value."""
+        return self._end.withdraw(now_us)
 
     @property
     def lost(self) -> int:
@@ -202,6 +237,10 @@ class Tap(Copyable, Generic[W]):
         if traffic:
             self._hear(now_us, Mark.FROM_DEVICE, traffic)
         self._port.send(now_us, traffic)
+
+    def use_uart(self, now_us: int, setting: UartSetting) -> None:
+        """Change the setting of the device at the end behind."""
+        self._port.use_uart(now_us, setting)  # type: ignore[attr-defined] # of a ByteEnd
 
     def _hear(self, now_us: int, mark: Mark, traffic: W) -> None:
         for hear in self.listeners:

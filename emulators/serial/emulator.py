@@ -20,6 +20,7 @@ from tickrig.emulators.serial.bridge import Bridge, HostEnd, Tap
 from tickrig.emulators.serial.serial_line import BYTE_FAULTS, SerialLine
 from tickrig.host.text.trace import Mark
 from tickrig.wire.instant import NEVER
+from tickrig.wire.uart import UartSetting
 
 
 class LineOutside(Port[bytes], Protocol):
@@ -37,6 +38,9 @@ class LineOutside(Port[bytes], Protocol):
 
     def attend(self, now_us: int, /) -> None:
         """Let hosts come and go, but take nothing: the line has no room."""
+
+    def device_uses(self, setting: UartSetting, /) -> None:
+        """Take note of the setting that the device has now."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,8 +103,13 @@ class Emulator(RunningEmulator):
         self.host_end = HostEnd(self.line.b, self.log.hear)
         bridges = []
         if outside:
-            bridges = [Bridge(self.line.b, Tap(outside, self.log.hear), outside.attend)]
+            tap, changed = Tap(outside, self.log.hear), self._line_changed if line.uart else None
+            bridges = [Bridge(self.line.b, tap, outside.attend, changed)]
         self.rig = Rig(station, bridges=bridges, clock=clock, event_queue=self.event_queue)
+
+    def _line_changed(self, setting: UartSetting) -> None:
+        assert self._outside is not None  # who asks is its bridge
+        self._outside.device_uses(setting)
 
     @property
     def _host_due_us(self) -> int:
@@ -169,6 +178,11 @@ class SerialHub(NonCopyable):
         """Let hosts come and go, and give them what is kept for them."""
         for port in self._ports:
             port.attend(now_us)
+
+    def device_uses(self, setting: UartSetting, /) -> None:
+        """Tell every port the setting that the device has now."""
+        for port in self._ports:
+            port.device_uses(setting)
 
     def send(self, now_us: int, traffic: bytes, /) -> None:
         """Send to every host."""

@@ -10,7 +10,7 @@ import socket
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Any, Final, cast
 
 from serial import SerialBase, rfc2217
 from serial.rfc2217 import COM_PORT_OPTION, IAC, IAC_DOUBLED, PortManager
@@ -20,6 +20,7 @@ from tickrig.emulators.serial.bridge import HostSetting
 from tickrig.host.links.serial_link import tune
 from tickrig.host.text.values import MOST_PORT, parse_port
 from tickrig.wire.instant import NEVER
+from tickrig.wire.uart import Parity, UartSetting, sample
 
 # Where a serial line is served: `rfc2217://[HOST:]PORT` or `socket://[HOST:]PORT`.
 
@@ -50,9 +51,10 @@ from tickrig.wire.instant import NEVER
 # (`_may_read`). The buffers of the kernel are small for the same reason: what is in them is
 # beyond the time of the rig.
 #
-# The settings of RFC 2217 are answered and remembered, and change nothing: the rate of the
-# line is that of the device. A host that sets another is told to people (`HostSetting`),
-# because at a real port it would read noise.
+# The settings of RFC 2217 are answered and remembered. The rate of the line is that of the
+# device, which may change it (`device_uses`). What a host of another setting reads and what
+# the device reads of it is sampled, as at a real port, each piece of a tick by itself; people
+# are told (`HostSetting`).
 
 _SCHEMES: Final = ("rfc2217", "socket")
 _LOOPBACK: Final = "127.0.0.1"
@@ -191,9 +193,9 @@ class HostConnection:
             _tune(connection)
 
     @property
-    def setting(self) -> str:
-        """What it has set the port to, as `9600 8N1`; empty where it cannot."""
-        return ""
+    def setting(self) -> UartSetting | None:
+        """What it has set the port to; None where it cannot."""
+        return None
 
     def has_ended(self, now_us: int) -> bool:
         """Whether another host may have the line: this one sends no more, or is stuck."""
@@ -365,28 +367,33 @@ class _SafePortManager(PortManager):
 class Rfc2217Connection(HostConnection):
     """A host that may set the port, as on a serial server; pyserial's `rfc2217://` is one.
 
-    What it sets is answered and remembered, and changes nothing on the line: the device has
-    its own rate. Its DTR, RTS and break reach nobody; CTS, DSR, CD and RI are off. One whose
-    telnet cannot be understood is left. Not emulated: FLOWCONTROL-SUSPEND, and purging what
-    is on the line already.
+    What it sets is answered and remembered; the device has its own setting. Its DTR, RTS and break
+    reach nobody; CTS, DSR, CD and RI are off. One whose telnet cannot be understood is left. Not
+    emulated: FLOWCONTROL-SUSPEND, and purging what is on the line already.
 
     Args:
         connection: to the host.
         buffer_bytes: bytes kept for a host that does not read.
-        baud: what the port is set to until the host sets it, with 8N1.
+        setting: what the port is set to until the host sets it.
     """
 
-    def __init__(self, connection: socket.socket, buffer_bytes: int, baud: int) -> None:
+    def __init__(self, connection: socket.socket, buffer_bytes: int, setting: UartSetting) -> None:
         super().__init__(connection, buffer_bytes)
-        self._adapter = _QuietAdapter(baudrate=baud)  # type: ignore[abstract] # it carries no bytes
+        self._adapter = _QuietAdapter(  # type: ignore[abstract] # it carries no bytes
+            baudrate=setting.baud,
+            bytesize=setting.data_bits,
+            parity=setting.parity,
+            stopbits=setting.stop_bits,
+        )
         # typeshed wants two pyserial ports; any port and a writer will do (pyserial docs)
         self._manager = _SafePortManager(self._adapter, self)  # type: ignore[arg-type]
 
     @property
-    def setting(self) -> str:
-        """What it has set the port to, as `9600 8N1`."""
+    def setting(self) -> UartSetting | None:
+        """What it has set the port to."""
         port = self._adapter
-        return f"{port.baudrate} {port.bytesize}{port.parity}{port.stopbits}"
+        parity = cast(Parity, port.parity)  # pyserial has checked it
+        return UartSetting(max(1, port.baudrate), port.bytesize, parity, port.stopbits)
 
     def write(self, data: bytes) -> None:
         """Answer a negotiation; pyserial's manager calls this."""
@@ -460,7 +467,8 @@ class NetworkPort(NonCopyable):
 
     def __init__(self, url: ServeUrl, buffer_bytes: int = 4_096) -> None:
         self._listener = _listen(url)
-        self._buffer_bytes, self._baud = buffer_bytes, 115_200
+        self._buffer_bytes, self._uart = buffer_bytes, UartSetting()
+        self._samples = False
         self._host: HostConnection | None = None
         self._next: tuple[HostConnection, str] | None = None
         self._dismissed: list[DismissedHost] = []
@@ -494,15 +502,26 @@ class NetworkPort(NonCopyable):
             baud: the device's rate in bit/s, with 8N1; above 4 Mbit/s it is not watched.
             notify: called with a setting as `9600 8N1` that is not the device's.
         """
-        self._baud = baud
+        self._uart = UartSetting(baud)
         if baud <= _MAX_BAUD:
-            own = f"{baud} 8N1"
-            self._setting = HostSetting(lambda: self._present_setting or own, own, notify)
+            self._setting = HostSetting(self._shown_setting, str(self._uart), notify)
+
+    def device_uses(self, setting: UartSetting) -> None:
+        """Let a host of another setting read what its UART would sample, and the device likewise.
+
+        Args:
+            setting: the device's; above 4 Mbit/s a host of any setting is understood.
+        """
+        self._uart, self._samples = setting, setting.baud <= _MAX_BAUD
+        if self._setting is not None:
+            self._setting.want(str(setting))
 
     def poll(self, now_us: int, /) -> bytes:
         """Take some of what the host sent; let hosts come and go."""
         data = self._host.poll(now_us) if self._host else b""
         self.spoken |= bool(data)
+        if (setting := self._differing) is not None:
+            data = _sampled(data, setting, self._uart)
         if self._host and self._host.mistake:
             self._leave(self._host, self._peer, now_us)
             self._forget(self._host)
@@ -527,6 +546,8 @@ class NetworkPort(NonCopyable):
     def send(self, now_us: int, traffic: bytes, /) -> None:
         """Send to the host, if there is one, as much as fits; keep the rest for later."""
         if self._host is not None:
+            if (setting := self._differing) is not None:
+                traffic = _sampled(traffic, self._uart, setting)
             self._host.send(now_us, traffic)
 
     def close(self) -> None:
@@ -539,9 +560,14 @@ class NetworkPort(NonCopyable):
         self._listener.close()
         self._setting = None
 
+    def _shown_setting(self) -> str:
+        return str((self._host and self._host.setting) or self._uart)
+
     @property
-    def _present_setting(self) -> str:
-        return self._host.setting if self._host else ""
+    def _differing(self) -> UartSetting | None:
+        """The setting of the host, if the device does not understand it."""
+        setting = self._host.setting if self._host and self._samples else None
+        return None if setting == self._uart else setting
 
     def _attend_next(self, now_us: int) -> None:
         """Accept the next host, and listen to it until the line is its own."""
@@ -578,7 +604,7 @@ class NetworkPort(NonCopyable):
     def _connected(self, connection: socket.socket) -> HostConnection:
         if self.url.startswith("socket:"):
             return HostConnection(connection, self._buffer_bytes)
-        return Rfc2217Connection(connection, self._buffer_bytes, self._baud)
+        return Rfc2217Connection(connection, self._buffer_bytes, self._uart)
 
     def _refuse(self, connection: socket.socket, peer: str, now_us: int) -> None:
         """Send a second host away."""
@@ -610,6 +636,10 @@ class NetworkPort(NonCopyable):
         if now_us >= self._quiet_until_us:
             self._quiet_until_us = now_us + QUIET_US
             _log.warning("%s", text)
+
+
+def _sampled(data: bytes, sender: UartSetting, receiver: UartSetting) -> bytes:
+    return bytes(each.value for each in sample(data, sender, receiver))
 
 
 def _listen(url: ServeUrl) -> socket.socket:

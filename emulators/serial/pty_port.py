@@ -17,6 +17,7 @@ from typing import Final
 from tickrig.device.twin import NonCopyable
 from tickrig.emulators.serial.bridge import HostSetting
 from tickrig.wire.instant import NEVER
+from tickrig.wire.uart import UartSetting
 
 # The name under which a pseudo-terminal is found, and who gave it.
 
@@ -250,6 +251,18 @@ class PtyPort(NonCopyable):
         attributes[4:6] = codes[0], codes[0]
         termios.tcsetattr(slave, termios.TCSANOW, attributes)
         self._setting = HostSetting(lambda: _setting_of(slave), _setting_of(slave), notify)
+
+    def device_uses(self, setting: UartSetting) -> None:
+        """Judge hosts by the setting that the device has now; a pty passes all bytes unchanged.
+
+        Args:
+            setting: the device's; a pty shows 8 data bits, and even parity as none.
+        """
+        if self._setting is not None:
+            parity = "O" if setting.parity == "O" else "N"
+            named = setting.baud in _BAUDS.values()
+            shown = f"{setting.baud} 8{parity}{setting.stop_bits:g}"
+            self._setting.want(shown if named else "")
 
     def poll(self, now_us: int, /) -> bytes:
         """Read without waiting."""

@@ -7,7 +7,9 @@ from collections.abc import Iterator
 from operator import itemgetter
 
 from tickrig.device.twin import Copyable
+from tickrig.emulators.rig.port import LineUart
 from tickrig.wire.instant import NEVER
+from tickrig.wire.uart import UartSetting
 
 
 class _Burst:
@@ -34,8 +36,8 @@ class Rs485Line(Copyable):
     the bits that both have set, and is counted. What an end sends while it is still
     sending waits its turn.
 
-    Not emulated: the turn-round of the transceivers, framing and parity errors, echo of
-    one's own bytes unless asked for.
+    Not emulated: the turn-round of the transceivers, a change of the bit rate, framing and parity
+    errors, echo of one's own bytes unless asked for.
 
     Args:
         baud: bit rate in bit/s.
@@ -49,6 +51,7 @@ class Rs485Line(Copyable):
     Attributes:
         ends: the stations' ends.
         collisions: pairs of bytes that overlapped.
+        uart: the setting of all devices.
 
     Raises:
         ValueError: a size below 1, or fewer than two ends.
@@ -72,7 +75,7 @@ class Rs485Line(Copyable):
         if min(baud, frame_bits, buffer_bytes) < 1 or ends < 2:
             raise ValueError("baud rate, frame bits and buffer size must be at least 1, ends 2")
         self._baud, self._byte_cost, self._echo = baud, frame_bits * 1_000_000, echo
-        self._bursts = bursts
+        self._bursts, self.uart = bursts, LineUart(UartSetting(baud))
         self.ends: tuple[Rs485End, ...] = tuple(Rs485End(self, buffer_bytes) for _ in range(ends))
         self.collisions = 0
         self._air: list[_Burst] = []
@@ -254,6 +257,21 @@ class Rs485End:
     def drop_unsent(self, now_us: int) -> None:
         """Forget the bytes sent from here of which no bit is on the line yet."""
         self._busy_us = self._line.cut(self, now_us)
+
+    @property
+    def uart(self) -> LineUart:
+        """The setting of the line."""
+        return self._line.uart
+
+    def use_uart(self, now_us: int, setting: UartSetting) -> None:
+        """Raise ValueError if it is not that of the line: no device changes it."""
+        if setting != self._line.uart.setting:
+            has = self._line.uart.setting
+            raise ValueError(f"a device changes its setting to {setting}: RS-485 keeps {has}")
+
+    def withdraw(self, now_us: int) -> list[tuple[int, int]]:
+        """Return nothing: the setting never changes."""
+        return []
 
     def poll(self, now_us: int, /) -> bytes:
         """Take the bytes that have arrived by `now_us`."""

@@ -10,7 +10,9 @@ from typing import Final
 
 from tickrig.device.twin import Copyable
 from tickrig.emulators.rig.faults import FaultArguments, FaultTrigger, FaultType
+from tickrig.emulators.rig.port import LineUart
 from tickrig.wire.instant import NEVER
+from tickrig.wire.uart import PS_PER_US, UartSetting
 
 # Theory of operation
 # ===================
@@ -23,10 +25,13 @@ from tickrig.wire.instant import NEVER
 #
 # Rules:
 #
-# - Only the last burst can still be on its way, because a burst that begins while the line
-#   is busy is joined to the one before. `unsent`, `drop_unsent` and `last_us` rest on that.
+# - A burst that begins while the line is busy is joined to the one before, so only the last
+#   burst can still be on its way. One exception: after a change of the setting the next
+#   burst has other times, so it waits behind the one before. `_unsent_bursts` finds both.
+# - A device changes the setting of the whole line (`use_uart`): from the last stop bit that
+#   it has sent, or at once. Until then bytes of the host keep the old times (`_from_us`).
 # - Times are never added up. A burst that goes on for hours is shortened at its front
-#   (`_forget_taken`) by a number of bytes that takes whole microseconds, so no arrival
+#   (`forget_taken`) by a number of bytes that takes whole microseconds, so no arrival
 #   moves.
 # - Two buffers. What the sender's does not take is lost at `put`, what the receiver's does
 #   not hold is lost at `take`: both are counted in `lost` of the end that would have
@@ -36,7 +41,7 @@ from tickrig.wire.instant import NEVER
 #   once.
 #
 # The host's bridge looks once a tick and takes what was written as written right after its
-# last look (bridge.py); therefore `_arrived` may be asked for a time before the start of a
+# last look (bridge.py); therefore `arrived` may be asked for a time before the start of a
 # burst.
 
 
@@ -45,7 +50,8 @@ class SerialLine(Copyable):
 
     A byte is delivered when its stop bit has passed. What is sent while the
     line is busy waits its turn; what finds a buffer full is lost and counted.
-    Not emulated: parity and framing errors, break, modem control lines.
+    A device may change the setting (`LineEnd.use_uart`). What a host of another setting reads
+    is worked out at its end (`SerialSide`, `Bridge`). Not emulated: modem control lines.
 
     Args:
         baud: bit rate in bit/s.
@@ -70,19 +76,49 @@ class SerialLine(Copyable):
     ) -> None:
         if min(baud, frame_bits, buffer_bytes) < 1:
             raise ValueError("baud rate, frame bits and buffer size must be at least 1")
-        there = _Direction(baud, frame_bits * 1_000_000, buffer_bytes)
-        back = _Direction(baud, frame_bits * 1_000_000, buffer_bytes)
-        self.a = LineEnd(back, there)
-        self.b = LineEnd(there, back)
+        timing = _Timing(baud, frame_bits * 1_000_000)
+        there, back = _Direction(timing, buffer_bytes), _Direction(timing, buffer_bytes)
+        uart = LineUart(UartSetting(baud))
+        self.a = LineEnd(back, there, uart)
+        self.b = LineEnd(there, back, uart)
 
 
 class LineEnd:
     """One end of a `SerialLine`; a `Port[bytes]`."""
 
-    __slots__ = ("_in", "_out")
+    __slots__ = ("_in", "_out", "uart")
 
-    def __init__(self, incoming: _Direction, outgoing: _Direction) -> None:
-        self._in, self._out = incoming, outgoing
+    def __init__(self, incoming: _Direction, outgoing: _Direction, uart: LineUart) -> None:
+        self._in, self._out, self.uart = incoming, outgoing, uart
+
+    def use_uart(self, now_us: int, setting: UartSetting) -> None:
+        """Change the setting of the device at this end, behind the last stop bit it has sent.
+
+        Args:
+            now_us: the present.
+            setting: the new setting.
+        """
+        uart = self.uart
+        if setting == uart.setting:
+            return
+        since_us = max(now_us, self._out.last_us) if self._out.unsent(now_us) else now_us
+        timing = _Timing(setting.baud, int(setting.frame_bits * 1_000_000))
+        self._out.change(since_us, timing)
+        self._in.change(since_us, timing)
+        uart.setting, uart.since_us = setting, since_us
+        for listener in uart.listeners:
+            listener(since_us, setting)
+
+    def withdraw(self, now_us: int) -> list[tuple[int, int]]:
+        """Take the bytes sent from here that have not arrived off the line.
+
+        Args:
+            now_us: the present.
+
+        Returns:
+            For each byte the start of its start bit in ps, and its value.
+        """
+        return self._out.withdraw(now_us)
 
     @property
     def due_us(self) -> int:
@@ -135,30 +171,64 @@ class LineEnd:
             self._out.put(now_us, traffic)
 
 
+@dataclass(frozen=True, slots=True)
+class _Timing:
+    """How long bytes take: `byte_cost` is the bits of a byte, in millionths."""
+
+    baud: int
+    byte_cost: int
+
+    @property
+    def whole_bytes(self) -> int:
+        """A number of bytes that takes a whole number of us."""
+        return self.baud // gcd(self.baud, self.byte_cost)
+
+
 class _Burst:
     """Bytes sent back to back."""
 
-    __slots__ = ("data", "start_us", "taken")
+    __slots__ = ("data", "start_us", "taken", "timing")
 
-    def __init__(self, start_us: int, data: bytes) -> None:
-        self.start_us, self.data, self.taken = start_us, data, 0
+    def __init__(self, start_us: int, data: bytes, timing: _Timing) -> None:
+        self.start_us, self.data, self.taken, self.timing = start_us, data, 0, timing
+
+    def arrived(self, now_us: int) -> int:
+        """Return how many bytes have arrived by `now_us`."""
+        passed_us = max(0, now_us - self.start_us)  # it may be looked at as of an earlier time
+        return min(len(self.data), passed_us * self.timing.baud // self.timing.byte_cost)
+
+    def arrival_us(self, count: int) -> int:
+        """Return when so many bytes have arrived, rounded up."""
+        return self.start_us - (-count * self.timing.byte_cost // self.timing.baud)
+
+    def forget_taken(self) -> None:
+        """Drop what was taken of a burst that goes on for long, without moving a time."""
+        count = self.taken - self.taken % self.timing.whole_bytes
+        self.data, self.taken = self.data[count:], self.taken - count
+        self.start_us += count * self.timing.byte_cost // self.timing.baud
 
 
 class _Direction:
     """One direction of the line: only the latest burst can still be on its way."""
 
     __slots__ = (
-        *("_baud", "_buffer_bytes", "_bursts", "_byte_cost", "_held", "_whole_bytes"),
+        *("_buffer_bytes", "_bursts", "_from_us", "_held", "_next", "_timing"),
         *("first_us", "last_us", "lost"),
     )
 
-    def __init__(self, baud: int, byte_cost: int, buffer_bytes: int) -> None:
-        self._baud, self._byte_cost, self._buffer_bytes = baud, byte_cost, buffer_bytes
-        self._whole_bytes = baud // gcd(baud, byte_cost)  # they take a whole number of us
+    def __init__(self, timing: _Timing, buffer_bytes: int) -> None:
+        self._timing, self._buffer_bytes = timing, buffer_bytes
+        self._next, self._from_us = timing, 0  # the latest change, and from when on it counts
         self._bursts: deque[_Burst] = deque()
         self._held = 0  # bytes in all bursts that are not taken
         self.first_us = self.last_us = NEVER
         self.lost = 0
+
+    def change(self, from_us: int, timing: _Timing) -> None:
+        """Send with another timing what begins at `from_us` or later."""
+        if from_us > self._from_us:
+            self._timing = self._next
+        self._next, self._from_us = timing, from_us
 
     def put(self, now_us: int, data: bytes) -> None:
         accepted = data[: self.room(now_us)]
@@ -166,10 +236,13 @@ class _Direction:
         if not accepted:
             return
         self._held += len(accepted)
-        if self._bursts and now_us < self.last_us:
+        busy = bool(self._bursts) and now_us < self.last_us
+        start_us = self.last_us if busy else now_us
+        timing = self._next if start_us >= self._from_us else self._timing
+        if busy and self._bursts[-1].timing == timing:
             self._bursts[-1].data += accepted
         else:
-            self._bursts.append(_Burst(now_us, accepted))
+            self._bursts.append(_Burst(start_us, accepted, timing))
         self._note_due()
 
     def take(self, now_us: int) -> bytes:
@@ -178,11 +251,11 @@ class _Direction:
         taken = []
         while self._bursts:
             burst = self._bursts[0]
-            arrived = self._arrived(burst, now_us)
+            arrived = burst.arrived(now_us)
             taken.append(burst.data[burst.taken : arrived])
             burst.taken = arrived
             if arrived < len(burst.data):
-                self._forget_taken(burst)
+                burst.forget_taken()
                 break
             self._bursts.popleft()
         data = b"".join(taken)
@@ -199,7 +272,7 @@ class _Direction:
         for burst in self._bursts:
             left = len(burst.data) - burst.taken
             if count <= left:
-                return self._arrival_us(burst, burst.taken + count)
+                return burst.arrival_us(burst.taken + count)
             count -= left
         return self.last_us
 
@@ -213,37 +286,51 @@ class _Direction:
     def unsent(self, now_us: int) -> int:
         if not self._bursts or now_us >= self.last_us:
             return 0
-        burst = self._bursts[-1]
-        return len(burst.data) - self._arrived(burst, now_us)
+        unsent = self._unsent_bursts(now_us)
+        return sum(len(burst.data) - burst.arrived(now_us) for burst in unsent)
 
     def drop_unsent(self, now_us: int) -> None:
-        dropped = self.unsent(now_us) - 1  # all but the one that is on the line
-        if dropped > 0:
-            burst = self._bursts[-1]
-            burst.data = burst.data[:-dropped]
-            self._held -= dropped
-            self._note_due()
+        for burst in self._unsent_bursts(now_us):
+            begun = burst.arrived(now_us) + (burst.start_us <= now_us)  # and the one on the line
+            self._cut(burst, begun)
+        self._tidy()
 
-    def _forget_taken(self, burst: _Burst) -> None:
-        """Drop what was taken of a burst that goes on for long, without moving a time."""
-        count = burst.taken - burst.taken % self._whole_bytes
-        burst.data, burst.taken = burst.data[count:], burst.taken - count
-        burst.start_us += count * self._byte_cost // self._baud
+    def withdraw(self, now_us: int) -> list[tuple[int, int]]:
+        withdrawn = []
+        for burst in self._unsent_bursts(now_us):
+            timing, arrived = burst.timing, burst.arrived(now_us)
+            for at in range(arrived, len(burst.data)):
+                passed_ps = at * timing.byte_cost * PS_PER_US // timing.baud
+                withdrawn.append((burst.start_us * PS_PER_US + passed_ps, burst.data[at]))
+            self._cut(burst, arrived)
+        self._tidy()
+        return withdrawn
 
-    def _arrived(self, burst: _Burst, now_us: int) -> int:
-        passed_us = max(0, now_us - burst.start_us)  # it may be looked at as of an earlier time
-        return min(len(burst.data), passed_us * self._baud // self._byte_cost)
+    def _unsent_bursts(self, now_us: int) -> deque[_Burst]:
+        """Return the bursts that have not arrived entirely, the earliest first."""
+        unsent = deque[_Burst]()
+        for burst in reversed(self._bursts):
+            if burst.arrival_us(len(burst.data)) <= now_us:
+                break
+            unsent.appendleft(burst)
+        return unsent
 
-    def _arrival_us(self, burst: _Burst, count: int) -> int:
-        return burst.start_us - (-count * self._byte_cost // self._baud)
+    def _cut(self, burst: _Burst, count: int) -> None:
+        self._held -= max(0, len(burst.data) - count)
+        burst.data = burst.data[:count]
+
+    def _tidy(self) -> None:
+        """Forget bursts of which nothing is left to be taken."""
+        self._bursts = deque(each for each in self._bursts if each.taken < len(each.data))
+        self._note_due()
 
     def _note_due(self) -> None:
         if not self._bursts:
             self.first_us = self.last_us = NEVER
             return
         first, last = self._bursts[0], self._bursts[-1]
-        self.first_us = self._arrival_us(first, first.taken + 1)
-        self.last_us = self._arrival_us(last, len(last.data))
+        self.first_us = first.arrival_us(first.taken + 1)
+        self.last_us = last.arrival_us(len(last.data))
 
 
 # Faults of a byte line: flip, drop, dup, cut.

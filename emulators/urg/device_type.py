@@ -39,6 +39,7 @@ def _config_to_trace(parameters: UrgParameters, world: World) -> Config:
         "noise": parameters.noise,
         "noise_seed": parameters.seed,
         "scip": parameters.scip,
+        "baud": parameters.rs232_baud or USB_BAUD,
         "walls": _text(world.walls),
         "posts": _text(world.posts),
     }
@@ -53,15 +54,26 @@ def build_urg(config: Config) -> Urg:
     defaults = {**_config_to_trace(UrgParameters(), World()), "scip": _OLD_SCIP}
     check_config(config, defaults, "a sensor has no setting", typed=False)
     settings: dict[str, Any] = {**defaults, **config}
+    baud = settings["baud"]
     noise, seed = settings["noise"], settings["noise_seed"]
     if type(seed) is not int or type(noise) not in (int, float):
         raise ValueError(f"noise {noise!r} and noise_seed {seed!r} are not two numbers")
+    if type(baud) is not int:
+        raise ValueError(f"baud {baud!r} is not a bit rate")
     walls = [_parse_wall(text) for text in str(settings["walls"]).split()]
     posts = [_parse_post(text) for text in str(settings["posts"]).split()]
     parameters = UrgParameters(
-        serial=str(settings["serial"]), noise=noise, seed=seed, scip=str(settings["scip"])
+        serial=str(settings["serial"]),
+        noise=noise,
+        seed=seed,
+        scip=str(settings["scip"]),
+        rs232_baud=_rs232_baud(baud),
     )
     return Urg(parameters, World(tuple(walls), tuple(posts)))
+
+
+def _rs232_baud(baud: int) -> int | None:
+    return None if baud == USB_BAUD else baud
 
 
 def _parse_wall(text: str) -> Wall:
@@ -97,7 +109,11 @@ def _configure(urg: DeviceType, options: Mapping[str, Any], seed: int) -> Config
     scip = options["scip"]
     with named("--serial"):
         parameters = UrgParameters(
-            serial=options["serial"], noise=options["noise"], seed=seed, scip=scip
+            serial=options["serial"],
+            noise=options["noise"],
+            seed=seed,
+            scip=scip,
+            rs232_baud=_rs232_baud(options["baud"]),
         )
     world = _world(options["size"], options["walls"], options["posts"])
     line = replace(urg.line, baud=options["baud"], uart=options["baud"] != USB_BAUD)

@@ -31,7 +31,7 @@ FIELDS: Final = (
         low=1_200,
         high=USB_BAUD,
         default=USB_BAUD,
-        help="Bit rate of the line; a whole scan at 10 Hz needs 230400.  [12000000, as USB]",
+        help="Bit rate of RS-232C after power-up, which SS changes.  [12000000, as USB]",
     ),
     DeviceField(
         name="size",

@@ -105,11 +105,26 @@ class HostReceiver(Copyable):
     """
 
     def __init__(self, end: ByteEnd, device: UartSetting) -> None:
-        self._end, self._device = end, device
+        self._end, self._device, self._setting = end, device, device
         self.errors = UartErrors()
         self._uart: UartReceiver | None = None  # none has the device's setting
         self._sent_ps = 0  # when the latest byte of the device ended
         self._received: deque[Character] = deque()
+
+    def follow(self, device: UartSetting, now_us: int) -> None:
+        """Let the device send with another setting from now on; the host's stays as it is.
+
+        Args:
+            device: the new setting.
+            now_us: the present.
+        """
+        if self._uart is None:
+            now_ps = now_us * PS_PER_US
+            self._received += [Character(value, now_ps) for value in self._end.poll(now_us)]
+            self._uart = UartReceiver(self._setting, now_ps)
+        else:
+            self._sample(self._uart, now_us)
+        self._device = device
 
     def use(self, setting: UartSetting, now_us: int) -> None:
         """Receive at a setting from now on; a character that is half received is lost.
@@ -118,7 +133,7 @@ class HostReceiver(Copyable):
             setting: the host's.
             now_us: the present; all that had come has been taken.
         """
-        same = setting == self._device
+        same, self._setting = setting == self._device, setting
         self._uart = None if same else UartReceiver(setting, now_us * PS_PER_US)
         self._received.clear()
 
@@ -155,17 +170,20 @@ class HostReceiver(Copyable):
         """
         if self._uart is None:
             return self._end.poll(now_us)
-        while (at_us := self._end.due_us) <= now_us:
-            self._listen(self._uart, at_us * PS_PER_US, self._end.poll(at_us))
-        now_ps = now_us * PS_PER_US
-        if at_us == NEVER:  # else a byte is on its way that has begun before now
-            self._received += self._uart.push(1, now_ps)
-        taken = bytearray()
+        self._sample(self._uart, now_us)
+        now_ps, taken = now_us * PS_PER_US, bytearray()
         while self._received and self._received[0].end_ps <= now_ps:
             character = self._received.popleft()
             self.errors.count(character)
             taken.append(character.value)
         return bytes(taken)
+
+    def _sample(self, uart: UartReceiver, now_us: int) -> None:
+        """Sample the line up to now."""
+        while (at_us := self._end.due_us) <= now_us:
+            self._listen(uart, at_us * PS_PER_US, self._end.poll(at_us))
+        if at_us == NEVER:  # else a byte is on its way that has begun before now
+            self._received += uart.push(1, now_us * PS_PER_US)
 
     def _listen(self, uart: UartReceiver, end_ps: int, data: bytes) -> None:
         """Sample bytes that the device has sent back to back until `end_ps`, to the microsecond."""
@@ -265,6 +283,25 @@ class HostTransmitter(Copyable):
         else:
             self._send_sampled(now_us, data)
         return len(data)
+
+    def follow(self, device: UartSetting, now_us: int) -> None:
+        """Let the device receive with another setting from now on.
+
+        The device loses the character that it has half received. What is on its way is sampled.
+
+        Args:
+            device: the new setting.
+            now_us: the present.
+        """
+        self._advance(now_us)
+        sent = [(start_ps, value, self.setting) for start_ps, value in self._end.withdraw(now_us)]
+        self._waiting.extendleft(reversed(sent))
+        if sent:
+            self._free_ps = max(self._free_ps, sent[-1][0] + self.setting.duration_ps())
+        self._device = device
+        self._uart = UartReceiver(device, now_us * PS_PER_US)
+        self._received.clear()
+        self._advance(now_us)
 
     def release(self, now_us: int) -> None:
         """Send what was held, unless the output is suspended or still waits for CTS.
@@ -482,6 +519,25 @@ class SerialSide(Copyable):
         self.receiver = HostReceiver(end, self.setting)
         self.transmitter = HostTransmitter(rig.event_queue, end, self.setting, self.modem_lines)
         self.modem_lines.cts_changed = self._release
+        self._changes: deque[tuple[int, UartSetting]] = deque()  # of the device, to come
+        end.uart.listeners.append(self._device_changes)
+
+    def _device_changes(self, since_us: int, setting: UartSetting) -> None:
+        """Note that the device changes its setting, now or behind what it still sends."""
+        if self.device is None:
+            return
+        self._changes.append((since_us, setting))
+        if since_us <= self.rig.now_us:
+            self._follow(self.rig.now_us)
+        else:
+            self.rig.event_queue.put((self, since_us), since_us, self._follow)
+
+    def _follow(self, now_us: int) -> None:
+        while self._changes and self._changes[0][0] <= now_us:
+            _, self.device = self._changes.popleft()
+        if self.device is not None:
+            self.receiver.follow(self.device, now_us)
+            self.transmitter.follow(self.device, now_us)
 
     def _release(self) -> None:
         self.transmitter.release(self.rig.now_us)

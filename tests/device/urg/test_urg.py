@@ -6,10 +6,11 @@ from math import pi
 import pytest
 
 from tests.device.urg.measured import Measured
-from tickrig.device.urg.sensor import INPUTS, OUTPUTS
+from tickrig.device.urg.sensor import INPUTS, OUTPUTS, Urg
 from tickrig.device.urg.world import Post, UrgParameters, Wall, World, room
 from tickrig.wire.instant import NEVER
 from tickrig.wire.scip import Reply, parse_number, parse_scan
+from tickrig.wire.uart import UartSetting
 
 AHEAD = World((Wall(2, -10, 2, 10),))
 """A wall 2 m in front of the origin."""
@@ -284,6 +285,23 @@ def test_reset_command_undoes_what_was_set() -> None:
     assert reply.lines[5].startswith(b"TIME:000001")
 
 
+def test_on_rs232_its_line_has_the_bit_rate_that_was_set() -> None:
+    urg = Urg(UrgParameters(scip="2.0", rs232_baud=38_400))
+    assert urg.uart == UartSetting(38_400)
+    assert urg.tick(1_000, b"SS115200\n") == b"SS115200\n00P\n\n"
+    assert urg.uart == UartSetting(115_200)
+    assert b"SBPS:115200[bps];" in urg.tick(2_000, b"II\n")
+    urg.tick(3_000, b"RS\n")
+    assert urg.uart == UartSetting(38_400)
+    assert b"SBPS:38400[bps]<-Default setting by user;" in urg.tick(4_000, b"II\n")
+
+
+def test_on_usb_its_line_has_no_setting() -> None:
+    measured = Measured()
+    assert measured.ask("SS115200") == "00"
+    assert measured.urg.uart is None
+
+
 def test_a_slower_mirror_takes_longer() -> None:
     measured = Measured(AHEAD)
     measured.ask("BM")
@@ -381,6 +399,7 @@ def test_it_is_a_device_of_a_millisecond_with_named_ends() -> None:
         ({"noise": 2.0}, "noise 2.0 is not in 0..1"),
         ({"serial": "a b"}, "serial 'a b' is not"),
         ({"scip": "3"}, "scip '3' is not one of 1.1, 2.0"),
+        ({"rs232_baud": 0}, "rs232_baud 0 bit/s is below 1"),
     ],
 )
 def test_parameters_that_cannot_be_are_refused(settings: dict[str, object], told: str) -> None:

@@ -13,6 +13,7 @@ from tests.host.live import served
 from tickrig.emulators.serial.network import NetworkPort, Rfc2217Connection, parse_serve_url
 from tickrig.host.links.link import LinkClosed, ReopeningLink
 from tickrig.host.links.serial_link import SerialLink, tune
+from tickrig.wire.uart import UartSetting
 
 pytestmark = [
     pytest.mark.realtime,
@@ -124,7 +125,7 @@ def test_what_is_no_telnet_ends_a_link_without_a_traceback(
     opened = threading.Event()
 
     def serve(server: socket.socket) -> None:
-        host = Rfc2217Connection(server.accept()[0], 4_096, 115_200)
+        host = Rfc2217Connection(server.accept()[0], 4_096, UartSetting())
         while not opened.wait(0.001):
             host.poll(0)
         host.connection.send(b"EV:Alarm\n\xff\xf0")

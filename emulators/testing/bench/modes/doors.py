@@ -198,7 +198,8 @@ class OutsideEnds:
         served = [self._serve(url) for url in door.serve]
         self.ports[mount.name] = [own, *served]
         hub = SerialHub([own, *served])
-        self.bridges.append(Bridge(mount.line.b, hub, hub.attend))
+        changed = hub.device_uses if mount.settings.uart else None
+        self.bridges.append(Bridge(mount.line.b, hub, hub.attend, changed))
         url = own.url if isinstance(own, NetworkPort) else own.path
         self.places[mount.name] = LinePlace(url, mount.settings.baud)
 

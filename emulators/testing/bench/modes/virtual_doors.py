@@ -158,9 +158,9 @@ class VirtualDoors:
         if isinstance(mount, BusMount):
             raise ValueError(f"{wire} is a CAN bus, not a serial line")
         if wire not in self._sides:
-            settings = mount.settings
-            device = UartSetting(settings.baud) if settings.uart else None
-            self._sides[wire] = SerialSide(self._rig, mount.line.b, device)
+            end = mount.line.b
+            device = end.uart.setting if mount.settings.uart else None
+            self._sides[wire] = SerialSide(self._rig, end, device)
         return self._sides[wire]
 
     def _bus(self, wire: str) -> BusMount:

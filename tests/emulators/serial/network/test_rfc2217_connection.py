@@ -16,6 +16,7 @@ from tickrig.emulators.serial.network import (
     READ_BYTES,
     Rfc2217Connection,
 )
+from tickrig.wire.uart import UartSetting
 
 IAC, SE, SB, WILL, WONT, DO, DONT = b"\xff", b"\xf0", b"\xfa", b"\xfb", b"\xfc", b"\xfd", b"\xfe"
 COM_PORT = b"\x2c"
@@ -31,7 +32,7 @@ class Bench:
     """A connection, and the host's end of it."""
 
     def __init__(self, ours: socket.socket, theirs: socket.socket) -> None:
-        self.connection = Rfc2217Connection(ours, BUFFER_BYTES, 115_200)
+        self.connection = Rfc2217Connection(ours, BUFFER_BYTES, UartSetting())
         self.host = theirs
 
     def exchange(self, sent: bytes) -> tuple[bytes, bytes]:
@@ -101,7 +102,7 @@ def test_what_a_host_sets_is_answered_with_what_is_set(
     bench: Bench, sent: bytes, answer: bytes, setting: str
 ) -> None:
     assert bench.exchange(sent) == (b"", answer)
-    assert bench.connection.setting == setting
+    assert str(bench.connection.setting) == setting
 
 
 @pytest.mark.parametrize(
@@ -141,7 +142,7 @@ def test_every_command_is_answered(bench: Bench, sent: bytes, answer: bytes) -> 
 def test_a_command_that_is_none_is_passed_over(bench: Bench, sent: bytes) -> None:
     assert bench.exchange(sent) == (b"", b"")
     assert not bench.connection.mistake
-    assert bench.connection.setting == "115200 8N1"
+    assert bench.connection.setting == UartSetting()
 
 
 def test_options_of_others_are_refused_and_telnet_commands_passed_over(bench: Bench) -> None:

@@ -155,7 +155,7 @@ def test_our_client_talks_at_every_place_and_comes_again(rrc: Served, door: str)
 @pytest.mark.realtime
 @pytest.mark.filterwarnings("ignore:set:DeprecationWarning")
 def test_pyserial_has_a_port_with_all_that_belongs_to_one(rrc: Served) -> None:
-    with serial_port(rrc.rfc2217, 9_600, 7, "E") as port:
+    with serial_port(rrc.rfc2217, 115_200) as port:
         assert (port.cts, port.dsr, port.ri, port.cd) == (False,) * 4
         port.dtr = port.rts = False
         port.break_condition = True
@@ -164,6 +164,19 @@ def test_pyserial_has_a_port_with_all_that_belongs_to_one(rrc: Served) -> None:
         port.reset_output_buffer()
         port.write(b"device\n")
         assert port.read_until(b"RRC\n") == b"OK:device\nRRC\n"
+
+
+@pytest.mark.realtime
+@pytest.mark.filterwarnings("ignore:set:DeprecationWarning")
+def test_a_host_of_another_setting_is_not_understood(rrc: Served) -> None:
+    with serial_port(rrc.rfc2217, 9_600, 7, "E") as port:
+        port.timeout = 0.3
+        port.write(b"device\n")
+        assert b"RRC" not in port.read_until(b"RRC\n")
+        port.timeout = PATIENCE_S
+        port.baudrate, port.bytesize, port.parity = 115_200, 8, "N"
+        port.write(b"\ndevice\n")
+        assert port.read_until(b"RRC\n").endswith(b"OK:device\nRRC\n")
 
 
 @pytest.mark.realtime
