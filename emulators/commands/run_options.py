@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
@@ -76,6 +76,13 @@ def run_options(wire_faults: str, device_faults: _Faults) -> Decorator:
         click.option("-v", "--verbose", count=True, help="Show events; -vv shows every line."),
         version_option(),
     )
+
+
+SERIAL_FAULTS: Final = (
+    "flip, drop, dup, cut, delay, jitter, split, swap, garbage, repeat, truncate, break, framing,"
+    " parity"
+)
+"""The names of `BYTE_FAULTS`, which takes time to load."""
 
 
 def line_options(wire_faults: str, inputs: str | Callable[[], Iterable[InputSignal]]) -> Decorator:

@@ -6,7 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tickrig.emulators.commands.run_options import device_options, line_options, run_named
+from tickrig.emulators.commands.run_options import (
+    SERIAL_FAULTS,
+    device_options,
+    line_options,
+    run_named,
+)
 from tickrig.emulators.rh3.fields import FIELDS
 from tickrig.host.cli.options import HarmlessCommand
 
@@ -16,7 +21,7 @@ if TYPE_CHECKING:
 
 @click.command(cls=HarmlessCommand)
 @device_options(FIELDS)
-@line_options("flip, drop, dup, cut", "tickrig.device.rh3.driver:INPUTS")
+@line_options(SERIAL_FAULTS, "tickrig.device.rh3.driver:INPUTS")
 @click.pass_context
 def main(context: click.Context, /, **options: Any) -> None:
     """Emulate the base of Reference Hardware 3, a Modbus RTU slave, on a pseudo-terminal.

@@ -15,8 +15,9 @@ from tickrig.emulators.rig.faults import FaultyPort
 from tickrig.emulators.rig.rig import Coupling, Rig
 from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.emulators.rig.station import Station
+from tickrig.emulators.serial.byte_faults import BYTE_FAULTS
 from tickrig.emulators.serial.rs485_line import Rs485Line
-from tickrig.emulators.serial.serial_line import BYTE_FAULTS, SerialLine
+from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.host.control.clock import RealClock
 from tickrig.host.rtc import Manager
 from tickrig.host.rtc.motion.chain import MotionChain

@@ -20,7 +20,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Final, Generic
+from typing import Any, ClassVar, Final, Generic
 
 from tickrig.device.chance import Chance, check_rate, threshold_of
 from tickrig.device.core import W
@@ -103,6 +103,12 @@ def _time(us: int) -> str:
 
 RATE: Final = FaultArgument(_RATE, "probability that it acts each time it could", "1")
 COUNT: Final = FaultArgument(_COUNT, "how often it acts at most", "always", low=1)
+
+_WAYS: Final = {"answer": "<", "request": ">", "both": "><"}
+WAY: Final = FaultArgument(
+    "way", "what the device sends or receives", "answer", choices=tuple(_WAYS)
+)
+"""For faults of a port that act in one direction unless somebody wants more."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -288,6 +294,12 @@ class HoldingFault(ABC, Generic[W]):
     def release(self, now_us: int) -> W | None:
         """Return what was held until now, None if nothing was."""
 
+    is_late: ClassVar[bool] = False
+    """Whether it lets go all that it takes in, so that nobody has to be told of a loss."""
+
+    def sent(self, until_us: int) -> None:
+        """Note when the line will have sent what the fault has let go last."""
+
     def pair(self, other: HoldingFault[W]) -> None:
         """Share with the fault of the other direction what both directions have in common."""
 
@@ -356,8 +368,11 @@ class FaultyPort(Copyable, Generic[W]):
         bound = bind_arguments(name, fault_type, arguments)
         tally = self._tallies[name] = FaultTally(bound.count)
         self.drawn |= bound.rate < 1
+        ways = _WAYS[bound.values.get(WAY.name, "both")]
         there, back = (
             fault_type.make(FaultTrigger(Chance(self.seed, f"{name} {way}"), bound, tally), bound)
+            if way in ways
+            else _unchanged
             for way in "><"
         )
         if isinstance(there, HoldingFault) and isinstance(back, HoldingFault):
@@ -385,18 +400,28 @@ class FaultyPort(Copyable, Generic[W]):
 
     def poll(self, now_us: int, /) -> W:
         """Take what has arrived and survived."""
-        if (held := _released(self._from_device, now_us)) is not None:
+        if (held := self._release(Mark.FROM_DEVICE, self._from_device, now_us)) is not None:
             self._port.send(now_us, held)
+            self._report_sent(now_us)
         if self._setting is not None:
             self.use_uart(now_us, self._setting)
         left = self._suffer(Mark.TO_DEVICE, self._to_device, now_us, self._port.poll(now_us))
-        late = _released(self._to_device, now_us)
+        late = self._release(Mark.TO_DEVICE, self._to_device, now_us)
         return left if late is None else late + left  # type: ignore[operator] # bytes or frames
 
     def send(self, now_us: int, traffic: W, /) -> None:
         """Send what the faults leave of one tick's traffic."""
         left = self._suffer(Mark.FROM_DEVICE, self._from_device, now_us, traffic)
         self._port.send(now_us, left)
+        if left and self._from_device:
+            self._report_sent(now_us)
+
+    def _report_sent(self, now_us: int) -> None:
+        """Tell the faults that hold traffic when the line will have sent what they let go."""
+        sent_us: int = getattr(self._port, "sent_us", NEVER)
+        for fault in self._from_device.values():
+            if isinstance(fault, HoldingFault):
+                fault.sent(now_us if sent_us == NEVER else sent_us)
 
     def use_uart(self, now_us: int, setting: UartSetting) -> None:
         """Change the setting of the device, behind what faults hold of what it has sent.
@@ -416,24 +441,39 @@ class FaultyPort(Copyable, Generic[W]):
     def _suffer(self, mark: Mark, faults: Mapping[str, Fault[W]], now_us: int, traffic: W) -> W:
         if not (faults and traffic):
             return traffic
-        left = traffic
+        left = told = traffic
         for fault in faults.values():
             if left:
                 left = fault(now_us, left)
+                if not _is_late(fault):
+                    told = left
+        self._notify(now_us, mark, traffic, told)
+        return left
+
+    def _release(self, mark: Mark, faults: Mapping[str, Fault[W]], now_us: int) -> W | None:
+        """Return what faults let go now; it meets those behind them as well."""
+        released: W | None = None
+        for fault in faults.values():
+            if released:
+                before, released = released, fault(now_us, released)
+                if not _is_late(fault):
+                    self._notify(now_us, mark, before, released)
+            if isinstance(fault, HoldingFault) and fault.due_us <= now_us:
+                held = fault.release(now_us)
+                if held is not None:
+                    released = held if released is None else released + held
+        return released
+
+    def _notify(self, now_us: int, mark: Mark, traffic: W, left: W) -> None:
         if left != traffic:
             for hear in self.listeners:
                 hear(now_us, mark, traffic, left)
-        return left
 
 
-def _released(faults: Mapping[str, Fault[W]], now_us: int) -> W | None:
-    """Return what faults let go now; it meets those behind them as well."""
-    released: W | None = None
-    for fault in faults.values():
-        if released:
-            released = fault(now_us, released)
-        if isinstance(fault, HoldingFault) and fault.due_us <= now_us:
-            held = fault.release(now_us)
-            if held is not None:
-                released = held if released is None else released + held
-    return released
+def _unchanged(now_us: int, traffic: W) -> W:
+    """Let all pass: the direction in which a fault does not act."""
+    return traffic
+
+
+def _is_late(fault: object) -> bool:
+    return isinstance(fault, HoldingFault) and fault.is_late

@@ -6,7 +6,12 @@ from typing import Any
 
 import click
 
-from tickrig.emulators.commands.run_options import device_options, line_options, run_named
+from tickrig.emulators.commands.run_options import (
+    SERIAL_FAULTS,
+    device_options,
+    line_options,
+    run_named,
+)
 from tickrig.emulators.rrc.fields import FIELDS
 from tickrig.host.cli.options import HarmlessCommand
 
@@ -14,7 +19,7 @@ from tickrig.host.cli.options import HarmlessCommand
 @click.command(cls=HarmlessCommand)
 @device_options(FIELDS)
 @click.option("--panel", is_flag=True, help="Show an operator panel in this terminal.")
-@line_options("flip, drop, dup, cut", "tickrig.device.rrc.board:INPUTS")
+@line_options(SERIAL_FAULTS, "tickrig.device.rrc.board:INPUTS")
 @click.pass_context
 def main(context: click.Context, /, **options: Any) -> None:
     """Emulate an RRC, with the VR2 wheelchair around it, on a pseudo-terminal.

@@ -6,14 +6,19 @@ from typing import Any
 
 import click
 
-from tickrig.emulators.commands.run_options import device_options, line_options, run_named
+from tickrig.emulators.commands.run_options import (
+    SERIAL_FAULTS,
+    device_options,
+    line_options,
+    run_named,
+)
 from tickrig.emulators.rtc_lite.fields import FIELDS
 from tickrig.host.cli.options import HarmlessCommand
 
 
 @click.command(cls=HarmlessCommand)
 @device_options(FIELDS)
-@line_options("flip, drop, dup, cut, noise, ping, radio", "tickrig.device.rtc_lite.node:INPUTS")
+@line_options(f"{SERIAL_FAULTS}, noise, ping, radio", "tickrig.device.rtc_lite.node:INPUTS")
 @click.pass_context
 def main(context: click.Context, /, **options: Any) -> None:
     """Emulate a PIC with an RTC-Lite component, on a pseudo-terminal.

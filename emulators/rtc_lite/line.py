@@ -17,7 +17,7 @@ from tickrig.device.rtc_lite.server import LiteConfig
 from tickrig.emulators.record.wire_log import Splitter
 from tickrig.emulators.rig.faults import FaultArguments, FaultTrigger, FaultType, HoldingFault
 from tickrig.emulators.scenario import Send, Sender, parse_raw
-from tickrig.emulators.serial.serial_line import BYTE_FAULTS, ByteFault
+from tickrig.emulators.serial.byte_faults import BYTE_FAULTS, ByteFault
 from tickrig.host.links.link import Link
 from tickrig.host.text.byte_text import escape, unescape
 from tickrig.host.text.names import near

@@ -9,6 +9,7 @@ from tickrig.device.core import W
 from tickrig.device.twin import Copyable, Listeners, itself
 from tickrig.emulators.rig.port import ByteEnd, LineUart, Port
 from tickrig.host.text.trace import Mark
+from tickrig.wire.instant import NEVER
 from tickrig.wire.uart import UartSetting
 
 # What the hosts of a line have set their port to, where the device has something else.
@@ -237,6 +238,11 @@ class Tap(Copyable, Generic[W]):
         if traffic:
             self._hear(now_us, Mark.FROM_DEVICE, traffic)
         self._port.send(now_us, traffic)
+
+    @property
+    def sent_us(self) -> int:
+        """When the line will have sent what was sent last; `NEVER` if it has, or nobody knows."""
+        return getattr(self._port, "sent_us", NEVER)
 
     def use_uart(self, now_us: int, setting: UartSetting) -> None:
         """Change the setting of the device at the end behind."""

@@ -17,7 +17,8 @@ from tickrig.emulators.rig.port import ByteLine, Port
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.bridge import Bridge, HostEnd, Tap
-from tickrig.emulators.serial.serial_line import BYTE_FAULTS, SerialLine
+from tickrig.emulators.serial.byte_faults import BYTE_FAULTS
+from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.host.text.trace import Mark
 from tickrig.wire.instant import NEVER
 from tickrig.wire.uart import UartSetting

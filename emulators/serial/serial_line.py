@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping
 from dataclasses import dataclass
 from math import gcd
-from typing import Final
 
 from tickrig.device.twin import Copyable
-from tickrig.emulators.rig.faults import FaultArguments, FaultTrigger, FaultType
 from tickrig.emulators.rig.port import LineUart
 from tickrig.wire.instant import NEVER
 from tickrig.wire.uart import PS_PER_US, UartSetting
@@ -331,56 +328,3 @@ class _Direction:
         first, last = self._bursts[0], self._bursts[-1]
         self.first_us = first.arrival_us(first.taken + 1)
         self.last_us = last.arrival_us(len(last.data))
-
-
-# Faults of a byte line: flip, drop, dup, cut.
-
-
-@dataclass(slots=True)
-class ByteFault:
-    """A fault that hits bits or bytes by chance.
-
-    Attributes:
-        trigger: decides which ones.
-        arguments: of the fault.
-    """
-
-    trigger: FaultTrigger
-    arguments: FaultArguments
-
-
-class _Flip(ByteFault):
-    def __call__(self, now_us: int, data: bytes) -> bytes:
-        if not (hits := self.trigger.hits(8 * len(data))):
-            return data
-        turned = bytearray(data)
-        for bit in hits:
-            turned[bit >> 3] ^= 1 << (bit & 7)
-        return bytes(turned)
-
-
-class _Drop(ByteFault):
-    def __call__(self, now_us: int, data: bytes) -> bytes:
-        if not (hits := set(self.trigger.hits(len(data)))):
-            return data
-        return bytes(byte for at, byte in enumerate(data) if at not in hits)
-
-
-class _Dup(ByteFault):
-    def __call__(self, now_us: int, data: bytes) -> bytes:
-        hits = set(self.trigger.hits(len(data)))
-        return b"".join(bytes([byte]) * (1 + (at in hits)) for at, byte in enumerate(data))
-
-
-class _Cut(ByteFault):
-    def __call__(self, now_us: int, data: bytes) -> bytes:
-        self.trigger.tally.allow()
-        return b""
-
-
-BYTE_FAULTS: Final[Mapping[str, FaultType[bytes]]] = {
-    "flip": FaultType("each bit is turned over at this rate", _Flip),
-    "drop": FaultType("each byte is lost at this rate", _Drop),
-    "dup": FaultType("each byte arrives twice at this rate", _Dup),
-    "cut": FaultType("nothing passes", _Cut, rated=False),
-}

@@ -6,7 +6,6 @@ import re
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from types import MappingProxyType
 from typing import Final, NamedTuple
 
 from tickrig.device.canopen.sdo import SdoServers
@@ -127,13 +126,16 @@ def _check_device(name: str, device: object) -> None:
         )
 
 
+_NO_CONFIG: Final[Config] = {}  # a mapping proxy could not be copied with the bench
+
+
 class _Made(NamedTuple):
     """A device, what its line is like, and what a trace says of it."""
 
     device: Emulated[bytes]
     line: LineSettings
     type: str = ""
-    config: Config = MappingProxyType({})
+    config: Config = _NO_CONFIG
 
 
 def _of_type(device: Emulated[bytes] | DeviceType | str, seed: int) -> _Made:

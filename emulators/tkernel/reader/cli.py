@@ -6,14 +6,19 @@ from typing import Any
 
 import click
 
-from tickrig.emulators.commands.run_options import device_options, line_options, run_named
+from tickrig.emulators.commands.run_options import (
+    SERIAL_FAULTS,
+    device_options,
+    line_options,
+    run_named,
+)
 from tickrig.emulators.tkernel.reader.fields import FIELDS
 from tickrig.host.cli.options import HarmlessCommand
 
 
 @click.command(cls=HarmlessCommand)
 @device_options(FIELDS)
-@line_options("flip, drop, dup, cut", "tickrig.device.ucode_reader:INPUTS")
+@line_options(SERIAL_FAULTS, "tickrig.device.ucode_reader:INPUTS")
 @click.pass_context
 def main(context: click.Context, /, **options: Any) -> None:
     """Emulate an infra-red reader of ucodes on a pseudo-terminal (38400 8N1).

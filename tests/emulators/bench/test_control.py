@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from tests.emulators.lamp import Lamp
 from tickrig.emulators.bench.control import EmulatorControl
+from tickrig.emulators.serial.byte_faults import BYTE_FAULTS
 from tickrig.emulators.serial.emulator import Emulator
 from tickrig.host.control.requests import RequestDispatcher
 
@@ -28,7 +29,7 @@ def test_describe_lists_all_names(emulator: Emulator) -> None:
     }
     assert answer["groups"] == {"place": ["x_mm", "y_mm"]}
     assert answer["outputs"][1] == {"name": "count", "text": "bytes heard", "unit": "B"}
-    assert [fault["name"] for fault in answer["wire_faults"]] == ["flip", "drop", "dup", "cut"]
+    assert [fault["name"] for fault in answer["wire_faults"]] == list(BYTE_FAULTS)
 
 
 def test_get_gives_all_or_what_is_named(emulator: Emulator) -> None:

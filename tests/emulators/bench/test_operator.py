@@ -128,7 +128,7 @@ def test_clearing_a_fault_forgets_its_future(emulator: Emulator) -> None:
 @pytest.mark.parametrize(
     ("text", "error"),
     [
-        ("x", "no fault 'x'; known: flip, drop, dup, cut, dead"),
+        ("x", "no fault 'x'; known: flip, drop, dup, cut, .*parity, dead"),
         ("lamp", "no fault 'lamp'"),
         ("dead=0.1", "dead takes no argument, got 0.1$"),
         ("dead=0", "dead takes no argument, got 0; clear ends it"),

@@ -13,11 +13,12 @@ from click.testing import CliRunner
 from tests.emulators.lamp import Lamp
 from tickrig.emulators.bench.control import EmulatorControl
 from tickrig.emulators.canopen.choices import MODELS
+from tickrig.emulators.serial.byte_faults import BYTE_FAULTS
 from tickrig.emulators.serial.emulator import Emulator
 from tickrig.host.cli.start import load
 from tickrig.host.control.server import ControlServer
 
-WIRE = "flip drop dup cut"
+WIRE = " ".join(BYTE_FAULTS)
 MAINS = {
     "rrc-emu": "tickrig.emulators.rrc.cli:main",
     "rh3-emu": "tickrig.emulators.rh3.cli:main",
@@ -66,7 +67,7 @@ def lamp(tmp_path: Path) -> Iterator[Path]:
         ("set ", "place lamp key x_mm y_mm dead"),
         ("set x", "x_mm"),
         ("fault ", f"{WIRE} dead"),
-        ("fault d", "drop dup dead"),
+        ("fault d", "drop dup delay dead"),
         ("clear cu", "cut"),
         ("get ", "lamp key x_mm y_mm dead state count"),
         ("get state c", "count"),

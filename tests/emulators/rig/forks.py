@@ -19,8 +19,9 @@ from tickrig.emulators.canopen.node import Node as CanopenNode
 from tickrig.emulators.rig.faults import FaultyPort
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
+from tickrig.emulators.serial.byte_faults import BYTE_FAULTS
 from tickrig.emulators.serial.rs485_line import Rs485Line
-from tickrig.emulators.serial.serial_line import BYTE_FAULTS, SerialLine
+from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.wire.can import CanFrame
 from tickrig.wire.modbus import encode_frame
 

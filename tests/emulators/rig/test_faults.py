@@ -18,7 +18,8 @@ from tickrig.emulators.rig.faults import (
 )
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
-from tickrig.emulators.serial.serial_line import BYTE_FAULTS, SerialLine
+from tickrig.emulators.serial.byte_faults import BYTE_FAULTS
+from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.wire.instant import NEVER
 
 

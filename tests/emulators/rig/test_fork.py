@@ -52,7 +52,16 @@ def acts(sends: st.SearchStrategy[Any], faults: list[Any], names: list[str]) -> 
     return st.lists(st.one_of(things), max_size=12)
 
 
-BYTES = [("flip", "0.01"), ("drop", "0.1"), ("dup", "0.1"), ("cut",)]
+BYTES = [
+    ("flip", "0.01"),
+    ("drop", "0.1"),
+    ("dup", "0.1"),
+    ("cut",),
+    ("split", "rate=0.5"),
+    ("jitter",),
+    ("swap", "frame"),
+    ("repeat",),
+]
 FRAMES = [("corrupt", "0.2"), ("drop", "0.2"), ("duplicate", "0.2"), ("delay", "0.2"), ("short",)]
 RIGS: dict[str, tuple[Callable[[], Bench], Any]] = {
     "serial": (forks.serial, acts(line_sends, BYTES, ["power_button", "bus_noise", "rrc_power"])),

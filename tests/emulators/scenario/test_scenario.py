@@ -86,7 +86,7 @@ def test_a_scenario_is_read_into_values() -> None:
         ("1 fault flip=", "'' is not a rate"),
         ("1 fault flip=x", "'x' is not a rate"),
         ("1 fault dead@0-1", "dead@0-1 would have ended before 1"),
-        ("1 clear key", "no fault 'key'; known: flip, drop, dup, cut, dead"),
+        ("1 clear key", "no fault 'key'; known: flip, drop, dup, cut, delay"),
         ("1 watch", "no output ''; known: state, count"),
         ("1 watch state x", "no output 'x'; known: state, count"),
         ("1 expect a", "expect takes TEXT within DURATION, got 'a'"),

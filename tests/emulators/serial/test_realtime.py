@@ -187,7 +187,7 @@ def test_each_mistake_at_the_control_socket_is_one_line(tmp_path: Path) -> None:
                 "Error: --for: '1x' is not a time: write",
             ),
             (("fault", "flip=2"), "Error: flip takes a rate above 0 and up to 1"),
-            (("clear", "x"), "Error: no fault 'x'; known: flip, drop, dup, cut, bus_noise"),
+            (("clear", "x"), "Error: no fault 'x'; known: flip, drop, dup, cut, delay, "),
             (("get", "x"), 'Error: no input or output "x"; known: rrc_power'),
         ):
             result = child.ctl(*words)

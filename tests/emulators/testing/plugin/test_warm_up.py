@@ -6,7 +6,8 @@ from tests.emulators.testing.plugin.conftest import Run
 from tests.emulators.testing.plugin.test_bench_fixture import RRC
 from tickrig.emulators.can.faults import CanFaults
 from tickrig.emulators.rig.faults import FaultyPort
-from tickrig.emulators.serial.serial_line import BYTE_FAULTS, SerialLine
+from tickrig.emulators.serial.byte_faults import BYTE_FAULTS
+from tickrig.emulators.serial.serial_line import SerialLine
 
 pytest_plugins = ("pytester",)
 

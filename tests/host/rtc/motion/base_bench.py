@@ -11,8 +11,8 @@ from tickrig.emulators.rig.faults import FaultyPort
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.emulators.rig.station import Station
+from tickrig.emulators.serial.byte_faults import BYTE_FAULTS
 from tickrig.emulators.serial.rs485_line import Rs485Line
-from tickrig.emulators.serial.serial_line import BYTE_FAULTS
 from tickrig.host.links.link import Link
 from tickrig.host.rtc.motion.components.ref_hard import RefHardRh3
 from tickrig.wire.rtc_types import iis

@@ -7,7 +7,8 @@ from tickrig.emulators.rig.faults import FaultyPort
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.emulators.rig.station import Station
-from tickrig.emulators.serial.serial_line import BYTE_FAULTS, SerialLine
+from tickrig.emulators.serial.byte_faults import BYTE_FAULTS
+from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.emulators.tkernel.resolution import ResolutionService, SimSource, opener
 from tickrig.emulators.tkernel.ucode_table import EXAMPLE, parse_table
 from tickrig.host.rtc import InPort, Manager
