@@ -19,7 +19,6 @@ from tickrig.emulators.testing.bench.bench_rig import BenchRig
 from tickrig.emulators.testing.bench.modes.mode import Address
 from tickrig.emulators.testing.bench.mounts import BusMount, LineMount
 from tickrig.emulators.testing.host_clock.host_code import HostTimeError
-from tickrig.wire.uart import UartSetting
 
 if TYPE_CHECKING:
     import can
