@@ -63,28 +63,7 @@ class RrcPanel(FramedApp):
     # Textual's names, never changed: classes of the screen from so many columns and lines on.
     HORIZONTAL_BREAKPOINTS = [(0, "-tiny"), (_LEAST[0], "-small"), (_ROOMY[0], "-roomy")]  # noqa: RUF012
     VERTICAL_BREAKPOINTS = [(0, "-tiny"), (_LEAST[1], "-small"), (_ROOMY[1], "-roomy")]  # noqa: RUF012
-    CSS = """
-    #top { height: 14; }
-    #stick { width: 27; }
-    #right { width: 1fr; }
-    #outputs { height: 8; }
-    #controls { height: 6; }
-    #wire { height: 1fr; }
-    .pane { border: round $primary; padding: 0 1; }
-    #status, #report { height: 1; }
-    #status { background: $boost; }
-    .-small #stick { display: none; }
-    .-small #top { height: 8; }
-    .-small #outputs { height: 5; }
-    .-small #controls { height: 3; }
-    .-small .pane { border: none; }
-    #help { display: none; padding: 0 1; }
-    .-helps #panel { display: none; }
-    .-helps #help { display: block; }
-    #tiny { display: none; }
-    .-tiny #panel, .-tiny #help, .-tiny #keys { display: none; }
-    .-tiny #tiny { display: block; }
-    """
+    CSS_PATH = "panel.tcss"
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("up", "stick(1,0)", "forward", show=False, priority=True),
         Binding("down", "stick(-1,0)", "back", show=False, priority=True),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Final
 
 from tickrig.host.rtc.ucode.contents_interpretation import parse_contents
@@ -20,22 +21,7 @@ from tickrig.host.text.section import (
 )
 from tickrig.wire.ucode import parse_ucode
 
-EXAMPLE: Final = """\
-[ucodes]                                # 32 hex digits = a name below, or "http://..."
-00001C00000000000001000000000001 = "door"
-00001C00000000000001000000000002 = "lift"
-
-[contents.door]                         # x_m and y_m in metres; all else are properties
-x_m = 1.0
-y_m = 0.0
-name = "door of room 1"
-
-[contents.lift]
-x_m = 4.0
-y_m = 2.5
-name = "lift"
-floor = 2
-"""
+EXAMPLE: Final = Path(__file__).with_name("example.toml").read_text("utf-8")
 
 
 @dataclass(frozen=True, slots=True)

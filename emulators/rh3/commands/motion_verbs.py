@@ -38,35 +38,9 @@ if TYPE_CHECKING:
 
 # Topics of ROS 2 for a cart, where no table names others.
 
-_TOPICS: Final = """
-[[topic]]
-port = "RefHardRh30.InTargetVelocity"
-topic = "cmd_vel"
-type = "geometry_msgs/msg/Twist"
+_TOPICS: Final = Path(__file__).with_name("topics.toml").read_text("utf-8")
 
-[[topic]]
-port = "Odometry0.OdometryPosition"
-topic = "odom"
-type = "nav_msgs/msg/Odometry"
-
-[[topic]]
-port = "Odometry0.OdometryPosition"
-topic = "tf"
-type = "tf2_msgs/msg/TFMessage"
-
-[[topic]]
-port = "RefHardRh30.OutWheelAngle"
-topic = "joint_states"
-type = "sensor_msgs/msg/JointState"
-joints = ["left_wheel", "right_wheel"]
-"""
-
-_SCAN: Final = """
-[[topic]]
-port = "LRFCapture_URG0.ranges"
-topic = "scan"
-type = "sensor_msgs/msg/LaserScan"
-"""
+_SCAN: Final = Path(__file__).with_name("scan_topic.toml").read_text("utf-8")
 """With a range finder."""
 
 

@@ -225,7 +225,7 @@ def _bind_object(search: _Search, wanted: WantedObject) -> None:
         return
     for entry in sorted(safe, key=lambda entry: _order(wanted, entry)):
         value = search.reader.read(entry) if entry.readable else None
-        if (value is not None or not entry.readable) and wanted.suits(value or b""):
+        if (value is not None or not entry.readable) and len(value or b"") in wanted.lengths:
             search.bound[wanted.name] = BoundObject(entry, value)
             return
     first = f"{safe[0].index:04X}h:{safe[0].sub:02X}"

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import string
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Final
 
 from tickrig.host.rtc.canopen.builder.profile_file import c_name, snake_name
@@ -32,85 +34,25 @@ _C_TYPES: Final = {
 NODE_ID: Final = 0x80
 """Bit of `access` beside those of `Access`: the node-ID is added to the default."""
 
-_HEAD: Final = """\
-/* {type_name} {version}: object dictionary of a DeviceRTC, written by rtc-canopen-builder.
- *
- * Define {upper}_OD_DEFINE in one C file before this header; the table is put there.
- */
-#ifndef {upper}_OD_H
-#define {upper}_OD_H
-
-#include <stddef.h>
-#include <stdint.h>
-
-#ifdef __cplusplus
-extern "C" {{
-#endif
-
-#define {upper}_RATE_HZ {rate_hz}u
-#define {upper}_OD_COUNT {count}u
-#define {upper}_NO_PORT 0xFFFFu
-#define {upper}_TEXT {text}u /* characters of a text port; a 0 follows them */
-
-/* Bits of `access`. */
-#define {upper}_READ 0x01u
-#define {upper}_WRITE 0x02u
-#define {upper}_CONST 0x04u
-#define {upper}_TPDO 0x08u
-#define {upper}_RPDO 0x10u
-#define {upper}_NODE_ID 0x80u /* the node-ID is added to the default */
-
-/* What a callback returns (OMG RTC, ReturnCode_t); anything but 0 leads to Error. */
-typedef enum {{ {upper}_RTC_OK = 0, {upper}_RTC_ERROR = 1 }} {lower}_result;
-"""
-
-_ENTRY: Final = """
-typedef struct {{
-    uint16_t index;
-    uint8_t sub;
-    uint8_t data_type;  /* CiA 301; A0h is one character */
-    uint8_t access;
-    uint8_t size;       /* bytes of a number or of a wide character, 0 of a text */
-    uint16_t port;      /* offset in {lower}_ports, or {upper}_NO_PORT */
-    uint64_t number;    /* default of a number, bit by bit */
-    const char *text;   /* default of a text */
-}} {lower}_od_entry;
-
-extern {lower}_ports {lower}_values;
-extern const {lower}_od_entry {lower}_od[{upper}_OD_COUNT];
-"""
-
-_FOOT: Final = """
-#ifdef __cplusplus
-}}
-#endif
-
-#endif /* {upper}_OD_H */
-"""
+_TEMPLATE: Final = string.Template(Path(__file__).with_name("header.txt").read_text("utf-8"))
 
 
 def write_header(profile: RtcProfile) -> str:
     """Return the text of a header: ports, callbacks, and every object with its default."""
     rows = list(object_table(profile))
     lower = snake_name(profile.type_name)
-    words = {
-        "type_name": profile.type_name,
-        "version": profile.version,
-        "rate_hz": profile.rate_hz,
-        "count": len(rows),
-        "text": MAX_TEXT,
-        "lower": lower,
-        "upper": lower.upper(),
-    }
-    return "\n".join(
-        [
-            _HEAD.format(**words),
-            *_ports(profile, lower, lower.upper()),
-            _ENTRY.format(**words),
-            *_prototypes(lower),
-            *_table(profile, rows, lower),
-            _FOOT.format(**words),
-        ]
+    upper = lower.upper()
+    return _TEMPLATE.substitute(
+        type_name=profile.type_name,
+        version=profile.version,
+        rate_hz=profile.rate_hz,
+        count=len(rows),
+        text=MAX_TEXT,
+        lower=lower,
+        upper=upper,
+        ports="\n".join(_ports(profile, lower, upper)),
+        prototypes="\n".join(_prototypes(lower)),
+        table="\n".join(_table(profile, rows, lower)),
     )
 
 

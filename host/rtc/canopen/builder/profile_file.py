@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import Enum
+from pathlib import Path
 from typing import Any, Final, TypeVar
 
 from tickrig.wire.rtc_canopen import (
@@ -85,27 +86,7 @@ def check_identifiers(type_name: str, ports: Iterable[str]) -> None:
 _Table = Mapping[str, Any]
 E = TypeVar("E", bound=Enum)
 
-EXAMPLE: Final = """\
-# A DeviceRTC: rtc-canopen-builder gripper.toml --out build
-name = "Gripper"
-version = "1.0"
-vendor = "tickrig"
-category = "actuator"
-rate_hz = 100           # on_execute, error_check and on_error
-node_id = 16            # in the System Definition; 1..127
-
-[[port]]                # objects from 2100h up in this order, each port in a PDO of its own;
-                        # texts, and what is wider than 64 bits, are read and written by SDO
-name = "target_um"
-direction = "in"
-type = "Short"          # Table 4: Boolean, Octet, Character, Short, UnsignedShort, Float, ...
-
-[[port]]
-name = "forces_mn"
-direction = "out"
-type = "Short"
-length = 3              # more than 1: a sequence
-"""
+EXAMPLE: Final = Path(__file__).with_name("example.toml").read_text("utf-8")
 
 _TEXTS: Final = ("version", "vendor", "category")
 _NUMBERS: Final = ("rate_hz", "product_code")

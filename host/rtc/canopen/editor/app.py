@@ -92,17 +92,7 @@ class SystemEditor(FramedApp):
     """
 
     TITLE = "RTC-CANopen System Editor"
-    CSS = """
-    SystemPane, ObjectsPane, #events { border: round $secondary; }
-    SystemPane:focus, ObjectsPane:focus, #events:focus { border: round $accent; }
-    #panes, SystemPane { height: 1fr; }
-    ObjectsPane { height: 1fr; }
-    .-wide #panes { layout: horizontal; }
-    .-wide SystemPane { width: 2fr; min-width: 56; }
-    .-wide ObjectsPane { width: 3fr; }
-    #events { height: 7; }
-    #status { height: 1; background: $boost; }
-    """
+    CSS_PATH = "editor.tcss"
     HORIZONTAL_BREAKPOINTS: ClassVar[list[tuple[int, str]] | None] = [  # type: ignore[misc]
         (0, "-narrow"),
         (130, "-wide"),

@@ -10,6 +10,7 @@ import re
 import time
 from collections.abc import Callable
 from functools import cache
+from pathlib import Path
 from typing import Any, Final
 
 from tickrig.wire.rtc_types.rtc import Time
@@ -61,57 +62,13 @@ class Stamps:
         return Time.from_us(max(0, at_us))
 
 
-_HEADER: Final = "std_msgs/Header header"
-_MULTI_ARRAY: Final = "std_msgs/MultiArrayLayout layout; {}[] data"
+def _read_fields(text: str) -> dict[str, str]:
+    lines = (line.partition(": ") for line in text.splitlines() if not line.startswith("#"))
+    return {name: fields for name, _, fields in lines}
 
-_FIELDS: Final = {
-    "builtin_interfaces/msg/Time": "int32 sec; uint32 nanosec",
-    "diagnostic_msgs/msg/DiagnosticArray": f"{_HEADER}; diagnostic_msgs/DiagnosticStatus[] status",
-    "diagnostic_msgs/msg/DiagnosticStatus": "uint8 level; string name; string message;"
-    " string hardware_id; diagnostic_msgs/KeyValue[] values",
-    "diagnostic_msgs/msg/KeyValue": "string key; string value",
-    "geometry_msgs/msg/Point": "float64 x; float64 y; float64 z",
-    "geometry_msgs/msg/Pose": "geometry_msgs/Point position; geometry_msgs/Quaternion orientation",
-    "geometry_msgs/msg/PoseStamped": f"{_HEADER}; geometry_msgs/Pose pose",
-    "geometry_msgs/msg/PoseWithCovariance": "geometry_msgs/Pose pose; float64[36] covariance",
-    "geometry_msgs/msg/Quaternion": "float64 x; float64 y; float64 z; float64 w",
-    "geometry_msgs/msg/Transform": "geometry_msgs/Vector3 translation;"
-    " geometry_msgs/Quaternion rotation",
-    "geometry_msgs/msg/TransformStamped": f"{_HEADER}; string child_frame_id;"
-    " geometry_msgs/Transform transform",
-    "geometry_msgs/msg/Twist": "geometry_msgs/Vector3 linear; geometry_msgs/Vector3 angular",
-    "geometry_msgs/msg/TwistStamped": f"{_HEADER}; geometry_msgs/Twist twist",
-    "geometry_msgs/msg/TwistWithCovariance": "geometry_msgs/Twist twist; float64[36] covariance",
-    "geometry_msgs/msg/Vector3": "float64 x; float64 y; float64 z",
-    "nav_msgs/msg/Odometry": f"{_HEADER}; string child_frame_id;"
-    " geometry_msgs/PoseWithCovariance pose; geometry_msgs/TwistWithCovariance twist",
-    "sensor_msgs/msg/JointState": f"{_HEADER}; string[] name; float64[] position;"
-    " float64[] velocity; float64[] effort",
-    "sensor_msgs/msg/LaserScan": f"{_HEADER}; float32 angle_min; float32 angle_max;"
-    " float32 angle_increment; float32 time_increment; float32 scan_time; float32 range_min;"
-    " float32 range_max; float32[] ranges; float32[] intensities",
-    "std_msgs/msg/Bool": "bool data",
-    "std_msgs/msg/Float32": "float32 data",
-    "std_msgs/msg/Float32MultiArray": _MULTI_ARRAY.format("float32"),
-    "std_msgs/msg/Float64": "float64 data",
-    "std_msgs/msg/Float64MultiArray": _MULTI_ARRAY.format("float64"),
-    "std_msgs/msg/Header": "builtin_interfaces/Time stamp; string frame_id",
-    "std_msgs/msg/Int16": "int16 data",
-    "std_msgs/msg/Int16MultiArray": _MULTI_ARRAY.format("int16"),
-    "std_msgs/msg/Int32": "int32 data",
-    "std_msgs/msg/Int32MultiArray": _MULTI_ARRAY.format("int32"),
-    "std_msgs/msg/MultiArrayDimension": "string label; uint32 size; uint32 stride",
-    "std_msgs/msg/MultiArrayLayout": "std_msgs/MultiArrayDimension[] dim; uint32 data_offset",
-    "std_msgs/msg/String": "string data",
-    "std_msgs/msg/UInt16": "uint16 data",
-    "std_msgs/msg/UInt16MultiArray": _MULTI_ARRAY.format("uint16"),
-    "std_msgs/msg/UInt32": "uint32 data",
-    "std_msgs/msg/UInt32MultiArray": _MULTI_ARRAY.format("uint32"),
-    "std_msgs/msg/UInt8": "uint8 data",
-    "std_msgs/msg/UInt8MultiArray": _MULTI_ARRAY.format("uint8"),
-    "tf2_msgs/msg/TFMessage": "geometry_msgs/TransformStamped[] transforms",
-}
-"""Fields by message, as its .msg file has them (common_interfaces 5.5.1, geometry2)."""
+
+_FIELDS: Final = _read_fields(Path(__file__).with_name("messages.txt").read_text("utf-8"))
+"""Fields by message."""
 
 _PYTHON: Final[dict[str, Any]] = {"bool": bool, "string": str}
 _FIELD: Final = re.compile(r"([\w/]+)(?:(\[)(\d*)\])? (\w+)")
