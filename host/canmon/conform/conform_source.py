@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from tickrig._lazy import LazyModule
 from tickrig.host.canmon.sources.source import BusSpec, FileSpec, LineSpec, parse_source
 from tickrig.host.canopen.conform.check import Stimulus
 from tickrig.host.cli.can_options import BusOptions
@@ -16,10 +17,15 @@ from tickrig.host.cli.messages import Refused, SourceFailed, refuse_path, say
 from tickrig.host.links.link import LinkClosed
 
 if TYPE_CHECKING:
+    from tickrig.host.canmon.sources import bus_source
     from tickrig.host.canopen.conform.binding.capabilities import NodeDescription
     from tickrig.host.canopen.conform.conform_run import ConformRun
-    from tickrig.host.links.can_link import CanLink
+    from tickrig.host.links import can_link, echo
     from tickrig.host.links.link import StampedLink
+else:  # python-can is slow; slow; with it
+    bus_source = LazyModule("tickrig.host.canmon.sources.bus_source")
+    can_link = LazyModule("tickrig.host.links.can_link")
+    echo = LazyModule("tickrig.host.links.echo")
 
 RIG_FILE: Final = ".toml"
 
@@ -135,20 +141,16 @@ def _open_rig(path: Path, node_id: int | None) -> ConformSource:
 
 
 def _open_bus(spec: BusSpec, options: BusOptions) -> ConformSource:
-    from tickrig.host.canmon.sources import bus_source  # noqa: PLC0415 - python-can is slow
-    from tickrig.host.links.can_link import CanLink, close_bus  # noqa: PLC0415 - slow
-    from tickrig.host.links.echo import free_of_echo  # noqa: PLC0415 - with it
-
     given = bus_source.merged(spec, options)
     bus, interface, name = bus_source.open_bus(given)
     try:
-        link = CanLink(bus, name)
+        link = can_link.CanLink(bus, name)
     except LinkClosed as error:
-        close_bus(bus)
+        can_link.close_bus(bus)
         raise SourceFailed(str(error)) from None
     link.reads.on_fault = say
     return ConformSource(
-        free_of_echo(link, interface),
+        echo.free_of_echo(link, interface),
         name,
         interface,
         given.bitrate,
@@ -166,7 +168,7 @@ def _is_local(interface: str, channel: object) -> bool:
     return interface == "socketcan" and net.exists() and not (net / "device").exists()
 
 
-def _watch_errors(link: CanLink, node_id: int, run: ConformRun) -> None:
+def _watch_errors(link: can_link.CanLink, node_id: int, run: ConformRun) -> None:
     def disturb(text: str) -> None:
         say(text)
         run.disturb("the driver could not read a frame")

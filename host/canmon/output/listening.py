@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Final, ParamSpec, Self, TypeVar
 
 import click
 
+from tickrig._lazy import LazyModule
 from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.traffic import BitRates
 from tickrig.host.canmon.sources.opening import BlockLog
@@ -28,9 +29,12 @@ from tickrig.host.text.page_text import in_cells
 from tickrig.host.text.values import counted
 
 if TYPE_CHECKING:
+    from tickrig.host.canmon.model.columns import column_traffic
     from tickrig.host.canmon.model.columns.columns import Columns
     from tickrig.host.canmon.model.frames import AnyRecord, LineRecord
     from tickrig.host.canmon.model.traffic import TrafficSnapshot
+else:  # numpy
+    column_traffic = LazyModule("tickrig.host.canmon.model.columns.column_traffic")
 
 
 # A terminal that is painted line by line: only lines that changed are written.
@@ -363,9 +367,7 @@ def count_blocks(log: BlockLog | None) -> TrafficSnapshot | None:
     """Return the statistics of a log; None where it is to be read frame by frame."""
     if log is None:
         return None
-    from tickrig.host.canmon.model.columns.column_traffic import ColumnTraffic  # noqa: PLC0415 - numpy
-
-    traffic = ColumnTraffic()
+    traffic = column_traffic.ColumnTraffic()
     return traffic.snapshot() if take_blocks(log, traffic.take) else None
 
 

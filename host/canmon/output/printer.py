@@ -8,7 +8,8 @@ from enum import StrEnum
 from math import isfinite
 from typing import TYPE_CHECKING, Final, assert_never
 
-from tickrig.host.canmon.model.frames import DumpLines, Record, decoded_text
+from tickrig._lazy import LazyModule
+from tickrig.host.canmon.model.frames import DumpLines, Record, decoded_text, line_text
 from tickrig.host.canmon.model.logs.log_writer import comment, log_line
 from tickrig.host.canmon.model.logs.mark import Mark, dropped
 from tickrig.host.canmon.model.logs.notation import DUMP_HEADER, drop_line, json_line, line_json
@@ -17,12 +18,19 @@ from tickrig.host.text.page_text import json_text, one_line
 from tickrig.wire.can import CanFrame, ErrorFrame
 
 if TYPE_CHECKING:
-    from tickrig.host.canmon.model.columns.columns import Columns
+    from tickrig.host.canmon.model.columns import column_meanings, column_text
+    from tickrig.host.canmon.model.columns import columns as column_blocks
+    from tickrig.host.canmon.model.decode import filter_terms, services
     from tickrig.host.canmon.model.decode.decoded import Decoded
     from tickrig.host.canmon.model.decode.decoder import Decoder
     from tickrig.host.canmon.model.decode.filter import Filter
-    from tickrig.host.canmon.model.decode.filter_terms import MissingSignals
     from tickrig.host.canmon.model.frames import AnyRecord
+else:  # slow; seldom wanted; numpy
+    column_meanings = LazyModule("tickrig.host.canmon.model.columns.column_meanings")
+    column_text = LazyModule("tickrig.host.canmon.model.columns.column_text")
+    column_blocks = LazyModule("tickrig.host.canmon.model.columns.columns")
+    filter_terms = LazyModule("tickrig.host.canmon.model.decode.filter_terms")
+    services = LazyModule("tickrig.host.canmon.model.decode.services")
 
 
 # What frames mean, and which of them are wanted.
@@ -41,11 +49,9 @@ class FilteredDecoder:
 
     def __init__(self, decoder: Decoder | None, wanted: Filter | None) -> None:
         self._decoder, self._wanted = decoder, wanted
-        self._missing: MissingSignals | None = None
+        self._missing: filter_terms.MissingSignals | None = None
         if wanted is not None and (wanted.signals or wanted.words):
-            from tickrig.host.canmon.model.decode.filter_terms import MissingSignals  # noqa: PLC0415 - slow
-
-            self._missing = MissingSignals(wanted.signals, wanted.words)
+            self._missing = filter_terms.MissingSignals(wanted.signals, wanted.words)
 
     def take(self, records: Sequence[AnyRecord]) -> Iterator[DecodedFrame]:
         """Pass on what is wanted; all frames are decoded, for the decoder learns from each."""
@@ -114,9 +120,7 @@ def _writer(output: DumpFormat, lines: DumpLines) -> _Printer:
 def _error_meaning(record: AnyRecord) -> Decoded | None:
     if not isinstance(record.frame, ErrorFrame):
         return None
-    from tickrig.host.canmon.model.decode.services import decode_error  # noqa: PLC0415 - seldom wanted
-
-    return decode_error(record.frame)
+    return services.decode_error(record.frame)
 
 
 def _text_printer(lines: DumpLines) -> _Printer:
@@ -126,8 +130,6 @@ def _text_printer(lines: DumpLines) -> _Printer:
         text = one_line(decoded_text(decoded))
         if isinstance(record, Record):
             return lines.line(record, text)
-        from tickrig.host.canmon.model.frames import line_text  # noqa: PLC0415 - seldom wanted
-
         return f"{lines.stamp(record.at_us)}  {line_text(record, text)}"
 
     return printed
@@ -198,26 +200,23 @@ class BlockPrinter:
     """
 
     def __init__(self, output: DumpFormat, lines: DumpLines, decoder: Decoder | None) -> None:
-        from tickrig.host.canmon.model.columns.column_text import ScreenText, fits, log_lines  # noqa: PLC0415 - numpy
-        from tickrig.host.canmon.model.columns.columns import records  # noqa: PLC0415
-
-        self._fits, self._records, self._print = fits, records, printer_of(output, lines, raw=False)
-        self._log_lines, self._screen = log_lines, ScreenText(lines)
+        self._print, self._screen = (
+            printer_of(output, lines, raw=False),
+            column_text.ScreenText(lines),
+        )
         self._output, self._meaning, self._decode = output, FilteredDecoder(decoder, None), None
         if decoder is not None:
-            from tickrig.host.canmon.model.columns.column_meanings import ColumnMeanings  # noqa: PLC0415
+            self._decode = column_meanings.ColumnMeanings(decoder).texts
 
-            self._decode = ColumnMeanings(decoder).texts
-
-    def text(self, columns: Columns) -> str:
+    def text(self, columns: column_blocks.Columns) -> str:
         """Write frames; the last line is without its end."""
         if not len(columns):
             return ""
-        if not self._fits(columns):
-            found = self._meaning.take(self._records(columns))
+        if not column_text.fits(columns):
+            found = self._meaning.take(column_blocks.records(columns))
             return "\n".join(self._print(*one) for one in found)
         if self._output is DumpFormat.LOG:
-            return self._log_lines(columns)[:-1]
+            return column_text.log_lines(columns)[:-1]
         return self._screen.text(columns, self._decode and self._decode(columns))[:-1]
 
 

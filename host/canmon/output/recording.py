@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from tickrig._lazy import LazyModule
 from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.logs.log_file import LogError, LogFormatError, log_format
 from tickrig.host.canmon.model.logs.log_writer import write_log
@@ -32,8 +33,18 @@ from tickrig.host.text.values import counted
 from tickrig.host.text.whole_file import replacing
 
 if TYPE_CHECKING:
+    from tickrig.host.canmon import extensions
+    from tickrig.host.canmon.model.check import alarms, rule_parser
+    from tickrig.host.canmon.model.check import rules as check_rules
+    from tickrig.host.canmon.model.decode import filter as filters
     from tickrig.host.canmon.model.frames import AnyRecord
     from tickrig.host.canmon.model.logs.log_writer import TextBlock
+else:  # slow
+    extensions = LazyModule("tickrig.host.canmon.extensions")
+    alarms = LazyModule("tickrig.host.canmon.model.check.alarms")
+    rule_parser = LazyModule("tickrig.host.canmon.model.check.rule_parser")
+    check_rules = LazyModule("tickrig.host.canmon.model.check.rules")
+    filters = LazyModule("tickrig.host.canmon.model.decode.filter")
 
 
 # A log file, or a recording in parts, that a verb writes.
@@ -293,26 +304,19 @@ def _read_recording_plan(path: Path, options: dict[str, Any], parts: bool = Fals
 def _trigger(word: str, bit_rate: int | None) -> Trigger:
     if word.endswith(_RULE_FILE):
         return _rules(word, bit_rate)
-    from tickrig.host.canmon.model.check.rule_parser import errors_alone  # noqa: PLC0415 - slow
-    from tickrig.host.canmon.model.decode.filter import FilterError, parse_filter, tokens_of  # noqa: PLC0415
-
-    with refusing("--trigger:", FilterError):
-        wanted = parse_filter(word)
-        matches = errors_alone(wanted.matches, tokens_of(word), wanted.signals)
+    with refusing("--trigger:", filters.FilterError):
+        wanted = filters.parse_filter(word)
+        matches = rule_parser.errors_alone(wanted.matches, filters.tokens_of(word), wanted.signals)
         return FilterTrigger(word, replace(wanted, matches=matches))
 
 
 def _rules(word: str, bit_rate: int | None) -> Trigger:
-    from tickrig.host.canmon.extensions import load_rule  # noqa: PLC0415 - slow
-    from tickrig.host.canmon.model.check.alarms import Alarms  # noqa: PLC0415
-    from tickrig.host.canmon.model.check.rules import Rules, parse_rule_file, parse_rules  # noqa: PLC0415
-
     try:
-        words = parse_rule_file(Path(word).read_text("utf-8"), load_rule)
-        rules = parse_rules(words, load_rule)
-        if rules == Rules(bit_rate=rules.bit_rate):
+        words = check_rules.parse_rule_file(Path(word).read_text("utf-8"), extensions.load_rule)
+        rules = check_rules.parse_rules(words, extensions.load_rule)
+        if rules == check_rules.Rules(bit_rate=rules.bit_rate):
             raise ValueError("it has no rule")
-        return RuleTrigger(Path(word).name, Alarms(rules, bit_rate))
+        return RuleTrigger(Path(word).name, alarms.Alarms(rules, bit_rate))
     except OSError as error:
         raise Refused(f"--trigger {word}: {error.strerror}") from error
     except ValueError as error:

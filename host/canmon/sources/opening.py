@@ -11,6 +11,7 @@ from itertools import islice, takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, cast
 
+from tickrig._lazy import LazyModule
 from tickrig.host.canmon.model.frames import Record, flagged_id
 from tickrig.host.canmon.model.logs.log_file import LogError
 from tickrig.host.canmon.model.logs.log_reader import Item, LogLines, among, read_log
@@ -22,10 +23,17 @@ from tickrig.host.links.link import LinkClosed
 from tickrig.host.links.ready import ready
 
 if TYPE_CHECKING:
+    from tickrig.host.canmon.model.columns import column_reader
+    from tickrig.host.canmon.model.columns import columns as column_blocks
     from tickrig.host.canmon.model.columns.columns import Columns
     from tickrig.host.canmon.model.frames import AnyRecord
-    from tickrig.host.canmon.sources.bus_source import OpenBus
-    from tickrig.host.canmon.sources.live_source import LiveSource, Reader
+    from tickrig.host.canmon.sources import bus_source, line_source, live_source
+else:  # numpy; threads; python-can is slow; pyserial
+    column_reader = LazyModule("tickrig.host.canmon.model.columns.column_reader")
+    column_blocks = LazyModule("tickrig.host.canmon.model.columns.columns")
+    bus_source = LazyModule("tickrig.host.canmon.sources.bus_source")
+    line_source = LazyModule("tickrig.host.canmon.sources.line_source")
+    live_source = LazyModule("tickrig.host.canmon.sources.live_source")
 
 
 # Log files, merged by time, and standard input as sources.
@@ -186,10 +194,8 @@ class BlockLog(source.AnySource["Columns"]):
     no_columns = False
 
     def __init__(self, path: Path) -> None:
-        from tickrig.host.canmon.model.columns.column_reader import read_columns  # noqa: PLC0415 - numpy
-
         _check_readable(path)
-        self._path, self._reader = path, read_columns(path)
+        self._path, self._reader = path, column_reader.read_columns(path)
         self._blocks = iter(self._reader)
 
     def tallies(self) -> Iterable[tuple[str, LogTally]]:
@@ -198,13 +204,11 @@ class BlockLog(source.AnySource["Columns"]):
 
     def poll(self, timeout_us: int, /) -> list[Columns]:
         """Return the next block; it never waits."""
-        from tickrig.host.canmon.model.columns.columns import NoColumnsError  # noqa: PLC0415 - numpy
-
         try:
             return [next(self._blocks)]
         except StopIteration:
             pass
-        except NoColumnsError:
+        except column_blocks.NoColumnsError:
             self.no_columns = True
         except LogError as error:
             self.failed = str(error)
@@ -225,10 +229,8 @@ class PieceLog(LoggedSource):
 
     def __init__(self, path: Path) -> None:
         super().__init__()
-        from tickrig.host.canmon.model.columns.column_reader import read_columns  # noqa: PLC0415 - numpy
-
         _check_readable(path)
-        self._path, self._reader = path, read_columns(path)
+        self._path, self._reader = path, column_reader.read_columns(path)
         self._stream = self._reader.pieces()
 
     def tallies(self) -> Iterable[tuple[str, LogTally]]:
@@ -338,7 +340,7 @@ def open_any(words: Sequence[str], options: BusOptions) -> source.AnySource[AnyR
 
 def open_live(
     buses: Sequence[source.BusSpec], lines: Sequence[source.LineSpec], options: BusOptions
-) -> tuple[LiveSource[AnyRecord], dict[str, OpenBus]]:
+) -> tuple[live_source.LiveSource[AnyRecord], dict[str, bus_source.OpenBus]]:
     """Open buses and serial ports, so that they can be opened again.
 
     Returns:
@@ -348,30 +350,30 @@ def open_live(
         Refused: options that python-can does not know.
         SourceFailed: a bus or port that cannot be opened.
     """
-    from tickrig.host.canmon.sources.live_source import LiveSource, ReopeningReader  # noqa: PLC0415 - threads
-
-    opened: dict[str, OpenBus] = {}
-    readers: list[Reader[AnyRecord]] = []
+    opened: dict[str, bus_source.OpenBus] = {}
+    readers: list[live_source.Reader[AnyRecord]] = []
     try:
         for word in buses:
-            from tickrig.host.canmon.sources import bus_source  # noqa: PLC0415 - python-can is slow
-
             bus = bus_source.OpenBus(word, options)
             opened[bus.name] = bus
-            reader: Reader[AnyRecord] = bus.reader
-            readers.append(reader if reader.stepped else ReopeningReader(reader, bus.open_again))
+            reader: live_source.Reader[AnyRecord] = bus.reader
+            readers.append(
+                reader if reader.stepped else live_source.ReopeningReader(reader, bus.open_again)
+            )
         for line in lines:
-            from tickrig.host.canmon.sources.line_source import LineReader  # noqa: PLC0415 - pyserial
-
-            reader = LineReader(line)
-            readers.append(ReopeningReader(reader, partial(LineReader, line)))
+            reader = line_source.LineReader(line)
+            readers.append(
+                live_source.ReopeningReader(reader, partial(line_source.LineReader, line))
+            )
     except BaseException as error:
         for reader in readers:
             reader.close()
         if isinstance(error, LinkClosed):
             raise SourceFailed(str(error)) from None
         raise
-    return LiveSource(readers, [*(bus.chosen for bus in buses), *(None for _ in lines)]), opened
+    return live_source.LiveSource(
+        readers, [*(bus.chosen for bus in buses), *(None for _ in lines)]
+    ), opened
 
 
 def log_path(word: str) -> Path:

@@ -12,6 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Protocol
 
+from tickrig._lazy import LazyModule
 from tickrig.host.canmon.extensions import make_decoder
 from tickrig.host.canmon.model.decode.decoded import Decoded
 from tickrig.host.canmon.model.decode.node_board import NodeBoard
@@ -31,7 +32,10 @@ from tickrig.wire.can import CanFrame, FdFrame
 from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
+    from tickrig.host.canmon.output import transmitter
     from tickrig.host.canmon.sources.bus_source import OpenBus
+else:  # python-can is slow
+    transmitter = LazyModule("tickrig.host.canmon.output.transmitter")
 
 
 # Theory of operation
@@ -321,9 +325,7 @@ def open_session(words: Sequence[str], options: BusOptions, model: Model) -> Ses
 
 def _send(bus: OpenBus, frame: CanFrame | FdFrame) -> None:
     """Send on a bus as it was opened last."""
-    from tickrig.host.canmon.output.transmitter import send_on  # noqa: PLC0415 - python-can is slow
-
-    send_on(bus.bus, bus.name, frame)
+    transmitter.send_on(bus.bus, bus.name, frame)
 
 
 def _take_pipe() -> int:

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from tickrig._lazy import LazyModule
 from tickrig.host.canmon.extensions import load_rule
 from tickrig.host.canmon.model.check.checker import DecodedCheck, Unjudged
-from tickrig.host.canmon.model.check.report import junit
+from tickrig.host.canmon.model.check.report import junit, sarif
 from tickrig.host.canmon.model.check.rule import TrafficFinding
 from tickrig.host.canmon.model.check.rules import (
     SWITCHES,
     VALUES,
-    EdsHeartbeats,
     Rules,
     RuleValues,
     joined,
@@ -37,8 +37,10 @@ from tickrig.host.text.values import counted
 from tickrig.host.text.whole_file import write_whole
 
 if TYPE_CHECKING:
-    from tickrig.host.canmon.model.check.column_check import ColumnChecker
+    from tickrig.host.canmon.model.check import column_check
     from tickrig.host.canmon.model.columns.columns import Columns
+else:  # numpy
+    column_check = LazyModule("tickrig.host.canmon.model.check.column_check")
 
 
 # What `check` finds, shown as it comes: as text, or as objects in JSON.
@@ -286,8 +288,9 @@ def command(  # noqa: PLR0913 - options
     shown = Stamp(stamp) if stamp else None
     verdict = _FindingPrinter(jsonl, shown, kept=kept, rules=rules.names())
     log = None if decoder else block_log(words)
-    made = partial(_column_checker, rules, bit_rate, heartbeats)
-    log = _in_blocks(log, made, verdict) if log else None
+    if log is not None:
+        checker = column_check.ColumnChecker(rules, bit_rate, heartbeats)
+        log = _in_blocks(log, checker, verdict)
     frames = log or open_source(words, bus)
     if reopen:
         frames.reopen()
@@ -302,7 +305,7 @@ def command(  # noqa: PLR0913 - options
     suite, why = " ".join(words), frames.failed or unjudged
     judged = suite, rules.names(), verdict.findings, why, verdict.none_judged
     _write("--junit", report_path, junit, judged)
-    _write("--sarif", sarif_path, _sarif, judged)
+    _write("--sarif", sarif_path, sarif, judged)
     said = verdict.doubts() if verdict.counts or not unjudged else []
     listening.report(
         frames, strict, [*said, verdict.summary()] if verdict.counts or not why else said
@@ -334,10 +337,9 @@ def _bit_rate(rules: Rules, words: Sequence[str], bus: BusOptions) -> int | None
 
 
 def _in_blocks(
-    log: BlockLog, make: Callable[[], ColumnChecker], verdict: _FindingPrinter
+    log: BlockLog, checker: column_check.ColumnChecker, verdict: _FindingPrinter
 ) -> BlockLog | None:
     """Judge a log; return None where it is to be read again, frame by frame."""
-    checker = make()
 
     def take(block: Columns) -> None:
         if len(block):
@@ -378,14 +380,6 @@ def _one_by_one(
     verdict.unjudged = held.unjudged(end_us, source.without_errors)
 
 
-def _column_checker(
-    rules: Rules, bit_rate: int | None, eds_heartbeats: EdsHeartbeats
-) -> ColumnChecker:
-    from tickrig.host.canmon.model.check.column_check import ColumnChecker  # noqa: PLC0415 - numpy
-
-    return ColumnChecker(rules, bit_rate, eds_heartbeats)
-
-
 _Judged = tuple[str, list[str], list[TrafficFinding], str, Mapping[str, str]]
 
 
@@ -395,9 +389,3 @@ def _write(option: str, path: Path | None, text: Callable[..., str], judged: _Ju
         return
     with refusing(option):
         write_whole(path, text(*judged))
-
-
-def _sarif(*judged: Any) -> str:
-    from tickrig.host.canmon.model.check.report import sarif  # noqa: PLC0415 - seldom wanted
-
-    return sarif(*judged)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from tickrig._lazy import LazyModule
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
 from tickrig.host.cli.messages import until_unread
 from tickrig.host.cli.options import PATH, Decorator, add_options
@@ -16,6 +17,15 @@ from tickrig.host.cli.start import loading
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
+
+    from tickrig.host.canmon import eds_document
+    from tickrig.host.canmon.conform import chosen, conformance
+    from tickrig.host.canopen.conform import suite
+else:  # slow
+    chosen = LazyModule("tickrig.host.canmon.conform.chosen")
+    conformance = LazyModule("tickrig.host.canmon.conform.conformance")
+    eds_document = LazyModule("tickrig.host.canmon.eds_document")
+    suite = LazyModule("tickrig.host.canopen.conform.suite")
 
 
 _LEVELS: Final = ("read-only", "communication", "intrusive")
@@ -45,13 +55,11 @@ def _complete_only(
     from click.shell_completion import CompletionItem  # noqa: PLC0415 - only at a TAB
 
     with loading():
-        from tickrig.host.canopen.conform.suite import read_suite  # noqa: PLC0415
-
-    names = [
-        (name, title)
-        for group in read_suite()
-        for name, title in [(group.name, group.title), *((c.id, c.title) for c in group.checks)]
-    ]
+        names = [
+            (name, title)
+            for group in suite.read_suite()
+            for name, title in [(group.name, group.title), *((c.id, c.title) for c in group.checks)]
+        ]
     return [CompletionItem(name, help=title) for name, title in names if name.startswith(begun)]
 
 
@@ -144,9 +152,7 @@ def command(context: click.Context, /, source: str | None, **options: Any) -> No
     if options["lists"]:
         _list(options["only"], options["eds"])
         return
-    from tickrig.host.canmon.conform.conformance import Conformance  # noqa: PLC0415 - slow
-
-    context.exit(Conformance(source, bus, options).run())
+    context.exit(conformance.Conformance(source, bus, options).run())
 
 
 def _level(options: dict[str, Any]) -> str:
@@ -159,11 +165,8 @@ def _level(options: dict[str, Any]) -> str:
 
 
 def _list(only: Sequence[str], eds: Path | None) -> None:
-    from tickrig.host.canmon.conform.chosen import listed_checks, patterns  # noqa: PLC0415 - slow
-    from tickrig.host.canmon.eds_document import read_device_document  # noqa: PLC0415 - slow
-
-    device = None if eds is None else read_device_document(eds, "--eds").device
-    lines = list(listed_checks(patterns(only), device))
+    device = None if eds is None else eds_document.read_device_document(eds, "--eds").device
+    lines = list(chosen.listed_checks(chosen.patterns(only), device))
     with until_unread():
         for line in lines:
             click.echo(line)

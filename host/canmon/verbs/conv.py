@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from tickrig._lazy import LazyModule
 from tickrig.host.canmon.model.recorder.plan import RecordingPlan
 from tickrig.host.canmon.output.listening import report, until_interrupted
 from tickrig.host.canmon.output.printer import DecodedFrame, FilteredDecoder
@@ -20,8 +21,13 @@ from tickrig.host.cli.options import PATH
 from tickrig.host.cli.start import INTERRUPTED
 
 if TYPE_CHECKING:
+    from tickrig.host.canmon.model.columns import column_text
+    from tickrig.host.canmon.model.columns import columns as column_blocks
     from tickrig.host.canmon.model.logs.log_writer import TextBlock
     from tickrig.host.canmon.model.logs.mark import Mark
+else:  # numpy
+    column_text = LazyModule("tickrig.host.canmon.model.columns.column_text")
+    column_blocks = LazyModule("tickrig.host.canmon.model.columns.columns")
 
 
 @click.command()
@@ -79,14 +85,13 @@ def _pass_pieces(
     take_block: Callable[[TextBlock], bool],
 ) -> None:
     """Pass a large log on, of which all frames are wanted."""
-    from tickrig.host.canmon.model.columns.column_text import ColumnText, fits  # noqa: PLC0415 - numpy
-    from tickrig.host.canmon.model.columns.columns import records  # noqa: PLC0415
-
     for piece in log.pieces():
         if isinstance(piece, Sequence):
             take([(record, None) for record in piece], log.lost, log.marks)
-        elif len(piece) and not (fits(piece) and take_block(ColumnText(piece))):
-            take([(record, None) for record in records(piece)], log.lost, log.marks)
+        elif len(piece) and not (
+            column_text.fits(piece) and take_block(column_text.ColumnText(piece))
+        ):
+            take([(record, None) for record in column_blocks.records(piece)], log.lost, log.marks)
 
 
 decode_options.explained(command)

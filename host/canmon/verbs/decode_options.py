@@ -14,14 +14,23 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from tickrig._lazy import LazyModule
 from tickrig.host.cli.can_options import BusCommand, bus_options, fd_options
 from tickrig.host.cli.messages import Refused, refusing, show_findings
 from tickrig.host.cli.options import PATH, Decorator, add_options
 
 if TYPE_CHECKING:
+    from tickrig.host.canmon import extensions
+    from tickrig.host.canmon.model.decode import dbc_file, node_memory
+    from tickrig.host.canmon.model.decode import filter as filters
     from tickrig.host.canmon.model.decode.decoder import Decoder
-    from tickrig.host.canmon.model.decode.filter import Filter
-    from tickrig.host.canmon.model.decode.node_memory import EdsObjects
+    from tickrig.wire.canopen.eds import eds_file
+else:  # slow
+    extensions = LazyModule("tickrig.host.canmon.extensions")
+    dbc_file = LazyModule("tickrig.host.canmon.model.decode.dbc_file")
+    filters = LazyModule("tickrig.host.canmon.model.decode.filter")
+    node_memory = LazyModule("tickrig.host.canmon.model.decode.node_memory")
+    eds_file = LazyModule("tickrig.wire.canopen.eds.eds_file")
 
 
 _EDS: Final = re.compile(r"(0[xX][0-9A-Fa-f]{1,2}|[0-9]{1,3})=(.+)")
@@ -49,12 +58,12 @@ filter_option: Final = click.option(
 """Add `-F`, as `wanted`; `read_filter` takes what it gives."""
 
 
-def read_eds_files(words: Sequence[str]) -> dict[int, EdsObjects]:
+def read_eds_files(words: Sequence[str]) -> dict[int, node_memory.EdsObjects]:
     """Read what `--eds` names; Refused if there is no such node or file, or it is no EDS."""
     return read_eds_paths(eds_paths(words))
 
 
-def read_eds_paths(paths: Mapping[int, Path]) -> dict[int, EdsObjects]:
+def read_eds_paths(paths: Mapping[int, Path]) -> dict[int, node_memory.EdsObjects]:
     """Read files by node-ID; Refused if one cannot be read, or is no EDS.
 
     What is wrong in a file, and not used, is told on standard error.
@@ -69,10 +78,8 @@ def make_decoder(eds: Sequence[str] = (), dbc: Sequence[Path] = ()) -> Decoder:
     return decoder_of(read_eds_files(eds), dbc)
 
 
-def decoder_of(objects: Mapping[int, EdsObjects], dbc: Sequence[Path] = ()) -> Decoder:
+def decoder_of(objects: Mapping[int, node_memory.EdsObjects], dbc: Sequence[Path] = ()) -> Decoder:
     """Make a decoder of what `--eds` names and was read, and of what `--dbc` names."""
-    from tickrig.host.canmon import extensions  # noqa: PLC0415 - slow
-
     with refusing_dbc():
         return extensions.make_decoder(objects, dbc)
 
@@ -80,9 +87,7 @@ def decoder_of(objects: Mapping[int, EdsObjects], dbc: Sequence[Path] = ()) -> D
 @contextmanager
 def refusing_dbc() -> Iterator[None]:
     """Refuse, as `--dbc` does, files that are no DBC."""
-    from tickrig.host.canmon.model.decode.dbc_file import DbcError  # noqa: PLC0415 - slow
-
-    with refusing("--dbc", DbcError):
+    with refusing("--dbc", dbc_file.DbcError):
         yield
 
 
@@ -91,14 +96,12 @@ def eds_paths(words: Sequence[str]) -> dict[int, Path]:
     return dict(map(_split, words))
 
 
-def read_filter(text: str | None) -> Filter | None:
+def read_filter(text: str | None) -> filters.Filter | None:
     """Read what `-F` says; Refused with the column if it is no filter."""
     if text is None:
         return None
-    from tickrig.host.canmon.model.decode.filter import FilterError, parse_filter  # noqa: PLC0415 - slow
-
-    with refusing("", FilterError):
-        return parse_filter(text)
+    with refusing("", filters.FilterError):
+        return filters.parse_filter(text)
 
 
 def _split(word: str) -> tuple[int, Path]:
@@ -109,12 +112,9 @@ def _split(word: str) -> tuple[int, Path]:
     return node, Path(match[2])
 
 
-def _read(node: int, path: Path) -> EdsObjects:
-    from tickrig.host.canmon.model.decode.node_memory import read_eds_objects  # noqa: PLC0415 - slow
-    from tickrig.wire.canopen.eds.eds_file import EdsError  # noqa: PLC0415
-
-    with refusing("--eds", EdsError):
-        return read_eds_objects(path, node)
+def _read(node: int, path: Path) -> node_memory.EdsObjects:
+    with refusing("--eds", eds_file.EdsError):
+        return node_memory.read_eds_objects(path, node)
 
 
 # What verbs that take SOURCE words share.

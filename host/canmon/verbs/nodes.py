@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from tickrig._lazy import LazyModule
 from tickrig.host.canmon.extensions import make_decoder
 from tickrig.host.canmon.model.decode.node_board import NodeBoard, board_json, render_board
 from tickrig.host.canmon.model.decode.node_memory import EdsObjects
@@ -19,8 +20,10 @@ from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.messages import until_unread
 
 if TYPE_CHECKING:
-    from tickrig.host.canmon.model.columns.column_meanings import ColumnNodes
+    from tickrig.host.canmon.model.columns import column_meanings
     from tickrig.host.canmon.model.columns.columns import Columns
+else:  # numpy
+    column_meanings = LazyModule("tickrig.host.canmon.model.columns.column_meanings")
 
 _MANY: Final = 1_000
 """Lines, and columns where nobody's terminal sets them."""
@@ -84,15 +87,13 @@ class _NodesView:
     def __init__(self, eds: dict[int, EdsObjects]) -> None:
         self.decoder = make_decoder(eds)
         self._board = NodeBoard(self.decoder, {node: found.name for node, found in eds.items()})
-        self._columns: ColumnNodes | None = None
+        self._columns: column_meanings.ColumnNodes | None = None
         self._watch = Stopwatch()
 
     def take_block(self, columns: Columns) -> None:
         """Take a block of a log."""
         if self._columns is None:
-            from tickrig.host.canmon.model.columns.column_meanings import ColumnNodes  # noqa: PLC0415 - numpy
-
-            self._columns = ColumnNodes(self.decoder, self._board)
+            self._columns = column_meanings.ColumnNodes(self.decoder, self._board)
         self._columns.take(columns)
 
     def take(self, records: Sequence[Record]) -> None:

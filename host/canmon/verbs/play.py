@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import click
 
+from tickrig._lazy import LazyModule
 from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.logs.log_file import LogError
 from tickrig.host.canmon.model.logs.log_reader import LogReader, read_log
@@ -25,7 +26,9 @@ from tickrig.wire.can import CanFrame, ErrorFrame, FdFrame
 from tickrig.wire.errors import FieldError, WireError
 
 if TYPE_CHECKING:
-    from tickrig.host.canmon.output.transmitter import Transmitter
+    from tickrig.host.canmon.output import transmitter
+else:  # python-can is slow
+    transmitter = LazyModule("tickrig.host.canmon.output.transmitter")
 
 
 # What of a log is sent where and when.
@@ -195,15 +198,13 @@ def command(log: str, buses: Sequence[str], step: bool, **options: Any) -> None:
     canmon play run.log vcan2=can0 vcan3=can1 --speed 2 --loop forever
     canmon play run.blf can0 --from 3s --to 9s --wait-rx 581
     """  # noqa: D301 - click wants the backspace
-    from tickrig.host.canmon.output.transmitter import transmitters  # noqa: PLC0415 - python-can is slow
-
     wait_rx = _can_id(options.pop("wait_rx"))
     words, route = _routes(buses, options["channel"])
     path = log_path(log)
     reader = read_log(path)
     plan = _plan(reader, route, options)
     receives = wait_rx is not None
-    with transmitters(words, BusOptions(**options), receives=receives) as opened:
+    with transmitter.transmitters(words, BusOptions(**options), receives=receives) as opened:
         _play(
             plan, {word or "": bus for word, bus in zip(words, opened, strict=True)}, step, wait_rx
         )
@@ -281,7 +282,10 @@ def _can_id(text: str | None) -> CanFrame | None:
 
 
 def _play(
-    plan: ReplayPlan, buses: dict[str, Transmitter], step: bool, wait_rx: CanFrame | None
+    plan: ReplayPlan,
+    buses: dict[str, transmitter.Transmitter],
+    step: bool,
+    wait_rx: CanFrame | None,
 ) -> None:
     late, pace = Lateness(), Pace()
     with until_interrupted(), until_unread():
@@ -310,7 +314,7 @@ def _due(plan: ReplayPlan) -> Iterator[_Due]:
         raise SourceFailed(str(error)) from error
 
 
-def _wait_for(wanted: CanFrame, buses: Sequence[Transmitter]) -> None:
+def _wait_for(wanted: CanFrame, buses: Sequence[transmitter.Transmitter]) -> None:
     """Return when one of the buses carried a frame with this CAN-ID."""
     while True:
         for bus in buses:

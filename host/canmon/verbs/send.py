@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from tickrig._lazy import LazyModule
 from tickrig.host.canmon.model import transmit
 from tickrig.host.canmon.output.listening import Pace, until_interrupted
 from tickrig.host.canmon.verbs.decode_options import eds_option, read_eds_files
@@ -18,7 +19,9 @@ from tickrig.wire.can import CanFrame, FdFrame, LogLine, parse_sent
 from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
-    from tickrig.host.canmon.output.transmitter import Transmitter
+    from tickrig.host.canmon.output import transmitter
+else:  # python-can is slow
+    transmitter = LazyModule("tickrig.host.canmon.output.transmitter")
 
 
 @click.command()
@@ -49,8 +52,6 @@ def command(words: Sequence[str], eds: Sequence[str], **options: Any) -> None:
     canmon send can0 080# --every 10ms --count 100
     canmon send can0 100#0000 --every 20ms --counter 0:0..14 --checksum 1:crc8
     """  # noqa: D301 - click wants the backspace
-    from tickrig.host.canmon.output.transmitter import transmitters  # noqa: PLC0415 - python-can is slow
-
     every, count, quiet = options.pop("every"), options.pop("count"), options.pop("quiet")
     fields = _fields(options.pop("counter"), options.pop("checksum"))
     bus, frames = bus_and_rest(words, options["channel"], "FRAME...")
@@ -59,7 +60,11 @@ def command(words: Sequence[str], eds: Sequence[str], **options: Any) -> None:
     made = _frames(frames, eds)
     period_us = _period_us(every, count)
     cyclic = _cyclic(made, period_us, count or (0 if every else 1), fields)
-    with transmitters([bus], BusOptions(**options)) as (out,), until_interrupted(), until_unread():
+    with (
+        transmitter.transmitters([bus], BusOptions(**options)) as (out,),
+        until_interrupted(),
+        until_unread(),
+    ):
         _run(cyclic, out, quiet)
     missed = sum(one.missed for one in cyclic)
     if missed:
@@ -106,7 +111,7 @@ def _cyclic(
         return [transmit.TransmitRow("", frame, period_us, fields, 0, count) for frame in frames]
 
 
-def _run(cyclic: Sequence[transmit.TransmitRow], out: Transmitter, quiet: bool) -> None:
+def _run(cyclic: Sequence[transmit.TransmitRow], out: transmitter.Transmitter, quiet: bool) -> None:
     pace = Pace()
     while (due_us := min(one.due_us for one in cyclic)) < NEVER:
         pace.wait_until(due_us)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from tickrig._lazy import LazyModule
 from tickrig.host.canmon.extensions import make_decoder
 from tickrig.host.canmon.model.decode.node_memory import EdsObjects
 from tickrig.host.canmon.model.frames import Record
@@ -33,7 +34,9 @@ from tickrig.host.text.steps import StepError
 from tickrig.wire.can import Frames
 
 if TYPE_CHECKING:
-    from tickrig.host.canmon.output.transmitter import Transmitter
+    from tickrig.host.canmon.output import transmitter
+else:  # python-can is slow
+    transmitter = LazyModule("tickrig.host.canmon.output.transmitter")
 
 
 class ConditionDecoder:
@@ -130,9 +133,11 @@ def _read(file: Path, words: Sequence[str], watch: ConditionDecoder) -> Steps:
 def _carry_out(
     run: SequenceRun, bus: str | None, options: BusOptions, watch: ConditionDecoder, quiet: bool
 ) -> None:
-    from tickrig.host.canmon.output.transmitter import transmitters  # noqa: PLC0415 - python-can is slow
-
-    with transmitters([bus], options, receives=True) as (out,), until_interrupted(), until_unread():
+    with (
+        transmitter.transmitters([bus], options, receives=True) as (out,),
+        until_interrupted(),
+        until_unread(),
+    ):
         pace = Pace()
         _send(out, watch, run.tick(pace.now_us))
         while not run.done:
@@ -147,7 +152,7 @@ def _carry_out(
     _show(run, quiet)
 
 
-def _send(out: Transmitter, watch: ConditionDecoder, frames: Frames) -> None:
+def _send(out: transmitter.Transmitter, watch: ConditionDecoder, frames: Frames) -> None:
     for frame in frames:
         out.send(frame)
         watch.take(Record(time.time_ns() // 1_000, out.name, frame, sent=True))

@@ -9,16 +9,23 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from tickrig._lazy import LazyModule
 from tickrig.host.canmon.output.listening import bit_rates_of, report
 from tickrig.host.canmon.verbs import decode_options
-from tickrig.host.canmon.workspace import MonitorSetup, Workspace, WorkspaceError
+from tickrig.host.canmon.workspace import MonitorSetup, PanelSettings, Workspace, WorkspaceError
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.messages import Refused, refusing, say
 from tickrig.host.cli.options import PATH
 from tickrig.host.cli.start import loading
 
 if TYPE_CHECKING:
-    from tickrig.host.canmon.tui.app import MonitorApp
+    from tickrig.host.canmon.tui import app
+    from tickrig.host.canmon.tui import session as sessions
+    from tickrig.host.canmon.tui.panels import panel
+else:  # an extra
+    app = LazyModule("tickrig.host.canmon.tui.app")
+    sessions = LazyModule("tickrig.host.canmon.tui.session")
+    panel = LazyModule("tickrig.host.canmon.tui.panels.panel")
 
 
 @decode_options.source_command(
@@ -75,31 +82,26 @@ def command(  # noqa: PLR0913 - options
     report(monitor.session.source, strict)
 
 
-def _monitor(path: Path | None, said: MonitorSetup) -> MonitorApp:
+def _monitor(path: Path | None, said: MonitorSetup) -> app.MonitorApp:
     """Make the program, its panels with the settings of the workspace."""
     try:
         with loading():
-            from tickrig.host.canmon.tui.app import MonitorApp  # noqa: PLC0415 - an extra
-            from tickrig.host.canmon.tui.panels.panel import make_panels  # noqa: PLC0415
+            make_app, make_panels = app.MonitorApp, panel.make_panels
     except ImportError as error:
         raise Refused(f"canmon tui needs Textual: pip install 'tickrig[tui]' ({error})") from None
-    from tickrig.host.canmon.tui.app import RecorderTask  # noqa: PLC0415 - slow
-    from tickrig.host.canmon.tui.session import Model, open_session  # noqa: PLC0415 - slow
-    from tickrig.host.canmon.workspace import PanelSettings  # noqa: PLC0415 - an extra
-
     with refusing("", WorkspaceError):
         workspace = Workspace() if path is None else Workspace.read(path)
         setup = MonitorSetup.read(workspace).under(said)
         objects = decode_options.read_eds_paths(setup.eds)
         with decode_options.refusing_dbc():
-            model = Model(objects, setup.dbc, *bit_rates_of(setup.source, setup.options))
-        session = open_session(setup.source, setup.options, model)
+            model = sessions.Model(objects, setup.dbc, *bit_rates_of(setup.source, setup.options))
+        session = sessions.open_session(setup.source, setup.options, model)
         try:
             panels = make_panels(session, say)
-            recorder = RecorderTask(session)
+            recorder = app.RecorderTask(session)
             panel_settings = PanelSettings(workspace, setup, [*panels, recorder])
             panel_settings.load()
         except BaseException:
             session.source.close()
             raise
-    return MonitorApp(session, panels, panel_settings, recorder)
+    return make_app(session, panels, panel_settings, recorder)
