@@ -17,10 +17,7 @@ _VERBS: Final = {
     "top": (f"{_HERE}.top:command", "Show all identifiers: counts, rates, gaps, jitter."),
     "stats": (f"{_HERE}.stats:command", "Count a log: rates, gaps, jitter, missed cycles."),
     "check": (f"{_HERE}.check:command", "Hold traffic against rules."),
-    "conform": (
-        f"{_HERE}.conform:command",
-        "Judge one CANopen node, clause by clause.",
-    ),
+    "conform": (f"{_HERE}.conform:command", "Judge one CANopen node, clause by clause."),
     "eds": ("tickrig.host.canmon.eds.group:command", "Check, mend, compare and show EDS files."),
     "net": ("tickrig.host.canmon.net.group:command", "Set a CANopen network to work."),
     "gateway": (

@@ -355,15 +355,12 @@ class Kept(Protocol):
     @property
     def section(self) -> str:
         """Its table."""
-        ...
 
     def load(self, settings: Mapping[str, Any], /) -> None:
         """Take settings; SettingError if one is wrong."""
-        ...
 
     def save(self) -> dict[str, Any]:
         """Return all its settings."""
-        ...
 
 
 class PanelSettings:

@@ -58,10 +58,7 @@ class PageTemplate:
     def render(self, **values: Any) -> str:
         """Return the page of these values; the same values give the same bytes."""
         return self._template.render(
-            style=Markup(self._style),
-            script=Markup(self._script),
-            policy=self._policy(),
-            **values,
+            style=Markup(self._style), script=Markup(self._script), policy=self._policy(), **values
         )
 
     def _policy(self) -> str:

@@ -445,11 +445,7 @@ def _steps(
 
 
 def _write_all(
-    session: NetSession,
-    objects: node_objects.NamedObjects,
-    steps: Sequence[Write],
-    *,
-    store: bool,
+    session: NetSession, objects: node_objects.NamedObjects, steps: Sequence[Write], *, store: bool
 ) -> None:
     titles = [
         f"{objects.title(at)} = {node_objects.shown(objects, at, data)}" for at, data in steps

@@ -48,18 +48,15 @@ class Reader(Protocol[Read_co]):
     @property
     def lost(self) -> int:
         """Frames that its driver says it dropped."""
-        ...
 
     def read(self, timeout_us: int, /) -> Sequence[Read_co | Mark]:
         """Wait for a first frame; LinkClosed if the bus is gone.
 
         A mark in front of all that it returns says that the bus went away or is back.
         """
-        ...
 
     def close(self) -> None:
         """Close the bus."""
-        ...
 
 
 class LiveSource(AnySource[Item]):

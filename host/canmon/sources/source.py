@@ -65,7 +65,6 @@ class AnySource(Generic[Taken_co]):
 
     def reopen(self) -> None:
         """Open buses again that go away; what has an end is left alone."""
-        return
 
     def tallies(self) -> Iterable[tuple[str, LogTally]]:
         """Return what was no frame, by the name of each bus or file."""

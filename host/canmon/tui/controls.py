@@ -112,9 +112,7 @@ class PromptLine(Vertical):
     PromptLine #wrong { display: none; color: $error; }
     PromptLine Input { height: 1; border: none; }
     """
-    BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("escape", "leave", "leave", show=False),
-    ]
+    BINDINGS: ClassVar[list[BindingType]] = [Binding("escape", "leave", "leave", show=False)]
 
     def __init__(self) -> None:
         super().__init__(id="ask")

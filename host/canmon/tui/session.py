@@ -153,7 +153,6 @@ class Task(Protocol):
             now_us: the session's time, not that of the frames.
             records: frames since the last call.
         """
-        ...
 
     def stop(self) -> None:
         """Send no more: the operator has disarmed."""

@@ -116,11 +116,7 @@ _ending: Final = add_options(
 
 
 @decode_options.source_command(
-    _shown,
-    recording_options,
-    decode_options.filter_option,
-    decode_options.decode_options,
-    _ending,
+    _shown, recording_options, decode_options.filter_option, decode_options.decode_options, _ending
 )
 def command(  # noqa: PLR0913 - options
     *,

@@ -125,11 +125,7 @@ SIZE: Final = (100, 28)
 @time_option("--at", "at_us", help="Read out the values there.")
 @click.option("--range", "ranges", multiple=True, metavar="AXIS=LOW..HIGH", help="As 1=-5..5.")
 @click.option(
-    "--size",
-    metavar="WxH",
-    default="960x400",
-    callback=_size,
-    help="Of a picture; 960x400 pixels.",
+    "--size", metavar="WxH", default="960x400", callback=_size, help="Of a picture; 960x400 pixels."
 )
 @time_option("--window", "window_us", default="10s", help="Shown of a bus; 10s.")
 @span_option

@@ -57,10 +57,7 @@ class ColumnChecker:
     """
 
     def __init__(
-        self,
-        rules: Rules,
-        bit_rate: int | None = None,
-        eds_heartbeats: EdsHeartbeats = NO_EDS,
+        self, rules: Rules, bit_rate: int | None = None, eds_heartbeats: EdsHeartbeats = NO_EDS
     ) -> None:
         self._rules, self._made = rules, rules.make(eds_heartbeats)
         self._limit = rules.load(bit_rate)
@@ -137,11 +134,7 @@ class ColumnChecker:
         rows, selected = rows[order], select(columns, rows[order])
         idents = np.where(selected.ident & ERROR, ERROR, selected.ident)
         seen = zip(
-            rows.tolist(),
-            idents.tolist(),
-            gaps_us[order].tolist(),
-            records(selected),
-            strict=True,
+            rows.tolist(), idents.tolist(), gaps_us[order].tolist(), records(selected), strict=True
         )
         for row, ident, gap_us, record in seen:
             wanting = self._wanting.get(ident)

@@ -23,12 +23,10 @@ class Judged(Protocol):
     @property
     def rule(self) -> str:
         """Name of the rule."""
-        ...
 
     @property
     def text(self) -> str:
         """What is wrong, in words."""
-        ...
 
 
 def junit(

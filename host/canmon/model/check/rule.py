@@ -179,7 +179,6 @@ class Rule:
 
     def begin(self, at_us: int, /) -> None:
         """Take the time of the first frame of all, before any is judged."""
-        return
 
     def unjudged(self, evidence: CheckedTraffic, /) -> str:
         """Say why it has judged nothing, so that nobody takes it for one that holds.

@@ -480,7 +480,4 @@ def parse_rule(text: str, name: str = "") -> Expression:
         raise RuleError(text, 1, f"nodes {said}: a rule that is made for each node names one range")
     first, _, last = next(iter(ranges)).partition("-")
     nodes = range(int(first), int(last) + 1)
-    return Expression(
-        name,
-        tuple(_NODES.sub(rf"\g<1>\g<2>{node}", text) for node in nodes),
-    )
+    return Expression(name, tuple(_NODES.sub(rf"\g<1>\g<2>{node}", text) for node in nodes))

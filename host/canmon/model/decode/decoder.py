@@ -26,7 +26,6 @@ class FrameDecoder(Protocol):
 
     def decode(self, record: Record) -> Decoded | None:
         """Return what a frame says; None for a frame of others."""
-        ...
 
 
 class Decoder:

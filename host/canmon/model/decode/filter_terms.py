@@ -68,11 +68,7 @@ RANGES: Final = {
     "bytes": range(MAX_FD_BYTES + 1),
 }
 """What the numbers of `FIELDS` can be."""
-KNOWN_WORDS: Final = {
-    "kind": (*KINDS, "fd"),
-    "dir": ("rx", "tx"),
-    "src": (EDS, SEEN, DBC),
-}
+KNOWN_WORDS: Final = {"kind": (*KINDS, "fd"), "dir": ("rx", "tx"), "src": (EDS, SEEN, DBC)}
 """What the words of `WORDS` can be, beside PDOs by their numbers."""
 FREE: Final = ("kind", "src")
 """Decoders of installed packages may say others."""

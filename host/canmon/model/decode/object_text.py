@@ -157,10 +157,7 @@ _ROWS: Final = [
 _ARRAYS: Final = {at: (name[:-2], kind) for at, name, kind in _ROWS if name.endswith("[]")}
 _VARIABLES: Final = {at: (name, kind) for at, name, kind in _ROWS if at not in _ARRAYS}
 _RECORDS: Final[dict[int, tuple[str, tuple[tuple[str, DataType], ...]]]] = {
-    0x1018: (
-        "identity",
-        (("vendor", U32), ("product", U32), ("revision", U32), ("serial", U32)),
-    ),
+    0x1018: ("identity", (("vendor", U32), ("product", U32), ("revision", U32), ("serial", U32)))
 }
 _SDO: Final = (("request_cob_id", U32), ("response_cob_id", U32), ("node_id", U8))
 _PDO: Final = (

@@ -124,12 +124,7 @@ _LEAST_HEIGHT: Final = 6
 
 
 def render(
-    series: Sequence[Series],
-    view: View,
-    width: int,
-    height: int,
-    *,
-    colour: bool = False,
+    series: Sequence[Series], view: View, width: int, height: int, *, colour: bool = False
 ) -> list[str]:
     """Return the picture as lines, as many as it is high and none longer than it is wide.
 

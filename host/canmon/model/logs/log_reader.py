@@ -486,7 +486,6 @@ class LogReader(Protocol):
 
     def items(self) -> Iterator[Item]:
         """Read the file, with the marks among its frames."""
-        ...
 
 
 def read_log(path: Path) -> LogReader:
@@ -538,7 +537,6 @@ class LineParser(Protocol):
         Raises:
             ValueError: this is no such log.
         """
-        ...
 
 
 class LineLogReader:

@@ -46,26 +46,21 @@ class LogWriter(Protocol):
 
     def write(self, record: Record, /) -> None:
         """Add a frame."""
-        ...
 
     def mark(self, mark: Mark, /) -> None:
         """Add what is no frame, where the format can hold it."""
-        ...
 
     def flush(self) -> None:
         """Give all that was added to the operating system: it is readable if nothing follows.
 
         Where `in_blocks` says so that makes the file larger: do it seldom.
         """
-        ...
 
     def close(self) -> None:
         """End the log; closing twice is no error."""
-        ...
 
     def messages(self) -> list[str]:
         """Say what the format could not hold, one line each."""
-        ...
 
 
 class TextBlock(Protocol):
@@ -87,15 +82,12 @@ class TextBlock(Protocol):
 
     def __len__(self) -> int:
         """Return how many frames there are."""
-        ...
 
     def log_lines(self) -> str:
         """Write them as `log_line` does, each line with its end."""
-        ...
 
     def asc_lines(self, begin_us: int, number: Callable[[str], int], /) -> str:
         """Write them as `AscWriter` does; it tells the numbers of buses, from 0."""
-        ...
 
 
 def in_blocks(path: Path) -> bool:

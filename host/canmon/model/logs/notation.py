@@ -191,7 +191,6 @@ class Counting(Protocol):
 
     def counted_us(self, count: int) -> int:
         """Return microseconds, not below 0."""
-        ...
 
 
 _DUMPED: Final = re.compile(

@@ -45,15 +45,12 @@ class Trigger(Protocol):
 
     def why(self, record: Record, decoded: Decoded | None, /) -> str:
         """Say why this frame makes somebody record; nothing if it does not."""
-        ...
 
     def missing(self, now_us: int, lost: int, /) -> str:
         """Say why what did not come until now, or was lost, does."""
-        ...
 
     def messages(self) -> list[str]:
         """Say what else there is to know of it."""
-        ...
 
 
 class FilterTrigger:
