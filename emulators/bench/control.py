@@ -79,6 +79,7 @@ class EmulatorControl(RequestDispatcher):
                 "press": (self._press, ("name", "duration_us")),
                 "fault": (self._fault, ("spec",)),
                 "clear": (self._clear, ("name",)),
+                "faults": (self._faults, ()),
                 **shows_lines,
                 "status": (self._status, ("since",)),
                 "stop": (self._stop, ()),
@@ -151,6 +152,10 @@ class EmulatorControl(RequestDispatcher):
     def _clear(self, request: Object) -> Object:
         self._emulator.operator.clear(text_of(request, "name"))
         return {}
+
+    def _faults(self, request: Object) -> Object:
+        rows = [row._asdict() for row in self._emulator.operator.fault_rows()]
+        return {"faults": [{**row, "arguments": dict(row["arguments"])} for row in rows]}
 
     def _lines(self, request: Object) -> Object:
         since = whole(request.get("since", 0), "since", 0, _MAX_SINCE)

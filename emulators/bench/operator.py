@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping
 from functools import partial
-from typing import ClassVar, Final, Protocol
+from typing import ClassVar, Final, NamedTuple, Protocol
 
 from tickrig.device.physical import SignalType
 from tickrig.device.twin import Copyable
 from tickrig.emulators.bench.fault_spec import FaultSpec
 from tickrig.emulators.rig.emulated import Inputs
 from tickrig.emulators.rig.event_queue import EventQueue
-from tickrig.emulators.rig.faults import FaultForm, bind_arguments
+from tickrig.emulators.rig.faults import FaultForm, bind_arguments, spelled
 from tickrig.host.text.names import near
 from tickrig.host.text.values import Setting
 from tickrig.wire.instant import NEVER
@@ -174,6 +174,27 @@ def _at(action: Callable[[], None], now_us: int) -> None:
     action()
 
 
+class FaultRow(NamedTuple):
+    """What is to be known of a fault of a running emulator.
+
+    Attributes:
+        name: of the fault.
+        text: what it does.
+        arguments: those with which it was armed, or its defaults, by name.
+        on: whether it is present.
+        since_us: since when; None if it is not, or nobody ordered it.
+        acted: how often it has acted since it was armed last; None for one of the device, which
+            is there all the time.
+    """
+
+    name: str
+    text: str
+    arguments: Mapping[str, str]
+    on: bool
+    since_us: int | None
+    acted: int | None
+
+
 class Operator(Copyable):
     """Sets inputs, presses buttons, makes faults come and go.
 
@@ -206,6 +227,9 @@ class Operator(Copyable):
             wire,
         )
         self.note = note
+        self._begun: dict[str, tuple[int, tuple[str, ...]]] = {}
+        """When each fault that is present began, and its arguments."""
+
         self._spans: dict[str, dict[int, int]] = {}
         """When each fault that was ordered begins and ends, by its name."""
 
@@ -273,10 +297,10 @@ class Operator(Copyable):
         key = spec.name, spec.from_us
         self._spans.setdefault(spec.name, {})[spec.from_us] = spec.to_us
         if spec.from_us > now_us:
-            begin = partial(_at, partial(self._begin, spec))
+            begin = partial(self._begin, spec)
             self._event_queue.put(("begin", *key), spec.from_us, begin)
         else:
-            self._begin(spec)
+            self._begin(spec, now_us)
         if spec.to_us != NEVER:
             end = partial(_at, partial(self._end_span, spec))
             self._event_queue.put(("end", *key), spec.to_us, end)
@@ -311,6 +335,20 @@ class Operator(Copyable):
         armed = self._wire.armed
         return tuple(f for f in self.faults if f in armed or self._inputs_fault(f))
 
+    def fault_rows(self) -> list[FaultRow]:
+        """Return what is to be known of each fault."""
+        present = frozenset(self.active_faults)
+        return [self._row(name, on=name in present) for name in self.faults]
+
+    def _row(self, name: str, *, on: bool) -> FaultRow:
+        since_us, words = self._begun.get(name, (None, ())) if on else (None, ())
+        form = self._wire.fault_types.get(name)
+        if form is None:
+            return FaultRow(name, self._inputs.table[name].text, {}, on, since_us, None)
+        given = spelled(name, form, words)
+        arguments = {each.name: given.get(each.name, each.default) for each in form.all_arguments}
+        return FaultRow(name, form.text, arguments, on, since_us, self._wire.acted(name))
+
     def _inputs_fault(self, name: str) -> bool:
         return name in self._inputs.table and bool(self._inputs[name])
 
@@ -323,7 +361,8 @@ class Operator(Copyable):
                 self._event_queue.drop(("end", name, begin_us))
                 del spans[begin_us]
 
-    def _begin(self, spec: FaultSpec) -> None:
+    def _begin(self, spec: FaultSpec, now_us: int) -> None:
+        self._begun[spec.name] = now_us, spec.arguments
         if spec.name in self._wire.fault_types:
             self._wire.arm(spec.name, *spec.arguments)
             self.note(spec.text)
@@ -338,6 +377,7 @@ class Operator(Copyable):
             self._end(spec.name)
 
     def _end(self, name: str) -> None:
+        self._begun.pop(name, None)
         if name in self._wire.fault_types:
             self._wire.clear(name)
             self.note(f"{name}=0")

@@ -13,7 +13,14 @@ AUTO: Final = "auto"
 PROFILES: Final = (AUTO, "none", "401", "402")
 """`AUTO`, and names of `profiles.PROFILES`."""
 
-NODE_FAULTS: Final = ("power_off", "unplugged")
+NODE_FAULTS: Final = (
+    *("power_off", "unplugged", "sdo_abort", "sdo_busy", "sdo_mute", "sdo_slow", "sdo_twice"),
+    *("sdo_wrong_index", "sdo_toggle", "sdo_crc", "heartbeat_mute", "heartbeat_state"),
+    *("heartbeat_late", "boot_late", "boots_twice", "boots_again", "pdo_short", "pdo_long"),
+    *("pdo_mute", "pdo_stale", "emcy_storm", "id_doubled", "sync_lost", "bus_off"),
+)
+"""Names of the faults of every node that its bus does not have."""
+
 _DRIVE: Final = ("short_circuit", "encoder_unplugged", "shaft_blocked", "motor_phase_open")
 MODEL_FAULTS: Final[Mapping[str, tuple[str, ...]]] = {
     "f-palette": ("internal_failure", "input_overcurrent", "output_overload"),

@@ -115,6 +115,17 @@ def _status(answer: Any) -> list[str]:
     ]
 
 
+def _faults(answer: Any) -> list[str]:
+    rows = [("fault", "on", "since", "acted", "arguments")]
+    for x in answer["faults"]:
+        since = "" if x["since_us"] is None else f"{format_time(x['since_us'])} s"
+        acted = "" if x["acted"] is None else str(x["acted"])
+        arguments = " ".join(f"{key}={word}" for key, word in x["arguments"].items())
+        rows.append((x["name"], "on" if x["on"] else "off", since, acted, arguments))
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
+
+
 def _describe(answer: Any) -> list[str]:
     if "components" in answer:  # a system of RT components, or a server that has one
         return [f"{x['name']} {x['type']} {x['state']}" for x in answer["components"]]
@@ -201,6 +212,12 @@ def fault(spec: str) -> Object:
 def clear(name: str) -> Object:
     """Let the fault NAME go."""
     return {"name": name}
+
+
+@verb(_faults)
+def faults_() -> Object:
+    """List the faults: on or off, since when, how often each acted, its arguments."""
+    return {}
 
 
 @verb(_lines)

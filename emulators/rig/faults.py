@@ -182,6 +182,20 @@ def bind_arguments(name: str, form: FaultForm, words: Sequence[str]) -> FaultArg
     >>> bind_arguments("slow", slow, ("5ms", "rate=0.1"))
     FaultArguments(values={'delay': 5000}, rate=0.1, count=None)
     """
+    given = spelled(name, form, words)
+    count = COUNT.parse(given[_COUNT]) if _COUNT in given else None
+    rate = _parse_rate(name, given[_RATE]) if _RATE in given else form.usual_rate
+    try:
+        values = {
+            each.name: each.parse(given.get(each.name, each.default)) for each in form.arguments
+        }
+    except ValueError as error:
+        raise ValueError(f"{name}: {error}") from None
+    return FaultArguments(values, rate, count)
+
+
+def spelled(name: str, form: FaultForm, words: Sequence[str]) -> dict[str, str]:
+    """Return the arguments that were written, each by its name; ValueError as `bind_arguments`."""
     known = {each.name: each for each in form.all_arguments}
     if words and not known:
         hint = "; clear ends it" if tuple(words) == ("0",) else ""
@@ -200,15 +214,7 @@ def bind_arguments(name: str, form: FaultForm, words: Sequence[str]) -> FaultArg
         if key in given:
             raise ValueError(f"{name} has {key} twice")
         given[key] = value
-    count = COUNT.parse(given[_COUNT]) if _COUNT in given else None
-    rate = _parse_rate(name, given[_RATE]) if _RATE in given else form.usual_rate
-    try:
-        values = {
-            each.name: each.parse(given.get(each.name, each.default)) for each in form.arguments
-        }
-    except ValueError as error:
-        raise ValueError(f"{name}: {error}") from None
-    return FaultArguments(values, rate, count)
+    return given
 
 
 def _parse_rate(name: str, text: str) -> float:

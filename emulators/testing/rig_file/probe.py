@@ -13,6 +13,7 @@ from tickrig.emulators.can.faults import CAN_FAULTS
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen import late
 from tickrig.emulators.canopen.choices import AUTO
+from tickrig.emulators.canopen.faults import NodeFaults
 from tickrig.emulators.canopen.node import Node, Nodes
 from tickrig.emulators.commands.device_type import ConfiguredDevice, configure, option_names
 from tickrig.emulators.rig.emulated import HasSignals
@@ -106,7 +107,7 @@ def probe(plan: DevicePlan, seed: int = 0) -> Probe | list[WrongDevice]:
         title = late.MODELS[plan.type].text
     return Probe(
         node,
-        CAN_FAULTS,
+        {**CAN_FAULTS, **NodeFaults.fault_types},
         title,
         node_id=found.node_id,
         bit_rate=found.bit_rate,

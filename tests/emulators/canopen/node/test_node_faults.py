@@ -14,8 +14,10 @@ import canopen
 import pytest
 
 from tickrig import Bench
-from tickrig.emulators.can.faults import NARROWED
+from tickrig.emulators.can.faults import CAN_FAULTS, NARROWED
+from tickrig.emulators.canopen import choices
 from tickrig.emulators.canopen.faults import NODE_FAULTS, NodeFaults
+from tickrig.emulators.commands import ctl_cli
 from tickrig.emulators.rig.faults import bind_arguments
 from tickrig.emulators.rig.rig import Rig
 from tickrig.wire.can import CanFrame
@@ -339,6 +341,32 @@ def test_what_cannot_be_is_refused_in_a_line(master: Master, spec: str, error: s
 def test_each_default_is_a_fault() -> None:
     for name, form in NodeFaults.fault_types.items():
         bind_arguments(name, form, ())
+
+
+def test_the_command_line_completes_the_names_of_all() -> None:
+    of_frames = [name for name in NODE_FAULTS if name not in CAN_FAULTS]
+    assert ["power_off", "unplugged", *of_frames] == list(choices.NODE_FAULTS)
+
+
+def test_what_is_armed_since_when_and_how_often_it_acted_can_be_asked(master: Master) -> None:
+    begun_us = master.bench.now_us
+    master.bench["axis2"].fault("sdo_slow=20ms,count=2")
+    master.bench["axis2"].fault("pdo_mute@1s")
+    for _ in range(3):
+        master.read()
+    answer = master.bench._mode.request("faults")
+    assert isinstance(answer["faults"], list)
+    rows = {row["name"]: row for row in answer["faults"]}
+    slow, mute = rows["axis2/sdo_slow"], rows["axis2/pdo_mute"]
+    assert slow["arguments"] == {"delay": "20ms", "rate": "1", "count": "2"}
+    assert (slow["on"], slow["acted"]) == (True, 2)
+    assert 0 <= slow["since_us"] - begun_us <= 1_000
+    assert (mute["on"], mute["since_us"], mute["acted"]) == (False, None, 0)
+    assert rows["axis2/power_off"]["acted"] is None
+    shown = ctl_cli._faults(answer)
+    assert shown[0].split() == ["fault", "on", "since", "acted", "arguments"]
+    line = next(each for each in shown if each.startswith("axis2/sdo_slow "))
+    assert line.split()[1:] == ["on", "0.051000", "s", "2", "delay=20ms", "rate=1", "count=2"]
 
 
 # The same in each run.
