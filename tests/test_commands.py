@@ -22,6 +22,7 @@ from tickrig.emulators.commands.cli import DEMOS
 from tickrig.emulators.commands.cli import main as tickrig
 from tickrig.emulators.rh3.commands.motion_cli import main as rh3
 from tickrig.host.canmon.cli import main as canmon
+from tickrig.host.rrc.cli import main as rrc
 
 ROOT = Path(__file__).parents[1]
 SCRIPTS = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["scripts"]
@@ -30,6 +31,7 @@ LOG = "(1.000000) can0 185#0102\n"
 BAD = {
     "tickrig": ("ctl /nowhere describe", "/nowhere: No such file"),
     "rrc-emu": ("--panel", "pip install 'tickrig[tui]'"),
+    "rrc": ("/nowhere --panel", "pip install 'tickrig[tui]'"),
     "rtc-lite-emu": ("--node nowhere.py:Echo", "nowhere.py: No such file"),
     "canmon": ("tui a.log", "pip install 'tickrig[tui]'"),
     "rh3": ("goto 1 0 0 --plot a.png", "pip install 'tickrig[plot]'"),
@@ -91,7 +93,7 @@ def paths(command: click.Command, *above: str) -> Iterator[tuple[str, ...]]:
             yield from paths(found, *above, name)
 
 
-GROUPS = {"tickrig": tickrig, "rh3": rh3, "canmon": canmon}
+GROUPS = {"tickrig": tickrig, "rh3": rh3, "canmon": canmon, "rrc": rrc}
 HELP = [
     *(f"{script} --help" for script in SCRIPTS if script not in GROUPS),
     *(" ".join([*path, "--help"]) for name, group in GROUPS.items() for path in paths(group, name)),

@@ -20,6 +20,7 @@ from tickrig.emulators.rrc import panel_text, small_panel_text
 from tickrig.emulators.rrc.panel_text import FAULT_KEYS, Observer, PanelView
 from tickrig.emulators.serial.emulator import Emulator
 from tickrig.host.control.requests import VERSION, Object
+from tickrig.host.rrc import gauges
 from tickrig.host.tui import FramedApp, KeyFooter
 
 _SendRequests = Callable[[Sequence[Object]], Awaitable[list[Object]]]
@@ -178,7 +179,7 @@ class RrcPanel(FramedApp):
     def _show(self) -> None:
         view, roomy = self.view, self.size.width >= _ROOMY[0] and self.size.height >= _ROOMY[1]
         panes = panel_text if roomy else small_panel_text
-        pad = panel_text.stick_pad(view.number("stick_v_pct"), view.number("stick_w_pct"))
+        pad = gauges.stick_pad(view.number("stick_v_pct"), view.number("stick_w_pct"))
         self.query_one("#stick").border_subtitle = panel_text.stick_hint(view)
         for name, text in (
             ("stick", pad),

@@ -9,6 +9,7 @@ from typing import Final, NamedTuple
 from rich.text import Text
 
 from tickrig.host.control.requests import Object
+from tickrig.host.rrc.gauges import DIM, FAULT, ON, bar, lamp, scale
 from tickrig.host.text.trace import Mark
 from tickrig.host.text.values import format_time
 from tickrig.wire.errors import WireError
@@ -40,14 +41,9 @@ _STATE_STYLES: Final = {
 }
 _LINE_STYLES: Final = {"EV": "bold cyan", "ER": "bold red"}
 
-ON: Final = "bold yellow"
-FAULT: Final = "bold white on red"
-DIM: Final = "bright_black"
 _KEPT_LINES: Final = 60
 _REPORT_US: Final = 100_000
 """So long the latest SA line stands; one comes each 10 ms while the status is on."""
-
-_HALF: Final = 15  # cells of a bar on each side of zero
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,62 +161,12 @@ def stick_hint(view: PanelView) -> str:
     return _STICK_HINTS.get(state, "waits for p: VR2 off")
 
 
-def stick_pad(v_pct: int, w_pct: int) -> Text:
-    """Draw the stick in its square: forward is up, right is right."""
-    row, column = 5 - round(v_pct / 20), 10 + round(w_pct / 10)
-    text = Text()
-    for y in range(11):
-        for x in range(21):
-            if (y, x) == (row, column):
-                text.append("●", style=ON)
-            else:
-                text.append("┼" if (y, x) == (5, 10) else _axis(y, x), style=DIM)
-        text.append("\n")
-    return text.append(f"v {signed(v_pct)} %     w {signed(w_pct)} %")
-
-
-def signed(percent: int) -> str:
-    """Write -100..100 in four columns."""
-    return f"{percent:+4}" if percent else "   0"
-
-
-def _axis(y: int, x: int) -> str:
-    if y == 5:
-        return "─"
-    return "│" if x == 10 else "·" if y % 5 == 0 or x % 10 == 0 else " "
-
-
-def bar(percent: int) -> Text:
-    """Draw -100..100 % as a bar to the left or right of zero."""
-    cells = round(abs(percent) * _HALF / 100)
-    left = "█" * cells if percent < 0 else ""
-    right = "█" * cells if percent > 0 else ""
-    return Text.assemble(
-        ("░" * (_HALF - len(left)), DIM),
-        (left, ON),
-        "│",
-        (right, ON),
-        ("░" * (_HALF - len(right)), DIM),
-        f" {signed(percent)} %",
-    )
-
-
-def scale(value: int, top: int) -> Text:
-    """Draw 1..top as filled and empty squares."""
-    return Text.assemble(("■" * value, ON), ("□" * (top - value), DIM), f" {value}")
-
-
-def _lamp(label: str, value: _Value, style: str) -> Text:
-    """Draw a lamp that is on or off."""
-    return Text.assemble(("● ", style) if value else ("○ ", DIM), label)
-
-
 def lamps(view: PanelView) -> list[Text]:
     """Draw the three lamps."""
     return [
-        _lamp("VR2 runs", view.number("vr2_power"), "bold green"),
-        _lamp("error LED", view.number("error_led"), "bold red"),
-        _lamp("buzzer", view.number("buzzer"), ON),
+        lamp("VR2 runs", view.number("vr2_power"), "bold green"),
+        lamp("error LED", view.number("error_led"), "bold red"),
+        lamp("buzzer", view.number("buzzer"), ON),
     ]
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from rich.text import Text
 
 from tickrig.emulators.rrc import panel_text
-from tickrig.emulators.rrc.panel_text import DIM, PanelView, bar, scale, signed
+from tickrig.emulators.rrc.panel_text import PanelView
+from tickrig.host.rrc.gauges import DIM, bar, scale, signed
 
 
 def outputs_pane(view: PanelView) -> Text:

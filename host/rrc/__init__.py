@@ -1,8 +1,22 @@
-"""RRC: a synchronous client for the Robotic Relay Communicator, on any link."""
+"""RRC: a synchronous client for the Robotic Relay Communicator, on any link, and its command."""
 
-from tickrig.host.rrc.channel import RrcLoad, RrcRefused, RrcStopped
-from tickrig.host.rrc.client import RrcClient
-from tickrig.host.rrc.inbox import Arrival
-from tickrig.host.rrc.reply_matcher import OnRefusals
+from tickrig._lazy import lazy
 
-__all__ = ["Arrival", "OnRefusals", "RrcClient", "RrcLoad", "RrcRefused", "RrcStopped"]
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from tickrig.host.rrc.channel import RrcLoad as RrcLoad
+    from tickrig.host.rrc.channel import RrcRefused as RrcRefused
+    from tickrig.host.rrc.channel import RrcStopped as RrcStopped
+    from tickrig.host.rrc.client import RrcClient as RrcClient
+    from tickrig.host.rrc.inbox import Arrival as Arrival
+    from tickrig.host.rrc.reply_matcher import OnRefusals as OnRefusals
+else:
+    __all__, __getattr__, __dir__ = lazy(
+        __name__,
+        {
+            "tickrig.host.rrc.channel": ("RrcLoad", "RrcRefused", "RrcStopped"),
+            "tickrig.host.rrc.client": ("RrcClient",),
+            "tickrig.host.rrc.inbox": ("Arrival",),
+            "tickrig.host.rrc.reply_matcher": ("OnRefusals",),
+        },
+    )

@@ -24,6 +24,11 @@ def rrc_emu() -> None:
     _start("rrc-emu", "tickrig.emulators.rrc.cli")
 
 
+def rrc() -> None:
+    """Call `rrc`."""
+    _start("rrc", "tickrig.host.rrc.cli")
+
+
 def rtc_lite_emu() -> None:
     """Call `rtc-lite-emu`."""
     _start("rtc-lite-emu", "tickrig.emulators.rtc_lite.cli")

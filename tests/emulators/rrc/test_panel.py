@@ -16,6 +16,7 @@ from tickrig.emulators.rrc.panel import HELP, RrcPanel, run_panel
 from tickrig.emulators.rrc.panel_text import PanelView
 from tickrig.emulators.serial.emulator import Emulator
 from tickrig.host.control.requests import Object
+from tickrig.host.rrc import gauges
 
 TOOL = Path(__file__).parents[3] / "tools" / "rrc_panel_picture.py"
 
@@ -243,8 +244,8 @@ def test_a_load_that_is_too_much_fits_and_is_marked() -> None:
     assert max(len(row) for row in small.plain.split("\n")) <= 60
     assert [panel_text.load(PanelView({"margin_pct": pct})).style for pct in (10, 9, -1)] == [
         "",
-        panel_text.ON,
-        panel_text.FAULT,
+        gauges.ON,
+        gauges.FAULT,
     ]
 
 
@@ -349,21 +350,6 @@ def test_the_picture_is_the_panel() -> None:
     for text in ("Limit", "within limits", "stick +80 -30", "hello", "ER:CommandUnknown"):
         assert text in svg
     assert "@font-face" not in svg
-
-
-def test_a_bar_begins_at_zero() -> None:
-    assert panel_text.bar(0).plain == "░" * 15 + "│" + "░" * 15 + "    0 %"
-    assert panel_text.bar(100).plain == "░" * 15 + "│" + "█" * 15 + " +100 %"
-    assert panel_text.bar(-40).plain == "░" * 9 + "█" * 6 + "│" + "░" * 15 + "  -40 %"
-
-
-@pytest.mark.parametrize(
-    ("v_pct", "w_pct", "row", "column"),
-    [(0, 0, 5, 10), (100, 100, 0, 20), (-100, -100, 10, 0), (100, -100, 0, 0), (50, 0, 3, 10)],
-)
-def test_the_stick_is_where_it_is(v_pct: int, w_pct: int, row: int, column: int) -> None:
-    rows = panel_text.stick_pad(v_pct, w_pct).plain.split("\n")
-    assert [(y, line.index("●")) for y, line in enumerate(rows) if "●" in line] == [(row, column)]
 
 
 def test_trouble_is_in_the_status_line() -> None:

@@ -1,0 +1,365 @@
+"""A chair behind an RRC: guarded, driven while a dead-man key is held, stopped at the end."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Final
+
+from tickrig.host.links.link import Closing, DeviceRefused, Link, LinkClosed, LinkError, LinkTimeout
+from tickrig.host.rrc.channel import RrcRefused, RrcStopped
+from tickrig.host.rrc.client import RrcClient
+from tickrig.host.rrc.inbox import Arrival
+from tickrig.wire.rrc.commands import Limit
+from tickrig.wire.rrc.replies import Event, Ok, RrcEvent, StatusA
+
+# Theory of operation
+# ===================
+#
+# A person sits in the chair, so each way in which a program can end or fail has an answer here.
+#
+# - Before anything else the device must answer as an RRC (`RrcClient.start`: `device`, which no
+#   other device answers with OK:device). What came instead is quoted: it shows what is connected.
+# - Then the guard is set: the watchdog first, because it also covers what follows, then
+#   stablemode. Only then a verb may move something.
+# - While the host drives, `drive` sends the values again each 100 ms, listens for 20 ms and
+#   judges what came (`watch`): an event that VR2 stopped, status lines that stop coming,
+#   status lines whose output is not what was commanded (CHECK does not detect exchanged
+#   characters, so the manual's own check is not enough). Each ends the drive.
+# - `DeadMan` is what lets values other than 0 through. A terminal reports no key-up, so a press
+#   holds for 1 s; a longer press repeats sooner than that. Whoever presses may run in another
+#   thread than `step` (the panel): if that thread hangs, no press comes, and the chair stops.
+# - The end of a `with` block leaves the RRC as it was found: motors stopped, status lines off,
+#   stablemode as before, and last the watchdog off. A watchdog that stays on would stop VR2 by
+#   force as soon as the program is gone, although nothing moves. A status line must show the
+#   stop; if none does, `poweroff` follows.
+# - If the line is gone, nothing can be sent: the watchdog stops VR2. The same happens if the
+#   program is killed or the machine fails. So without a watchdog there is no such end.
+#
+# Signals do not raise exceptions inside of a call of the client, which would leave it in an
+# unknown state in the middle of the stop: the commands set a flag (`verbs.Ended`), and the
+# loops look at it.
+
+DEAD_MAN_US: Final = 1_000_000
+"""A press of the dead-man key holds for so long."""
+
+STEP_US: Final = 20_000
+_RESEND_US: Final = 100_000
+_SILENT_US: Final = 300_000
+"""Status lines come each 10 ms; after so long without one, the RRC does not answer."""
+
+_TAKEN_US: Final = 200_000
+"""After so long a status line shows what was commanded."""
+
+_STOP_TRIES: Final = 3
+_KEPT_BYTES: Final = 4_096
+_SHOWN_BYTES: Final = 40
+_OK: Final = Ok("device").encode()
+
+_OFF: Final = "VR2 is off: press its power button, then call this again"
+_STOPS: Final = frozenset(
+    {kind for kind in RrcEvent if kind.startswith("PowerOff")} | {RrcEvent.INITIALIZED}
+)
+
+
+class ChairStopped(Exception):  # noqa: N818 - what happened
+    """VR2 is off, or it was stopped.
+
+    Attributes:
+        kind: the event that said so, None if there was none.
+    """
+
+    def __init__(self, message: str, kind: RrcEvent | None = None) -> None:
+        super().__init__(message)
+        self.kind = kind
+
+
+class NotAnRrc(LinkError):  # noqa: N818 - what is there
+    """Something else than an RRC answers."""
+
+
+@dataclass(frozen=True, slots=True)
+class Guard:
+    """What protects the chair while a program talks to it.
+
+    Attributes:
+        watchdog_us: VR2 stops after so long without a command; 0 is off.
+        stable: whether stablemode is switched on.
+    """
+
+    watchdog_us: int = 500_000
+    stable: bool = True
+
+
+class DeadMan:
+    """A key that must be pressed again within a second."""
+
+    def __init__(self) -> None:
+        self._until_us: int | None = None
+
+    def press(self, now_us: int) -> None:
+        """Note a press."""
+        self._until_us = now_us + DEAD_MAN_US
+
+    def release(self) -> None:
+        """Let go at once."""
+        self._until_us = None
+
+    def holds(self, now_us: int) -> bool:
+        """Whether the latest press still holds."""
+        until_us = self._until_us
+        return until_us is not None and now_us < until_us
+
+
+class _OpeningLink:
+    """A `Link[bytes]` that remembers the first bytes that came.
+
+    Attributes:
+        received: these bytes.
+    """
+
+    def __init__(self, link: Link[bytes]) -> None:
+        self._link, self.received = link, b""
+
+    @property
+    def now_us(self) -> int:
+        """Time on the clock of the link."""
+        return self._link.now_us
+
+    def send(self, traffic: bytes, /) -> None:
+        """Send bytes."""
+        self._link.send(traffic)
+
+    def receive(self, timeout_us: int, /) -> bytes:
+        """Return what arrived."""
+        data = self._link.receive(timeout_us)
+        if len(self.received) < _KEPT_BYTES:
+            self.received += data
+        return data
+
+    def close(self) -> None:
+        """Give the line back."""
+        self._link.close()
+
+
+class Chair(Closing):
+    """An RRC under a guard; the end of a `with` block stops the motors.
+
+    Args:
+        link: the line, open; it is closed at the end.
+        guard: what protects the chair.
+
+    Attributes:
+        client: talks to the RRC.
+        guard: what protects the chair.
+        moved: whether the motors may run because of this program.
+
+    Raises:
+        NotAnRrc: something else answers.
+        LinkTimeout: nothing answers.
+        LinkClosed: the line is gone.
+    """
+
+    def __init__(self, link: Link[bytes], guard: Guard) -> None:
+        opening = _OpeningLink(link)
+        self.client, self.guard, self.moved = RrcClient(opening), guard, False
+        self._sent: tuple[int, int] | None = None  # what the host drives, None if it does not
+        self._changed_us = self._resend_us = 0
+        self._status_since_us: int | None = None
+        try:
+            self._meet(opening)
+            self._found_stable = self.client.stable
+            self.set_guard()
+        except BaseException:
+            self.client.close()
+            raise
+
+    def set_guard(self) -> None:
+        """Set watchdog and stablemode, as at the start and after EV:Initialized."""
+        if self.guard.watchdog_us:
+            self.client.watchdog(self.guard.watchdog_us)
+        if self.guard.stable:
+            self.client.stablemode()
+        if self._status_since_us is not None:
+            self.client.status()
+
+    def _meet(self, opening: _OpeningLink) -> None:
+        """Talk to the RRC for the first time; a line that echoes says no OK:device."""
+        failure: Exception | None = None
+        try:
+            self.client.start()
+        except (LinkTimeout, DeviceRefused) as error:
+            failure = error
+        if failure is None and (self.client.stable or _OK in opening.received):
+            return
+        if opening.received:
+            raise NotAnRrc(f"no RRC: {opening.received[:_SHOWN_BYTES]!r} came") from failure
+        raise LinkTimeout("no answer: is an RRC connected, and has it power?") from failure
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Stop the motors, leave the RRC as it was found, close the line."""
+        try:
+            if not isinstance(error, LinkClosed):
+                self._leave()
+        except (LinkError, DeviceRefused):
+            if error is None:
+                raise
+        finally:
+            self.client.close()
+
+    def close(self) -> None:
+        """Close the line; the watchdog stops VR2."""
+        self.client.close()
+
+    def leave_driving(self) -> None:
+        """Let the stick drive on after the end, without a watchdog."""
+        self.moved = False
+
+    def _leave(self) -> None:
+        self.stop()
+        client = self.client
+        if self._status_since_us is not None:
+            client.status(on=False)
+        if client.stable and not self._found_stable:
+            client.stablemode(on=False)
+        if client.watchdog_us:
+            client.watchdog(0)
+
+    def status(self) -> StatusA | None:
+        """Switch status lines on and return one; None if VR2 is off."""
+        if self._status_since_us is None:
+            self._status_since_us = self.client.now_us
+            self.client.status()
+        until_us = self.client.now_us + _SILENT_US
+        while (latest := self.latest_status) is None and self.client.now_us < until_us:
+            self.client.run_for(STEP_US)
+        return None if latest is None else latest.value
+
+    def require_on(self) -> StatusA:
+        """Return a status line; ChairStopped if VR2 is off."""
+        status = self.status()
+        if status is None:
+            raise ChairStopped(_OFF)
+        list(self.client.events(0))  # what happened before is over
+        return status
+
+    def take_over(self, speed_mode: int = 1) -> None:
+        """Let the host drive, at 0, in a speed mode."""
+        self.require_on()
+        self.moved = True
+        self.client.drive_by_host(0, 0)
+        self._note(0, 0)
+        if speed_mode != 1:
+            self.client.speedmode(speed_mode)
+
+    def drive(self, v_pct: int, w_pct: int) -> None:
+        """Drive for 20 ms: forward and to the right, -100..100 %.
+
+        Raises:
+            ChairStopped: VR2 was stopped, or does something else.
+            LinkTimeout: status lines do not come any more.
+        """
+        try:
+            if (v_pct, w_pct) != self._sent or self.client.now_us >= self._resend_us:
+                self.client.drive_by_host(v_pct, w_pct)
+                self._note(v_pct, w_pct)
+            self.client.run_for(STEP_US)
+        except DeviceRefused:
+            self.watch()  # an event is the better reason
+            raise
+        self.watch()
+
+    def drive_by_stick(self, limit: Limit, speed_mode: int = 1) -> None:
+        """Let the stick drive within limits, in a speed mode."""
+        self.require_on()
+        self.moved = True
+        self._sent = None
+        self.client.drive_by_stick(*limit.values())
+        if speed_mode != 1:
+            self.client.speedmode(speed_mode)
+
+    def watch(self) -> list[Arrival[Event]]:
+        """Judge what has come since the last call; return the events that end nothing.
+
+        Raises:
+            ChairStopped: VR2 was stopped, or does something else than it was told.
+            LinkTimeout: status lines do not come any more.
+        """
+        events = []
+        for arrival in self.client.events(0):  # those behind one that raises stay untaken
+            events.append(arrival)
+            if (kind := arrival.value.kind) in _STOPS:
+                self.moved, self._sent = False, None
+                if self._status_since_us is not None:
+                    self._status_since_us = self.client.now_us  # they come again with VR2
+                raise ChairStopped(f"VR2 was stopped: EV:{arrival.value.name}", kind)
+        now_us, latest = self.client.now_us, self.latest_status
+        if latest is not None and now_us - latest.at_us > _SILENT_US:
+            raise LinkTimeout(
+                f"no status line for {_SILENT_US // 1_000} ms: is the RRC still there?"
+            )
+        if latest is not None and self._sent is not None:
+            out_pct = latest.value.out_v_pct, latest.value.out_w_pct
+            if out_pct != self._sent and latest.at_us - self._changed_us > _TAKEN_US:
+                self._power_off()
+                said = "commanded {} {}, the RRC drives {} {}: VR2 switched off"
+                raise ChairStopped(said.format(*self._sent, *out_pct))
+        return events
+
+    def stop(self) -> None:
+        """Stop the motors until a status line shows it; switch VR2 off if none does."""
+        if not self.moved:
+            return
+        for _ in range(_STOP_TRIES):
+            try:
+                if self._sent is None:  # the stick drives
+                    self.client.drive_by_host(0, 0)
+                self.client.output(0, 0, confirm=True)
+            except RrcRefused as error:
+                if error.code in ("output", "limit"):  # VR2 is off
+                    self.moved = False
+                    return
+            except RrcStopped:
+                break
+            except LinkTimeout:
+                continue
+            self._note(0, 0)
+            if self._stands():
+                self.moved = False
+                return
+        self._power_off()
+
+    def _stands(self) -> bool:
+        """Wait for a status line whose output is 0; with stablemode a lost line has no reply."""
+        since_us = self.client.now_us
+        while self.client.now_us < since_us + _TAKEN_US:
+            self.client.run_for(STEP_US)
+            latest = self.latest_status
+            if latest is None or latest.at_us < since_us:
+                continue
+            if not (latest.value.out_v_pct or latest.value.out_w_pct):
+                return True
+        return False
+
+    def _power_off(self) -> None:
+        with suppress(RrcRefused):  # it is off
+            self.client.poweroff()
+        self.moved = False
+
+    def _note(self, v_pct: int, w_pct: int) -> None:
+        now_us = self.client.now_us
+        if self._sent != (v_pct, w_pct):
+            self._sent, self._changed_us = (v_pct, w_pct), now_us
+        self._resend_us = now_us + _RESEND_US
+
+    @property
+    def latest_status(self) -> Arrival[StatusA] | None:
+        """The newest status line; None if VR2 was off since."""
+        latest, since_us = self.client.latest_status, self._status_since_us
+        return latest if latest and since_us is not None and latest.at_us >= since_us else None

@@ -1,0 +1,366 @@
+"""The command `rrc`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+
+import click
+from click.shell_completion import CompletionItem
+
+from tickrig.host.cli.messages import Refused
+from tickrig.host.cli.options import HarmlessCommand, time_option, version_option, works_in
+from tickrig.host.cli.start import load, loading
+
+_VERBS: Final = "tickrig.host.rrc.verbs"
+_WATCHDOG_US: Final = 500_000
+_MOST_WATCHDOG_US: Final = 2_550_000
+_UNIT_US: Final = 10_000
+
+SPEED: Final = click.IntRange(1, 5)
+_PERCENT: Final = click.IntRange(0, 100)
+_SIGNED: Final = click.IntRange(-100, 100)
+_BYTE: Final = click.IntRange(0, 255)
+_NIBBLE: Final = click.IntRange(0, 15)
+_ANGLE: Final = click.IntRange(0, 90)
+
+
+@dataclass(frozen=True, slots=True)
+class RrcCall:
+    """What stands before the verb.
+
+    Attributes:
+        url: of the port; empty if none was given.
+        watchdog_us: of the RRC, 0 is off.
+        stable: whether stablemode is switched on.
+        pad: path of a game pad, None without one.
+    """
+
+    url: str
+    watchdog_us: int
+    stable: bool
+    pad: str | None
+
+
+class _Url(click.ParamType):  # type: ignore[type-arg] # generic since click 8.4 only
+    """A port, which the shell completes as a file."""
+
+    name = "url"
+
+    def shell_complete(
+        self, ctx: click.Context, param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        """Let the shell offer its files."""
+        return [CompletionItem(incomplete, type="file")]
+
+
+class _Verb(HarmlessCommand):
+    """A verb among whose words may be negative numbers, which are no options."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Put a blank before a negative number: it reads the same, and is no option."""
+        return super().parse_args(
+            ctx, [f" {a}" if a[:1] == "-" and a[1:2].isdecimal() else a for a in args]
+        )
+
+
+class _RrcGroup(HarmlessCommand, click.Group):
+    """A group with URL before its verbs."""
+
+    command_class = _Verb
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Take options behind URL too, and no URL where a verb comes first: its help needs none."""
+        options, url, rest = self._split(ctx, args)
+        if url in self.commands:
+            return super().parse_args(ctx, [*options, "", url, *rest])
+        more, verb, rest = self._split(ctx, rest) if rest[:1] != ["--"] else ([], "", rest)
+        words = [word for word in (url, verb) if word]
+        return super().parse_args(ctx, [*options, *more, *words, *rest])
+
+    def _split(self, ctx: click.Context, args: list[str]) -> tuple[list[str], str, list[str]]:
+        """Return the options before the first other word, that word, and what follows it."""
+        found, rest, _ = self.make_parser(ctx).parse_args(list(args))
+        word = found.get("url")
+        count = len(args) - len(rest)
+        if not isinstance(word, str):
+            return args, "", []
+        return args[: count - 1], word, rest
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the verbs in the order in which people meet them."""
+        return list(self.commands)
+
+
+@click.group(cls=_RrcGroup, subcommand_metavar="[VERB [ARGS]...]", invoke_without_command=True)
+@click.argument("url", type=_Url())
+@click.option("--panel", is_flag=True, help="Show a panel in this terminal, and drive by keys.")
+@click.option(
+    "--pad", metavar="DEVICE", help="Drive by a game pad while a button is held: /dev/input/event5."
+)
+@time_option(
+    "--watchdog", "watchdog_us", help="VR2 stops after so long without a command.  [500ms]"
+)
+@click.option("--no-watchdog", is_flag=True, help="Set none: nothing stops VR2 if this ends badly.")
+@click.option("--no-stablemode", is_flag=True, help="Leave CHECK and OK lines as they are.")
+@version_option()
+@click.pass_context
+def main(context: click.Context, /, url: str, *, panel: bool, **guard: Any) -> None:
+    """Drive and watch an RRC, the controller of a VR2 wheelchair, real or emulated.
+
+    URL is a port: /dev/ttyACM0, COM3, rfc2217://HOST:PORT, socket://HOST:PORT.
+    Nothing moves before an RRC has answered there. Its watchdog and stablemode
+    are on meanwhile. However the command ends, it stops the motors first; if it
+    is killed, the watchdog stops VR2.
+
+    \b
+    rrc /dev/ttyACM0 status                  what is connected, and its state
+    rrc /dev/ttyACM0 drive 30 0              forward at 30 %, while SPACE is held
+    rrc /dev/ttyACM0 limit 50 50             the stick drives, at 50 % at most
+    rrc /dev/ttyACM0 --panel                 drive by keys
+    rrc /dev/ttyACM0 --pad /dev/input/event5 drive 50 50
+    rrc /dev/ttyACM0 test                    the test procedure of the manual
+
+    \b
+    Exit status  0 all is done               3 no device, another device, or
+                 1 VR2 is off, was stopped,     the device is gone
+                   or refused; a test failed  130 Ctrl-C, 129 terminal closed
+                 2 usage
+
+    \b
+    Completion of verbs and options in the shell:
+    eval "$(_RRC_COMPLETE=bash_source rrc)"
+    """  # noqa: D301 - click wants the backspace
+    watchdog_us = _watchdog(guard["watchdog_us"], off=guard["no_watchdog"])
+    context.obj = RrcCall(url, watchdog_us, not guard["no_stablemode"], guard["pad"])
+    if context.invoked_subcommand is not None:
+        if panel:
+            raise Refused(f"--panel and {context.invoked_subcommand}: give one of them")
+        return
+    if not panel:
+        raise Refused("a verb is missing: status, drive, watch, ..., or --panel; see rrc --help")
+    with loading():
+        from importlib.util import find_spec  # noqa: PLC0415 - a TAB needs none
+
+        if find_spec("textual") is None:
+            raise Refused("--panel needs Textual: pip install 'tickrig[tui]'")
+        run = load("tickrig.host.rrc.panel:run")
+    run()
+
+
+def _watchdog(time_us: int | None, *, off: bool) -> int:
+    if off and time_us is not None:
+        raise Refused("--watchdog and --no-watchdog: give one of them")
+    if off:
+        return 0
+    time_us = _WATCHDOG_US if time_us is None else time_us
+    if time_us % _UNIT_US or not 0 < time_us <= _MOST_WATCHDOG_US:
+        raise Refused(f"--watchdog {time_us / 1_000:g}ms is not 10ms..2550ms in steps of 10ms")
+    return time_us
+
+
+_for_option: Final = time_option("--for", "for_us", help="End after so long.")
+_json_option: Final = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+_speed_option: Final = click.option(
+    "--speed", type=SPEED, default=1, show_default=True, help="Speed mode, 1 is the slowest."
+)
+
+_Decorator = Callable[[Callable[..., Any]], click.Command]
+
+
+@main.command("status")
+@_json_option
+@works_in(f"{_VERBS}:status")
+def _status(**options: Any) -> None:
+    """Say what is connected, whether VR2 is on, and what its status line says.
+
+    \b
+    rrc /dev/ttyACM0 status
+    rrc /dev/ttyACM0 status --json | jq .gauge
+    """  # noqa: D301 - click wants the backspace
+
+
+@main.command("drive")
+@click.argument("v_pct", metavar="V", type=_SIGNED)
+@click.argument("w_pct", metavar="W", type=_SIGNED)
+@_speed_option
+@_for_option
+@click.option("--no-dead-man", is_flag=True, help="Drive without a key that is held; wants --for.")
+@works_in(f"{_VERBS}:drive")
+def _drive(**options: Any) -> None:
+    """Drive: V forward and W to the right, -100..100 % each.
+
+    On a terminal the chair drives while SPACE is held, or pressed again within
+    1 s; q ends. With --pad it drives by the left stick while a button of the pad
+    is held, and V and W are the most. A script has neither, and gives --for.
+
+    \b
+    rrc /dev/ttyACM0 drive 30 0
+    rrc /dev/ttyACM0 drive -20 0 --speed 2
+    rrc /dev/ttyACM0 --pad /dev/input/event5 drive 50 50
+    rrc /dev/ttyACM0 drive 0 15 --for 2s </dev/null
+    """  # noqa: D301 - click wants the backspace
+
+
+@main.command("limit")
+@click.argument("v_pct", metavar="V", type=_PERCENT)
+@click.argument("w_pct", metavar="W", type=_PERCENT)
+@click.option("--sum", "sum_pct", type=_BYTE, default=255, help="Most of |v| + |w|.  [no limit]")
+@click.option(
+    "--product", "product_pct", type=_BYTE, default=255, help="Most of |v| * |w| / 100.  [no limit]"
+)
+@click.option(
+    "--radius",
+    "radius_pct",
+    type=_BYTE,
+    default=255,
+    help="Most of the root of v² + w².  [no limit]",
+)
+@_speed_option
+@_for_option
+@click.option("--leave", is_flag=True, help="End at once; the stick drives on, without a watchdog.")
+@works_in(f"{_VERBS}:limit")
+def _limit(**options: Any) -> None:
+    """Let the stick drive: V % forward and W % of rotation at most.
+
+    It runs until Ctrl-C, and stops the chair then.
+
+    \b
+    rrc /dev/ttyACM0 limit 50 50
+    rrc /dev/ttyACM0 limit 100 60 --sum 120 --for 10s
+    rrc /dev/ttyACM0 limit 100 100 --leave
+    """  # noqa: D301 - click wants the backspace
+
+
+@main.command("stick")
+@click.option(
+    "--low", type=_PERCENT, nargs=2, default=(0, 0), metavar="V W", help="Counts as 0.  [0 0]"
+)
+@click.option(
+    "--high",
+    type=_PERCENT,
+    nargs=2,
+    default=(100, 100),
+    metavar="V W",
+    help="Counts as 100.  [100 100]",
+)
+@click.option(
+    "--exponent",
+    type=_NIBBLE,
+    nargs=2,
+    default=(0, 0),
+    metavar="V W",
+    help="Output is input ^ (1 + 0.1 * exponent), 0..15.  [0 0]",
+)
+@click.option(
+    "--reverse",
+    "reverse_mode",
+    type=click.IntRange(0, 3),
+    default=0,
+    show_default=True,
+    help="0 plain, 1 no backing, 2 gears, 3 gears, backing toward the stick.",
+)
+@click.option(
+    "--neutral",
+    "neutral_pct",
+    type=_PERCENT,
+    default=5,
+    show_default=True,
+    help="Radius of rest, gears.",
+)
+@click.option(
+    "--switch",
+    "switch_deg",
+    type=_ANGLE,
+    default=30,
+    show_default=True,
+    help="Angle up to which R is chosen.",
+)
+@click.option(
+    "--fade",
+    "fade_deg",
+    type=_ANGLE,
+    default=45,
+    show_default=True,
+    help="Angle from which R fades.",
+)
+@works_in(f"{_VERBS}:stick")
+def _stick(**options: Any) -> None:
+    """Shape the stick: dead zones, exponents, and how it backs.
+
+    It holds until VR2 or the RRC is switched off.
+
+    \b
+    rrc /dev/ttyACM0 stick --low 10 10 --exponent 5 5
+    rrc /dev/ttyACM0 stick --reverse 3
+    """  # noqa: D301 - click wants the backspace
+
+
+@main.command("speed")
+@click.argument("mode", metavar="MODE", type=SPEED)
+@click.option("--lock", is_flag=True, help="Lock the speed buttons of the controller.")
+@works_in(f"{_VERBS}:speed")
+def _speed(**options: Any) -> None:
+    """Choose the speed mode, 1 (slowest) to 5.
+
+    \b
+    rrc /dev/ttyACM0 speed 4
+    rrc /dev/ttyACM0 speed 1 --lock
+    """  # noqa: D301 - click wants the backspace
+
+
+@main.command("beep")
+@click.argument("times", metavar="ON [OFF ON ...]", nargs=-1, required=True)
+@works_in(f"{_VERBS}:beep")
+def _beep(**options: Any) -> None:
+    """Sound the buzzer: up to ten times, on and off by turns.
+
+    A time is 0..2550ms, in steps of 10ms. One 0 ends what sounds.
+
+    \b
+    rrc /dev/ttyACM0 beep 1s 1s 1s
+    rrc /dev/ttyACM0 beep 0
+    """  # noqa: D301 - click wants the backspace
+
+
+@main.command("poweroff")
+@works_in(f"{_VERBS}:poweroff")
+def _poweroff(**options: Any) -> None:
+    """Stop VR2 by force; its power button must be pressed afterwards.
+
+    \b
+    rrc /dev/ttyACM0 poweroff
+    """  # noqa: D301 - click wants the backspace
+
+
+@main.command("watch")
+@_for_option
+@click.option("--all", "every", is_flag=True, help="Print each status line, not only changes.")
+@_json_option
+@works_in(f"{_VERBS}:watch")
+def _watch(**options: Any) -> None:
+    """Print events and changes of the status line as they come, until Ctrl-C.
+
+    \b
+    rrc /dev/ttyACM0 watch
+    rrc /dev/ttyACM0 watch --json --for 10s > run.jsonl
+    """  # noqa: D301 - click wants the backspace
+
+
+@main.command("test")
+@click.option(
+    "--json", "json_path", metavar="FILE", help="Write the results, - is standard output."
+)
+@works_in(f"{_VERBS}:test")
+def _test(**options: Any) -> None:
+    """Lead through the test procedure of the manual, step by step.
+
+    It sends the sample commands without CHECK, then with CHECK, and judges the
+    answers; you press buttons, move the stick, and say what you see. Two samples
+    let the motors run: lift the wheels off the ground first.
+
+    \b
+    rrc /dev/ttyACM0 test
+    rrc /dev/ttyACM0 test --json results.json
+    """  # noqa: D301 - click wants the backspace

@@ -1,0 +1,213 @@
+"""What a panel wants of a chair, and what it shows of it: a screen and a line do not wait."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Final, Protocol
+
+from tickrig.host.links.link import DeviceRefused
+from tickrig.host.rrc.chair import STEP_US, Chair, ChairStopped, DeadMan
+from tickrig.host.rrc.channel import RrcLoad, RrcStopped
+from tickrig.wire.rrc.commands import Limit
+from tickrig.wire.rrc.replies import RrcEvent, StatusA
+
+_KEPT_LINES: Final = 60
+
+
+class Drives(StrEnum):
+    """Who drives the chair, as far as the panel has chosen."""
+
+    NOBODY = "nobody"
+    HOST = "host"
+    STICK = "stick"
+
+
+class PadStick(Protocol):
+    """A stick with a dead-man button."""
+
+    def poll(self, now_us: int, /) -> tuple[int, int]:
+        """Return what to drive in per cent, 0 while no button is held; ChairStopped if gone."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class PilotView:
+    """What is known at one time.
+
+    Attributes:
+        now_us: the time.
+        drives: who drives.
+        aim_pct: what is driven while the dead-man key holds.
+        held: whether it holds.
+        speed_mode: that was chosen.
+        most_pct: limit of the stick.
+        status: the latest status line, None while VR2 is off.
+        load: how busy the RRC is with this program.
+        lines: events and what was done, `(time, mark, text)`.
+    """
+
+    now_us: int
+    drives: Drives = Drives.NOBODY
+    aim_pct: tuple[int, int] = (0, 0)
+    held: bool = False
+    speed_mode: int = 1
+    most_pct: int = 50
+    status: StatusA | None = None
+    load: RrcLoad | None = None
+    lines: tuple[tuple[int, str, str], ...] = ()
+
+
+class Pilot:
+    """Steps a chair in one thread; another one presses, aims and looks.
+
+    Args:
+        chair: guarded.
+        pad: a game pad in place of the keys.
+
+    Attributes:
+        view: what is known now.
+    """
+
+    def __init__(self, chair: Chair, pad: PadStick | None = None) -> None:
+        self._chair, self._pad = chair, pad
+        self._client = chair.client
+        self._dead_man = DeadMan()
+        self._drives, self._aim_pct = Drives.NOBODY, (0, 0)
+        self._speed_mode, self._most_pct = 1, 50
+        self._acts: deque[Callable[[], None]] = deque()
+        self._lines: deque[tuple[int, str, str]] = deque(maxlen=_KEPT_LINES)
+        self._began_us = self._client.now_us
+        chair.status()
+        self.view = self._look()
+
+    # Called by the screen.
+
+    def press(self) -> None:
+        """Press the dead-man key."""
+        self._dead_man.press(self._client.now_us)
+
+    def release(self) -> None:
+        """Let the dead-man key go, and aim at 0."""
+        self._dead_man.release()
+        self._aim_pct = 0, 0
+
+    def aim(self, v_pct: int, w_pct: int) -> None:
+        """Change what is driven, in per cent."""
+        v, w = self._aim_pct
+        self._aim_pct = max(-100, min(100, v + v_pct)), max(-100, min(100, w + w_pct))
+
+    def take(self, drives: Drives) -> None:
+        """Let the host, the stick or nobody drive."""
+        self.release()
+        self._acts.append(lambda: self._take(drives))
+
+    def choose_speed(self, mode: int) -> None:
+        """Choose the speed mode."""
+
+        def act() -> None:
+            self._client.speedmode(mode)
+            self._speed_mode = mode
+            self._note(">", f"speed mode {mode}")
+
+        self._acts.append(act)
+
+    def limit_stick(self, pct: int) -> None:
+        """Change the limit of the stick."""
+        self._most_pct = max(0, min(100, self._most_pct + pct))
+        if self._drives is Drives.STICK:
+            self._acts.append(lambda: self._take(Drives.STICK))
+
+    def beep(self) -> None:
+        """Sound the buzzer for a moment."""
+        self._acts.append(lambda: self._client.beep(200_000))
+
+    def power_off(self) -> None:
+        """Stop VR2 by force."""
+        self.release()
+        self._acts.append(self._power_off)
+
+    # Called by the thread of the line.
+
+    def step(self) -> None:
+        """Do what was asked for, and drive or listen for 20 ms.
+
+        Raises:
+            LinkError: the line is gone, or the RRC does not answer.
+        """
+        try:
+            while self._acts:
+                self._acts.popleft()()
+            if self._drives is Drives.HOST:
+                self._chair.drive(*self._drive_pct())
+            else:
+                self._client.run_for(STEP_US)
+            for arrival in self._chair.watch():
+                self._note("<", f"EV:{arrival.value.name}")
+        except ChairStopped as stop:
+            self._stopped(stop)
+        except RrcStopped as refused:
+            self._note("!", str(refused))
+            self._client.resume()
+            self._drives = Drives.NOBODY
+        except DeviceRefused as refused:
+            self._note("!", str(refused))
+        self.view = self._look()
+
+    def _drive_pct(self) -> tuple[int, int]:
+        now_us = self._client.now_us
+        if self._pad is not None:
+            aim_pct = self._pad.poll(now_us)
+            if any(aim_pct):
+                self._dead_man.press(now_us)
+                self._aim_pct = aim_pct
+            else:
+                self.release()
+        return self._aim_pct if self._dead_man.holds(now_us) else (0, 0)
+
+    def _take(self, drives: Drives) -> None:
+        if drives is Drives.HOST:
+            self._chair.take_over(self._speed_mode)
+        elif drives is Drives.STICK:
+            limit = Limit(self._most_pct, self._most_pct)
+            self._chair.drive_by_stick(limit, self._speed_mode)
+        else:
+            self._chair.stop()
+        self._drives = drives
+        self._note(">", f"{drives} drives")
+
+    def _power_off(self) -> None:
+        self._client.poweroff()
+        self._note(">", "power off")
+
+    def _stopped(self, stop: ChairStopped) -> None:
+        self._drives = Drives.NOBODY
+        self.release()
+        if stop.kind is None:
+            self._note("!", str(stop))
+            self._chair.stop()
+        else:
+            self._note("<", f"EV:{stop.kind}")
+        if stop.kind is RrcEvent.INITIALIZED:
+            self._chair.set_guard()  # it has forgotten all
+            self._speed_mode = 1
+
+    def _note(self, mark: str, text: str) -> None:
+        self._lines.append((self._client.now_us - self._began_us, mark, text))
+
+    def _look(self) -> PilotView:
+        now_us = self._client.now_us
+        latest = self._chair.latest_status
+        return PilotView(
+            now_us - self._began_us,
+            self._drives,
+            self._aim_pct,
+            self._dead_man.holds(now_us),
+            self._speed_mode,
+            self._most_pct,
+            None if latest is None else latest.value,
+            self._client.load,
+            tuple(self._lines),
+        )

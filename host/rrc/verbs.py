@@ -1,0 +1,359 @@
+"""What the verbs of `rrc` do."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager, suppress
+from dataclasses import asdict
+from types import FrameType
+from typing import Any, Final, Protocol
+
+import click
+
+from tickrig.host.cli.messages import BusFailed, Refused, refused_at
+from tickrig.host.cli.start import give_up_terminals, taking_signals
+from tickrig.host.links.game_pad import EvdevPad
+from tickrig.host.links.link import DeviceRefused, LinkClosed, LinkError, first_line
+from tickrig.host.links.serial_link import SerialLink
+from tickrig.host.links.terminal import TerminalOutput, take_keys
+from tickrig.host.rrc.chair import STEP_US, Chair, ChairStopped, DeadMan, Guard
+from tickrig.host.rrc.cli import RrcCall
+from tickrig.host.rrc.client import RrcClient
+from tickrig.host.text.page_text import json_text
+from tickrig.host.text.values import format_time, parse_time_with_unit_us
+from tickrig.wire.instant import NEVER
+from tickrig.wire.rrc.commands import Joystick, Limit
+from tickrig.wire.rrc.replies import StatusA
+
+_FIELDS: Final = {
+    "in_v_pct": "stick_v_pct",
+    "in_w_pct": "stick_w_pct",
+    "out_v_pct": "out_v_pct",
+    "out_w_pct": "out_w_pct",
+    "gauge": "gauge",
+    "speed_mode": "speed_mode",
+    "speed_up_count": "speed_up_count",
+    "speed_down_count": "speed_down_count",
+    "alarm_count": "alarm_count",
+}
+"""What is printed of a status line, by the names that inputs and outputs of the emulator have."""
+
+_MOST_BEEPS: Final = 10
+_SHOWN_US: Final = 100_000
+
+
+class Ended:
+    """A signal that has come; it interrupts nothing, the loops look at it.
+
+    Attributes:
+        number: of the first signal, 0 if none came.
+    """
+
+    number = 0
+
+    def received(self, number: int, frame: FrameType | None) -> None:
+        """Take a signal."""
+        self.number = self.number or number
+
+
+@contextmanager
+def open_chair(ended: Ended) -> Iterator[Chair]:
+    """Open the port of this call and guard the chair; stop it at the end, then end the command.
+
+    Raises:
+        click.ClickException: a line says what failed; exit status 1 or 3.
+        KeyboardInterrupt: a signal came, after the chair was stopped.
+    """
+    call = click.get_current_context().find_object(RrcCall)
+    assert call is not None
+    if not call.url:
+        raise Refused("no URL: rrc /dev/ttyACM0 VERB")
+    chair: Chair | None = None
+    with taking_signals(ended.received):
+        try:
+            with Chair(SerialLink(call.url), Guard(call.watchdog_us, call.stable)) as chair:
+                yield chair
+        except LinkError as error:
+            raise BusFailed(_lost(call, error, chair)) from error
+        except (DeviceRefused, ChairStopped) as error:
+            raise click.ClickException(str(error)) from error
+    if ended.number:
+        give_up_terminals()
+        raise KeyboardInterrupt(ended.number)
+
+
+def _lost(call: RrcCall, error: LinkError, chair: Chair | None) -> str:
+    text = first_line(error)
+    named = text if call.url in text else f"{call.url}: {text}"
+    if chair is None or not chair.moved:
+        return named
+    if call.watchdog_us:
+        return f"{named}; the watchdog stops VR2 within {call.watchdog_us // 1_000} ms"
+    return f"{named}; no watchdog was set: stop the chair by its power button"
+
+
+def described(status: StatusA) -> dict[str, int]:
+    """Return what a status line says, by the names of the emulator."""
+    values = asdict(status)
+    return {shown: values[name] for name, shown in _FIELDS.items()}
+
+
+def status(*, as_json: bool) -> None:
+    """Say what is connected and in which state."""
+    with open_chair(Ended()) as chair:
+        client = chair.client
+        found = {"device": client.device(), "version": client.version(), "date": client.date()}
+        sa = chair.status()
+    values: dict[str, object] = {**found, "vr2": "off" if sa is None else "on"}
+    values |= {} if sa is None else described(sa)
+    if as_json:
+        click.echo(json_text(values))
+        return
+    for name, value in values.items():
+        click.echo(f"{name:<17}{value}")
+
+
+class _DriveInput(Protocol):
+    """Who says what to drive.
+
+    Attributes:
+        hint: what to do, for the line of the terminal.
+        leaves: whether the end was asked for.
+    """
+
+    hint: str
+    leaves: bool
+
+    def poll(self, now_us: int) -> tuple[int, int]:
+        """Return what to drive now, in per cent; ChairStopped if terminal or pad are gone."""
+        ...
+
+    def close(self) -> None:
+        """Give keys or pad back."""
+
+
+class _Script:
+    """Drives without a dead-man key."""
+
+    hint, leaves = "", False
+
+    def __init__(self, v_pct: int, w_pct: int) -> None:
+        self._drive = v_pct, w_pct
+
+    def poll(self, now_us: int) -> tuple[int, int]:
+        return self._drive
+
+    def close(self) -> None:
+        """Nothing is taken."""
+
+
+class _Keys:
+    """Drives while SPACE comes from the terminal."""
+
+    hint, leaves = "   SPACE drives, q ends", False
+
+    def __init__(self, v_pct: int, w_pct: int) -> None:
+        self._drive, self._dead_man = (v_pct, w_pct), DeadMan()
+        self._fd = sys.stdin.fileno()
+        try:
+            self.close = take_keys(self._fd)
+        except OSError as error:
+            raise Refused(f"the keyboard is no terminal: {error.strerror}") from error
+
+    def poll(self, now_us: int) -> tuple[int, int]:
+        try:
+            keys = os.read(self._fd, 256)
+        except OSError as error:
+            raise ChairStopped(f"the terminal is gone: {error.strerror}") from error
+        if b" " in keys:
+            self._dead_man.press(now_us)
+        if keys.strip(b" "):  # any other key lets go
+            self._dead_man.release()
+        self.leaves = self.leaves or b"q" in keys
+        return self._drive if self._dead_man.holds(now_us) else (0, 0)
+
+
+class PadHand:
+    """Drives by the left stick of a game pad while one of its buttons is held.
+
+    Args:
+        path: of the pad.
+        v_pct: most translation.
+        w_pct: most rotation.
+    """
+
+    hint, leaves = "   a button drives", False
+    _REST: Final = 0.1
+
+    def __init__(self, path: str, v_pct: int, w_pct: int) -> None:
+        self._pad, self._most = EvdevPad(path), (abs(v_pct), abs(w_pct))
+        self.close = self._pad.close
+
+    def poll(self, now_us: int) -> tuple[int, int]:
+        """Return what the stick asks for; 0 while no button is held."""
+        try:
+            hand = self._pad.poll(now_us)
+        except LinkClosed as error:
+            raise ChairStopped(str(error)) from error
+        if not self._pad.held:
+            return 0, 0
+        forward, right = (x if abs(x) > self._REST else 0.0 for x in (hand.forward, -hand.turn))
+        return round(forward * self._most[0]), round(right * self._most[1])
+
+
+def open_pad(path: str, v_pct: int = 100, w_pct: int = 100) -> PadHand:
+    """Open a game pad; Refused if it cannot be."""
+    try:
+        return PadHand(path, v_pct, w_pct)
+    except LinkClosed as error:
+        raise Refused(str(error)) from error
+
+
+def _drive_input(v_pct: int, w_pct: int, for_us: int | None, *, no_dead_man: bool) -> _DriveInput:
+    call = click.get_current_context().find_object(RrcCall)
+    if call is not None and call.pad is not None:
+        return open_pad(call.pad, v_pct, w_pct)
+    if no_dead_man or not sys.stdin.isatty():
+        if for_us is None:
+            raise Refused("nothing holds a dead-man key: call it on a terminal, or give --for TIME")
+        return _Script(v_pct, w_pct)
+    return _Keys(v_pct, w_pct)
+
+
+class _Line:
+    """One line of the terminal that is written again; nothing if standard error is none.
+
+    A terminal that takes nothing does not keep the chair waiting.
+    """
+
+    def __init__(self) -> None:
+        self._output = TerminalOutput(2) if sys.stderr.isatty() else None
+        self._text, self._due_us = "", 0
+
+    def show(self, now_us: int, text: str) -> None:
+        if self._output is not None and text != self._text and now_us >= self._due_us:
+            self._output.write(f"\r{text}\x1b[K")
+            self._text, self._due_us = text, now_us + _SHOWN_US
+
+    def close(self) -> None:
+        if self._output is not None:
+            if self._text:
+                self._output.write("\r\n", last=True)
+            self._output.close()
+
+
+def _shown(client: RrcClient) -> str:
+    if client.latest_status is None:
+        return ""
+    sa = client.latest_status.value
+    return (
+        f"stick {sa.in_v_pct:+} {sa.in_w_pct:+}  out {sa.out_v_pct:+} {sa.out_w_pct:+}"
+        f"  gauge {sa.gauge}  speed {sa.speed_mode}"
+    )
+
+
+def drive(*, v_pct: int, w_pct: int, speed: int, for_us: int | None, no_dead_man: bool) -> None:
+    """Drive while the dead-man key is held."""
+    ended = Ended()
+    with (
+        closing(_drive_input(v_pct, w_pct, for_us, no_dead_man=no_dead_man)) as control,
+        closing(_Line()) as line,
+        open_chair(ended) as chair,
+    ):
+        client = chair.client
+        chair.require_on()
+        chair.take_over(speed)
+        end_us = NEVER if for_us is None else client.now_us + for_us
+        while not (ended.number or control.leaves) and client.now_us < end_us:
+            chair.drive(*control.poll(client.now_us))
+            line.show(client.now_us, _shown(client) + control.hint)
+
+
+def limit(*, speed: int, for_us: int | None, leave: bool, **limits: int) -> None:
+    """Let the stick drive."""
+    if leave and for_us is not None:
+        raise Refused("--leave and --for: give one of them")
+    ended = Ended()
+    with closing(_Line()) as line, open_chair(ended) as chair:
+        client = chair.client
+        chair.require_on()
+        chair.drive_by_stick(Limit(**limits), speed)
+        if leave:
+            chair.leave_driving()
+            return
+        end_us = NEVER if for_us is None else client.now_us + for_us
+        while not ended.number and client.now_us < end_us:
+            client.run_for(STEP_US)
+            chair.watch()
+            line.show(client.now_us, f"{_shown(client)}   the stick drives, Ctrl-C ends")
+
+
+def _once(act: Callable[[RrcClient], object]) -> None:
+    with open_chair(Ended()) as chair:
+        act(chair.client)
+
+
+def stick(
+    *, low: tuple[int, int], high: tuple[int, int], exponent: tuple[int, int], **gears: int
+) -> None:
+    """Shape the stick."""
+    with refused_at("stick"):
+        shape = Joystick(*low, *high, *exponent, **gears)
+    _once(lambda client: client.joystick(shape))
+
+
+def speed(*, mode: int, lock: bool) -> None:
+    """Choose the speed mode."""
+    _once(lambda client: client.speedmode(mode, locked=lock))
+
+
+def beep(*, times: tuple[str, ...]) -> None:
+    """Sound the buzzer."""
+    if len(times) > _MOST_BEEPS:
+        raise Refused(f"{len(times)} times, an RRC takes at most {_MOST_BEEPS}")
+    with refused_at("beep"):
+        times_us = [parse_time_with_unit_us(each) for each in times]
+        for word, time_us in zip(times, times_us, strict=True):
+            if time_us % 10_000 or time_us > 2_550_000:
+                raise ValueError(f"{word} is not 0..2550ms in steps of 10ms")
+    _once(lambda client: client.beep(*times_us))
+
+
+def poweroff() -> None:
+    """Stop VR2 by force."""
+    with open_chair(Ended()) as chair:
+        chair.require_on()
+        chair.client.poweroff()
+
+
+def watch(*, for_us: int | None, every: bool, as_json: bool) -> None:
+    """Print what comes."""
+    ended = Ended()
+    with open_chair(ended) as chair, suppress(BrokenPipeError):
+        client = chair.client
+        chair.status()
+        began_us = client.now_us
+        end_us = NEVER if for_us is None else began_us + for_us
+        before: StatusA | None = None
+        while not ended.number and client.now_us < end_us:
+            client.run_for(STEP_US)
+            lines: list[tuple[int, dict[str, object]]] = [
+                (each.at_us, {"event": each.value.name}) for each in client.events(0)
+            ]
+            for sa in client.statuses(0):
+                if every or sa.value != before:
+                    lines.append((sa.at_us, dict(described(sa.value))))
+                before = sa.value
+            for at_us, values in sorted(lines, key=lambda line: line[0]):
+                _print(at_us - began_us, values, as_json=as_json)
+
+
+def _print(at_us: int, values: dict[str, Any], *, as_json: bool) -> None:
+    if as_json:
+        click.echo(json_text({"at_us": at_us, **values}))
+    else:
+        shown = "  ".join(f"{name} {value}" for name, value in values.items())
+        click.echo(f"{format_time(max(0, at_us)):>12}  {shown}")
+    sys.stdout.flush()
