@@ -38,19 +38,20 @@ class CanFaultType(FaultForm):
 
 CAN_FAULTS: Final[Mapping[str, CanFaultType]] = {
     "drop": CanFaultType(
-        "each frame is acknowledged and then taken by nobody, at this rate",
+        "each frame is acknowledged, and received by no node",
         verdict=FaultVerdict.DROPPED,
     ),
     "corrupt": CanFaultType(
-        "a bit of each frame is turned over, at this rate", verdict=FaultVerdict.CORRUPTED
+        "a bit of each frame is turned over: an error frame, and it is sent again",
+        verdict=FaultVerdict.CORRUPTED,
     ),
     "duplicate": CanFaultType(
-        "each frame is sent again, its sender saw the last bit wrong, at this rate",
+        "each frame is sent again, because its sender saw the last bit wrong",
         verdict=FaultVerdict.DUPLICATED,
     ),
-    "delay": CanFaultType("each time a node sends, it is held for 10 ms, at this rate"),
+    "delay": CanFaultType("each time a node sends, it is held for 10 ms"),
     "babble": CanFaultType("a broken node sends 000# without a pause", rated=False),
-    "short": CanFaultType("the lines touch: nobody can send", rated=False),
+    "short": CanFaultType("the lines touch: no node can send", rated=False),
 }
 
 
@@ -96,7 +97,7 @@ class CanFaults(Part):
         fault_types: the faults that can be armed, by name.
         active: whether any is armed.
         place: a number from which the place of a turned bit is taken.
-        listeners: called with the time and each frame that nobody takes.
+        listeners: called with the time and each frame that no node takes.
     """
 
     fault_types = CAN_FAULTS

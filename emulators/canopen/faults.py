@@ -204,7 +204,7 @@ class NodeFaultType(FaultForm):
     Attributes:
         frames: what it acts on.
         instead: returns what comes instead of a frame.
-        meant: says whether it acts on a frame of that kind.
+        matches: says whether it acts on a frame of that kind.
         by_itself: what it does each `period` (an argument; each tick without it).
         abort: it answers the request itself, with this function's frame.
         controller: it is done to the CAN controller.
@@ -214,7 +214,7 @@ class NodeFaultType(FaultForm):
 
     frames: NodeFrames = field(default=_NO_FRAMES, kw_only=True)
     instead: Callable[[ArmedNodeFault, CanFrame], _Sent] = field(default=_lost, kw_only=True)
-    meant: Callable[[NodeFaults, ArmedNodeFault, CanFrame], bool] | None = field(
+    matches: Callable[[NodeFaults, ArmedNodeFault, CanFrame], bool] | None = field(
         default=None, kw_only=True
     )
     by_itself: Callable[[NodeFaults, ArmedNodeFault], Frames] | None = field(
@@ -411,7 +411,7 @@ NODE_FAULTS: Final[Mapping[str, NodeFaultType]] = {
             FaultArgument("access", "which transfers", "both", choices=("both", "read", "write")),
         ),
         frames=NodeFrames.FOR_SDO_START,
-        meant=_is_object,
+        matches=_is_object,
         abort=_aborted,
     ),
     "sdo_busy": NodeFaultType(
@@ -494,24 +494,24 @@ NODE_FAULTS: Final[Mapping[str, NodeFaultType]] = {
         "TPDOs have bytes too few",
         arguments=(_BYTES, _TPDO),
         frames=NodeFrames.PDO,
-        meant=_is_tpdo,
+        matches=_is_tpdo,
         instead=_shorter,
     ),
     "pdo_long": NodeFaultType(
         "TPDOs have bytes too many, up to 8",
         arguments=(_BYTES, _TPDO),
         frames=NodeFrames.PDO,
-        meant=_is_tpdo,
+        matches=_is_tpdo,
         instead=_longer,
     ),
     "pdo_mute": NodeFaultType(
-        "TPDOs are missing", arguments=(_TPDO,), frames=NodeFrames.PDO, meant=_is_tpdo
+        "TPDOs are missing", arguments=(_TPDO,), frames=NodeFrames.PDO, matches=_is_tpdo
     ),
     "pdo_stale": NodeFaultType(
         "TPDOs repeat the data of the first one since the fault began",
         arguments=(_TPDO,),
         frames=NodeFrames.PDO,
-        meant=_is_tpdo,
+        matches=_is_tpdo,
         instead=_stale,
     ),
     "emcy_storm": NodeFaultType(
@@ -731,7 +731,7 @@ class NodeFaults(Copyable):
             armed
             for armed in self._armed.values()
             if kind & armed.fault_type.frames
-            and (armed.fault_type.meant is None or armed.fault_type.meant(self, armed, frame))
+            and (armed.fault_type.matches is None or armed.fault_type.matches(self, armed, frame))
             and armed.trigger.hit()
         ]
 

@@ -75,10 +75,10 @@ class Journal(WireLog):
         return hear
 
     def of_lost(self, source: str) -> Callable[[int, CanFrame], None]:
-        """Return what takes the frames of a bus that nobody takes."""
+        """Return what takes the frames of a bus that no node takes."""
 
         def hear(at_us: int, frame: CanFrame) -> None:
-            self.add(at_us, Mark.WIRE, f"nobody takes {frame}".encode(), source)
+            self.add(at_us, Mark.WIRE, f"no node takes {frame}".encode(), source)
 
         return hear
 

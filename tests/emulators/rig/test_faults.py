@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Mapping
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -9,12 +11,15 @@ from hypothesis import strategies as st
 from tests.emulators.lamp import Lamp
 from tickrig.device.chance import Chance, threshold_of
 from tickrig.emulators.bench.fault_spec import parse_fault_spec
+from tickrig.emulators.can.faults import CAN_FAULTS
+from tickrig.emulators.canopen.faults import NODE_FAULTS
 from tickrig.emulators.rig.faults import (
     FaultArgument,
     FaultArguments,
     FaultForm,
     FaultyPort,
     bind_arguments,
+    usage,
 )
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
@@ -248,3 +253,29 @@ def test_the_range_and_the_default_of_each_argument_can_be_read() -> None:
         "count": ("always", "1 to 1000000"),
     }
     assert BYTE_FAULTS["cut"].all_arguments == ()
+
+
+TABLES: dict[str, Mapping[str, FaultForm]] = {
+    "Of a serial line": BYTE_FAULTS,
+    "Of a CAN bus": CAN_FAULTS,
+    "Of a CANopen node": NODE_FAULTS,
+}
+
+
+def table_of(faults: Mapping[str, FaultForm]) -> str:
+    """Return the rows of a table of the page, made from the declarations."""
+    rows = ["| fault | what it does | arguments |", "|---|---|---|"]
+    for name, form in faults.items():
+        arguments = "; ".join(
+            f"`{one.name}`: {one.text}, {one.range} [{one.default}]" for one in form.arguments
+        )
+        usual = form.all_arguments[-2].default if form.rated else "1"
+        arguments += f"rate [{usual}]" if usual != "1" else ""
+        rows.append(f"| `{usage(name, form)}` | {form.text} | {arguments} |".replace("  ", " "))
+    return "\n".join(rows)
+
+
+@pytest.mark.parametrize("title", TABLES)
+def test_the_page_has_the_table_of_the_declarations(title: str) -> None:
+    page = (Path(__file__).parents[3] / "docs/reference/bench/faults.md").read_text("utf-8")
+    assert table_of(TABLES[title]) in page.partition(f"## {title}\n")[2].partition("\n## ")[0]

@@ -300,7 +300,7 @@ def test_what_nobody_takes_and_what_a_fault_changes_is_marked(master: Master) ->
         master.read()
     marked = [line.split(" ~ ") for line in master.bench.transcript().splitlines() if " ~ " in line]
     assert {(place.split()[1], text) for place, text in marked} >= {
-        ("can", "nobody takes 582#43816000E8030000"),
+        ("can", "no node takes 582#43816000E8030000"),
         ("axis2", "the node hears nothing where the bus sent 602#4081600000000000"),
     }
 
