@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
+from tickrig.emulators.record.frames import FrameLog
 from tickrig.host.text.trace import Mark
 from tickrig.wire.can import CanFrame, ErrorFrame
 from tickrig.wire.lines import LineSplitter
@@ -69,11 +70,26 @@ class WireLog:
 
     def hear(self, at_us: int, mark: Mark, data: bytes) -> None:
         """Take what passed, cut anywhere."""
+        self._end_silent(at_us)
+        splitter = self._splitters[mark]
+        if isinstance(splitter, FrameLog):
+            for line in splitter(at_us, data):
+                self.add(at_us, mark, line)
+            self._begun[mark] = at_us, splitter.begun
+            return
         begun = (self._begun[mark][1] + data)[-_MOST_BEGUN:]
-        for line in self._splitters[mark](at_us, data):
+        for line in splitter(at_us, data):
             self.add(at_us, mark, line)
             begun = begun[begun.find(line) + len(line) :].lstrip(_LINE_ENDS)
         self._begun[mark] = at_us, begun
+
+    def _end_silent(self, at_us: int) -> None:
+        """Take frames that a silence has ended, at the time of their last byte."""
+        for mark, splitter in self._splitters.items():
+            if isinstance(splitter, FrameLog) and splitter.due_us <= at_us:
+                for line in splitter(at_us, b""):
+                    self.add(splitter.last_us, mark, line)
+                self._begun[mark] = at_us, b""
 
     def unfinished(self) -> tuple[WireLine, ...]:
         """Return what has begun and did not end, of each direction; not numbered."""

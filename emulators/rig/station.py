@@ -24,7 +24,7 @@ class Station(StationFields, Generic[W]):
     __slots__ = ()
 
     def __init__(self, device: Device[W], port: Port[W]) -> None:
-        if hasattr(device, "uart"):
+        if getattr(device, "uart", None) is not None:
             port = _UartPort(device, port)
         self.device, self.port, self.tick_us = device, port, device.tick_us
         self.at_us: int = NEVER

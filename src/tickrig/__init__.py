@@ -18,6 +18,12 @@ if TYPE_CHECKING:
     from tickrig.emulators.canopen.eds import read_eds as read_eds
     from tickrig.emulators.commands.device_type import DeviceType as DeviceType
     from tickrig.emulators.fields import DeviceField as DeviceField
+    from tickrig.emulators.record.frames import FrameFormat as FrameFormat
+    from tickrig.emulators.record.frames import FrameSplitter as FrameSplitter
+    from tickrig.emulators.record.frames import by_delimiter as by_delimiter
+    from tickrig.emulators.record.frames import by_gap as by_gap
+    from tickrig.emulators.record.frames import by_length as by_length
+    from tickrig.emulators.record.frames import by_size as by_size
     from tickrig.emulators.rig.clock import VirtualClock as VirtualClock
     from tickrig.emulators.rig.kernel import kernel as kernel
     from tickrig.emulators.rig.rig import Rig as Rig
@@ -63,6 +69,14 @@ else:
             "tickrig.emulators.canopen.eds": ("read_eds",),
             "tickrig.emulators.commands.device_type": ("DeviceType",),
             "tickrig.emulators.fields": ("DeviceField",),
+            "tickrig.emulators.record.frames": (
+                "FrameFormat",
+                "FrameSplitter",
+                "by_delimiter",
+                "by_gap",
+                "by_length",
+                "by_size",
+            ),
             "tickrig.emulators.rig.clock": ("VirtualClock",),
             "tickrig.emulators.rig.kernel": ("kernel",),
             "tickrig.emulators.rig.rig": ("Rig",),

@@ -458,7 +458,8 @@ class BenchRig(RunningEmulator):
             if isinstance(mount, LineMount):
                 hear = self.journal.of_line(mount.name, mount.settings.splitter)
                 mount.tap.listeners.append(hear)
-                mount.faults.listeners.append(self.journal.of_faults(mount.name))
+                suffer = self.journal.of_faults(mount.name, splitter=mount.settings.splitter)
+                mount.faults.listeners.append(suffer)
             else:
                 mount.wire.observers.append(self.journal.of_bus(mount.name))
                 mount.wire.faults.listeners.append(self.journal.of_lost(mount.name))

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Final
 
+from tickrig.emulators.record.frames import FrameFormat, hex_text
 from tickrig.emulators.record.wire_log import Splitter, WireLine, WireLog
 from tickrig.host.text.byte_text import escape
 from tickrig.host.text.trace import Mark
@@ -50,16 +51,23 @@ class Journal(WireLog):
         return log.hear
 
     def of_faults(
-        self, source: str, ends: tuple[bytes, bytes] = _ENDS
+        self,
+        source: str,
+        ends: tuple[bytes, bytes] = _ENDS,
+        splitter: Callable[[Mark], Splitter] | None = None,
     ) -> Callable[[int, Mark, bytes | Frames, bytes | Frames], None]:
         """Return what takes traffic as it was sent, and as it is heard.
 
         Args:
             source: the line, or the node.
             ends: who is at the far end, and who at the near one.
+            splitter: of the line; bytes of one without a delimiter are shown in hex.
         """
+        is_binary = isinstance(splitter, FrameFormat) and not splitter.delimiter
 
         def hear(at_us: int, mark: Mark, sent: bytes | Frames, received: bytes | Frames) -> None:
+            if is_binary and isinstance(sent, bytes) and isinstance(received, bytes):
+                sent, received = hex_text(sent).encode(), hex_text(received).encode()
             sender, receiver = ends if mark is Mark.TO_DEVICE else ends[::-1]
             words = (
                 b"the",

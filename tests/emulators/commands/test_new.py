@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
 
 from tickrig.emulators.commands.cli import main
+
+ROOT = Path(__file__).parents[3]
 
 
 @pytest.fixture(autouse=True)
@@ -27,6 +32,22 @@ def test_it_names_the_files_that_it_wrote() -> None:
     assert Path("my-lamp/my_lamp/device.py") in paths
     assert "class MyLamp(" in Path("my-lamp/my_lamp/device.py").read_text("utf-8")
     assert not any("$" in path.read_text("utf-8") for path in paths)
+
+
+def test_a_binary_device_is_green_when_it_is_made() -> None:
+    made = new("my-gadget", "--binary")
+    assert Path("my-gadget/my_gadget/frames.py") in map(Path, made.stdout.splitlines())
+    path = os.pathsep.join([".", str(ROOT / "src")])
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider"],
+        cwd="my-gadget",
+        env={**os.environ, "PYTHONPATH": path},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (0, ""), done.stdout
+    assert "passed" in done.stdout
 
 
 @pytest.mark.parametrize(
