@@ -51,6 +51,7 @@ class KnownState:
         original: what objects held before the run.
         written: what may have changed, and has not been seen to be as before since.
         all_written: what was written in this run.
+        stored: what was written by checks that store it, so that a reset may bring it back.
         unrestored: what could not be written back, one a line.
         repairs: what to write to restore the rest, in this order.
     """
@@ -61,8 +62,11 @@ class KnownState:
         self._begin: Values = {}
         self.written: set[Address] = set()
         self.all_written: set[Address] = set()
+        self.stored: set[Address] = set()
         self.unrestored: dict[str, None] = {}
         self.repairs: list[Write] = []
+        self._is_reset = False
+        self._moved: dict[str, set[Address]] = {}  # what resets of a kind have changed
         self._silent = 0
 
     def learn(self, addresses: Iterable[Address]) -> None:
@@ -93,13 +97,33 @@ class KnownState:
         self.all_written.update(addresses)
 
     def reset(self) -> None:
-        """Take note that all that was written may have other values."""
-        self.written |= self.all_written
+        """Take note that all that was written may have other values, until `tidy_after`."""
+        self._is_reset = True
 
-    def tidy(self, addresses: Iterable[Address] | None) -> None:
-        """Bring objects into the state in which checks begin; all that are known if None."""
-        touched = self._begin if addresses is None else addresses
-        self._write_back(self._begin, [at for at in touched if at in self._begin])
+    def tidy(self, addresses: Iterable[Address]) -> None:
+        """Bring objects into the state in which checks begin."""
+        self._write_back(self._begin, [at for at in addresses if at in self._begin])
+
+    def tidy_after(self, resets: Collection[str] = (), written: Collection[Address] = ()) -> None:
+        """Bring what resets have changed into the state in which checks begin.
+
+        The first reset of a kind shows which objects it changes. After the next ones only these
+        are read, and what was written since: to read all of them each time was half the
+        processor time of a run.
+
+        Args:
+            resets: their kinds; empty if it is not known what has happened to the node.
+            written: what may have been written since the last reset.
+        """
+        touched: Iterable[Address] = self._begin
+        if resets and self._moved.keys() >= set(resets):
+            known = self.stored.union(
+                written, self.written, *(self._moved[kind] for kind in resets)
+            )
+            touched = [at for at in self._begin if at in known or self.is_quieted(at)]
+        moved = [self._moved.setdefault(kind, set()) for kind in resets]
+        self._write_back(self._begin, touched, moved)
+        self._is_reset = False
 
     def restore(self) -> None:
         """Bring all objects into the state before the run, and tell what could not be."""
@@ -110,7 +134,8 @@ class KnownState:
 
     def give_up(self) -> None:
         """Tell what was written and may not be as it was: the node is gone."""
-        left = [at for at in self.original if at in self.written]
+        unsure = self.all_written if self._is_reset else self.written
+        left = [at for at in self.original if at in unsure]
         for at in left:
             self.unrestored[f"{self._was(at)}; not verified: the node was lost"] = None
         self._repair(left)
@@ -130,9 +155,13 @@ class KnownState:
         is_text = at[0] in _TEXTS or (len(value) not in _NUMBERS and text.isprintable())
         return f"{at[0]:04X}h:{at[1]:02X} was {repr(text) if is_text else value.hex().upper()}"
 
-    def _write_back(self, target: Values, addresses: Iterable[Address]) -> list[Address]:
-        """Write what differs; return what differs still."""
+    def _write_back(
+        self, target: Values, addresses: Iterable[Address], moved: Iterable[set[Address]] = ()
+    ) -> list[Address]:
+        """Write what differs, and add it to sets; return what differs still."""
         wrong = self._differing(target, addresses)
+        for each in moved:
+            each.update(wrong)
         if not wrong:
             return []
         touched = dict.fromkeys(wrong)
@@ -215,6 +244,8 @@ _DEVICE_TYPE: Final = (0x1000, 0)
 _STORAGE: Final = frozenset((0x1010, 0x1011))
 _STORE: Final = (0x1010, 1)
 _SAVE: Final = b"save"
+_RESET_COMMUNICATION: Final = f"{NMT_COB_ID:03X}#{NmtCommand.RESET_COMMUNICATION:02X}"
+"""In `BoundCheck.resets`."""
 
 _RECOVERY: Final[dict[Level, tuple[NmtCommand | None, ...]]] = {
     Level.READ_ONLY: (None,),
@@ -321,10 +352,16 @@ class NodeCare:
 
     def tidy(self, bound: BoundCheck, boots_before: int) -> bool:
         """Bring the node back after a check; False, and it is lost, if it cannot be."""
-        changed = bound.resets or self._exchange.boots != boots_before
+        booted, crashed = self._exchange.boots - boots_before, bool(self._exchange.crashes)
+        storing = {f"{index:04X}" for index, _ in bound.changed if index in _STORAGE}
+        if storing:
+            self._state.stored |= bound.written
+        kinds = storing.union(bound.resets)
+        if crashed or booted > len(bound.resets):
+            kinds.clear()
         self._exchange.begin(_CARE_US)
         try:
-            self._tidy(None if changed else bound.written)
+            self._tidy(bound.written, kinds if bound.resets or booted else None)
         except (SdoFailed, StepFailed):
             self._recover()
         return not self.lost
@@ -359,18 +396,22 @@ class NodeCare:
         except (SdoAborted, SdoMisnamed) as error:
             self._state.unrestored[f"what a check stored is still stored: {error}"] = None
 
-    def _tidy(self, addresses: Iterable[Address] | None) -> None:
+    def _tidy(self, written: Collection[Address], resets: Collection[str] | None = None) -> None:
+        """Bring the node back; `resets` as `KnownState.tidy_after` takes them, None without any."""
         self._client.abort()
         if self._level is Level.READ_ONLY:
             self._exchange.wait(_SETTLE_MS)
             self._probe()
             return
         self._command(NmtCommand.ENTER_PRE_OPERATIONAL)
-        self._state.tidy(addresses)
+        if resets is None:
+            self._state.tidy(written)
+        else:
+            self._state.tidy_after(resets, written)
         if self._has_errors():
             self._command(NmtCommand.RESET_COMMUNICATION)
             self._answers(_RETURN_MS)
-            self._state.tidy(None)
+            self._state.tidy_after({_RESET_COMMUNICATION}, written)
 
     def _has_errors(self) -> bool:
         """Say whether a check left an error behind: those of before the run may have gone."""
@@ -395,7 +436,7 @@ class NodeCare:
                 self._command(command)
             if self._answers(_RETURN_MS):
                 try:
-                    self._tidy(None)
+                    self._tidy((), ())
                 except (SdoFailed, StepFailed):
                     continue
                 return

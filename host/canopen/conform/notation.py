@@ -344,7 +344,8 @@ class BoundCheck:
         questions: what a person is asked before it.
         can_ids: of the frames that it looks at.
         within_us: how long it may last at most.
-        resets: it may reset the node, so that all its values change.
+        resets: how it may reset the node, so that all its values change: frames without the
+            node-ID, and the first word of each act at the device.
     """
 
     check: Check
@@ -355,7 +356,7 @@ class BoundCheck:
     questions: frozenset[str]
     can_ids: frozenset[str]
     within_us: int
-    resets: bool
+    resets: tuple[str, ...]
 
 
 def bind_check(check: Check, names: Names) -> BoundCheck:
@@ -376,7 +377,7 @@ def bind_check(check: Check, names: Names) -> BoundCheck:
         frozenset(question for action in actions for question in _questions(action, sync)),
         frozenset(text.partition("#")[0] for action in actions for text in _watched(action)),
         _MARGIN_US + 1_000 * sum(map(_longest_ms, actions)),
-        any(map(_resets, actions)),
+        tuple(reset for action in actions for reset in _resets(action)),
     )
 
 
@@ -435,8 +436,11 @@ def _longest_ms(action: Action) -> int:
             return _LONGEST_TRANSFER_MS
 
 
-def _resets(action: Action) -> bool:
-    return isinstance(action, Act) or (isinstance(action, Send) and action.frame[:6] in _RESETS)
+def _resets(action: Action) -> Iterator[str]:
+    if isinstance(action, Act):
+        yield action.words[0]
+    elif isinstance(action, Send) and action.frame[:6] in _RESETS:
+        yield action.frame[:6]
 
 
 def _changed(action: Action, request: str) -> Iterator[Address]:

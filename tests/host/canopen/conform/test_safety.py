@@ -179,6 +179,32 @@ def test_of_a_lost_node_only_what_was_written_is_told() -> None:
     assert not [line for line in report.unrestored if line.startswith(untouched)]
 
 
+def test_after_a_second_reset_of_a_kind_only_what_the_first_changed_is_read() -> None:
+    class Node:
+        def __init__(self) -> None:
+            self.values, self.read = {(0x2000 + n, 0): bytes([n]) for n in range(50)}, 0
+
+        def upload(self, index: int, sub: int) -> bytes:
+            self.read += 1
+            return self.values[index, sub]
+
+        def download(self, index: int, sub: int, data: bytes) -> None:
+            self.values[index, sub] = data
+
+    node = Node()
+    begin = dict(node.values)
+    state = KnownState(cast("BusExchange", None), cast("SdoClient", node))
+    state.learn(begin)
+    reads = []
+    for resets, changed in ((["000#82"], 7), (["000#82"], 7), ([], 9), (["000#82", "000#81"], 9)):
+        node.values[0x2000 + changed, 0] = b"\xff"
+        node.read = 0
+        state.tidy_after(resets)
+        assert node.values == begin
+        reads.append(node.read >= len(begin))
+    assert reads == [True, False, True, True]
+
+
 def test_a_text_that_was_lost_is_told_as_text() -> None:
     state = KnownState(cast("BusExchange", None), cast("SdoClient", None))
     values = {(0x1008, 0): b"reference", (0x2005, 0): b"a longer text", (0x1014, 0): b"abcd"}
