@@ -11,6 +11,7 @@ from tickrig.host.links.link import Closing, DeviceRefused, Link, LinkClosed, Li
 from tickrig.host.rrc.channel import RrcRefused, RrcStopped
 from tickrig.host.rrc.client import RrcClient
 from tickrig.host.rrc.inbox import Arrival
+from tickrig.wire.lines import LineSplitter
 from tickrig.wire.rrc.commands import Limit
 from tickrig.wire.rrc.replies import Event, Ok, RrcEvent, StatusA
 
@@ -164,6 +165,7 @@ class Chair(Closing):
     def __init__(self, link: Link[bytes], guard: Guard) -> None:
         opening = _OpeningLink(link)
         self.client, self.guard, self.moved = RrcClient(opening), guard, False
+        self._link = link
         self._sent: tuple[int, int] | None = None  # what the host drives, None if it does not
         self._changed_us = self._resend_us = 0
         self._status_since_us: int | None = None
@@ -182,6 +184,7 @@ class Chair(Closing):
         if self.guard.stable:
             self.client.stablemode()
         if self._status_since_us is not None:
+            self._status_since_us = self.client.now_us
             self.client.status()
 
     def _meet(self, opening: _OpeningLink) -> None:
@@ -311,6 +314,27 @@ class Chair(Closing):
                 said = "commanded {} {}, the RRC drives {} {}: VR2 switched off"
                 raise ChairStopped(said.format(*self._sent, *out_pct))
         return events
+
+    def stay_silent(self, kind: RrcEvent, most_us: int) -> int | None:
+        """Send nothing until an event comes, as a program that hangs; then begin to talk again.
+
+        Args:
+            kind: which event.
+            most_us: how long to wait for it.
+
+        Returns:
+            How long it took; None if it did not come.
+        """
+        lines, began_us = LineSplitter(), self.client.now_us
+        wanted = Event(kind).encode().removesuffix(b"\n")
+        while (waited_us := self.client.now_us - began_us) < most_us:
+            if wanted in lines.push(self._link.receive(most_us - waited_us)):
+                waited_us = self.client.now_us - began_us
+                self.moved, self._sent, self._status_since_us = False, None, self.client.now_us
+                self.client.start()
+                return waited_us
+        self.client.start()
+        return None
 
     def stop(self) -> None:
         """Stop the motors until a status line shows it; switch VR2 off if none does."""

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import os
+import select
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager, suppress
 from dataclasses import asdict
+from pathlib import Path
 from types import FrameType
 from typing import Any, Final, Protocol
 
 import click
 
-from tickrig.host.cli.messages import BusFailed, Refused, refused_at
+from tickrig.host.cli.messages import BusFailed, Refused, refuse_path, refused_at, say
 from tickrig.host.cli.start import give_up_terminals, taking_signals
 from tickrig.host.links.game_pad import EvdevPad
 from tickrig.host.links.link import DeviceRefused, LinkClosed, LinkError, first_line
@@ -21,8 +23,9 @@ from tickrig.host.links.terminal import TerminalOutput, take_keys
 from tickrig.host.rrc.chair import STEP_US, Chair, ChairStopped, DeadMan, Guard
 from tickrig.host.rrc.cli import RrcCall
 from tickrig.host.rrc.client import RrcClient
+from tickrig.host.rrc.procedure import STEPS, Procedure, Quit, StepResult
 from tickrig.host.text.page_text import json_text
-from tickrig.host.text.values import format_time, parse_time_with_unit_us
+from tickrig.host.text.values import counted, format_time, parse_time_with_unit_us
 from tickrig.wire.instant import NEVER
 from tickrig.wire.rrc.commands import Joystick, Limit
 from tickrig.wire.rrc.replies import StatusA
@@ -59,8 +62,12 @@ class Ended:
 
 
 @contextmanager
-def open_chair(ended: Ended) -> Iterator[Chair]:
+def open_chair(ended: Ended, *, stable: bool = True) -> Iterator[Chair]:
     """Open the port of this call and guard the chair; stop it at the end, then end the command.
+
+    Args:
+        ended: takes signals.
+        stable: whether stablemode is switched on, unless the call says otherwise.
 
     Raises:
         click.ClickException: a line says what failed; exit status 1 or 3.
@@ -73,7 +80,9 @@ def open_chair(ended: Ended) -> Iterator[Chair]:
     chair: Chair | None = None
     with taking_signals(ended.received):
         try:
-            with Chair(SerialLink(call.url), Guard(call.watchdog_us, call.stable)) as chair:
+            with Chair(
+                SerialLink(call.url), Guard(call.watchdog_us, call.stable and stable)
+            ) as chair:
                 yield chair
         except LinkError as error:
             raise BusFailed(_lost(call, error, chair)) from error
@@ -357,3 +366,93 @@ def _print(at_us: int, values: dict[str, Any], *, as_json: bool) -> None:
         shown = "  ".join(f"{name} {value}" for name, value in values.items())
         click.echo(f"{format_time(max(0, at_us)):>12}  {shown}")
     sys.stdout.flush()
+
+
+class _TerminalOperator:
+    """The person who reads standard error and types answers.
+
+    Args:
+        chair: time passes on it meanwhile, so that its watchdog is renewed.
+        ended: a signal ends the procedure.
+    """
+
+    def __init__(self, chair: Chair, ended: Ended) -> None:
+        self._chair, self._ended = chair, ended
+        self._typed = b""
+
+    def tell(self, text: str) -> None:
+        say(f"   {text}")
+
+    def confirms(self, question: str) -> bool:
+        click.echo(f"   {question} [y/n/q] ", nl=False, err=True)
+        while True:
+            self.waits()
+            self._chair.client.run_for(STEP_US)
+            answer, ended, rest = self._typed.partition(b"\n")
+            if not ended:
+                continue
+            self._typed = rest
+            word = answer.strip().lower()
+            if word in (b"y", b"yes", b"n", b"no"):
+                return word.startswith(b"y")
+            if word in (b"q", b"quit"):
+                raise Quit("ended by the operator")
+            click.echo(f"   {question} type y, n or q: ", nl=False, err=True)
+
+    def waits(self) -> None:
+        if self._ended.number:
+            raise Quit("interrupted")
+        if select.select([0], [], [], 0)[0]:
+            data = os.read(0, 1_024)
+            if not data:
+                raise Quit("standard input has ended")
+            self._typed += data
+
+
+def test(*, json_path: str | None) -> None:
+    """Lead through the test procedure."""
+    if sys.platform == "win32":
+        raise Refused("the test procedure needs a POSIX terminal")
+    ended = Ended()
+    results: list[StepResult] = []
+    quits = ""
+
+    def report(result: StepResult) -> None:
+        verdict = "ok" if result.passed else f"FAILED: {result.reason}"
+        sent = f"{result.sent}{result.check}"
+        say(f"{len(results) + 1:>2} {result.step}{f' ({sent})' if sent else ''}: {verdict}")
+        results.append(result)
+
+    found: dict[str, str] = {}
+    try:
+        with open_chair(ended, stable=False) as chair:
+            client = chair.client
+            if client.stable:
+                client.stablemode(on=False)
+            found = {"device": client.device(), "version": client.version(), "date": client.date()}
+            say(", ".join(found.values()))
+            try:
+                Procedure(chair, _TerminalOperator(chair, ended), report).run()
+            except Quit as quit_:
+                quits = str(quit_)
+    finally:  # what was done is written, whatever ended it
+        if json_path is not None and found:
+            steps = [asdict(each) for each in results]
+            complete = len(results) == STEPS
+            _write_json(json_path, {**found, "complete": complete, "steps": steps})
+    failed = sum(not each.passed for each in results)
+    if quits:
+        raise click.ClickException(f"not complete: {quits}; {counted(len(results), 'step')} done")
+    if failed:
+        raise click.ClickException(f"{failed} of {counted(len(results), 'step')} failed")
+    say(f"all {counted(len(results), 'step')} passed")
+
+
+def _write_json(path: str, document: object) -> None:
+    if path == "-":
+        click.echo(json_text(document))
+        return
+    try:
+        Path(path).write_text(json_text(document) + "\n", "utf-8")
+    except OSError as error:
+        refuse_path("results", error)

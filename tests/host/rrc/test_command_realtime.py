@@ -295,3 +295,38 @@ def test_a_device_that_is_gone_ends_the_panel(bench: Bench) -> None:
     )
     child.expect(pexpect.EOF)
     assert status_of(child) == 3
+
+
+def test_the_test_procedure_ends_where_nobody_answers(bench: Bench, tmp_path: Path) -> None:
+    _, port = bench
+    code, out, err = ran(port.path, "test", "--json", str(tmp_path / "results.json"))
+    assert (code, out) == (1, "")
+    assert err.startswith(
+        "RRC, Version 1.0, Apr 30 2015 00:00:00\n   Are the wheels off the ground"
+    )
+    assert err.endswith("Error: not complete: standard input has ended; 0 steps done\n")
+    document = json.loads((tmp_path / "results.json").read_text("utf-8"))
+    assert (document["complete"], document["steps"]) == (False, [])
+
+
+def test_the_test_procedure_reports_each_step(bench: Bench, tmp_path: Path) -> None:
+    live, port = bench
+    child = spawned(port, "test", "--json", str(tmp_path / "results.json"))
+    child.sendline(b"perhaps")
+    child.expect_exact("type y, n or q: ")
+    child.sendline(b"y")
+    child.expect_exact(" 1 VR2 starts: ok")
+    child.expect_exact("Push the stick forward")
+    live.move_stick(100, 0)
+    child.expect_exact("Let the stick go")
+    live.move_stick(0, 0)
+    child.expect_exact(" 2 the stick drives at 50 % at most (limit3232ffffff): ok")
+    child.expect_exact("Did both wheels turn forward? [y/n/q]")
+    assert live.read("out_v_pct") == 0
+    child.sendline(b"n")
+    child.expect_exact(" 3 forward at 30 % (output1e00): FAILED: the operator says no")
+    press_ctrl_c(child)
+    child.expect(pexpect.EOF)
+    assert status_of(child) == 130
+    document = json.loads((tmp_path / "results.json").read_text("utf-8"))
+    assert [each["passed"] for each in document["steps"]] == [True, True, False]
