@@ -93,19 +93,16 @@ class FrameSlice:
         raw = payload << np.uint64(64 - self.first_bit - self.bits)
         if self.big_endian:
             raw = (raw >> drop).byteswap()
-        numbers: NDArray[np.float64]
+        numbers: NDArray[np.generic]
         if self.kind == "s":
-            numbers = (raw.view(np.int64) >> np.int64(64 - self.bits)).astype(np.float64)
+            numbers = raw.view(np.int64) >> np.int64(64 - self.bits)
         elif self.kind == "f":
             size = self.bits // 8
-            floats = (raw >> drop).astype(f"u{size}").view(f"f{size}")
-            with np.errstate(invalid="ignore"):  # a signalling NaN becomes a quiet one
-                numbers = floats.astype(np.float64)
+            numbers = (raw >> drop).astype(f"u{size}").view(f"f{size}")
         else:
-            numbers = (raw >> drop).astype(np.float64)
-        numbers *= self.factor
-        numbers += self.offset
-        return numbers
+            numbers = raw >> drop
+        with np.errstate(invalid="ignore"):  # a signalling NaN becomes a quiet one
+            return numbers.astype(np.float64) * self.factor + self.offset
 
     def _number(self, data: bytes) -> float:
         if not self.big_endian and self.kind != "f":

@@ -9,8 +9,11 @@ from __future__ import annotations
 import zlib
 from collections.abc import Iterator
 from enum import StrEnum
+from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO, Final, Literal, cast
+from typing import TYPE_CHECKING, Any, BinaryIO, Final, Literal, cast
+
+from tickrig.host.text.steps import content_lines
 
 if TYPE_CHECKING:
     from io import BufferedReader
@@ -32,22 +35,12 @@ class LogFormat(StrEnum):
     PCAP = "pcap"
 
 
-SUFFIXES: Final = {
-    ".log": LogFormat.CANDUMP,
-    ".candump": LogFormat.CANDUMP,
-    ".txt": LogFormat.CANDUMP,
-    ".jsonl": LogFormat.JSONL,
-    ".asc": LogFormat.ASC,
-    ".blf": LogFormat.BLF,
-    ".trc": LogFormat.TRC,
-    ".csv": LogFormat.CSV,
-    ".gvret.csv": LogFormat.GVRET,
-    ".mf4": LogFormat.MF4,
-    ".trace": LogFormat.TRACE,
-    ".pcapng": LogFormat.PCAPNG,
-    ".pcap": LogFormat.PCAP,
+_FORMATS: Final = {
+    LogFormat(words[0]): words[1:]
+    for _, line in content_lines(Path(__file__).with_name("formats.txt").read_text("ascii"))
+    if (words := [word.strip() for word in line.split("|")])
 }
-
+SUFFIXES: Final = {suffix: kind for kind, one in _FORMATS.items() for suffix in one[0].split()}
 COMPRESSED: Final = ".gz"
 
 NO_MF4: Final = "MF4 needs asammdf: pip install 'python-can[mf4]'"
@@ -79,6 +72,21 @@ def log_format(path: Path) -> LogFormat:
         known = ", ".join(SUFFIXES)
         raise LogFormatError(f"{path}: a log's name ends in {known}, with .gz behind it or not")
     return SUFFIXES[suffix]
+
+
+def reader_of(kind: LogFormat) -> Any:
+    """Return the class that reads a format."""
+    return _class_at(_FORMATS[kind][1])
+
+
+def writer_of(kind: LogFormat) -> Any:
+    """Return the class that writes a format."""
+    return _class_at(_FORMATS[kind][2])
+
+
+def _class_at(place: str) -> Any:
+    module, _, name = place.partition(".")
+    return getattr(import_module(f"{__package__}.{module}"), name)
 
 
 def log_ending(path: Path) -> str:

@@ -24,10 +24,9 @@ from __future__ import annotations
 import re
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from importlib import import_module
 from itertools import pairwise
 from pathlib import Path
-from typing import Final, Protocol, cast
+from typing import Final, Protocol
 
 from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.logs import log_file
@@ -448,26 +447,6 @@ def _usual_frames(lines: list[tuple[str, str, str, str, str, str]]) -> list[Reco
 BLOCK_BYTES: Final = 1 << 13
 """So few frames at once that the garbage collector seldom meets them."""
 
-_CAN_LOG: Final = "tickrig.host.canmon.model.logs.can_log"
-"""python-can is slow to import: this module is when a log needs it."""
-
-_CAPTURE: Final = "tickrig.host.canmon.model.logs.pcap"
-
-_READERS: Final = {
-    log_file.LogFormat.CANDUMP: (__name__, "TextLogReader"),
-    log_file.LogFormat.JSONL: (__name__, "TextLogReader"),
-    log_file.LogFormat.CSV: (__name__, "TextLogReader"),
-    log_file.LogFormat.GVRET: (__name__, "TextLogReader"),
-    log_file.LogFormat.ASC: ("tickrig.host.canmon.model.logs.asc_log", "AscLogReader"),
-    log_file.LogFormat.BLF: (_CAN_LOG, "CanLogReader"),
-    log_file.LogFormat.TRC: ("tickrig.host.canmon.model.logs.trc_log", "TrcLogReader"),
-    log_file.LogFormat.MF4: (_CAN_LOG, "CanLogReader"),
-    log_file.LogFormat.TRACE: ("tickrig.host.canmon.model.logs.trace_log", "TraceLogReader"),
-    log_file.LogFormat.PCAPNG: (_CAPTURE, "PcapReader"),
-    log_file.LogFormat.PCAP: (_CAPTURE, "PcapReader"),
-}
-"""Module and class of the reader of each format."""
-
 
 class LogReader(Protocol):
     """An iterable of frames; it reads while it is iterated, from the beginning each time.
@@ -495,8 +474,8 @@ def read_log(path: Path) -> LogReader:
         LogFormatError: the file's name tells no format.
     """
     kind = log_file.log_format(path)
-    module, name = _READERS[kind]
-    return cast("LogReader", getattr(import_module(module), name)(path, kind))
+    reader: LogReader = log_file.reader_of(kind)(path, kind)
+    return reader
 
 
 class TextLogReader:

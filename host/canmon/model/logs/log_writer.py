@@ -5,40 +5,25 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Callable
-from importlib import import_module
 from pathlib import Path
-from typing import Final, Protocol, cast
+from typing import Final, Protocol
 
 from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.logs import notation
-from tickrig.host.canmon.model.logs.log_file import COMPRESSED, LogFormat, log_format, open_log
+from tickrig.host.canmon.model.logs.log_file import (
+    COMPRESSED,
+    LogFormat,
+    log_format,
+    open_log,
+    writer_of,
+)
 from tickrig.host.canmon.model.logs.mark import Mark
 from tickrig.wire.can import CanFrame, ErrorFrame
 
 _BLOCK_LINES: Final = 256
 
 
-_CAN_LOG_WRITER: Final = "tickrig.host.canmon.model.logs.can_log"
-"""python-can is slow to import: this module is when a log needs it."""
-
 MARKS: Final = "marks of gaps and triggers left out"
-
-_CAPTURE_WRITER: Final = "tickrig.host.canmon.model.logs.pcap"
-
-_WRITERS: Final = {
-    LogFormat.CANDUMP: (__name__, "TextLogWriter"),
-    LogFormat.JSONL: (__name__, "TextLogWriter"),
-    LogFormat.CSV: (__name__, "CsvLogWriter"),
-    LogFormat.GVRET: (__name__, "GvretLogWriter"),
-    LogFormat.ASC: (_CAN_LOG_WRITER, "CanLogWriter"),
-    LogFormat.BLF: (_CAN_LOG_WRITER, "CanLogWriter"),
-    LogFormat.TRC: (_CAN_LOG_WRITER, "CanLogWriter"),
-    LogFormat.MF4: (_CAN_LOG_WRITER, "CanLogWriter"),
-    LogFormat.TRACE: ("tickrig.host.canmon.model.logs.trace_log", "TraceLogWriter"),
-    LogFormat.PCAPNG: (_CAPTURE_WRITER, "PcapngWriter"),
-    LogFormat.PCAP: (_CAPTURE_WRITER, "PcapngWriter"),
-}
-"""Module and class of the writer of each format."""
 
 
 class LogWriter(Protocol):
@@ -104,8 +89,8 @@ def write_log(path: Path) -> LogWriter:
         LogError: its format needs a library that is not there.
     """
     kind = log_format(path)
-    module, name = _WRITERS[kind]
-    return cast("LogWriter", getattr(import_module(module), name)(path, kind))
+    writer: LogWriter = writer_of(kind)(path, kind)
+    return writer
 
 
 def log_line(record: Record) -> str:
