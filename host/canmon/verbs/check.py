@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import closing
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -294,13 +295,11 @@ def command(  # noqa: PLR0913 - options
     frames = log or open_source(words, bus)
     if reopen:
         frames.reopen()
-    try:
+    with closing(frames):
         if not isinstance(frames, BlockLog):
             rates = listening.bit_rates_of(words, bus)
             held = DecodedCheck(rules, rates, decoder, around, heartbeats)
             _one_by_one(frames, words, held, verdict, span_us)
-    finally:
-        frames.close()
     unjudged = verdict.nothing_judged() if verdict.frames else _no_frame(frames, words)
     suite, why = " ".join(words), frames.failed or unjudged
     judged = suite, rules.names(), verdict.findings, why, verdict.none_judged

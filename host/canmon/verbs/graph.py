@@ -7,6 +7,7 @@ import re
 import shutil
 import sys
 from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import dataclass, fields
 from functools import partial
 from pathlib import Path
@@ -162,14 +163,12 @@ def command(source: str, signals: Sequence[str], **options: Any) -> None:
     collector = Collector(words)
     whole = log is not None and take_blocks(log, collector.take_columns)
     frames = (log if whole else None) or open_source([source], BusOptions(**options))
-    try:
+    with closing(frames):
         if not isinstance(frames, BlockLog):
             collector = Collector(words, decoder, _MOST if frames.live else 0)
             lines = partial(_live, collector.series, request)
             follow(frames, [source], collector.take_all, request.span_us, lines)
         _show(collector.series, request)
-    finally:
-        frames.close()
     report(frames, strict)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from contextlib import closing
 from typing import TYPE_CHECKING, Any, Final
 
 import click
@@ -62,15 +63,13 @@ def command(
     view, log = _NodesView(found), block_log(source)
     whole = log is not None and view.decoder.standard and take_blocks(log, view.take_block)
     frames = (log if whole else None) or open_source(source, BusOptions(**options))
-    try:
+    with closing(frames):
         if not isinstance(frames, BlockLog):
             view = view if log is None else _NodesView(found)
             follow(frames, source, view.take, span_us, None if jsonl else view.painted)
         with until_unread():
             for line in view.json(live=frames.live) if jsonl else view.lines(live=frames.live):
                 click.echo(line)
-    finally:
-        frames.close()
     report(frames, strict)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from contextlib import closing
 from typing import Any, Final, NamedTuple
 
 import click
@@ -237,11 +238,9 @@ def command(
     log = block_log(source)
     snapshot = listening.count_blocks(log)
     frames = (log if snapshot else None) or open_source(source, bus)
-    try:
+    with closing(frames):
         if not isinstance(frames, BlockLog):
             snapshot = _one_by_one(frames, source, span_us, rates)
-    finally:
-        frames.close()
     assert snapshot
     with until_unread():
         for line in (_jsonl if jsonl else _tables)(snapshot, by, rates.nominal):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -82,11 +83,9 @@ def command(  # noqa: PLR0913 - options
             shown[0] = f"GONE: {', '.join(away)}  {shown[0]}"[:width]
         return shown
 
-    try:
+    with closing(frames):
         if not isinstance(frames, BlockLog):
             listening.follow(frames, source, take, span_us, lines, press=model.press)
         with until_unread():
             click.echo("\n".join(model.final(frames.lost, snapshot)))
-    finally:
-        frames.close()
     listening.report(frames, strict, meaning.messages())
