@@ -9,8 +9,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Final, NamedTuple, assert_never
 
-from tickrig.emulators.bench.fault_spec import FaultSpec, parse_fault_spec
-from tickrig.emulators.bench.operator import PRESS_US, Operator
+from tickrig.emulators.bench.operator import PRESS_US, FaultSpec, Operator, parse_fault_spec
 from tickrig.emulators.bench.running_emulator import RunningEmulator, Transcript
 from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.rig.emulated import HasSignals

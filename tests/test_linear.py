@@ -21,7 +21,7 @@ import pytest
 
 from tests.emulators.lamp import Lamp
 from tests.emulators.scenario.test_scenario import parse as parse_scenario
-from tickrig.emulators.bench.fault_spec import parse_fault_spec
+from tickrig.emulators.bench.operator import parse_fault_spec
 from tickrig.emulators.canopen.bus_file.node_keys import BusMistakesError
 from tickrig.emulators.canopen.bus_file.urdf import parse_urdf
 from tickrig.emulators.canopen.store_file import StoreFile
@@ -176,7 +176,7 @@ READERS: Final = {
         lambda text: parse_scenario(text, Emulator("lamp", Lamp())),
         ("1ms send ", "1ms set ", "1ms expect ", "1ms fault ", "1ms press "),
     ),
-    "emulators.bench.fault_spec": Reader(parse_fault_spec, ("cut=", "cut@")),
+    "emulators.bench.operator": Reader(parse_fault_spec, ("cut=", "cut@")),
     "emulators.record.comparison": Reader(parse_number_rule, ("a=", "a[1:2]=")),
     "emulators.testing.campaign.table": Reader(
         of_file(read_table, "t.csv"),

@@ -7,8 +7,7 @@ from concurrent.futures import Future
 from queue import Empty, SimpleQueue
 from typing import Final, Protocol
 
-from tickrig.emulators.bench.fault_spec import parse_fault_spec
-from tickrig.emulators.bench.operator import PRESS_US, Operator, WireFaults
+from tickrig.emulators.bench.operator import PRESS_US, Operator, WireFaults, parse_fault_spec
 from tickrig.emulators.bench.running_emulator import RunningEmulator
 from tickrig.emulators.rig.emulated import HasSignals, read_signal
 from tickrig.emulators.rig.faults import FaultForm, usage

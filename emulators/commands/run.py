@@ -14,8 +14,7 @@ from typing import Final
 import click
 
 from tickrig.emulators.bench.control import EmulatorControl
-from tickrig.emulators.bench.fault_spec import FaultSpec, parse_fault_spec
-from tickrig.emulators.bench.operator import Operator
+from tickrig.emulators.bench.operator import FaultSpec, Operator, parse_fault_spec
 from tickrig.emulators.bench.running_emulator import RunningEmulator, keeping_time
 from tickrig.emulators.scenario import ScenarioParser, ScenarioPlayer, ScenarioStep
 from tickrig.host.cli import messages

@@ -57,8 +57,7 @@ from tickrig.emulators.rig.clock import Clock, VirtualClock
 from tickrig.emulators.rig.event_queue import EventQueue
 from tickrig.emulators.rig.kernel import enter_stations, kernel, run, tick_stations
 from tickrig.emulators.rig.port import Host, OutsideBridge, Wire
-from tickrig.emulators.rig.station import Station, Timetable, next_tick_us
-from tickrig.emulators.rig.wire_port import is_wire_port
+from tickrig.emulators.rig.station import Station, Timetable, is_wire_port, next_tick_us
 from tickrig.wire.instant import NEVER
 
 # What joins devices beside their wires.

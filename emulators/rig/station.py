@@ -2,16 +2,38 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from heapq import heappop, heappush
-from typing import Any, Generic
+from typing import Any, Generic, Protocol, TypeGuard
 
 from tickrig.device.core import Device, W
 from tickrig.device.twin import Copyable
 from tickrig.emulators.rig.kernel import StationFields, TimetableFields, in_kernel
-from tickrig.emulators.rig.port import Port
-from tickrig.emulators.rig.wire_port import is_wire_port
+from tickrig.emulators.rig.port import Port, Wire
 from tickrig.wire.instant import NEVER
 from tickrig.wire.uart import UartSetting
+
+# Ports of shared wires; the rig asks at run time which ones are.
+
+
+class WirePort(Protocol[W]):
+    """A `Port` that says when traffic has arrived, so that nobody need look.
+
+    It is not derived from it: a compiled base has more names than what is looked for.
+    """
+
+    @property
+    def wire(self) -> Wire:
+        """The wire it is an end of."""
+        ...
+
+    def attach(self, device: Device[W], wake: Callable[[int], None], /) -> None:
+        """Serve a device: call `wake` with the time when traffic has arrived for it."""
+
+
+def is_wire_port(port: object) -> TypeGuard[WirePort[Any]]:
+    """Say whether a port has the members of `WirePort`, by `__getattr__` too."""
+    return hasattr(port, "wire") and hasattr(port, "attach")
 
 
 class Station(StationFields, Generic[W]):

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
 
-from tickrig.emulators.bench.fault_spec import FaultSpec
-from tickrig.emulators.bench.operator import Operator
+from tickrig.emulators.bench.operator import FaultSpec, Operator
 from tickrig.emulators.rig.emulated import HasSignals
 from tickrig.emulators.rig.event_queue import EventQueue
 from tickrig.emulators.rig.faults import FaultForm

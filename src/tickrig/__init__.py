@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from tickrig.emulators.testing.bench.errors import NotOnThisBench as NotOnThisBench
     from tickrig.emulators.testing.bench.errors import OperatorRefused as OperatorRefused
     from tickrig.emulators.testing.bench.errors import PortGone as PortGone
-    from tickrig.emulators.testing.rig_file.schema import RigFileError as RigFileError
+    from tickrig.emulators.testing.rig_file.plan import RigFileError as RigFileError
     from tickrig.host.control.clock import RealClock as RealClock
     from tickrig.wire.can import CanFrame as CanFrame
     from tickrig.wire.instant import NEVER as NEVER
@@ -97,7 +97,7 @@ else:
                 "OperatorRefused",
                 "PortGone",
             ),
-            "tickrig.emulators.testing.rig_file.schema": ("RigFileError",),
+            "tickrig.emulators.testing.rig_file.plan": ("RigFileError",),
             "tickrig.host.control.clock": ("RealClock",),
             "tickrig.wire.can": ("CanFrame",),
             "tickrig.wire.instant": ("NEVER",),

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, Self, TypeVar, cast
 
 from tickrig._lazy import LazyModule
 from tickrig.device.twin.snapshot import MachineSnapshot
-from tickrig.emulators.bench.fault_spec import parse_fault_spec
+from tickrig.emulators.bench.operator import parse_fault_spec
 from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.emulators.testing.bench import tasks
 from tickrig.emulators.testing.bench.bench_rig import BenchDescription, Parts

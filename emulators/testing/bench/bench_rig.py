@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 from tickrig.device.physical import InputSignal, OutputSignal, SignalType
 from tickrig.device.twin import Copyable
-from tickrig.emulators.bench.fault_spec import FaultOrder, FaultSpec
-from tickrig.emulators.bench.operator import AssemblyFaults, Operator
+from tickrig.emulators.bench.operator import AssemblyFaults, FaultOrder, FaultSpec, Operator
 from tickrig.emulators.bench.running_emulator import RunningEmulator
 from tickrig.emulators.can.faults import CanFaults
 from tickrig.emulators.canopen.body import BodyOnDrives

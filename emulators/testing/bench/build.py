@@ -18,7 +18,7 @@ from tickrig.emulators.testing.bench.plan_parts import NoNodeIdError, slave_of
 from tickrig.emulators.testing.bench.recorded_device import node_entry
 from tickrig.emulators.testing.rig_file.devices import RIG_SUFFIXES, kind_of
 from tickrig.emulators.testing.rig_file.plan import DeviceKind, DevicePlan, seed_of
-from tickrig.emulators.testing.rig_file.schema import node_id as read_node_id
+from tickrig.emulators.testing.rig_file.plan import node_id as read_node_id
 from tickrig.host.text.bench_header import DeviceEntry
 from tickrig.host.text.trace import Config
 

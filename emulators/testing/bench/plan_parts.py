@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tickrig.device.canopen.slave import CanopenSlave
-from tickrig.emulators.bench.fault_spec import FaultOrder
+from tickrig.emulators.bench.operator import FaultOrder
 from tickrig.emulators.canopen import late
 from tickrig.emulators.canopen.choices import AUTO
 from tickrig.emulators.canopen.store_file import StoreFile

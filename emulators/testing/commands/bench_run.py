@@ -24,9 +24,8 @@ from tickrig.emulators.testing.bench.journal import line_text
 from tickrig.emulators.testing.bench.modes.doors import OutsideEnds
 from tickrig.emulators.testing.bench.mounts import BusMount, LineMount, Mount
 from tickrig.emulators.testing.bench.plan_parts import parts_of, rig_of
-from tickrig.emulators.testing.rig_file.plan import RigPlan, bus_text, device_text
+from tickrig.emulators.testing.rig_file.plan import RigFileError, RigPlan, bus_text, device_text
 from tickrig.emulators.testing.rig_file.reader import read_rig_file
-from tickrig.emulators.testing.rig_file.schema import RigFileError
 from tickrig.host.cli.messages import Refused, refuse_path, say
 from tickrig.host.text.trace import Mark
 from tickrig.host.text.values import Setting, format_time

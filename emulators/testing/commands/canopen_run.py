@@ -30,10 +30,9 @@ from tickrig.emulators.commands.run import EmulatorRun, RunOptions, mistakes_in
 from tickrig.emulators.record.recorder import CandumpFile
 from tickrig.emulators.rig.event_queue import EventQueue
 from tickrig.emulators.scenario import ScenarioParser, ScenarioPlayer, ScenarioStep, Send
-from tickrig.emulators.testing.rig_file.plan import DeviceKind, DevicePlan, RigPlan
+from tickrig.emulators.testing.rig_file.plan import DeviceKind, DevicePlan, RigFileError, RigPlan
 from tickrig.emulators.testing.rig_file.probe import eds_cache
 from tickrig.emulators.testing.rig_file.reader import read_rig_file
-from tickrig.emulators.testing.rig_file.schema import RigFileError
 from tickrig.emulators.testing.signals.sources import SignalSpec
 from tickrig.host.canopen.bus_file.bus_file import is_bus_file
 from tickrig.host.cli.can_options import BusOptions, open_raw

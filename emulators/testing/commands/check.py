@@ -10,9 +10,8 @@ from typing import Final
 import click
 
 from tickrig.emulators.canopen.bus_file.bus_nodes import check_nodes
-from tickrig.emulators.testing.rig_file.plan import summary
+from tickrig.emulators.testing.rig_file.plan import RigFileError, summary
 from tickrig.emulators.testing.rig_file.reader import read_rig_file
-from tickrig.emulators.testing.rig_file.schema import RigFileError
 from tickrig.host.canopen.bus_file.bus_checks import check_sheets
 from tickrig.host.canopen.bus_file.bus_file import BusFile, check_of, read_bus_file
 from tickrig.host.canopen.bus_file.bus_values import BusMaster, BusSlave

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 from tickrig.device.physical import OutputSignal
-from tickrig.emulators.bench.fault_spec import FaultOrder
+from tickrig.emulators.bench.operator import FaultOrder
 from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.rig.emulated import HasSignals, read_signal
 from tickrig.emulators.testing.bench.bench import HARDWARE, Bench

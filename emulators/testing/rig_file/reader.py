@@ -2,44 +2,225 @@
 
 from __future__ import annotations
 
+import json
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from tickrig.device.body import SIDES
 from tickrig.device.canopen.slave import UNCONFIGURED
-from tickrig.emulators.bench.fault_spec import parse_fault_spec
+from tickrig.emulators.bench.operator import parse_fault_spec
 from tickrig.emulators.can.faults import CAN_FAULTS
+from tickrig.emulators.canopen import late
 from tickrig.emulators.canopen.body import SHAFTS, BodyPlan
 from tickrig.emulators.canopen.choices import is_bus_node
 from tickrig.emulators.rig.emulated import HasSignals
 from tickrig.emulators.rig.faults import FaultForm, bind_arguments
-from tickrig.emulators.testing.rig_file.bus_yml import bus_as_rig, is_bus_yml, with_nodes
 from tickrig.emulators.testing.rig_file.devices import (
     DeviceReader,
+    DoorReader,
     check_wires,
     kind_of,
     read_wires,
 )
-from tickrig.emulators.testing.rig_file.doors import DoorReader
-from tickrig.emulators.testing.rig_file.old_formats import no_rig_file, refuse_old_tables
 from tickrig.emulators.testing.rig_file.plan import (
+    BODY,
+    TOP,
     DeviceKind,
     DevicePlan,
     FaultPlan,
+    RigFileError,
     RigPlan,
     WirePlan,
     WireType,
     seed_of,
 )
-from tickrig.emulators.testing.rig_file.probe import UNKNOWN, Probe, WrongDevice, probe
-from tickrig.emulators.testing.rig_file.schema import BODY, TOP, RigFileError
-from tickrig.emulators.testing.rig_file.starts import Start, StartReader, read_safe
+from tickrig.emulators.testing.rig_file.probe import (
+    UNKNOWN,
+    Probe,
+    Start,
+    StartReader,
+    WrongDevice,
+    eds_cache,
+    probe,
+    read_safe,
+)
 from tickrig.host.text.names import near
 from tickrig.host.text.section import Notes, Section, is_broken, shown, texts
-from tickrig.host.text.toml_reader import Mistake, read_toml
+from tickrig.host.text.toml_reader import BROKEN, Mistake, TomlDocument, TomlPath, read_toml
+from tickrig.host.text.trace import BEGIN
+
+# Files that are no rig file, and tables of files of before: what to write in their place.
+
+_SYSTEM: Final = (
+    "it is a system of RT components, of which nothing is emulated: tickrig rtc run FILE"
+)
+SCENARIO: Final = "it is a scenario: --scenario FILE plays it"
+_TRACE: Final = "it is a trace: tickrig replay FILE, tickrig compare FILE"
+EDS: Final = "it is an EDS or DCF: a rig file names it as the type of a device, type = FILE"
+_URDF: Final = (
+    "it is a URDF: a bus.yml names it, options: {tickrig: {urdf: FILE}}, and tickrig check of that"
+    " checks both"
+)
+_NODE: Final = "[[node]] is a device now, one for each node-ID: {new}"
+_DUT: Final = (
+    'a real RRC is a device now: [device.rrc] with type = "rrc", [hardware.rrc] with port = "...";'
+    " [tolerance] is [hardware.tolerance], [operator] is [hardware]"
+)
+_EDS: Final = re.compile(r"\s*\[(FileInfo|DeviceInfo|DeviceComissioning)\]", re.IGNORECASE)
+_HEAD: Final = 2_000
+"""Characters at its beginning by which a URDF is known."""
+_SCENARIO: Final = re.compile(
+    r"(?:[^\S\n]*+(?:#.*+)?\n)*+[^\S\n]*+\+?[0-9][0-9.]*(s|ms|us)?[ \t]+[a-z]+\b(?!\s*=)"
+)
+
+
+def no_rig_file(text: str) -> str:
+    r"""Say what a text is that no bench can be made of; empty if nothing is known of it.
+
+    >>> no_rig_file("# drive\n0.1s press power_button\n")
+    'it is a scenario: --scenario FILE plays it'
+    """
+    if text.startswith(BEGIN):
+        return _TRACE
+    if _EDS.match(text):
+        return EDS
+    head = text[:_HEAD].lstrip("\ufeff \t\r\n")
+    if head.startswith("<") and "<robot" in head:
+        return _URDF
+    return SCENARIO if _SCENARIO.match(text) else ""
+
+
+def refuse_old_tables(top: Section) -> Section:
+    """Return a rig file as it is; note what replaces the tables of files of before.
+
+    Args:
+        top: the whole file.
+    """
+    given, before = top.values, len(top.notes.all)
+    nodes = given.get("node")
+    if isinstance(nodes, list):
+        for at, node in enumerate(nodes):
+            if node is not BROKEN:
+                top.wrong(_NODE.format(new=_device(node, at + 1)), "node", at)
+    if isinstance(given.get("dut"), dict):
+        top.wrong(_DUT, "dut")
+    if isinstance(given.get("component"), list):
+        top.wrong(_SYSTEM, "component")
+    if len(top.notes.all) > before or ("device" not in given and before):
+        return Section(top.notes, (), {"device": {}})
+    return top
+
+
+def _device(node: object, number: int) -> str:
+    """Return a table [[node]] as a table [device.NAME]."""
+    old: dict[str, object] = node if isinstance(node, dict) else {}
+    device = next((old[key] for key in ("eds", "model", "rtc") if key in old), "FILE.eds")
+    keys = {"type": device, "node_id": old.get("id"), "profile": old.get("profile")}
+    shown = ", ".join(f"{key} = {json.dumps(x)}" for key, x in keys.items() if x is not None)
+    return f"[device.node{number}] with {shown}"
+
+
+# A bus.yml in the words of rig files: each of its nodes is a device on the bus.
+
+_BUS: Final = "bus"
+"""The key of a rig file that names a bus.yml."""
+
+_MISNAMED: Final = "it is a bus.yml: its name has to end in .yml or .yaml"
+_TOML: Final = re.compile(rb"^[ \t]*+\[", re.MULTILINE)
+_TABLE: Final = re.compile(rb"^[ \t]*+\[[\w.-]+\]", re.MULTILINE)
+"""The head of a table, which no bus.yml has."""
+
+
+def is_bus_yml(path: Path, data: bytes) -> bool:
+    """Return whether a file is a bus.yml, a good or a bad one; not what only its name says."""
+    if _TABLE.search(data):
+        return False
+    return late.is_bus_file(data) or (_is_named(path) and not _TOML.search(data))
+
+
+def _is_named(path: Path) -> bool:
+    return path.suffix.lower() in (".yml", ".yaml")
+
+
+def bus_as_rig(path: Path) -> Section:
+    """Return a bus.yml as if it were a rig file with its nodes alone.
+
+    Raises:
+        OSError: it cannot be read.
+    """
+    document = TomlDocument({_BUS: path.name}, {(_BUS,): 1})
+    if not _is_named(path):
+        return Section(Notes(document, [Mistake(1, _MISNAMED)]), (), {"device": {}})
+    return with_nodes(Section(Notes(document), (), document.values), path.parent, alone=True)
+
+
+def with_nodes(top: Section, folder: Path, *, alone: bool = False) -> Section:
+    """Return a rig file in which each node of the bus.yml that it names is a device.
+
+    What the file says of a device of the same name is kept.
+
+    Args:
+        top: the whole file.
+        folder: where the bus.yml is looked for.
+        alone: there is only the bus.yml, and what cannot be read is an OSError.
+    """
+    given = top.values.get(_BUS)
+    if given is None:
+        return top
+    if not isinstance(given, str) or not given or "\0" in given:
+        top.wrong(f"it takes the name of a bus.yml, not {shown(given)}", _BUS)
+        return top
+    places: dict[str, int] = {}
+    try:
+        places = _places(top, folder / given, alone=alone)
+    except OSError as error:
+        if alone:
+            raise
+        top.wrong(f"{folder / given}: {error.strerror}", _BUS)
+    return _merged(top, given, places)
+
+
+def _places(top: Section, path: Path, *, alone: bool) -> dict[str, int]:
+    """Return the lines of the nodes by their names; what is wrong is noted."""
+    try:
+        bus = late.read_bus(path, cache=eds_cache())
+    except ImportError as error:
+        top.wrong(str(error), _BUS)
+        return {}
+    except late.BusMistakesError as error:
+        for place, text, _ in error.mistakes:
+            own = alone and place.file == str(path)
+            line = place.line if own else top.notes.document.line_of((_BUS,))
+            top.notes.mistakes.append(Mistake(line, text if own else f"{place}: {text}"))
+        return {}
+    return {node.name: node.line for node in bus.nodes}
+
+
+def _merged(top: Section, bus: str, nodes: dict[str, int]) -> Section:
+    """Return the document with a device for each node."""
+    old = top.notes.document
+    devices: Any = top.values.get("device", {})
+    if not isinstance(devices, dict):
+        return top
+    own = {name: devices.get(name, {}) for name in nodes}
+    found = {
+        name: {"type": f"{bus}:{name}", **table}
+        for name, table in own.items()
+        if isinstance(table, dict)
+    }
+    lines, names = dict(old.lines), dict[TomlPath, str]()
+    for name in nodes:
+        names["device", name] = f"{_BUS} {name}" if name not in devices else ""
+        lines.setdefault(("device", name), old.line_of((_BUS,)))
+    values = {key: each for key, each in top.values.items() if key != _BUS}
+    values["device"] = {**found, **{k: v for k, v in devices.items() if k not in found}}
+    document = TomlDocument(values, lines, old.mistakes, old.whole)
+    return Section(Notes(document, top.notes.mistakes, names), (), values)
+
 
 # `[fault]`: faults of devices and wires, each in a word as on command lines.
 

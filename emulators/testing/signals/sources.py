@@ -1,9 +1,11 @@
-"""Values that depend on time alone: pure functions, the same whoever asks how often.
+"""Values that depend on time alone: pure functions, the same whoever asks how often; their fields.
 
 >>> RampSource(12.0, 9.5, over_us=10_000_000).value(4_000_000)
 11.0
 >>> Wave("square", 0, 1, period_us=1_000_000).next_us(0)
 500000
+>>> time("1.5s"), number(2), spread([0, 1])
+(1500000, 2, (0, 1))
 """
 
 from __future__ import annotations
@@ -12,12 +14,12 @@ from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import expm1, inf, isfinite, pi, sin
-from typing import Final, Protocol
+from typing import Final, NamedTuple, Protocol
 
 from tickrig.device.chance import Chance
 from tickrig.device.twin import Immutable
-from tickrig.emulators.testing.signals.formula import Formula
-from tickrig.host.text.values import Setting
+from tickrig.emulators.testing.signals.formula import Formula, parse_formula
+from tickrig.host.text.values import Setting, parse_time_us
 from tickrig.wire.instant import NEVER
 
 
@@ -326,3 +328,107 @@ def _rounded(value: float, step: float) -> float:
     if whole and 1 / whole == step:
         return round(value * whole) / whole
     return round(value / step) * step
+
+
+# Fields of a signal's table: each takes what TOML gives, or says what it takes instead.
+
+Keys = tuple[str | int, ...]
+"""Keys and indices from the top of a file, as `("device", "left", "start", "supply_v")`."""
+
+
+class SignalMistake(NamedTuple):
+    """One mistake.
+
+    Attributes:
+        keys: where it is.
+        reason: what came, and what was allowed.
+
+    >>> print(SignalMistake(("signal", "load", "over"), "it is missing"))
+    signal.load.over: it is missing
+    """
+
+    keys: Keys
+    reason: str
+
+    def __str__(self) -> str:
+        """Write it in one line."""
+        return f"{'.'.join(map(str, self.keys))}: {self.reason}"
+
+
+_LEAST_US: Final = 100
+"""No period, ramp or time constant is shorter."""
+
+_FINEST: Final = 1e-12
+"""No quantisation is finer."""
+
+
+def number(value: object) -> float:
+    """Take a number, or true and false as 1 and 0."""
+    if isinstance(value, int | float):
+        try:
+            if isfinite(value):
+                return int(value) if isinstance(value, bool) else value
+        except OverflowError:
+            pass
+    raise ValueError(f"it takes a number, as 12.5, not {value!r:.60}")
+
+
+def step(value: object) -> float:
+    """Take a number from `_FINEST` on."""
+    if (found := number(value)) < _FINEST:
+        raise ValueError(f"it takes a number from {_FINEST:g} on, as 0.01, not {value!r:.60}")
+    return found
+
+
+def part(value: object) -> float:
+    """Take a number above 0 and below 1."""
+    if not 0 < (found := number(value)) < 1:
+        raise ValueError(f"it takes a number between 0 and 1, as 0.25, not {value!r:.60}")
+    return found
+
+
+def seed(value: object) -> int:
+    """Take a whole number from 0 on."""
+    if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value < 1 << 64:
+        raise ValueError(f"it takes a whole number from 0 on, not {value!r:.60}")
+    return value
+
+
+def pair(value: object) -> tuple[float, float]:
+    """Take two numbers."""
+    if isinstance(value, list) and len(value) == 2:
+        first, second = value
+        return number(first), number(second)
+    raise ValueError(f"it takes two numbers, as [0, 5], not {value!r:.60}")
+
+
+def spread(value: object) -> float | tuple[float, float]:
+    """Take a standard deviation, or the ends of a range."""
+    if isinstance(value, list):
+        return pair(value)
+    if (found := number(value)) < 0:
+        raise ValueError(f"it takes a standard deviation from 0 on, not {value!r:.60}")
+    return found
+
+
+def time(value: object) -> int:
+    """Take a time from 0 on; return microseconds."""
+    if not isinstance(value, str):
+        raise ValueError(f'it takes a time with its unit, as "1.5s" or "20ms", not {value!r:.60}')
+    return parse_time_us(value)
+
+
+def some_time(value: object) -> int:
+    """Take a time that is not too short; return microseconds."""
+    if (found := time(value)) < _LEAST_US:
+        raise ValueError(f'it takes a time from "{_LEAST_US}us" on, not {value!r:.60}')
+    return found
+
+
+def formula(value: object) -> Formula:
+    """Take a formula, or a number."""
+    if isinstance(value, int | float):
+        value = repr(float(number(value)))
+    if not isinstance(value, str):
+        raise ValueError(f'it takes a formula, as "2 * load + 1", not {value!r:.60}')
+    return parse_formula(value)

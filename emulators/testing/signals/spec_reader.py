@@ -19,19 +19,6 @@ from pathlib import Path
 from typing import Any, Final
 
 from tickrig.emulators.testing.signals import sources
-from tickrig.emulators.testing.signals.fields import (
-    Keys,
-    SignalMistake,
-    formula,
-    number,
-    pair,
-    part,
-    seed,
-    some_time,
-    spread,
-    step,
-    time,
-)
 from tickrig.emulators.testing.signals.table import read_table
 from tickrig.host.text.names import near
 from tickrig.host.text.section import anything, flag, text
@@ -46,12 +33,12 @@ _Reader = Callable[[object], object]
 """Takes what TOML gives, and returns a field; ValueError with what was allowed."""
 
 _COMMON: Final[Mapping[str, _Reader]] = {
-    "every": some_time,
-    "min": number,
-    "max": number,
-    "step": step,
+    "every": sources.some_time,
+    "min": sources.number,
+    "max": sources.number,
+    "step": sources.step,
 }
-_FROM: Final[Mapping[str, _Reader]] = {"from": time, **_COMMON}
+_FROM: Final[Mapping[str, _Reader]] = {"from": sources.time, **_COMMON}
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,11 +93,13 @@ def _integral(folder: Path, fields: _Fields) -> sources.Integral:
 
 
 FORMS: Final[Mapping[str, Form]] = {
-    "ramp": Form({"ramp": pair, "over": some_time, "repeat": flag, **_FROM}, _ramp, ("over",)),
+    "ramp": Form(
+        {"ramp": sources.pair, "over": sources.some_time, "repeat": flag, **_FROM}, _ramp, ("over",)
+    ),
     **{
         shape: Form(
-            {shape: pair, "period": some_time, "phase_deg": number}
-            | ({"duty": part} if shape == "square" else {})
+            {shape: sources.pair, "period": sources.some_time, "phase_deg": sources.number}
+            | ({"duty": sources.part} if shape == "square" else {})
             | dict(_FROM),
             partial(_wave, shape),
             ("period",),
@@ -118,26 +107,33 @@ FORMS: Final[Mapping[str, Form]] = {
         for shape in sources.SHAPES
     },
     "noise": Form(
-        {"noise": spread, "mean": number, "seed": seed, **_FROM}, _noise, every_us=_EVERY_US
+        {"noise": sources.spread, "mean": sources.number, "seed": sources.seed, **_FROM},
+        _noise,
+        every_us=_EVERY_US,
     ),
     "table": Form(
         {"table": anything, "column": text, "interpolation": text, "repeat": flag} | dict(_FROM),
         read_table,
     ),
-    "formula": Form({"formula": formula, **_COMMON}, _formula),
+    "formula": Form({"formula": sources.formula, **_COMMON}, _formula),
     "lag": Form(
-        {"lag": formula, "tau": some_time, "start": number, **_COMMON}, _lag, ("tau",), _EVERY_US
+        {"lag": sources.formula, "tau": sources.some_time, "start": sources.number, **_COMMON},
+        _lag,
+        ("tau",),
+        _EVERY_US,
     ),
     "integral": Form(
-        {"integral": formula, "start": number, **_COMMON}, _integral, every_us=_EVERY_US
+        {"integral": sources.formula, "start": sources.number, **_COMMON},
+        _integral,
+        every_us=_EVERY_US,
     ),
 }
 """What a signal can be, by the key that names it."""
 
 
 def read_signal_spec(
-    value: object, keys: Keys = (), folder: Path | None = None
-) -> sources.SignalSpec | list[SignalMistake]:
+    value: object, keys: sources.Keys = (), folder: Path | None = None
+) -> sources.SignalSpec | list[sources.SignalMistake]:
     """Read what TOML gives for a value that may change by itself.
 
     Whether the signals that a formula names are there is judged by `check_signals`.
@@ -153,25 +149,27 @@ def read_signal_spec(
     if isinstance(value, bool | int | float | str):
         try:
             return sources.SignalSpec(
-                sources.Constant(value if isinstance(value, str) else number(value))
+                sources.Constant(value if isinstance(value, str) else sources.number(value))
             )
         except ValueError as error:
-            return [SignalMistake(keys, str(error))]
+            return [sources.SignalMistake(keys, str(error))]
     names = [name for name in FORMS if isinstance(value, dict) and name in value]
     if not isinstance(value, dict) or len(names) != 1:
         came = " and ".join(names) if names else f"{value!r:.60}"
         wanted = f"a number, a text, or a table with one of {', '.join(FORMS)}"
-        return [SignalMistake(keys, f"it is {wanted}; not {came}")]
+        return [sources.SignalMistake(keys, f"it is {wanted}; not {came}")]
     return _read(names[0], value, keys, folder or Path())
 
 
 def _read(
-    name: str, table: _Fields, keys: Keys, folder: Path
-) -> sources.SignalSpec | list[SignalMistake]:
+    name: str, table: _Fields, keys: sources.Keys, folder: Path
+) -> sources.SignalSpec | list[sources.SignalMistake]:
     form, fields = FORMS[name], dict[str, Any]()
     mistakes = [*_read_fields(name, table, keys, fields)]
     mistakes += [
-        SignalMistake((*keys, key), "it is missing") for key in form.needed if key not in table
+        sources.SignalMistake((*keys, key), "it is missing")
+        for key in form.needed
+        if key not in table
     ]
     if not mistakes:
         try:
@@ -182,24 +180,24 @@ def _read(
                 **_limits(fields),
             )
         except ValueError as error:
-            mistakes.append(SignalMistake((*keys, name), str(error)))
+            mistakes.append(sources.SignalMistake((*keys, name), str(error)))
     return mistakes
 
 
 def _read_fields(
-    name: str, table: _Fields, keys: Keys, fields: dict[str, Any]
-) -> Iterator[SignalMistake]:
+    name: str, table: _Fields, keys: sources.Keys, fields: dict[str, Any]
+) -> Iterator[sources.SignalMistake]:
     """Enter the fields; yield the mistakes in them."""
     known = FORMS[name].keys
     for key, value in table.items():
         if key not in known:
             hint = near(str(key), [other for other in known if other != name])
-            yield SignalMistake((*keys, key), f"not a key of {name}; {hint}")
+            yield sources.SignalMistake((*keys, key), f"not a key of {name}; {hint}")
             continue
         try:
             fields[key] = known[key](value)
         except ValueError as error:
-            yield SignalMistake((*keys, key), str(error))
+            yield sources.SignalMistake((*keys, key), str(error))
 
 
 def _limits(fields: _Fields) -> dict[str, float]:

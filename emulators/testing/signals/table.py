@@ -19,8 +19,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from tickrig._lazy import LazyModule
 from tickrig.emulators.record.replay import read_bench_recording
-from tickrig.emulators.testing.signals.fields import number
-from tickrig.emulators.testing.signals.sources import ValueTable
+from tickrig.emulators.testing.signals.sources import ValueTable, number
 from tickrig.host.text.names import near
 from tickrig.host.text.trace import Mark
 from tickrig.host.text.values import parse_time_us

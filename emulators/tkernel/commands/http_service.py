@@ -12,7 +12,7 @@ from typing import ClassVar, Final
 import click
 
 from tickrig.emulators.bench.control import EmulatorControl
-from tickrig.emulators.bench.fault_spec import parse_fault_spec
+from tickrig.emulators.bench.operator import parse_fault_spec
 from tickrig.emulators.tkernel.operated import Operated
 from tickrig.emulators.tkernel.resolution import ResolutionService
 from tickrig.emulators.tkernel.ucode_table import EXAMPLE, UcodeTable, parse_table

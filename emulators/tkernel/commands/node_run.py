@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from tickrig.emulators.bench.control import EmulatorControl
-from tickrig.emulators.bench.fault_spec import parse_fault_spec
+from tickrig.emulators.bench.operator import parse_fault_spec
 from tickrig.emulators.bench.running_emulator import keeping_time
 from tickrig.emulators.tkernel import node_manager
 from tickrig.emulators.tkernel.board import Board

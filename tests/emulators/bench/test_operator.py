@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from tickrig.emulators.bench.fault_spec import parse_fault_spec
+from tickrig.emulators.bench.operator import parse_fault_spec
 from tickrig.emulators.serial.emulator import Emulator
 
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from tests.emulators.lamp import Lamp
 from tickrig.device.chance import Chance, threshold_of
-from tickrig.emulators.bench.fault_spec import parse_fault_spec
+from tickrig.emulators.bench.operator import parse_fault_spec
 from tickrig.emulators.can.faults import CAN_FAULTS
 from tickrig.emulators.canopen.faults import NODE_FAULTS
 from tickrig.emulators.rig.faults import (

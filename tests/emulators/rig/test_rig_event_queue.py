@@ -15,7 +15,7 @@ from tests.emulators.canopen.dimmer import Dimmer
 from tests.emulators.lamp import Lamp
 from tickrig.device.canopen.stack import make_slave
 from tickrig.device.rrc.machine import Rrc
-from tickrig.emulators.bench.fault_spec import parse_fault_spec
+from tickrig.emulators.bench.operator import parse_fault_spec
 from tickrig.emulators.bench.running_emulator import Transcript
 from tickrig.emulators.can.emulator import CanEmulator
 from tickrig.emulators.can.outside.host import CanHost

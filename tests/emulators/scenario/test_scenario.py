@@ -5,7 +5,7 @@ from collections.abc import Callable
 import pytest
 
 from tests.emulators.lamp import Lamp
-from tickrig.emulators.bench.fault_spec import FaultSpec
+from tickrig.emulators.bench.operator import FaultSpec
 from tickrig.emulators.bench.running_emulator import Transcript
 from tickrig.emulators.scenario import Press, ScenarioEnd, ScenarioParser, ScenarioPlayer, Send, Set
 from tickrig.emulators.serial.emulator import Emulator

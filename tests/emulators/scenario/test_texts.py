@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.emulators.bench.fault_spec import FaultSpec, parse_fault_spec
+from tickrig.emulators.bench.operator import FaultSpec, parse_fault_spec
 from tickrig.host.text.byte_text import escape, unescape
 from tickrig.host.text.values import format_time, parse_time_us
 from tickrig.wire.instant import NEVER

@@ -5,11 +5,12 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cached_property
 from pathlib import Path
 from typing import Final, TypeVar
 
 from tickrig.emulators.bench.control import EmulatorControl
-from tickrig.emulators.bench.fault_spec import FaultOrder, FaultSpec
+from tickrig.emulators.bench.operator import FaultOrder, FaultSpec
 from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.testing.bench.bench_rig import BenchDescription, BenchRig
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
@@ -32,8 +33,13 @@ class EmulatedMode(ABC):
     """
 
     def __init__(self, rig: BenchRig, tolerance: Tolerances) -> None:
-        self._rig, self._control = rig, EmulatorControl(rig)
+        self._rig = rig
         self.tolerance = tolerance
+
+    @cached_property
+    def _control(self) -> EmulatorControl:
+        """What answers requests."""
+        return EmulatorControl(self._rig)
 
     @property
     def devices(self) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Final
 
 from tickrig.device.physical import SignalType
-from tickrig.emulators.bench.fault_spec import FaultSpec
+from tickrig.emulators.bench.operator import FaultSpec
 from tickrig.emulators.rig.emulated import HasSignals
 from tickrig.emulators.testing.bench.errors import MachineTooSlow, NotOnThisBench, PortGone
 from tickrig.emulators.testing.bench.modes.emulated_mode import POWER

@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NoReturn, TypeVar
 
-from tickrig.emulators.bench.fault_spec import FaultOrder, FaultSpec
+from tickrig.emulators.bench.operator import FaultOrder, FaultSpec
 from tickrig.emulators.bench.running_emulator import keeping_time
 from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.testing.bench.bench_rig import BenchDescription, BenchRig, RigState

@@ -7,8 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import IO, Final
 
 from tickrig.device.physical import InputSignal, SignalType
-from tickrig.emulators.bench.fault_spec import FaultSpec
-from tickrig.emulators.bench.operator import AssemblyFaults, Operator
+from tickrig.emulators.bench.operator import AssemblyFaults, FaultSpec, Operator
 from tickrig.emulators.rig.emulated import HasSignals
 from tickrig.emulators.rig.event_queue import EventQueue
 from tickrig.emulators.testing.bench.errors import BenchBlocked, NotOnThisBench, OperatorRefused

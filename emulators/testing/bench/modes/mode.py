@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
-from tickrig.emulators.bench.fault_spec import FaultOrder, FaultSpec
+from tickrig.emulators.bench.operator import FaultOrder, FaultSpec
 from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.testing.bench.bench_rig import BenchDescription, BenchRig
 from tickrig.emulators.testing.bench.tasks import Condition

@@ -7,7 +7,7 @@ from contextlib import ExitStack
 from dataclasses import replace
 from typing import Any, Protocol
 
-from tickrig.emulators.bench.fault_spec import FaultOrder, FaultSpec
+from tickrig.emulators.bench.operator import FaultOrder, FaultSpec
 from tickrig.emulators.rig.emulated import HasSignals
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
 from tickrig.emulators.testing.bench.errors import NotOnThisBench

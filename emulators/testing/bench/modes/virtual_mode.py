@@ -4,15 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager
+from functools import partial
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
+from tickrig._lazy import LazyModule
 from tickrig.device.twin import twin
+from tickrig.emulators.can.outside.host import CanHost
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.sim_link import SimLink
+from tickrig.emulators.rig.sim_waits import EPOCH_S, LOOK_US
+from tickrig.emulators.serial.outside.serial_ports import SERIAL_PORTS
+from tickrig.emulators.serial.outside.serial_side import SerialSide
+from tickrig.emulators.serial.outside.sim_serial import SimSerial
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
 from tickrig.emulators.testing.bench.errors import BenchError
 from tickrig.emulators.testing.bench.modes.emulated_mode import EmulatedMode
 from tickrig.emulators.testing.bench.modes.mode import Address
-from tickrig.emulators.testing.bench.modes.virtual_doors import LONGEST_US, RigPassing, VirtualDoors
+from tickrig.emulators.testing.bench.mounts import BusMount, LineMount
 from tickrig.emulators.testing.bench.tasks import DAY_US
+from tickrig.emulators.testing.host_clock.host_code import HostTimeError
 from tickrig.emulators.testing.host_clock.patched_time import patched_time
 from tickrig.emulators.testing.rig_file.plan import Tolerances
 from tickrig.wire.instant import NEVER
@@ -22,9 +32,159 @@ if TYPE_CHECKING:
     import canopen
     import serial
 
+    from tickrig.emulators.can.outside import interface, sim_network
     from tickrig.host.links.link import Link
+else:  # python-can and canopen are slow
+    interface = LazyModule("tickrig.emulators.can.outside.interface")
+    sim_network = LazyModule("tickrig.emulators.can.outside.sim_network")
+
+
+# The time of a rig, for hosts that look at a clock.
+
+LONGEST_US: Final = 3_600_000_000
+"""Who waits without a timeout waits an hour at most."""
+
+
+class RigPassing:
+    """A `Passing` that is a rig's time.
+
+    What is called back in the middle of a step may look at the clock, but not wait.
+
+    Args:
+        rig: stepped while somebody waits.
+    """
+
+    def __init__(self, rig: Rig) -> None:
+        self._rig = rig
+
+    @property
+    def time_s(self) -> float:
+        """Seconds since 1970: a rig begins with the year 2000."""
+        return EPOCH_S + self._rig.now_us / 1e6
+
+    def wait(self, done: Callable[[], bool], timeout_s: float | None) -> bool:
+        """Let time pass until `done()`; False if the timeout was first.
+
+        Without a timeout it is False once nothing happens any more, or after an hour.
+
+        Raises:
+            HostTimeError: it is the rig that has called, in the middle of a step.
+        """
+        timeout_us = LONGEST_US if timeout_s is None else max(0, round(timeout_s * 1e6))
+        if not self._rig.in_step:
+            return self._rig.run_until(done, timeout_us)
+        if timeout_us > LOOK_US:
+            raise HostTimeError("what is called back while time passes cannot wait itself")
+        return done()
+
 
 T = TypeVar("T")
+
+
+class _Offers:
+    """What programs find under names; a snapshot takes back what was offered since."""
+
+    def __init__(self) -> None:
+        self._open: list[AbstractContextManager[object]] = []
+
+    def enter(self, offer: AbstractContextManager[T]) -> None:
+        """Offer something until it is taken back."""
+        offer.__enter__()
+        self._open.append(offer)
+
+    def close(self, left: int = 0) -> None:
+        """Take back the latest, but for so many."""
+        while len(self._open) > left:
+            self._open.pop().__exit__(None, None, None)
+
+    def way_back(self) -> Callable[[], None]:
+        """Return what takes back what is offered from now on."""
+        return partial(self.close, len(self._open))
+
+
+class VirtualDoors:
+    """Opens doors for hosts; see `BenchMode`.
+
+    Args:
+        rig: the rig.
+    """
+
+    def __init__(self, rig: BenchRig) -> None:
+        self._rig, self._mounts = rig.rig, rig.state.mounts
+        self._sides: dict[str, SerialSide] = {}
+        self._addresses: dict[str, Address] = {}
+        self._offers = _Offers()
+
+    def link(self, wire: str) -> Link[Any]:
+        """Connect a link."""
+        mount = self._mounts[wire]
+        if isinstance(mount, BusMount):
+            return CanHost(self._rig, mount.open_end())
+        return SimLink(self._rig, mount.line.b)
+
+    def serial(self, wire: str, options: dict[str, Any]) -> serial.SerialBase:
+        """Open a line by pyserial."""
+        return SimSerial(self._side(wire), **{"port": wire, **options})
+
+    def can_bus(self, wire: str, options: dict[str, Any]) -> can.BusABC:
+        """Open a bus by python-can."""
+        self._bus(wire)
+        address = self.address(wire)
+        assert not isinstance(address, str)
+        return interface.TickrigBus(address["channel"], **options)
+
+    def canopen_network(self, wire: str) -> canopen.Network:
+        """Connect the canopen library to a bus."""
+        return sim_network.SimNetwork(self._rig, self._bus(wire).open_end())
+
+    def address(self, wire: str) -> Address:
+        """Return where a program opens a wire by itself."""
+        if wire not in self._addresses:
+            self._addresses[wire] = self._offer(wire)
+        return self._addresses[wire]
+
+    def close(self) -> None:
+        """Offer nothing any more."""
+        self._offers.close()
+
+    def _offer(self, wire: str) -> Address:
+        """Offer a wire under a name that nobody else has."""
+        mount = self._mounts[wire]
+        if isinstance(mount, LineMount):
+            name = _free(wire, SERIAL_PORTS.names)
+            self._offers.enter(SERIAL_PORTS.offer(name, self._side(wire)))
+            return f"tickrig://{name}"
+        name = _free(wire, interface.CHANNELS.names)
+        self._offers.enter(interface.CHANNELS.offer(name, self._rig, mount.wire))
+        return {"interface": "tickrig", "channel": name}
+
+    def _side(self, wire: str) -> SerialSide:
+        """Return the host's side of a line, where one host is at a time."""
+        mount = self._mounts[wire]
+        if isinstance(mount, BusMount):
+            raise ValueError(f"{wire} is a CAN bus, not a serial line")
+        if wire not in self._sides:
+            end = mount.line.b
+            device = end.uart.setting if mount.settings.uart else None
+            self._sides[wire] = SerialSide(self._rig, end, device)
+        return self._sides[wire]
+
+    def _bus(self, wire: str) -> BusMount:
+        mount = self._mounts[wire]
+        if isinstance(mount, LineMount):
+            raise ValueError(f"{wire} is a serial line, not a CAN bus")
+        return mount
+
+
+def _free(name: str, taken: tuple[str, ...]) -> str:
+    """Return a name that is not taken: it itself, or with a number behind it.
+
+    >>> _free("rrc", ("rrc", "rrc-2"))
+    'rrc-3'
+    """
+    names = [name, *(f"{name}-{number}" for number in range(2, len(taken) + 3))]
+    return next(each for each in names if each not in taken)
+
 
 _LOOK_US: Final = 1_000
 _LOOKS: Final = 10_000

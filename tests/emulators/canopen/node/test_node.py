@@ -6,7 +6,7 @@ import pytest
 
 from tickrig.device.canopen.stack import make_slave
 from tickrig.device.physical import SignalType
-from tickrig.emulators.bench.fault_spec import parse_fault_spec
+from tickrig.emulators.bench.operator import parse_fault_spec
 from tickrig.emulators.can.emulator import CanEmulator
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.build import make_bench

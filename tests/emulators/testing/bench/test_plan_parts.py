@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from tickrig.emulators.bench.fault_spec import FaultSpec
+from tickrig.emulators.bench.operator import FaultSpec
 from tickrig.emulators.canopen.body import BodyPlan
 from tickrig.emulators.canopen.models import MODELS
 from tickrig.emulators.testing.bench.bench import Bench

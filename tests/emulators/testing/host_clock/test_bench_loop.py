@@ -17,7 +17,7 @@ from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.outside.serial_ports import SERIAL_PORTS
 from tickrig.emulators.serial.outside.serial_side import SerialSide
 from tickrig.emulators.serial.serial_line import SerialLine
-from tickrig.emulators.testing.bench.modes.virtual_doors import RigPassing
+from tickrig.emulators.testing.bench.modes.virtual_mode import RigPassing
 from tickrig.emulators.testing.host_clock.patched_time import patched_time
 
 

@@ -25,7 +25,7 @@ from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.emulators.rig.sim_waits import EPOCH_S
 from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.serial_line import SerialLine
-from tickrig.emulators.testing.bench.modes.virtual_doors import RigPassing
+from tickrig.emulators.testing.bench.modes.virtual_mode import RigPassing
 from tickrig.emulators.testing.host_clock.host_code import HostTimeError
 from tickrig.emulators.testing.host_clock.patched_time import patched_time
 

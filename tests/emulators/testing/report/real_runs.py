@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from tickrig.device.rrc.machine import Rrc
-from tickrig.emulators.bench.fault_spec import FaultSpec
+from tickrig.emulators.bench.operator import FaultSpec
 from tickrig.emulators.bench.running_emulator import RunningEmulator, Transcript
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.build import describe_nodes, make_bench, make_nodes

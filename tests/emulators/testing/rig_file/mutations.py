@@ -10,8 +10,8 @@ from random import Random
 from tests.emulators.testing.rig_file.test_reader import WHOLE
 from tests.mutators import damaged, with_piece
 from tickrig.emulators.testing.bench.bench import Bench
+from tickrig.emulators.testing.rig_file.plan import RigFileError
 from tickrig.emulators.testing.rig_file.reader import decode_rig_file
-from tickrig.emulators.testing.rig_file.schema import RigFileError
 
 RIGS = Path(__file__).parents[4] / "examples" / "rigs"
 PLACE = RIGS / "mutated.toml"

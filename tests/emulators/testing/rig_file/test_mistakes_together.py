@@ -7,8 +7,8 @@ from random import Random
 import pytest
 
 from tests.emulators.testing.rig_file.test_reader import HERE, WHOLE
+from tickrig.emulators.testing.rig_file.plan import RigFileError
 from tickrig.emulators.testing.rig_file.reader import parse_rig_file
-from tickrig.emulators.testing.rig_file.schema import RigFileError
 from tickrig.host.text.toml_reader import Mistake
 
 EDITS = [

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
+from tickrig.emulators.testing.rig_file.plan import RigFileError
 from tickrig.emulators.testing.rig_file.reader import parse_rig_file
-from tickrig.emulators.testing.rig_file.schema import RigFileError
 
 NODE = "[[node]] is a device now, one for each node-ID:"
 

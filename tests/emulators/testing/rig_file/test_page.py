@@ -10,8 +10,8 @@ import pytest
 from click.testing import CliRunner
 
 from tickrig.emulators.commands.cli import main
+from tickrig.emulators.testing.rig_file.plan import PAGE
 from tickrig.emulators.testing.rig_file.reader import parse_rig_file
-from tickrig.emulators.testing.rig_file.schema import PAGE
 from tickrig.host.text.section import rows
 
 FILE = Path(__file__).parents[4] / "docs" / "reference/bench/rig-file.md"

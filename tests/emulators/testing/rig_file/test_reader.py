@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from tickrig.device.canopen.slave import UNCONFIGURED
-from tickrig.emulators.bench.fault_spec import FaultSpec
+from tickrig.emulators.bench.operator import FaultSpec
 from tickrig.emulators.canopen.body import BodyPlan
 from tickrig.emulators.testing.rig_file.plan import (
     BusPlan,
@@ -15,13 +15,13 @@ from tickrig.emulators.testing.rig_file.plan import (
     FaultPlan,
     PortPlan,
     PowerPlan,
+    RigFileError,
     RigPlan,
     Tolerances,
     WirePlan,
     WireType,
 )
 from tickrig.emulators.testing.rig_file.reader import parse_rig_file, read_rig_file
-from tickrig.emulators.testing.rig_file.schema import RigFileError
 from tickrig.emulators.testing.signals.sources import SignalSpec
 
 ROOT = Path(__file__).parents[4]

@@ -13,8 +13,7 @@ from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.node import Node, Nodes
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
-from tickrig.emulators.testing.signals.driver import SignalDriver
-from tickrig.emulators.testing.signals.scope import check_signals
+from tickrig.emulators.testing.signals.driver import SignalDriver, check_signals
 from tickrig.wire.instant import NEVER
 
 

@@ -16,9 +16,8 @@ from hypothesis import strategies as st
 
 from tests.emulators.testing.signals.signal_bench import Meter, SignalBench, signals_of
 from tests.soak import examples
-from tickrig.emulators.testing.signals.fields import SignalMistake
-from tickrig.emulators.testing.signals.scope import check_signals
-from tickrig.emulators.testing.signals.sources import SignalSpec
+from tickrig.emulators.testing.signals.driver import check_signals
+from tickrig.emulators.testing.signals.sources import SignalMistake, SignalSpec
 from tickrig.emulators.testing.signals.spec_reader import FORMS, read_signal_spec
 
 ROOT = Path(__file__).parents[4]

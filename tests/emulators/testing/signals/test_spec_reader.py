@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from tickrig.emulators.testing.signals.fields import SignalMistake
 from tickrig.emulators.testing.signals.sources import (
     Constant,
     Lag,
     Noise,
     RampSource,
+    SignalMistake,
     SignalSpec,
     ValueTable,
     Wave,
