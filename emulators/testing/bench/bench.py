@@ -203,7 +203,7 @@ class BenchDevice:
     @property
     def link(self) -> Link[Any]:
         """A new link for a client: bytes on a serial line, frames on a CAN bus."""
-        return self._mode.link(self._wire())
+        return self._mode.doors.link(self._wire())
 
     def serial(self, **options: Any) -> serial.Serial:
         """Open the serial line as a pyserial object, for types what `serial_for_url` returns.
@@ -211,7 +211,7 @@ class BenchDevice:
         Args:
             options: as `serial.Serial` takes them; `timeout` passes in the time of the bench.
         """
-        return cast("serial.Serial", self._mode.serial(self._wire(), options))
+        return cast("serial.Serial", self._mode.doors.serial(self._wire(), options))
 
     @property
     def url(self) -> str:
@@ -219,7 +219,7 @@ class BenchDevice:
 
         It is what `serial.serial_for_url` takes: `tickrig://rrc`, `/dev/pts/7`, `COM3`.
         """
-        address = self._mode.address(self._wire())
+        address = self._mode.doors.address(self._wire())
         if not isinstance(address, str):
             raise ValueError(f"{self._wire()} is a CAN bus, which has no URL: see bus_options")
         return address
@@ -227,7 +227,7 @@ class BenchDevice:
     @property
     def bus_options(self) -> dict[str, Any]:
         """With what a program opens the CAN bus by itself: `can.Bus(**bench.bus_options)`."""
-        address = self._mode.address(self._wire())
+        address = self._mode.doors.address(self._wire())
         if isinstance(address, str):
             raise ValueError(f"{self._wire()} is a serial line, which has no bus: see url")
         return dict(address)
@@ -238,11 +238,11 @@ class BenchDevice:
         Args:
             options: as `can.Bus` takes them.
         """
-        return self._mode.can_bus(self._wire(), options)
+        return self._mode.doors.can_bus(self._wire(), options)
 
     def canopen_network(self) -> canopen.Network:
         """Connect the canopen library to the CAN bus, as a master."""
-        return self._mode.canopen_network(self._wire())
+        return self._mode.doors.canopen_network(self._wire())
 
     def _wire(self) -> str:
         """Return the wire of this device, or the only one there is."""

@@ -253,7 +253,7 @@ def _offer(bench: Bench) -> None:
     mode = bench._mode
     for wire, library in mode.act(_libraries) if bench.mode == VIRTUAL else ():
         if library in sys.modules:
-            mode.address(wire)
+            mode.doors.address(wire)
 
 
 def _libraries(rig: BenchRig) -> list[tuple[str, str]]:

@@ -61,7 +61,7 @@ def buses_of(bench: Bench) -> tuple[str, ...]:
     try:
         mounts = mode.act(lambda rig: rig.state.mounts)
     except NotOnThisBench:
-        return tuple(wire for wire in mode.wires if isinstance(mode.address(wire), dict))
+        return tuple(wire for wire in mode.wires if isinstance(mode.doors.address(wire), dict))
     return tuple(name for name, mount in mounts.items() if isinstance(mount, BusMount))
 
 

@@ -66,21 +66,25 @@ class LinePlace:
 
 
 class Doors:
-    """Opens doors for hosts; what a host leaves open is closed with them.
+    """The `HostDoors` of benches in real time; what a host leaves open is closed with them.
 
     Args:
         places: where the wires are, by name.
         watch_of: returns who watches the doors of a wire.
+        begin: lets time begin; called when a door is open.
     """
 
     def __init__(
-        self, places: Mapping[str, LinePlace | BusPlan], watch_of: Callable[[str], DoorWatch]
+        self,
+        places: Mapping[str, LinePlace | BusPlan],
+        watch_of: Callable[[str], DoorWatch],
+        begin: Callable[[], None],
     ) -> None:
-        self._places, self._watch_of = places, watch_of
+        self._places, self._watch_of, self._begin = places, watch_of, begin
         self._opened = ExitStack()
 
     def link(self, wire: str) -> Link[Any]:
-        """Connect a link; see `BenchMode`."""
+        """Connect a link."""
         place, watch = self._place(wire), self._watch_of(wire)
         link: WatchedLink[Any]
         if isinstance(place, BusPlan):
@@ -88,10 +92,11 @@ class Doors:
         else:
             link = WatchedLink(_line_link(place), watch)
         self._opened.callback(link.close)
+        self._begin()
         return link
 
     def serial(self, wire: str, options: dict[str, Any]) -> serial.SerialBase:
-        """Open a line by pyserial; see `BenchMode`."""
+        """Open a line by pyserial."""
         place = self._place(wire)
         if isinstance(place, BusPlan):
             raise ValueError(f"{wire} is a CAN bus, not a serial line")
@@ -100,26 +105,35 @@ class Doors:
         locked = {"exclusive": True}  # a second host takes bytes away from the first
         port = open_watched_serial(place.url, self._watch_of(wire), {**own, **locked, **options})
         self._opened.callback(port.close)
+        self._begin()
         return port
 
     def can_bus(self, wire: str, options: dict[str, Any]) -> can.BusABC:
-        """Open a bus by python-can; see `BenchMode`."""
+        """Open a bus by python-can."""
+        bus = self._open_bus(wire, options)
+        self._begin()
+        return bus
+
+    def _open_bus(self, wire: str, options: dict[str, Any]) -> can.BusABC:
         bus = bus_doors.open_watched_bus(self._bus(wire), self._watch_of(wire), options)
         self._opened.callback(can_link.close_bus, bus)
         return bus
 
     def canopen_network(self, wire: str) -> canopen.Network:
-        """Connect the canopen library to a bus; see `BenchMode`."""
+        """Connect the canopen library to a bus."""
         import canopen  # noqa: PLC0415 - slow
 
-        network = canopen.Network(self.can_bus(wire, {}))
+        network = canopen.Network(self._open_bus(wire, {}))
         network.NOTIFIER_CYCLE = _NOTIFIER_S
         self._opened.callback(network.disconnect)
-        return network.connect()
+        network.connect()
+        self._begin()
+        return network
 
     def address(self, wire: str) -> Address:
-        """Return where a program opens a wire by itself; see `BenchMode`."""
+        """Return where a program opens a wire by itself."""
         place = self._places[wire]
+        self._begin()
         if isinstance(place, LinePlace):
             return place.url
         rate = {} if place.bit_rate is None else {"bitrate": place.bit_rate}

@@ -19,7 +19,6 @@ from tickrig.emulators.testing.bench.modes.door_watch import HostPace
 from tickrig.emulators.testing.bench.modes.doors import Doors, LinePlace
 from tickrig.emulators.testing.bench.modes.human_operator import Terminal
 from tickrig.emulators.testing.bench.modes.lateness import CpuWaits, too_slow
-from tickrig.emulators.testing.bench.modes.mode import Address
 from tickrig.emulators.testing.bench.modes.operators import Operators
 from tickrig.emulators.testing.bench.mounts import LineMount, Mount
 from tickrig.emulators.testing.bench.plan_parts import parts_of
@@ -28,11 +27,7 @@ from tickrig.emulators.testing.rig_file.plan import BusPlan, HardwarePlan, RigPl
 from tickrig.host.control.requests import Object
 
 if TYPE_CHECKING:
-    import can
-    import canopen
-    import serial
-
-    from tickrig.host.links.link import Link
+    pass
 
 
 # Where the wires of real devices are.
@@ -97,12 +92,14 @@ class HardwareMode:
         self._record = PortRecord(plan, mounts, lambda: self.now_us)
         self._journal = DoorJournal(lambda: self.now_us, self._look, self._record)
         places = _places_of(plan, self._where, mounts)
-        self._doors = Doors(places, lambda wire: self._journal.watch(mounts[wire], self._pace))
+        self.doors = Doors(
+            places, lambda wire: self._journal.watch(mounts[wire], self._pace), self._begin
+        )
         self._waits = CpuWaits()
         self._operators = Operators(plan, self._where, self._like, self._terminal, self._journal)
         self._stack = ExitStack()
         self._stack.enter_context(keeping_time())
-        for close in (self._operators.close, self._doors.close):
+        for close in (self._operators.close, self.doors.close):
             self._stack.callback(close)
 
     @property
@@ -189,7 +186,7 @@ class HardwareMode:
 
     def wait_until(self, done: Condition, within_us: int) -> bool:
         """Let time pass until something is so; False if it was not in time."""
-        self._begin_with(None)
+        self._begin()
         until_us = self.now_us + within_us
         while True:
             left_us = until_us - self.now_us
@@ -201,26 +198,6 @@ class HardwareMode:
             wait_us = min(left_us, _POLL_US)
             with self._pace.waiting(wait_us):
                 time.sleep(wait_us / 1e6)
-
-    def link(self, wire: str) -> Link[Any]:
-        """Connect a host: bytes on a serial line, frames on a bus."""
-        return self._begin_with(self._doors.link(wire))
-
-    def serial(self, wire: str, options: dict[str, Any]) -> serial.SerialBase:
-        """Open a serial line by pyserial."""
-        return self._begin_with(self._doors.serial(wire, options))
-
-    def can_bus(self, wire: str, options: dict[str, Any]) -> can.BusABC:
-        """Open a bus by python-can."""
-        return self._begin_with(self._doors.can_bus(wire, options))
-
-    def canopen_network(self, wire: str) -> canopen.Network:
-        """Connect the canopen library to a bus."""
-        return self._begin_with(self._doors.canopen_network(wire))
-
-    def address(self, wire: str) -> Address:
-        """Return where a program opens a wire by itself."""
-        return self._begin_with(self._doors.address(wire))
 
     def journal(self) -> tuple[WireLine, ...]:
         """Return what passed the doors last, and what the operator did."""
@@ -257,12 +234,11 @@ class HardwareMode:
         """Close all ports, and let the operator go."""
         self._stack.close()
 
-    def _begin_with(self, door: T) -> T:
+    def _begin(self) -> None:
         """Give the devices their power, now that somebody hears them."""
         if not self._begun:
             self._begun = True
             self._operators.begin()
-        return door
 
     def _look(self) -> None:
         """Do what has waited for a condition that is true now."""

@@ -26,6 +26,33 @@ Address = str | dict[str, Any]
 """What `serial.serial_for_url` takes of a line, and by keyword `can.Bus` of a bus."""
 
 
+class HostDoors(Protocol):
+    """Opens the wires of a bench for hosts; each wire by its name.
+
+    A wire of the other kind raises ValueError, one that is nowhere `NotOnThisBench`.
+    """
+
+    def link(self, wire: str) -> Link[Any]:
+        """Connect a host: bytes on a serial line, frames on a bus."""
+        ...
+
+    def serial(self, wire: str, options: dict[str, Any]) -> serial.SerialBase:
+        """Open a serial line by pyserial."""
+        ...
+
+    def can_bus(self, wire: str, options: dict[str, Any]) -> can.BusABC:
+        """Open a bus by python-can."""
+        ...
+
+    def canopen_network(self, wire: str) -> canopen.Network:
+        """Connect the canopen library to a bus."""
+        ...
+
+    def address(self, wire: str) -> Address:
+        """Return where a program opens a wire by itself."""
+        ...
+
+
 class BenchMode(Protocol):
     """Where the devices are, and how time passes.
 
@@ -112,24 +139,9 @@ class BenchMode(Protocol):
         """Let time pass until something is so; False if it was not in time."""
         ...
 
-    def link(self, wire: str) -> Link[Any]:
-        """Connect a host: bytes on a serial line, frames on a bus."""
-        ...
-
-    def serial(self, wire: str, options: dict[str, Any]) -> serial.SerialBase:
-        """Open a serial line by pyserial."""
-        ...
-
-    def can_bus(self, wire: str, options: dict[str, Any]) -> can.BusABC:
-        """Open a bus by python-can."""
-        ...
-
-    def canopen_network(self, wire: str) -> canopen.Network:
-        """Connect the canopen library to a bus."""
-        ...
-
-    def address(self, wire: str) -> Address:
-        """Return where a program opens a wire by itself."""
+    @property
+    def doors(self) -> HostDoors:
+        """Where hosts come in; the first one that does lets time begin."""
         ...
 
     def save_trace(self, path: Path) -> None:

@@ -20,7 +20,6 @@ from tickrig.emulators.testing.bench.modes.door_watch import HostPace
 from tickrig.emulators.testing.bench.modes.doors import Doors, OutsideEnds
 from tickrig.emulators.testing.bench.modes.emulated_mode import EmulatedMode
 from tickrig.emulators.testing.bench.modes.lateness import CpuWaits, too_slow
-from tickrig.emulators.testing.bench.modes.mode import Address
 from tickrig.emulators.testing.bench.mounts import LineMount, Mount
 from tickrig.emulators.testing.rig_file.plan import RealPlan, Tolerances
 from tickrig.host.control.clock import ServingClock
@@ -30,11 +29,7 @@ from tickrig.host.links.ready import WaitingQueue
 from tickrig.host.text.trace import Mark
 
 if TYPE_CHECKING:
-    import can
-    import canopen
-    import serial
-
-    from tickrig.host.links.link import Link
+    pass
 
 
 # A rig in real time, in a thread of its own, and what others have done to it there.
@@ -275,11 +270,11 @@ class RealMode(EmulatedMode):
         self._begun = self._judging = False
         self._thread = RigThread(rig, outside.clock)
         self._pace, self._waits = _Watch(self._thread), CpuWaits(spares_looker=True)
-        self._doors = Doors(outside.places, lambda wire: self._pace)
+        self.doors = Doors(outside.places, lambda wire: self._pace, self._begin)
         rig.rig.watchers.append(self._waits.look)
         rig.ports = outside.ports
         self._watch_settings(outside)
-        for close in (outside.close, self._thread.stop, self._doors.close):
+        for close in (outside.close, self._thread.stop, self.doors.close):
             self._stack.callback(close)
 
     @classmethod
@@ -374,35 +369,6 @@ class RealMode(EmulatedMode):
             self._begun = True
             self._stack.enter_context(keeping_time())
             self._thread.start()
-
-    def link(self, wire: str) -> Link[Any]:
-        """Connect a host: bytes on a serial line, frames on a bus."""
-        link = self._doors.link(wire)
-        self._begin()
-        return link
-
-    def serial(self, wire: str, options: dict[str, Any]) -> serial.SerialBase:
-        """Open a serial line by pyserial."""
-        port = self._doors.serial(wire, options)
-        self._begin()
-        return port
-
-    def can_bus(self, wire: str, options: dict[str, Any]) -> can.BusABC:
-        """Open a bus by python-can."""
-        bus = self._doors.can_bus(wire, options)
-        self._begin()
-        return bus
-
-    def canopen_network(self, wire: str) -> canopen.Network:
-        """Connect the canopen library to a bus."""
-        network = self._doors.canopen_network(wire)
-        self._begin()
-        return network
-
-    def address(self, wire: str) -> Address:
-        """Return where a program opens a wire by itself."""
-        self._begin()
-        return self._doors.address(wire)
 
     def too_slow(self) -> str:
         """Say why no failure is to be believed: real time was not kept; empty if it was."""

@@ -103,7 +103,7 @@ class _Offers:
 
 
 class VirtualDoors:
-    """Opens doors for hosts; see `BenchMode`.
+    """The `HostDoors` of a bench in virtual time.
 
     Args:
         rig: the rig.
@@ -204,7 +204,7 @@ class VirtualMode(EmulatedMode):
 
     def __init__(self, rig: BenchRig) -> None:
         super().__init__(rig, _EXACT)
-        self._doors, self._closed = VirtualDoors(rig), False
+        self.doors, self._closed = VirtualDoors(rig), False
 
     @property
     def now_us(self) -> int:
@@ -244,26 +244,6 @@ class VirtualMode(EmulatedMode):
         if self._closed:
             raise BenchError("the bench is closed: no time passes")
 
-    def link(self, wire: str) -> Link[Any]:
-        """Connect a host: bytes on a serial line, frames on a bus."""
-        return self._doors.link(wire)
-
-    def serial(self, wire: str, options: dict[str, Any]) -> serial.SerialBase:
-        """Open a serial line by pyserial."""
-        return self._doors.serial(wire, options)
-
-    def can_bus(self, wire: str, options: dict[str, Any]) -> can.BusABC:
-        """Open a bus by python-can."""
-        return self._doors.can_bus(wire, options)
-
-    def canopen_network(self, wire: str) -> canopen.Network:
-        """Connect the canopen library to a bus."""
-        return self._doors.canopen_network(wire)
-
-    def address(self, wire: str) -> Address:
-        """Return where a program opens a wire by itself."""
-        return self._doors.address(wire)
-
     def patched_time(self) -> AbstractContextManager[object]:
         """Let hosts that look at a clock live in the rig's time; see `patched_time`."""
         return patched_time(RigPassing(self._rig.rig))
@@ -279,4 +259,4 @@ class VirtualMode(EmulatedMode):
     def close(self) -> None:
         """Give everything back; no time passes any more."""
         self._closed = True
-        self._doors.close()
+        self.doors.close()
