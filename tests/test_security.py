@@ -25,7 +25,7 @@ RUNNING = re.compile(
 
 RUNS = {
     "emulators/bench/child.py": "our own emulators, for demos",
-    "emulators/testing/bench/modes/human_operator.py": "`power` of a rig file",
+    "emulators/testing/bench/modes/operators.py": "`power` of a rig file",
     "emulators/testing/campaign/crew.py": "a worker of a campaign: pytest",
     "host/canmon/conform/stimulus.py": "`--stimulus CMD`",
     "host/rtc/engines/openrtm/stubs.py": "omniidl, and the stubs that it makes",

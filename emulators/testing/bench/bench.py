@@ -16,12 +16,17 @@ from tickrig.emulators.bench.operator import parse_fault_spec
 from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.emulators.testing.bench import tasks
 from tickrig.emulators.testing.bench.bench_rig import BenchDescription, Parts
-from tickrig.emulators.testing.bench.build import BenchedDevice, mounts_of, name_of
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
 from tickrig.emulators.testing.bench.journal import text_of
 from tickrig.emulators.testing.bench.modes.mode import BenchMode
 from tickrig.emulators.testing.bench.modes.virtual_mode import VirtualMode
-from tickrig.emulators.testing.bench.plan_parts import parts_of, rig_of
+from tickrig.emulators.testing.bench.plan_parts import (
+    BenchedDevice,
+    mounts_of,
+    name_of,
+    parts_of,
+    rig_of,
+)
 from tickrig.emulators.testing.rig_file.plan import RigPlan, Tolerances
 from tickrig.emulators.testing.rig_file.reader import read_rig_file
 from tickrig.host.links.link import Closing
@@ -35,7 +40,7 @@ if TYPE_CHECKING:
     import serial
 
     from tickrig.emulators.testing.bench.modes import hardware_mode, real_mode
-    from tickrig.emulators.testing.bench.modes.human_operator import Terminal
+    from tickrig.emulators.testing.bench.modes.operators import Terminal
     from tickrig.host.links.link import Link
 else:  # POSIX
     hardware_mode = LazyModule("tickrig.emulators.testing.bench.modes.hardware_mode")

@@ -32,11 +32,11 @@ from tickrig.emulators.testing.campaign.order import (
     RunVerdict,
 )
 from tickrig.emulators.testing.plugin import pytest_plugin
+from tickrig.emulators.testing.plugin.bench_source import SNAPSHOTS
 from tickrig.emulators.testing.plugin.failure_report import outcome_of
 from tickrig.emulators.testing.plugin.parameters import words_of
 from tickrig.emulators.testing.plugin.settings import SETTINGS
 from tickrig.emulators.testing.plugin.stash import BENCHED
-from tickrig.emulators.testing.plugin.warm_up import SNAPSHOTS
 from tickrig.emulators.testing.report.bench_report import Outcome
 
 _IDLE_S: Final = 60.0

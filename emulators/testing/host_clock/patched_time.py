@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 from tickrig._lazy import LazyModule
 from tickrig.emulators.rig.sim_waits import LOOK_US, Passing, SimTime
-from tickrig.emulators.testing.host_clock import host_code, patches
+from tickrig.emulators.testing.host_clock import host_code
+from tickrig.emulators.testing.host_clock import host_code as patches
 
 if TYPE_CHECKING:
     from tickrig.emulators.testing.host_clock import bench_loop

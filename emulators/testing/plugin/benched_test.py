@@ -17,14 +17,23 @@ from tickrig.emulators.testing.bench.errors import BenchBlocked, NotOnThisBench
 from tickrig.emulators.testing.bench.mounts import LineMount
 from tickrig.emulators.testing.host_clock.host_code import HostTimeError, UnpatchedTimeError
 from tickrig.emulators.testing.plugin import bench_source
+from tickrig.emulators.testing.plugin.bench_source import WarmUp, warmed
 from tickrig.emulators.testing.plugin.compare import FINGERPRINT, Fingerprint
 from tickrig.emulators.testing.plugin.failure_report import keep, sections_of
-from tickrig.emulators.testing.plugin.health import Health, SafeState, check_safe, unsafe, with_plan
-from tickrig.emulators.testing.plugin.host_checks import THREADS, dead_threads, guard, never_awaited
+from tickrig.emulators.testing.plugin.health import (
+    THREADS,
+    Health,
+    SafeState,
+    check_safe,
+    dead_threads,
+    guard,
+    never_awaited,
+    unsafe,
+    with_plan,
+)
 from tickrig.emulators.testing.plugin.settings import SETTINGS
 from tickrig.emulators.testing.plugin.stash import BENCHED, TestWithBench
 from tickrig.emulators.testing.plugin.verdict import MisusedError, blocked, make_error
-from tickrig.emulators.testing.plugin.warm_up import WarmUp, warmed
 
 if TYPE_CHECKING:
     from tickrig.emulators.testing.plugin import bench_evidence

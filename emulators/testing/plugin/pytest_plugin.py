@@ -20,9 +20,8 @@ from tickrig.emulators.testing.plugin.stash import BENCHED, is_blocked, skipped_
 if TYPE_CHECKING:
     from tickrig.emulators.testing.bench.bench import Bench
     from tickrig.emulators.testing.plugin import bench_source, benched_test, verdict
-    from tickrig.emulators.testing.plugin.bench_source import BenchSource
+    from tickrig.emulators.testing.plugin.bench_source import BenchSource, WarmUp
     from tickrig.emulators.testing.plugin.health import SafeState
-    from tickrig.emulators.testing.plugin.warm_up import WarmUp
     from tickrig.host.text import whole_file
 else:
     _HERE = "tickrig.emulators.testing.plugin"

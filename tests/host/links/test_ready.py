@@ -147,5 +147,5 @@ def test_nothing_else_waits_with_select() -> None:
         "host/cli/start.py",  # poll
         "host/links/terminal.py",  # poll
         "emulators/testing/host_clock/patched_time.py",
-        "emulators/testing/host_clock/patches.py",
+        "emulators/testing/host_clock/host_code.py",
     }

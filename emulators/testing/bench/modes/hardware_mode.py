@@ -15,11 +15,9 @@ from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.testing.bench.bench_rig import BenchDescription, BenchRig, RigState
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
 from tickrig.emulators.testing.bench.modes.door_journal import DoorJournal, PortRecord
-from tickrig.emulators.testing.bench.modes.door_watch import HostPace
+from tickrig.emulators.testing.bench.modes.door_watch import CpuWaits, HostPace, too_slow
 from tickrig.emulators.testing.bench.modes.doors import Doors, LinePlace
-from tickrig.emulators.testing.bench.modes.human_operator import Terminal
-from tickrig.emulators.testing.bench.modes.lateness import CpuWaits, too_slow
-from tickrig.emulators.testing.bench.modes.operators import Operators
+from tickrig.emulators.testing.bench.modes.operators import Operators, Terminal
 from tickrig.emulators.testing.bench.mounts import LineMount, Mount
 from tickrig.emulators.testing.bench.plan_parts import parts_of
 from tickrig.emulators.testing.bench.tasks import Condition, text_of

@@ -1,29 +1,465 @@
-"""Who is at which real device, and what is asked of whom."""
+"""Who is at which real device, a human or an emulator, and what is asked of whom."""
 
 from __future__ import annotations
 
+import subprocess
+import threading
+import time
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import replace
-from typing import Any, Protocol
+from pathlib import Path
+from typing import IO, Any, Final, Protocol
 
-from tickrig.emulators.bench.operator import FaultOrder, FaultSpec
+from tickrig.device.physical import InputSignal, SignalType
+from tickrig.emulators.bench.operator import AssemblyFaults, FaultOrder, FaultSpec, Operator
 from tickrig.emulators.rig.emulated import HasSignals
+from tickrig.emulators.rig.event_queue import EventQueue
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
-from tickrig.emulators.testing.bench.errors import NotOnThisBench
-from tickrig.emulators.testing.bench.modes.door_journal import DoorJournal
-from tickrig.emulators.testing.bench.modes.emulator_operator import EmulatorOperator
-from tickrig.emulators.testing.bench.modes.human_operator import (
-    HumanOperator,
-    PowerSwitch,
-    Terminal,
+from tickrig.emulators.testing.bench.errors import (
+    BenchBlocked,
+    MachineTooSlow,
+    NotOnThisBench,
+    OperatorRefused,
+    PortGone,
 )
-from tickrig.emulators.testing.rig_file.plan import HardwarePlan, RigPlan
+from tickrig.emulators.testing.bench.modes.door_journal import DoorJournal
+from tickrig.emulators.testing.bench.modes.mode import POWER
+from tickrig.emulators.testing.rig_file.plan import DevicePlan, HardwarePlan, PowerPlan, RigPlan
 from tickrig.emulators.testing.signals.sources import SignalSpec
+from tickrig.host.control.client import TIMEOUT_S, ControlClient, ControlRefused
 from tickrig.host.control.requests import Object
-from tickrig.host.text.names import near
-from tickrig.host.text.values import Setting
+from tickrig.host.links.ready import ready
+from tickrig.host.text.names import known, near
+from tickrig.host.text.page_text import harmless
+from tickrig.host.text.values import Setting, format_time, parse_setting
 from tickrig.wire.instant import NEVER
+
+# A device that is switched by commands.
+
+_SWITCH_S: Final = 30.0
+"""A command that takes longer is ended."""
+
+
+class PowerSwitch:
+    """Switches a device by the commands of a rig file.
+
+    Args:
+        device: name of the device.
+        plan: the commands.
+    """
+
+    def __init__(self, device: str, plan: PowerPlan) -> None:
+        self._device, self._plan = device, plan
+
+    def switch(self, *, on: bool) -> None:
+        """Give or take the supply.
+
+        Raises:
+            BenchBlocked: the command cannot be run, failed, or did not end.
+        """
+        command = self._plan.on if on else self._plan.off
+        try:
+            done = subprocess.run(
+                command,
+                stdin=subprocess.DEVNULL,
+                capture_output=True,
+                timeout=_SWITCH_S,
+                check=False,
+            )
+        except OSError as error:
+            raise self._blocked(on, error.strerror or str(error)) from None
+        except subprocess.TimeoutExpired:
+            raise self._blocked(on, f"has not ended after {_SWITCH_S:g} s") from None
+        if done.returncode:
+            said = done.stderr.decode("utf-8", "replace").strip().split("\n")[-1]
+            raise self._blocked(on, f"exit status {done.returncode}{said and f': {said}'}")
+
+    def _blocked(self, on: bool, why: str) -> BenchBlocked:
+        state, command = ("on", self._plan.on) if on else ("off", self._plan.off)
+        return BenchBlocked(f"{self._device} was not switched {state}: {' '.join(command)}: {why}")
+
+
+# Who sits at the terminal is told what to do, and asked what happened.
+
+_TERMINAL: Final = "/dev/tty"
+_POLL_US: Final = 10_000
+_DONE: Final = "then press Enter (n: not done, c: cannot be done)"
+
+
+class Terminal:
+    """Asks at the terminal of this process, whatever its standard input and output are.
+
+    So tests may run with both caught. Hosts go on meanwhile.
+
+    Args:
+        path: of the terminal.
+
+    Attributes:
+        hosts: are called in turn with microseconds while an answer is awaited.
+    """
+
+    def __init__(self, path: str = _TERMINAL) -> None:
+        self._path = path
+        self.hosts: list[Callable[[int], object]] = []
+
+    def prompt(self, text: str) -> str:
+        """Show a text and return the line that is typed.
+
+        Raises:
+            OperatorRefused: nobody is there.
+        """
+        try:
+            with open(self._path, "r+b", buffering=0) as terminal:
+                terminal.write(f"\n{harmless(text)} ".encode())
+                while not self._is_typed(terminal):
+                    for host in self.hosts:
+                        host(_POLL_US)
+                line = terminal.readline()
+        except OSError as error:
+            raise OperatorRefused(f"nobody is at the terminal ({error.strerror})") from None
+        if not line:
+            raise OperatorRefused("nobody is at the terminal (end of input)")
+        return line.decode("utf-8", "replace").strip()
+
+    def have_done(self, text: str) -> None:
+        """Ask for something to be done.
+
+        Args:
+            text: what, as a sentence without its end.
+
+        Raises:
+            OperatorRefused: it was not done.
+            NotOnThisBench: it cannot be done.
+        """
+        while answer := self.prompt(f"{text}, {_DONE}:").lower():
+            if answer == "n":
+                raise OperatorRefused(f"the operator did not do this: {text}")
+            if answer == "c":
+                raise NotOnThisBench(f"the operator cannot do this: {text}")
+
+    def sees(self, question: str) -> bool:
+        """Ask a question that is answered by yes or no."""
+        while (answer := self.prompt(f"{question} [y/n]").lower()) not in ("y", "n"):
+            continue
+        return answer == "y"
+
+    def _is_typed(self, terminal: IO[bytes]) -> bool:
+        wait_s = 0 if self.hosts else _POLL_US / 1e6
+        return bool(ready([terminal], wait_s=wait_s)[0])
+
+
+_HOLD_US: Final = 1_000_000
+"""Who holds a button for so long is told how long."""
+
+
+class HumanOperator:
+    """`DeviceOperator` of a human, who is asked in the words of the device's type.
+
+    What was set is remembered: nobody is asked for it again.
+
+    Args:
+        device: name of the device.
+        physical: such a device, for its tables; it remembers.
+        terminal: where the human is.
+        power: switches the device; the human does if there is none.
+    """
+
+    late_us, quick = 0, False
+
+    def __init__(
+        self,
+        device: str,
+        physical: HasSignals,
+        terminal: Terminal,
+        power: PowerSwitch | None = None,
+    ) -> None:
+        self._device, self._physical, self._terminal = device, physical, terminal
+        self._power, self.said_no = power, False
+        no_faults = AssemblyFaults({})
+        self._record = Operator(physical.inputs, physical.tick_us, EventQueue(), no_faults)
+
+    def prepare(self, like: HasSignals) -> None:
+        """Switch it off, if a command can; nobody is asked to bring it anywhere."""
+        if self._power is not None:
+            self._power.switch(on=False)
+
+    def begin(self) -> None:
+        """Switch it on, if a command can."""
+        if self._power is not None:
+            self._power.switch(on=True)
+
+    def set(self, name: str, values: tuple[Setting, ...]) -> None:
+        """Have an input set, or all inputs of a group, and held."""
+        pairs = self._record.check_set(name, *values)
+        wanted = [self._wish(self._physical.inputs.table[member], value) for member, value in pairs]
+        self.have_done(f"{' and '.join(wanted)}, and leave it so")
+        self._record.set(name, *values)
+
+    def set_all(self, values: Mapping[str, Setting]) -> None:
+        """Have several inputs set, and held, in one go."""
+        table = self._physical.inputs.table
+        wanted = [self._wish(table[name], value) for name, value in values.items()]
+        self.have_done(f"{' and '.join(wanted)}, and leave it so")
+        for name, value in values.items():
+            self._record.set(name, value)
+
+    def get(self, name: str) -> Setting:
+        """Return what an input was set to, or ask for what is seen of an output."""
+        if name in self._physical.inputs.table:
+            return self._physical.inputs[name]
+        output = self._physical.outputs.get(name)
+        if output is None:
+            names = [*self._physical.inputs.table, *self._physical.outputs]
+            raise ValueError(f"no input or output {name!r}; {near(name, names)}")
+        unit = f" in {output.unit}" if output.unit else ""
+        while True:
+            text = self._terminal.prompt(
+                f"{self._device}: what is {name} now{unit}? ({output.text})"
+            )
+            value = parse_setting(text)
+            if text and not (output.unit and isinstance(value, str)):
+                return value
+
+    def press(self, name: str, duration_us: int) -> None:
+        """Have a button pressed and let go."""
+        text = self._physical.inputs.find(name, SignalType.BUTTON).text
+        held = f", hold it for {duration_us / 1e6:g} s" if duration_us >= _HOLD_US else ""
+        self.have_done(f"press the {text}{held} and let it go")
+
+    def fault(self, spec: FaultSpec, now_us: int, for_us: int | None) -> None:
+        """Have a physical fault made; NotOnThisBench for one of the wire, or of a certain time."""
+        item = self._find_fault(spec.name)
+        if (spec.arguments, spec.from_us, spec.to_us, for_us) != ((), 0, NEVER, None):
+            raise NotOnThisBench(f"no hand makes {spec.name} at a certain time")
+        self.have_done(f"make this fault: {item.text} ({item.name})")
+        self._record.set(spec.name, 1)
+
+    def clear(self, fault: str) -> None:
+        """Have a physical fault mended."""
+        item = self._find_fault(fault)
+        self.have_done(f"mend this fault: {item.text} ({item.name})")
+        self._record.set(fault, 0)
+
+    def sees(self, text: str) -> bool | None:
+        """Ask whether something is seen."""
+        seen = self._terminal.sees(f"{self._device}: is it so? {text}")
+        self.said_no |= not seen
+        return seen
+
+    def have_done(self, text: str) -> bool:
+        """Have something done, told in words."""
+        self._terminal.have_done(f"{self._device}: {text}")
+        return True
+
+    def switch_power(self, *, on: bool) -> None:
+        """Switch the device, or have it switched."""
+        if self._power is not None:
+            self._power.switch(on=on)
+        else:
+            self.have_done(f"switch it {'on' if on else 'off'}")
+
+    def close(self) -> None:
+        """Nothing is held."""
+
+    def _find_fault(self, name: str) -> InputSignal:
+        if name not in self._physical.inputs.table:
+            raise NotOnThisBench(f"no hand can make {name}: it is a fault of the wire")
+        return self._physical.inputs.find(name, SignalType.FAULT)
+
+    def _wish(self, item: InputSignal, value: Setting) -> str:
+        """Say what an input is to become."""
+        if item.type is SignalType.FAULT:
+            return f"{'make' if value else 'mend'} this fault: {item.text}"
+        if item.type is SignalType.BUTTON:
+            return f"{'press' if value else 'let go'} the {item.text}"
+        unit = f" {item.unit}" if item.unit else ""
+        return f"set {item.name} ({item.text}) to {value}{unit}"
+
+
+# An emulator that plays a real device, reached by its control socket for what hands do.
+
+_NO_ANSWER_US: Final = round(TIMEOUT_S * 1e6)
+"""How late an emulator is that does not answer."""
+
+_OBJECT: Final = "0x"
+"""So objects of a dictionary begin; they are new whenever the power comes."""
+
+
+class EmulatorOperator:
+    """`DeviceOperator` that ask the control socket of an emulator.
+
+    Args:
+        path: of its socket.
+        plan: the device; an emulator of several has it under its name, or its node-ID.
+
+    Raises:
+        PortGone: nobody is there.
+        MachineTooSlow: nobody answers.
+        ValueError: the emulator has several devices, and none of this name.
+    """
+
+    said_no, quick = False, True
+
+    def __init__(self, path: Path, plan: DevicePlan) -> None:
+        self._path, self._lock = path, threading.RLock()
+        try:
+            self._client = ControlClient(path)
+        except OSError as error:
+            raise PortGone(f"{plan.name}: no emulator at {path}: {error.strerror}") from None
+        described = self._request("describe")
+        inputs, outputs, wire_faults = (
+            _names_of(described, key) for key in ("inputs", "outputs", "wire_faults")
+        )
+        self._prefix, self._wire = _prefix_of(plan, inputs | outputs, path), plan.wire
+        self._name = plan.name
+        self._inputs, self._tick_us = inputs | wire_faults, int(str(described["tick_us"]))
+        self._wire_faults = [name for name in wire_faults if self._is_of_wire(name)]
+        self._begun_us = self._now_us
+
+    @property
+    def late_us(self) -> int:
+        """How late its worst step was since this was made; 0 if it is gone."""
+        try:
+            late_us = self._request("status", since=self._begun_us)["late_us"]
+        except MachineTooSlow:
+            return _NO_ANSWER_US
+        except PortGone:
+            return 0
+        assert isinstance(late_us, int)
+        return late_us
+
+    def prepare(self, like: HasSignals) -> None:
+        """Bring it to where a new one begins: nothing is broken, all inputs are as at the start.
+
+        Its power is off then. The world around it stays: where a drive has turned to it is still.
+        """
+        for name in self._wire_faults:
+            self._request("clear", name=name)
+        for item in like.inputs.table.values():
+            if self._prefix + item.name not in self._inputs or item.name.startswith(_OBJECT):
+                continue
+            if item.type is SignalType.FAULT:
+                self.clear(item.name)
+            elif item.name not in POWER and self.get(item.name) != like.inputs[item.name]:
+                self.set(item.name, (like.inputs[item.name],))
+        if self._power is not None:
+            self.switch_power(on=False)
+        self._off_us = self._now_us
+
+    def begin(self) -> None:
+        """Give it its power, when it has seen that it had none."""
+        if self._power is None:
+            return
+        while self._now_us < self._off_us + 2 * self._tick_us:
+            time.sleep(self._tick_us / 1e6)
+        self.switch_power(on=True)
+
+    def set(self, name: str, values: tuple[Setting, ...]) -> None:
+        """Set an input, or all inputs of a group."""
+        self._request("set", name=self._prefix + name, value=list(values))
+
+    def set_all(self, values: Mapping[str, Setting]) -> None:
+        """Nothing: `prepare` has done so."""
+
+    def get(self, name: str) -> Setting:
+        """Return the present value of an input or output."""
+        full = self._prefix + name
+        values = self._request("get", names=[full])["values"]
+        assert isinstance(values, dict)
+        value: Setting = values[full]
+        return value
+
+    def press(self, name: str, duration_us: int) -> None:
+        """Press a button and let it go."""
+        self._request("press", name=self._prefix + name, duration_us=duration_us)
+
+    def fault(self, spec: FaultSpec, now_us: int, for_us: int | None) -> None:
+        """Let a fault come, in the time of the emulator."""
+        text = replace(spec, name=self._fault_name(spec.name)).text
+        timed = (spec.from_us, spec.to_us, for_us) != (0, NEVER, None)
+        if timed:
+            ahead_us = self._now_us - now_us
+            from_us = max(spec.from_us, now_us)
+            to_us = spec.to_us if for_us is None else from_us + for_us
+            text += f"@{format_time(from_us + ahead_us)}s"
+            text += "" if to_us == NEVER else f"-{format_time(to_us + ahead_us)}s"
+        self._request("fault", spec=text)
+
+    def clear(self, fault: str) -> None:
+        """Let a fault go."""
+        self._request("clear", name=self._fault_name(fault))
+
+    def sees(self, text: str) -> bool | None:
+        """The emulator is to be asked."""
+        return None
+
+    def have_done(self, text: str) -> bool:
+        """Nobody understands it."""
+        return False
+
+    def switch_power(self, *, on: bool) -> None:
+        """Give or take the supply."""
+        if self._power is None:
+            raise NotOnThisBench("this device has no input that is its supply")
+        self.set(self._power, (POWER[self._power] if on else 1 - POWER[self._power],))
+
+    def close(self) -> None:
+        """Hang up."""
+        self._client.close()
+
+    def _fault_name(self, name: str) -> str:
+        own = f"{self._name}/"
+        if name.startswith(own):  # of the node alone, not of its bus
+            bare = name.removeprefix(own)
+            names: tuple[str, ...] = (self._prefix + bare, name, bare)
+        else:
+            names = (f"{self._wire}/{name}", name, self._prefix + name)
+        return next((full for full in names if full in self._inputs), name)
+
+    def _is_of_wire(self, fault: str) -> bool:
+        return "/" not in fault or fault.startswith((f"{self._wire}/", self._prefix))
+
+    @property
+    def _power(self) -> str | None:
+        """The input that is its supply, None if there is none."""
+        return next((name for name in POWER if self._prefix + name in self._inputs), None)
+
+    @property
+    def _now_us(self) -> int:
+        now_us = self._request("status")["now_us"]
+        assert isinstance(now_us, int)
+        return now_us
+
+    def _request(self, do: str, **fields: object) -> Object:
+        try:
+            with self._lock:
+                return self._client.request(do, **fields)
+        except ControlRefused:
+            raise
+        except TimeoutError:
+            text = f"the emulator at {self._path} has not answered for {TIMEOUT_S:g} s"
+            raise MachineTooSlow(text) from None
+        except (OSError, ValueError) as error:
+            raise PortGone(f"the emulator at {self._path} is gone: {error}") from None
+
+
+def _names_of(found: Object, key: str) -> frozenset[str]:
+    items = found[key]
+    assert isinstance(items, list)
+    return frozenset(item["name"] for item in items)
+
+
+def _prefix_of(plan: DevicePlan, names: frozenset[str], path: Path) -> str:
+    """Return what an emulator writes before the names of a device."""
+    owners = {name.partition("/")[0] for name in names if "/" in name}
+    for name in (plan.name, str(plan.node_id)):
+        if name in owners:
+            return f"{name}/"
+    if names and all("/" in name for name in names):
+        raise ValueError(f"the emulator at {path} has no {plan.name!r}; known: {known(owners)}")
+    return ""
+
 
 # The hands at one real device, and the eyes on it.
 

@@ -16,10 +16,9 @@ from tickrig.emulators.bench.control import EmulatorControl
 from tickrig.emulators.bench.running_emulator import RunningEmulator, keeping_time
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
 from tickrig.emulators.testing.bench.errors import BenchError, NotOnThisBench
-from tickrig.emulators.testing.bench.modes.door_watch import HostPace
+from tickrig.emulators.testing.bench.modes.door_watch import CpuWaits, HostPace, too_slow
 from tickrig.emulators.testing.bench.modes.doors import Doors, OutsideEnds
-from tickrig.emulators.testing.bench.modes.emulated_mode import EmulatedMode
-from tickrig.emulators.testing.bench.modes.lateness import CpuWaits, too_slow
+from tickrig.emulators.testing.bench.modes.mode import EmulatedMode
 from tickrig.emulators.testing.bench.mounts import LineMount, Mount
 from tickrig.emulators.testing.rig_file.plan import RealPlan, Tolerances
 from tickrig.host.control.clock import ServingClock

@@ -18,8 +18,7 @@ from tickrig.emulators.serial.outside.serial_side import SerialSide
 from tickrig.emulators.serial.outside.sim_serial import SimSerial
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
 from tickrig.emulators.testing.bench.errors import BenchError
-from tickrig.emulators.testing.bench.modes.emulated_mode import EmulatedMode
-from tickrig.emulators.testing.bench.modes.mode import Address
+from tickrig.emulators.testing.bench.modes.mode import Address, EmulatedMode
 from tickrig.emulators.testing.bench.mounts import BusMount, LineMount
 from tickrig.emulators.testing.bench.tasks import DAY_US
 from tickrig.emulators.testing.host_clock.host_code import HostTimeError

@@ -146,5 +146,5 @@ def test_afterwards_and_in_other_threads_loops_are_as_ever() -> None:
         thread.join()
         other()
     other()
-    assert [kind.__name__ == "BenchLoop" for kind in kinds] == [False, True, False]
+    assert [kind.__name__ == "_BenchLoop" for kind in kinds] == [False, True, False]
     assert asyncio.new_event_loop is original

@@ -12,9 +12,8 @@ import pytest
 from tests.emulators.testing.host_clock.user_host import Host
 from tickrig import Bench
 from tickrig.device import Rrc
-from tickrig.emulators.testing.host_clock.host_code import UnpatchedTimeError
+from tickrig.emulators.testing.host_clock.host_code import LOOKS, UnpatchedTimeError
 from tickrig.emulators.testing.host_clock.patched_time import unpatched_time_fails
-from tickrig.emulators.testing.host_clock.patches import LOOKS
 
 PAGE = (Path(__file__).parents[4] / "docs/reference/bench/hosts.md").read_text("utf-8")
 SECTION = PAGE.partition("\n## Hosts that look at the clock\n")[2].partition("\n## ")[0]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from tickrig.emulators.testing.bench.modes.human_operator import Terminal
+from tickrig.emulators.testing.bench.modes.operators import Terminal
 from tickrig.emulators.testing.rig_file.plan import (
     DeviceKind,
     DevicePlan,

@@ -20,7 +20,7 @@ from tickrig.emulators.testing.bench.errors import (
     OperatorRefused,
     PortGone,
 )
-from tickrig.emulators.testing.bench.modes.human_operator import Terminal
+from tickrig.emulators.testing.bench.modes.operators import Terminal
 from tickrig.emulators.testing.rig_file.plan import (
     HardwarePlan,
     PortPlan,

@@ -39,7 +39,7 @@ with Bench.of_plan(plan, "hardware") as bench, RrcClient(bench.link) as client:
 
 ASK = """
 from tickrig.emulators.testing.bench.errors import OperatorRefused
-from tickrig.emulators.testing.bench.modes.human_operator import Terminal
+from tickrig.emulators.testing.bench.modes.operators import Terminal
 
 try:
     print("typed:", Terminal().prompt("What now?"))

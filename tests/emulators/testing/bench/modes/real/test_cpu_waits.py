@@ -3,7 +3,7 @@ from __future__ import annotations
 import threading
 from pathlib import Path
 
-from tickrig.emulators.testing.bench.modes.lateness import CpuWaits
+from tickrig.emulators.testing.bench.modes.door_watch import CpuWaits
 
 
 def count(tasks: Path, thread: str, waited_ns: int) -> None:
