@@ -34,10 +34,7 @@ FIELDS: Final = (
         help="Bit rate of RS-232C after power-up, which SS changes.  [12000000, as USB]",
     ),
     DeviceField(
-        name="size",
-        option="room",
-        unit="WIDTH,DEPTH",
-        help="Four walls around the origin, m.",
+        name="size", option="room", unit="WIDTH,DEPTH", help="Four walls around the origin, m."
     ),
     DeviceField(name="walls", option="wall", many=True, unit="X1,Y1,X2,Y2", help="A wall, m."),
     DeviceField(name="posts", option="post", many=True, unit="X,Y,RADIUS", help="A round post, m."),

@@ -173,10 +173,4 @@ class ConfigSample(RtComponent):
         self.vector_param0 = bind("vector_param0", vector, widget="text")
 
 
-EXAMPLES: tuple[type[RtComponent], ...] = (
-    ConsoleIn,
-    ConsoleOut,
-    SeqIn,
-    SeqOut,
-    ConfigSample,
-)
+EXAMPLES: tuple[type[RtComponent], ...] = (ConsoleIn, ConsoleOut, SeqIn, SeqOut, ConfigSample)

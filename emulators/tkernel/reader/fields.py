@@ -8,11 +8,7 @@ from tickrig.emulators.fields import DeviceField
 
 FIELDS: Final = (
     DeviceField(
-        name="markers",
-        option="marker",
-        many=True,
-        unit="UCODE,X,Y",
-        help="A marker, place in m.",
+        name="markers", option="marker", many=True, unit="UCODE,X,Y", help="A marker, place in m."
     ),
     DeviceField(
         name="range_m",

@@ -96,9 +96,7 @@ def _is_double(one: BusSlave | None, other: BusSlave) -> bool:
     return one is not None and one is not other and one.node_id == other.node_id
 
 
-def _pdos(
-    slaves: Mapping[str, BusSlave],
-) -> Iterator[tuple[str, int, FilePlace, BusSlave, bool]]:
+def _pdos(slaves: Mapping[str, BusSlave]) -> Iterator[tuple[str, int, FilePlace, BusSlave, bool]]:
     """Give the PDOs that are on with 11 bits, TPDOs first: what they are, CAN-ID, place, slave."""
     for transmit in (True, False):
         for slave in slaves.values():

@@ -257,10 +257,7 @@ _RECOVERY: Final[dict[Level, tuple[NmtCommand | None, ...]]] = {
 }
 """What is tried to get a node back that does not answer."""
 
-_TO_STATE: Final = {
-    NmtState.OPERATIONAL: NmtCommand.START,
-    NmtState.STOPPED: NmtCommand.STOP,
-}
+_TO_STATE: Final = {NmtState.OPERATIONAL: NmtCommand.START, NmtState.STOPPED: NmtCommand.STOP}
 
 
 class NodeCare:

@@ -302,10 +302,7 @@ def _first(name: str, attribute: str, pdo: BoundPdo) -> str:
     index, sub, bits = mapped.index, mapped.sub, mapped.bits
     if index in _DRIVE:
         raise Unbound(name, f"{index:04X}h tells what a drive does: nobody can set it")
-    texts = {
-        "first": f"{index:04X}:{sub:02X}",
-        "padding": "00" * ((bits + 7) // 8 - 1),
-    }
+    texts = {"first": f"{index:04X}:{sub:02X}", "padding": "00" * ((bits + 7) // 8 - 1)}
     return texts[attribute]
 
 

@@ -182,11 +182,7 @@ class SdoDataFlow:
         node.run(now_us, QueuedScript("ports", script, end, fail, end, moves=False))
 
     def _transfer(
-        self,
-        node: ServedNode,
-        proxy: ProxyRtc,
-        sinks: list[SdoSink],
-        sources: list[SdoSource],
+        self, node: ServedNode, proxy: ProxyRtc, sinks: list[SdoSink], sources: list[SdoSource]
     ) -> Script[None]:
         """Write, then read; what one port is refused does not hold up the others."""
         for sink in sinks:

@@ -231,8 +231,7 @@ def _fields(ids: Collection[int]) -> dict[str, _Reader]:
         "nodes": lambda node, place: None,
         "sdo": many(lambda node, place: _sdo(node, place, ids)),
         "pdo_links": once(
-            lambda node, place: _link(node, place, ids),
-            lambda link: f"{link.target} is linked",
+            lambda node, place: _link(node, place, ids), lambda link: f"{link.target} is linked"
         ),
         "rt_connections": many(_rt_connection),
         "start": lambda node, place: _start(node, place, ids),

@@ -242,9 +242,7 @@ class ServerView:
     def definition(self) -> SystemDefinition:
         """Return the definition with connections and links as they are now."""
         return replace(
-            self._server.definition,
-            pdo_links=self.links,
-            rt_connections=self.connections,
+            self._server.definition, pdo_links=self.links, rt_connections=self.connections
         )
 
     def _node(self, node_id: int) -> ServedNode:

@@ -49,10 +49,7 @@ class DeviceProfile:
     @property
     def properties(self) -> dict[str, str]:
         """What the profile of its proxy says of it."""
-        return {
-            "rtc_lite.type_name": self.type_name,
-            "rtc_lite.context": f"0x{self.context:02X}",
-        }
+        return {"rtc_lite.type_name": self.type_name, "rtc_lite.context": f"0x{self.context:02X}"}
 
 
 def _start_up(channel: RequestChannel, boot_us: int) -> DeviceProfile:

@@ -244,10 +244,7 @@ class Connector(ConnectorBase, Generic[T]):
     """
 
     def __init__(
-        self,
-        profile: ConnectorProfile,
-        ports: tuple[AnyPort, ...],
-        options: ConnectorOptions,
+        self, profile: ConnectorProfile, ports: tuple[AnyPort, ...], options: ConnectorOptions
     ) -> None:
         super().__init__(profile, ports)
         pulled = options.dataflow is DataflowType.PULL

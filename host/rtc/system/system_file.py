@@ -77,10 +77,7 @@ _CONNECTION: Final[Schema] = {
     "connector_id": Field(string, "a text", "its ID", "made of the ports"),
     "properties": Field(lines, 'lines like name = "value"', "of the connector", "none"),
 }
-_REMOTE: Final[Schema] = {
-    "name": _TEXT,
-    "path": Field(text, "a text", "where its engine finds it"),
-}
+_REMOTE: Final[Schema] = {"name": _TEXT, "path": Field(text, "a text", "where its engine finds it")}
 _TOP: Final[Schema] = {
     name: Field(anything, f"tables [[{name}]]", "a part of the system", "none")
     for name in ("component", "connection", "remote")

@@ -53,11 +53,7 @@ class Lookup(RtComponent, Generic[V]):
     """
 
     def __init__(
-        self,
-        instance_name: str,
-        in_port: str,
-        cache: LookupCache[V],
-        open_source: OpenSource,
+        self, instance_name: str, in_port: str, cache: LookupCache[V], open_source: OpenSource
     ) -> None:
         super().__init__(instance_name)
         bind = self.configuration.bind

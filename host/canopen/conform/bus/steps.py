@@ -37,11 +37,7 @@ class StepPlayer:
     """
 
     def __init__(
-        self,
-        exchange: BusExchange,
-        node_id: int,
-        stimulus: check.Stimulus | None,
-        client: Client,
+        self, exchange: BusExchange, node_id: int, stimulus: check.Stimulus | None, client: Client
     ) -> None:
         self._exchange, self._stimulus, self._client = exchange, stimulus, client
         self._sdo = SdoFrames(exchange, node_id)

@@ -99,11 +99,7 @@ def lists(document: Document) -> Iterator[RuleFinding]:
 
 
 def _judge(
-    document: Document,
-    each: ObjectList,
-    found: list[ObjectList],
-    present: set[int],
-    seen: set[int],
+    document: Document, each: ObjectList, found: list[ObjectList], present: set[int], seen: set[int]
 ) -> Iterator[RuleFinding]:
     edits = _mended(document, found, each.title, present)
     for rule, what, line in _faults(document, each, present, seen):

@@ -25,11 +25,7 @@ from tickrig.host.tui import Line
 Item = NodeView | ComponentView | PdoView | PortView | PdoLink | RtConnection
 _SystemRow = CursorRow[Item]
 
-_STATES: Final = {
-    "ACTIVE": "bold green",
-    "INACTIVE": "cyan",
-    "ERROR": "bold white on red",
-}
+_STATES: Final = {"ACTIVE": "bold green", "INACTIVE": "cyan", "ERROR": "bold white on red"}
 _DIM: Final = "bright_black"
 _ALARM: Final = "bold red"
 _MARK: Final = "bold yellow"

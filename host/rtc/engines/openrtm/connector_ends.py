@@ -206,12 +206,7 @@ class ConnectorEnd(ABC):
 
 _LOG: Final = log_of(__name__)
 
-_GONE: Final = (
-    CORBA.TRANSIENT,
-    CORBA.TIMEOUT,
-    CORBA.COMM_FAILURE,
-    CORBA.OBJECT_NOT_EXIST,
-)
+_GONE: Final = (CORBA.TRANSIENT, CORBA.TIMEOUT, CORBA.COMM_FAILURE, CORBA.OBJECT_NOT_EXIST)
 """With these a peer gave no answer; all else that it raises is one."""
 
 _EMPTY: Final = (PortStatus.BUFFER_EMPTY, PortStatus.BUFFER_TIMEOUT)
