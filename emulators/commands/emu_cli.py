@@ -11,6 +11,7 @@ from tickrig.emulators.commands.run_options import (
     device_options,
     device_types,
     line_options,
+    panel_option,
     run_named,
 )
 from tickrig.host.cli.extensions import ExtensionError
@@ -43,7 +44,6 @@ It runs in real time until Ctrl-C. A scenario alone runs in virtual time: as
 fast as it goes, with the same transcript each time, exit status 1 if something
 expected did not come. Together with --link, --serve or --control it is
 played in real time."""
-_PANEL: Final = "Show an operator panel in this terminal."
 
 
 class _DeviceGroup(LazyGroup):
@@ -84,7 +84,7 @@ def device_command(device_type: DeviceType) -> click.Command:
     command = click.command(device_type.name, help=f"{first}\n\n{_HELP}")(run)
     command.params[:0] = declared.values()
     if device_type.panel:
-        command.params.append(click.Option(["--panel"], is_flag=True, help=_PANEL))
+        panel_option(command)
     return command
 
 

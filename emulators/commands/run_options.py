@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from functools import wraps
 from typing import TYPE_CHECKING, Any, Final
 
 import click
 
 from tickrig.emulators.fields import DeviceField
-from tickrig.host.cli.options import PATH, Decorator, NumberRange, add_options, version_option
+from tickrig.host.cli.options import (
+    PATH,
+    Decorator,
+    HarmlessCommand,
+    NumberRange,
+    add_options,
+    version_option,
+)
 from tickrig.host.cli.start import load, loading
 
 if TYPE_CHECKING:
@@ -85,6 +93,11 @@ SERIAL_FAULTS: Final = (
 """The names of `BYTE_FAULTS`, which takes time to load."""
 
 
+panel_option: Final[Decorator] = click.option(
+    "--panel", is_flag=True, help="Show an operator panel in this terminal."
+)
+
+
 def line_options(wire_faults: str, inputs: str | Callable[[], Iterable[InputSignal]]) -> Decorator:
     """Return a decorator that adds the options of a device on a serial line, and --version.
 
@@ -130,6 +143,41 @@ def run_named(name: str, options: Mapping[str, Any]) -> int:
         run_device = load("tickrig.emulators.commands.serial_run:run_device")
     status: int = run_device(device_types().load(name), options)
     return status
+
+
+def serial_command(
+    name: str,
+    fields: Iterable[DeviceField],
+    inputs: str,
+    wire_faults: str = SERIAL_FAULTS,
+    *,
+    panel: bool = False,
+) -> Callable[[Callable[[], None]], click.Command]:
+    """Return a decorator that makes the command of a device on a serial line.
+
+    The decorated function has the help as its docstring, and an empty body.
+
+    Args:
+        name: of one of `device_type.DEVICES`.
+        fields: of the device.
+        inputs: where the table of its physical inputs is, as `MODULE:NAME`.
+        wire_faults: names with commas between.
+        panel: whether it has an operator panel.
+    """
+
+    def decorate(described: Callable[[], None]) -> click.Command:
+        @click.command(cls=HarmlessCommand)
+        @device_options(fields)
+        @add_options(*[panel_option] * panel)
+        @line_options(wire_faults, inputs)
+        @click.pass_context
+        @wraps(described)
+        def command(context: click.Context, /, **options: Any) -> None:
+            context.exit(run_named(name, options))
+
+        return command
+
+    return decorate
 
 
 def device_types() -> ExtensionGroup[DeviceType]:

@@ -2,28 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
-import click
-
-from tickrig.emulators.commands.run_options import (
-    SERIAL_FAULTS,
-    device_options,
-    line_options,
-    run_named,
-)
+from tickrig.emulators.commands.run_options import serial_command
 from tickrig.emulators.rh3.fields import FIELDS
-from tickrig.host.cli.options import HarmlessCommand
-
-if TYPE_CHECKING:
-    pass
 
 
-@click.command(cls=HarmlessCommand)
-@device_options(FIELDS)
-@line_options(SERIAL_FAULTS, "tickrig.device.rh3.driver:INPUTS")
-@click.pass_context
-def main(context: click.Context, /, **options: Any) -> None:
+@serial_command("rh3-base", FIELDS, "tickrig.device.rh3.driver:INPUTS")
+def main() -> None:
     """Emulate the base of Reference Hardware 3, a Modbus RTU slave, on a pseudo-terminal.
 
     It runs in real time until Ctrl-C. A scenario alone runs in virtual time:
@@ -42,4 +26,3 @@ def main(context: click.Context, /, **options: Any) -> None:
     Completion of options in the shell:
     eval "$(_RH3_EMU_COMPLETE=bash_source rh3-emu)"
     """  # noqa: D301 - click wants the backspace
-    context.exit(run_named("rh3-base", options))

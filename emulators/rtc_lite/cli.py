@@ -2,25 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-import click
-
-from tickrig.emulators.commands.run_options import (
-    SERIAL_FAULTS,
-    device_options,
-    line_options,
-    run_named,
-)
+from tickrig.emulators.commands.run_options import SERIAL_FAULTS, serial_command
 from tickrig.emulators.rtc_lite.fields import FIELDS
-from tickrig.host.cli.options import HarmlessCommand
 
 
-@click.command(cls=HarmlessCommand)
-@device_options(FIELDS)
-@line_options(f"{SERIAL_FAULTS}, noise, ping, radio", "tickrig.device.rtc_lite.node:INPUTS")
-@click.pass_context
-def main(context: click.Context, /, **options: Any) -> None:
+@serial_command(
+    "rtc-lite",
+    FIELDS,
+    "tickrig.device.rtc_lite.node:INPUTS",
+    f"{SERIAL_FAULTS}, noise, ping, radio",
+)
+def main() -> None:
     """Emulate a PIC with an RTC-Lite component, on a pseudo-terminal.
 
     It runs in real time until Ctrl-C. A scenario alone runs in virtual time:
@@ -43,4 +35,3 @@ def main(context: click.Context, /, **options: Any) -> None:
     Completion of options and nodes in the shell:
     eval "$(_RTC_LITE_EMU_COMPLETE=bash_source rtc-lite-emu)"
     """  # noqa: D301 - click wants the backspace
-    context.exit(run_named("rtc-lite", options))

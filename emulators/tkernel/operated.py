@@ -3,32 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from types import MappingProxyType
 
-from tickrig.emulators.bench.operator import FaultSpec, Operator
+from tickrig.emulators.bench.operator import AssemblyFaults, FaultSpec, Operator
 from tickrig.emulators.rig.emulated import HasSignals
 from tickrig.emulators.rig.event_queue import EventQueue
-from tickrig.emulators.rig.faults import FaultForm
-
-
-class _NoWire:
-    """A wire that has no faults."""
-
-    fault_types: Mapping[str, FaultForm] = MappingProxyType({})
-    armed: tuple[str, ...] = ()
-
-    def check(self, name: str, *arguments: str) -> None:
-        """Allow everything: nothing is asked."""
-
-    def arm(self, name: str, *arguments: str) -> None:
-        """Do nothing."""
-
-    def acted(self, name: str) -> int:
-        """Return 0: nothing can be armed."""
-        return 0
-
-    def clear(self, name: str) -> None:
-        """Do nothing."""
 
 
 class Operated:
@@ -55,7 +33,7 @@ class Operated:
         status: Callable[[], Mapping[str, object]] = dict,
     ) -> None:
         self.name, self.device, self.stop, self._more = name, thing, stop, status
-        self._events, self.now_us, self.wire = EventQueue(), 0, _NoWire()
+        self._events, self.now_us, self.wire = EventQueue(), 0, AssemblyFaults({})
         self.operator = Operator(thing.inputs, thing.tick_us, self._events, self.wire)
 
     @property

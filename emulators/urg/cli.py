@@ -2,25 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-import click
-
-from tickrig.emulators.commands.run_options import (
-    SERIAL_FAULTS,
-    device_options,
-    line_options,
-    run_named,
-)
+from tickrig.emulators.commands.run_options import serial_command
 from tickrig.emulators.urg.fields import FIELDS
-from tickrig.host.cli.options import HarmlessCommand
 
 
-@click.command(cls=HarmlessCommand)
-@device_options(FIELDS)
-@line_options(SERIAL_FAULTS, "tickrig.device.urg.sensor:INPUTS")
-@click.pass_context
-def main(context: click.Context, /, **options: Any) -> None:
+@serial_command("urg", FIELDS, "tickrig.device.urg.sensor:INPUTS")
+def main() -> None:
     """Emulate a scanning range finder URG-04LX (SCIP 1.1 and 2.0) on a pseudo-terminal.
 
     It runs in real time until Ctrl-C. A scenario alone runs in virtual time:
@@ -38,4 +25,3 @@ def main(context: click.Context, /, **options: Any) -> None:
     Completion of options in the shell:
     eval "$(_URG_EMU_COMPLETE=bash_source urg-emu)"
     """  # noqa: D301 - click wants the backspace
-    context.exit(run_named("urg", options))

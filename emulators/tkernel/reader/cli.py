@@ -2,25 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-import click
-
-from tickrig.emulators.commands.run_options import (
-    SERIAL_FAULTS,
-    device_options,
-    line_options,
-    run_named,
-)
+from tickrig.emulators.commands.run_options import serial_command
 from tickrig.emulators.tkernel.reader.fields import FIELDS
-from tickrig.host.cli.options import HarmlessCommand
 
 
-@click.command(cls=HarmlessCommand)
-@device_options(FIELDS)
-@line_options(SERIAL_FAULTS, "tickrig.device.ucode_reader:INPUTS")
-@click.pass_context
-def main(context: click.Context, /, **options: Any) -> None:
+@serial_command("ucode-reader", FIELDS, "tickrig.device.ucode_reader:INPUTS")
+def main() -> None:
     """Emulate an infra-red reader of ucodes on a pseudo-terminal (38400 8N1).
 
     Markers in the environment send ucodes of 128 bits, written as 32 hex
@@ -41,4 +28,3 @@ def main(context: click.Context, /, **options: Any) -> None:
     Completion of options in the shell:
     eval "$(_UCODE_READER_EMU_COMPLETE=bash_source ucode-reader-emu)"
     """  # noqa: D301 - click wants the backspace
-    context.exit(run_named("ucode-reader", options))
