@@ -43,7 +43,7 @@ from tickrig.host.canmon.model.check.rule_parser import parse_rule
 from tickrig.host.canmon.model.check.rules import parse_rule_file
 from tickrig.host.canmon.model.decode.dbc_file import DbcFile
 from tickrig.host.canmon.model.decode.filter import parse_filter
-from tickrig.host.canmon.model.graph.signal_spec import parse_signal
+from tickrig.host.canmon.model.graph.series import parse_signal
 from tickrig.host.canmon.model.logs.log_reader import read_log
 from tickrig.host.canmon.model.recorder.files import _objects
 from tickrig.host.canmon.model.sequence import TomlSequence, evaluate, fill_in, parse_lines

@@ -25,7 +25,7 @@ from tickrig.host.canmon.model.columns.columns import Columns
 from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.top_model import TableView, TopModel, render
 from tickrig.host.canmon.model.traffic import Traffic, TrafficSnapshot
-from tickrig.host.canmon.sources.opening import open_source
+from tickrig.host.canmon.sources.source import open_source
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.links.can_link import to_message
 from tickrig.wire.can import CanFrame

@@ -13,8 +13,7 @@ import can
 
 from benchmarks.table import percentiles, row
 from tickrig.host.canmon.model.frames import Record
-from tickrig.host.canmon.model.graph.chart import svg
-from tickrig.host.canmon.model.graph.plot import render
+from tickrig.host.canmon.model.graph.plot import render, svg
 from tickrig.host.canmon.model.graph.series import Series, View
 from tickrig.host.canmon.model.sequence import SequenceRun, TomlSequence
 from tickrig.host.canmon.output.listening import Pace

@@ -11,7 +11,7 @@ from tickrig.host.canmon.model.decode.decoder import Decoder
 from tickrig.host.canmon.model.decode.node_memory import EdsObjects, read_eds_objects
 from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.graph.plot import MOST, LiveGraph, ViewMode
-from tickrig.host.canmon.model.graph.signal_spec import parse_signal
+from tickrig.host.canmon.model.graph.series import parse_signal
 from tickrig.host.canmon.model.node_dictionary import NodeDictionary, render_dictionary
 from tickrig.host.canmon.model.transmit import parse_row_text
 from tickrig.host.canmon.sources.source import AnySource

@@ -8,7 +8,7 @@ from itertools import pairwise
 from typing import Final, NamedTuple
 
 from tickrig.emulators.testing.report import bench_report
-from tickrig.host.canmon.model.graph.chart import ticks, widened
+from tickrig.host.canmon.model.graph.plot import ticks, widened
 from tickrig.host.text.page_text import DASH
 from tickrig.host.text.values import counted
 

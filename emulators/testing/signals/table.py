@@ -25,11 +25,11 @@ from tickrig.host.text.trace import Mark
 from tickrig.host.text.values import parse_time_us
 
 if TYPE_CHECKING:
-    from tickrig.host.canmon.model.graph import series, signal_spec
+    from tickrig.host.canmon.model.graph import series
     from tickrig.host.canmon.model.logs import log_reader
 else:  # columns of CAN logs alone need them
     series = LazyModule("tickrig.host.canmon.model.graph.series")
-    signal_spec = LazyModule("tickrig.host.canmon.model.graph.signal_spec")
+    series = LazyModule("tickrig.host.canmon.model.graph.series")
     log_reader = LazyModule("tickrig.host.canmon.model.logs.log_reader")
 
 _Points = Sequence[tuple[int, float]]
@@ -104,8 +104,8 @@ def _read_log(path: Path, column: str | None) -> _Points:
     """Return the values in frames of a CAN log, from its first frame on."""
     if column is None:
         raise ValueError("column is missing: bits of a frame, as 181[2:6]s*0.001")
-    bits = signal_spec.parse_slice(column)
-    collector = series.Collector([signal_spec.CurveSpec("", bits, 1, column)])
+    bits = series.parse_slice(column)
+    collector = series.Collector([series.CurveSpec("", bits, 1, column)])
     begin_us = None
     for record in log_reader.read_log(path):
         begin_us = record.at_us if begin_us is None else begin_us

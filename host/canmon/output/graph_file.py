@@ -11,7 +11,7 @@ from operator import itemgetter
 from pathlib import Path
 from typing import BinaryIO, Final, TextIO
 
-from tickrig.host.canmon.model.graph.chart import COLOURS, Chart, Curve, chart, html_page, svg
+from tickrig.host.canmon.model.graph.plot import COLOURS, Chart, Curve, chart, html_page, svg
 from tickrig.host.canmon.model.graph.series import Series, View
 from tickrig.host.cli.messages import Refused, SourceFailed
 from tickrig.host.text.whole_file import replacing, write_whole

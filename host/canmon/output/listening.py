@@ -17,8 +17,7 @@ import click
 from tickrig._lazy import LazyModule
 from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.traffic import BitRates
-from tickrig.host.canmon.sources.opening import BlockLog
-from tickrig.host.canmon.sources.source import AnySource, BusSpec, parse_source
+from tickrig.host.canmon.sources.source import AnySource, BlockLog, BusSpec, parse_source
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.messages import SourceFailed
 from tickrig.host.cli.options import time_option

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Final, assert_never
 
 from tickrig._lazy import LazyModule
 from tickrig.host.canmon.model.frames import DumpLines, Record, decoded_text, line_text
+from tickrig.host.canmon.model.logs.log_file import Mark, dropped
 from tickrig.host.canmon.model.logs.log_writer import comment, log_line
-from tickrig.host.canmon.model.logs.mark import Mark, dropped
 from tickrig.host.canmon.model.logs.notation import DUMP_HEADER, drop_line, json_line, line_json
 from tickrig.host.cli.start import as_is
 from tickrig.host.text.page_text import json_text, one_line

@@ -14,10 +14,9 @@ import click
 
 from tickrig._lazy import LazyModule
 from tickrig.host.canmon.model.frames import Record
-from tickrig.host.canmon.model.logs.log_file import LogError, LogFormatError, log_format
+from tickrig.host.canmon.model.logs.log_file import LogError, LogFormatError, Mark, log_format
 from tickrig.host.canmon.model.logs.log_writer import write_log
-from tickrig.host.canmon.model.logs.mark import Mark
-from tickrig.host.canmon.model.recorder.plan import AtLimit, RecordingPlan, read_plan
+from tickrig.host.canmon.model.recorder.files import AtLimit, RecordingPlan, read_plan
 from tickrig.host.canmon.model.recorder.recorder import (
     FilterTrigger,
     Recorder,
@@ -34,14 +33,14 @@ from tickrig.host.text.whole_file import replacing
 
 if TYPE_CHECKING:
     from tickrig.host.canmon import extensions
-    from tickrig.host.canmon.model.check import alarms, rule_parser
+    from tickrig.host.canmon.model.check import checker, rule_parser
     from tickrig.host.canmon.model.check import rules as check_rules
     from tickrig.host.canmon.model.decode import filter as filters
     from tickrig.host.canmon.model.frames import AnyRecord
     from tickrig.host.canmon.model.logs.log_writer import TextBlock
 else:  # slow
     extensions = LazyModule("tickrig.host.canmon.extensions")
-    alarms = LazyModule("tickrig.host.canmon.model.check.alarms")
+    checker = LazyModule("tickrig.host.canmon.model.check.checker")
     rule_parser = LazyModule("tickrig.host.canmon.model.check.rule_parser")
     check_rules = LazyModule("tickrig.host.canmon.model.check.rules")
     filters = LazyModule("tickrig.host.canmon.model.decode.filter")
@@ -316,7 +315,7 @@ def _rules(word: str, bit_rate: int | None) -> Trigger:
         rules = check_rules.parse_rules(words, extensions.load_rule)
         if rules == check_rules.Rules(bit_rate=rules.bit_rate):
             raise ValueError("it has no rule")
-        return RuleTrigger(Path(word).name, alarms.Alarms(rules, bit_rate))
+        return RuleTrigger(Path(word).name, checker.Alarms(rules, bit_rate))
     except OSError as error:
         raise Refused(f"--trigger {word}: {error.strerror}") from error
     except ValueError as error:

@@ -19,7 +19,7 @@ from can.util import load_config
 
 from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.logs.can_log import channel_name, to_record
-from tickrig.host.canmon.model.logs.mark import CAN_XL, LogTally
+from tickrig.host.canmon.model.logs.log_file import CAN_XL, LogTally
 from tickrig.host.canmon.sources.live_source import LiveSource, Reader
 from tickrig.host.canmon.sources.source import INTERFACES, BusSpec
 from tickrig.host.cli.can_options import UNNAMED, BusOptions, open_raw

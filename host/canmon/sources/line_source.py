@@ -16,7 +16,7 @@ from typing import Final
 from tickrig.host.canmon.model.decode.decoded import Decoded, Signal
 from tickrig.host.canmon.model.decode.rtc_lite_lines import RtcLiteLine
 from tickrig.host.canmon.model.frames import LineRecord
-from tickrig.host.canmon.model.logs.mark import LogTally
+from tickrig.host.canmon.model.logs.log_file import LogTally
 from tickrig.host.canmon.sources.source import LineSpec
 from tickrig.host.links.serial_link import SerialLink
 from tickrig.wire.errors import WireError

@@ -12,7 +12,7 @@ from queue import Empty
 from typing import TYPE_CHECKING, Final, Generic, Protocol, TypeVar
 
 from tickrig.host.canmon.model.frames import CandumpFilter, Record, flagged_id
-from tickrig.host.canmon.model.logs.mark import LogTally, Mark, back, gone
+from tickrig.host.canmon.model.logs.log_file import LogTally, Mark, back, gone
 from tickrig.host.canmon.sources.source import AnySource
 from tickrig.host.cli.messages import Refused, SourceFailed
 from tickrig.host.links.link import LinkClosed

@@ -14,18 +14,31 @@ True
 
 from __future__ import annotations
 
+import heapq
+import os
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import partial
+from importlib.util import find_spec
+from itertools import islice, takewhile
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, Generic, TypeVar
+from typing import TYPE_CHECKING, Final, Generic, TypeVar, cast
 
-from tickrig.host.canmon.model.frames import CandumpFilter, Record
-from tickrig.host.canmon.model.logs.log_file import COMPRESSED, SUFFIXES, LogFormatError, log_format
-from tickrig.host.cli.messages import Refused, refusing
+from tickrig.host.canmon.model.frames import CandumpFilter, Record, flagged_id
+from tickrig.host.canmon.model.logs import log_file
+from tickrig.host.canmon.model.logs.log_reader import Item, LogLines, among, read_log
+from tickrig.host.cli.can_options import BusOptions
+from tickrig.host.cli.messages import Refused, SourceFailed, refusing
+from tickrig.host.links.link import LinkClosed
+from tickrig.host.links.ready import ready
 
 if TYPE_CHECKING:
-    from tickrig.host.canmon.model.logs.mark import LogTally, Mark
+    from tickrig.host.canmon.model.columns import column_reader
+    from tickrig.host.canmon.model.columns import columns as column_blocks
+    from tickrig.host.canmon.model.columns.columns import Columns
+    from tickrig.host.canmon.model.frames import AnyRecord
+    from tickrig.host.canmon.sources import bus_source, line_source, live_source
 
 
 # Where frames come from: buses, log files or standard input, under one face.
@@ -45,7 +58,7 @@ class AnySource(Generic[Taken_co]):
 
     live = recorded = False
     failed = ""
-    marks: Sequence[Mark] = ()
+    marks: Sequence[log_file.Mark] = ()
     _ended = False
 
     @property
@@ -66,7 +79,7 @@ class AnySource(Generic[Taken_co]):
     def reopen(self) -> None:
         """Open buses again that go away; what has an end is left alone."""
 
-    def tallies(self) -> Iterable[tuple[str, LogTally]]:
+    def tallies(self) -> Iterable[tuple[str, log_file.LogTally]]:
         """Return what was no frame, by the name of each bus or file."""
         return ()
 
@@ -188,7 +201,7 @@ def parse_source(word: str) -> FileSpec | BusSpec | LineSpec | None:
         return _file(word, "")
     name, _, filters = word.partition(",")
     path = Path(name)
-    if path.is_file() or path.suffix.lower() in (*SUFFIXES, COMPRESSED):
+    if path.is_file() or path.suffix.lower() in (*log_file.SUFFIXES, log_file.COMPRESSED):
         return _file(name, filters)
     if name and path.is_dir():
         raise Refused(f"SOURCE {name!r} is a folder")
@@ -196,8 +209,8 @@ def parse_source(word: str) -> FileSpec | BusSpec | LineSpec | None:
 
 
 def _file(name: str, filters: str) -> FileSpec:
-    with refusing("", LogFormatError):
-        log_format(Path(name))
+    with refusing("", log_file.LogFormatError):
+        log_file.log_format(Path(name))
     return FileSpec(Path(name), _chosen(filters))
 
 
@@ -229,3 +242,355 @@ def _bit_s(text: str) -> int:
 def _chosen(filters: str) -> CandumpFilter | None:
     with refusing():
         return CandumpFilter.parse(filters) if filters else None
+
+
+# Opening what SOURCE words name: buses, serial ports, log files or standard input.
+
+
+# Log files, merged by time, and standard input as sources.
+
+
+_BATCH: Final = 1_024
+"""Frames of one poll."""
+
+
+class LoggedSource(AnySource[Record]):
+    """What somebody recorded: frames up to the next marks at a time."""
+
+    recorded = True
+
+    def __init__(self) -> None:
+        self._items: Sequence[Item] = ()
+        self._said_lost, self._no_more = 0, False
+
+    @property
+    def lost(self) -> int:
+        """Frames that its recorder lost in front of those that come next."""
+        return super().lost if self._ended else self._said_lost
+
+    def _read(self, timeout_us: int) -> Sequence[Item]:
+        """Return what is next, or none; `_no_more` says whether that was all."""
+        return []
+
+    def poll(self, timeout_us: int, /) -> list[Record]:
+        """Return the next frames, up to a mark; of a pipe it waits for some."""
+        if self._ended:
+            self.marks = ()
+            return []
+        items = self._items or self._read(timeout_us)
+        kinds = list(map(type, items))
+        end = kinds.index(log_file.Mark) if log_file.Mark in kinds else len(kinds)
+        marks = list(takewhile(lambda item: isinstance(item, log_file.Mark), items[end:]))
+        self._items = items[end + len(marks) :]
+        self._take_marks(cast("Sequence[log_file.Mark]", marks))
+        self._ended = self._no_more and not self._items
+        return cast("list[Record]", list(items[:end]))
+
+    def _take_marks(self, marks: Sequence[log_file.Mark]) -> None:
+        self._said_lost += sum(mark.frames for mark in marks)
+        self.marks = [mark for mark in marks if mark.event != log_file.DROP]  # `lost` says these
+
+    def close(self) -> None:
+        """Read no more."""
+        super().close()
+        self._items = ()
+
+
+class FileSource(LoggedSource):
+    """One or more log files.
+
+    Raises:
+        SourceFailed: a file cannot be read.
+    """
+
+    live = False
+
+    def __init__(self, files: Sequence[FileSpec]) -> None:
+        super().__init__()
+        self._names = [str(file.path) for file in files]
+        self._readers = [read_log(file.path) for file in files]
+        for file in files:
+            _check_readable(file.path)
+        streams = [
+            _chosen_items(file, reader.items())
+            for file, reader in zip(files, self._readers, strict=True)
+        ]
+        self._stream = streams[0] if len(streams) == 1 else _merged(streams)
+
+    def tallies(self) -> Iterable[tuple[str, log_file.LogTally]]:
+        """Return the tally of each file, with its name."""
+        return [
+            (name, reader.tally) for name, reader in zip(self._names, self._readers, strict=True)
+        ]
+
+    def _read(self, timeout_us: int) -> list[Item]:
+        batch: list[Item] = []
+        try:
+            batch.extend(islice(self._stream, _BATCH))
+        except (OSError, log_file.LogError) as error:
+            self.failed = str(error)
+        self._no_more = len(batch) < _BATCH
+        return batch
+
+    def close(self) -> None:
+        """Read no more."""
+        super().close()
+        self._stream = iter(())
+
+
+def _check_readable(path: Path) -> None:
+    """Raise SourceFailed where a file cannot be read."""
+    try:
+        path.open("rb").close()
+    except OSError as error:
+        raise SourceFailed(f"{path}: {error.strerror}") from error
+
+
+def _chosen_items(file: FileSpec, items: Iterator[Item]) -> Iterator[Item]:
+    chosen = file.chosen
+    if chosen is None:
+        return items
+    return (
+        one for one in items if isinstance(one, log_file.Mark) or chosen.passes(flagged_id(one))
+    )
+
+
+def _merged(streams: Sequence[Iterator[Item]]) -> Iterator[Item]:
+    return heapq.merge(*streams, key=lambda item: item.at_us)
+
+
+STDIN: Final = 0
+_READ_BYTES: Final = 1 << 16
+
+
+class StdinSource(LoggedSource):
+    """A pipe, a terminal or a file that somebody feeds."""
+
+    live = True
+
+    def __init__(self, descriptor: int = STDIN) -> None:
+        super().__init__()
+        self._descriptor, self._lines = descriptor, LogLines()
+
+    def tallies(self) -> Iterable[tuple[str, log_file.LogTally]]:
+        """Return the tally of what came."""
+        return [("standard input", self._lines.tally)]
+
+    def _read(self, timeout_us: int) -> Sequence[Item]:
+        """Wait for bytes; return what the lines hold that are whole."""
+        if not ready([self._descriptor], wait_s=timeout_us / 1e6)[0]:
+            return []
+        try:
+            data = os.read(self._descriptor, _READ_BYTES)
+        except OSError as error:
+            data, self.failed = b"", f"standard input: {error.strerror}"
+        self._no_more = not data
+        records = self._lines.push(data) if data else self._lines.finish()
+        return among(records, self._lines.marks)
+
+
+# A log file that is read in blocks, where that is faster than frame by frame.
+
+SMALL_BYTES: Final = 1 << 20
+"""Below it a log is read frame by frame sooner than numpy is imported."""
+
+
+class BlockLog(AnySource["Columns"]):
+    """A log file as columns, a block at each poll; it holds no more than that.
+
+    Attributes:
+        no_columns: it ends before its time, for it is to be read frame by frame.
+
+    Raises:
+        SourceFailed: the file cannot be read.
+    """
+
+    no_columns = False
+
+    def __init__(self, path: Path) -> None:
+        _check_readable(path)
+        self._path, self._reader = path, column_reader.read_columns(path)
+        self._blocks = iter(self._reader)
+
+    def tallies(self) -> Iterable[tuple[str, log_file.LogTally]]:
+        """Return the tally of the file."""
+        return [(str(self._path), self._reader.tally)]
+
+    def poll(self, timeout_us: int, /) -> list[Columns]:
+        """Return the next block; it never waits."""
+        try:
+            return [next(self._blocks)]
+        except StopIteration:
+            pass
+        except column_blocks.NoColumnsError:
+            self.no_columns = True
+        except log_file.LogError as error:
+            self.failed = str(error)
+        except OSError as error:
+            self.failed = f"{self._path}: {error.strerror or error}"
+        self._ended = True
+        return []
+
+
+class PieceLog(LoggedSource):
+    """A log file in pieces: columns where it has them, else frames up to the next marks.
+
+    Raises:
+        SourceFailed: the file cannot be read.
+    """
+
+    live = False
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        _check_readable(path)
+        self._path, self._reader = path, column_reader.read_columns(path)
+        self._stream = self._reader.pieces()
+
+    def tallies(self) -> Iterable[tuple[str, log_file.LogTally]]:
+        """Return the tally of the file."""
+        return [(str(self._path), self._reader.tally)]
+
+    def pieces(self) -> Iterator[Columns | Sequence[Record]]:
+        """Read the file; `lost` and `marks` are of what is behind each piece."""
+        ahead: Columns | Sequence[Item] | None = ()
+        while not self._ended:
+            if not self._items:
+                # marks that follow each other are one event, wherever a piece ends
+                items = list[Item]()
+                while isinstance(ahead, Sequence) and len(items) < _BATCH:
+                    items += ahead
+                    ahead = self._next()
+                self._items, self._no_more = items, ahead is None
+                if not items and ahead is not None and not isinstance(ahead, Sequence):
+                    self.marks, block, ahead = (), ahead, ()
+                    yield block
+                    continue
+            yield self.poll(0)
+
+    def _next(self) -> Columns | Sequence[Item] | None:
+        try:
+            return next(self._stream, None)
+        except (OSError, log_file.LogError) as error:
+            self.failed = str(error)
+        return None
+
+
+def block_log(words: Sequence[str]) -> BlockLog | None:
+    """Open the log that SOURCE words name; None if it is better read frame by frame.
+
+    Raises:
+        Refused: words that name nothing.
+        SourceFailed: a file that cannot be read.
+    """
+    path = _large_log(words)
+    return None if path is None else BlockLog(path)
+
+
+def piece_log(words: Sequence[str]) -> PieceLog | None:
+    """Open the log that SOURCE words name in pieces; None and errors as `block_log`."""
+    path = _large_log(words)
+    return None if path is None else PieceLog(path)
+
+
+def _large_log(words: Sequence[str]) -> Path | None:
+    """Return the path of a log that is to be read in blocks."""
+    if len(words) != 1 or find_spec("numpy") is None:
+        return None
+    word = parse_source(words[0])
+    if not isinstance(word, FileSpec) or word.chosen is not None:
+        return None
+    try:
+        return word.path if word.path.stat().st_size >= SMALL_BYTES else None
+    except OSError:
+        return None  # who reads it frame by frame says so
+
+
+def open_source(words: Sequence[str], options: BusOptions | None = None) -> Source:
+    """Open what SOURCE words name: one or more buses, or files, or standard input.
+
+    Files are merged by time; buses are read as frames come in.
+
+    Args:
+        words: SOURCE words; without any the options name a bus.
+        options: interface, bit rate and such of the buses.
+
+    Raises:
+        Refused: words that name nothing, or things that do not go together.
+        SourceFailed: a bus or file that cannot be opened.
+    """
+    options = options or BusOptions()
+    if not words and not options:
+        raise Refused(
+            "no SOURCE: name a bus as can0, a log file as run.log, or - for standard input"
+        )
+    parsed = [parse_source(word) for word in words]
+    files = [word for word in parsed if isinstance(word, FileSpec)]
+    buses = [word for word in parsed if isinstance(word, BusSpec)]
+    if parsed == [None]:
+        return StdinSource()
+    if len(files) == len(parsed) > 0:
+        return FileSource(files)
+    if any(isinstance(word, LineSpec) for word in parsed):
+        raise Refused("serial lines are shown by dump, top and tui: " + " ".join(words))
+    if len(buses) < len(parsed):
+        raise Refused("buses, files and standard input cannot be mixed: " + " ".join(words))
+    return cast("Source", open_live(buses or [BusSpec()], [], options)[0])  # buses alone: frames
+
+
+def open_any(words: Sequence[str], options: BusOptions) -> AnySource[AnyRecord]:
+    """Open what SOURCE words name, as `open_source` does; serial ports and buses may be mixed."""
+    parsed = [parse_source(word) for word in words]
+    lines = [word for word in parsed if isinstance(word, LineSpec)]
+    if not lines:
+        return open_source(words, options)
+    buses = [word for word in parsed if isinstance(word, BusSpec)]
+    if len(buses) + len(lines) < len(parsed):
+        raise Refused("serial ports, files and standard input cannot be mixed: " + " ".join(words))
+    return open_live(buses, lines, options)[0]
+
+
+def open_live(
+    buses: Sequence[BusSpec], lines: Sequence[LineSpec], options: BusOptions
+) -> tuple[live_source.LiveSource[AnyRecord], dict[str, bus_source.OpenBus]]:
+    """Open buses and serial ports, so that they can be opened again.
+
+    Returns:
+        The source, and the buses by name, to send on.
+
+    Raises:
+        Refused: options that python-can does not know.
+        SourceFailed: a bus or port that cannot be opened.
+    """
+    opened: dict[str, bus_source.OpenBus] = {}
+    readers: list[live_source.Reader[AnyRecord]] = []
+    try:
+        for word in buses:
+            bus = bus_source.OpenBus(word, options)
+            opened[bus.name] = bus
+            reader: live_source.Reader[AnyRecord] = bus.reader
+            readers.append(
+                reader if reader.stepped else live_source.ReopeningReader(reader, bus.open_again)
+            )
+        for line in lines:
+            reader = line_source.LineReader(line)
+            readers.append(
+                live_source.ReopeningReader(reader, partial(line_source.LineReader, line))
+            )
+    except BaseException as error:
+        for reader in readers:
+            reader.close()
+        if isinstance(error, LinkClosed):
+            raise SourceFailed(str(error)) from None
+        raise
+    return live_source.LiveSource(
+        readers, [*(bus.chosen for bus in buses), *(None for _ in lines)]
+    ), opened
+
+
+def log_path(word: str) -> Path:
+    """Return the log file that a word names; Refused if it names none."""
+    parsed = parse_source(word)
+    if not isinstance(parsed, FileSpec):
+        raise Refused(f"{word!r} is no log file")
+    return parsed.path

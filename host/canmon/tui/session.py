@@ -18,14 +18,22 @@ from tickrig.host.canmon.model.decode.decoded import Decoded
 from tickrig.host.canmon.model.decode.node_board import NodeBoard
 from tickrig.host.canmon.model.decode.node_memory import EdsObjects
 from tickrig.host.canmon.model.frames import AnyRecord, Record
-from tickrig.host.canmon.model.logs.mark import Mark
+from tickrig.host.canmon.model.logs.log_file import Mark
 from tickrig.host.canmon.model.top_model import TopModel
 from tickrig.host.canmon.model.trace import FrameTrace
 from tickrig.host.canmon.model.traffic import BitRates
 from tickrig.host.canmon.model.transmit import AnyFrames
 from tickrig.host.canmon.output.listening import Stopwatch
-from tickrig.host.canmon.sources.opening import STDIN, StdinSource, open_any, open_live
-from tickrig.host.canmon.sources.source import AnySource, BusSpec, LineSpec, parse_source
+from tickrig.host.canmon.sources.source import (
+    STDIN,
+    AnySource,
+    BusSpec,
+    LineSpec,
+    StdinSource,
+    open_any,
+    open_live,
+    parse_source,
+)
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.messages import SourceFailed
 from tickrig.wire.can import CanFrame, FdFrame

@@ -27,8 +27,7 @@ from tickrig.host.canmon.model.check.rules import (
 )
 from tickrig.host.canmon.model.frames import DumpLines, Record, Stamp, decoded_text
 from tickrig.host.canmon.output import listening
-from tickrig.host.canmon.sources.opening import BlockLog, block_log, open_source
-from tickrig.host.canmon.sources.source import AnySource, Source
+from tickrig.host.canmon.sources.source import AnySource, BlockLog, Source, block_log, open_source
 from tickrig.host.canmon.verbs import decode_options
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.messages import Refused, refuse_path, refusing, until_unread

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 import click
 
 from tickrig._lazy import LazyModule
-from tickrig.host.canmon.model.recorder.plan import RecordingPlan
+from tickrig.host.canmon.model.recorder.files import RecordingPlan
 from tickrig.host.canmon.output.listening import report, until_interrupted
 from tickrig.host.canmon.output.printer import DecodedFrame, FilteredDecoder
 from tickrig.host.canmon.output.recording import LogFile, whole_log
-from tickrig.host.canmon.sources.opening import PieceLog, open_source, piece_log
+from tickrig.host.canmon.sources.source import PieceLog, open_source, piece_log
 from tickrig.host.canmon.verbs import decode_options
 from tickrig.host.canmon.verbs.dump import pass_on
 from tickrig.host.cli.options import PATH
@@ -23,8 +23,8 @@ from tickrig.host.cli.start import INTERRUPTED
 if TYPE_CHECKING:
     from tickrig.host.canmon.model.columns import column_text
     from tickrig.host.canmon.model.columns import columns as column_blocks
+    from tickrig.host.canmon.model.logs.log_file import Mark
     from tickrig.host.canmon.model.logs.log_writer import TextBlock
-    from tickrig.host.canmon.model.logs.mark import Mark
 else:  # numpy
     column_text = LazyModule("tickrig.host.canmon.model.columns.column_text")
     column_blocks = LazyModule("tickrig.host.canmon.model.columns.columns")

@@ -20,8 +20,14 @@ from tickrig.host.canmon.model.recorder.recorder import FilterTrigger
 from tickrig.host.canmon.output import printer
 from tickrig.host.canmon.output.listening import bit_rate_of, report, say_marks, until_interrupted
 from tickrig.host.canmon.output.recording import NAMES, RecordingOptions, recording_options
-from tickrig.host.canmon.sources.opening import PieceLog, open_any, piece_log
-from tickrig.host.canmon.sources.source import AnySource, LineSpec, parse_source
+from tickrig.host.canmon.sources.source import (
+    AnySource,
+    LineSpec,
+    PieceLog,
+    open_any,
+    parse_source,
+    piece_log,
+)
 from tickrig.host.canmon.verbs import decode_options
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.messages import Refused, until_unread
@@ -30,7 +36,7 @@ from tickrig.host.links.ready import ready
 
 if TYPE_CHECKING:
     from tickrig.host.canmon.model.frames import AnyRecord
-    from tickrig.host.canmon.model.logs.mark import Mark
+    from tickrig.host.canmon.model.logs.log_file import Mark
     from tickrig.host.canmon.output.recording import LogFile
 
 

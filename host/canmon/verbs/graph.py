@@ -16,11 +16,10 @@ from typing import Any, Final
 import click
 
 from tickrig.host.canmon.model.graph.plot import render
-from tickrig.host.canmon.model.graph.series import Collector, Series, View
-from tickrig.host.canmon.model.graph.signal_spec import ObjectName, parse_signal
+from tickrig.host.canmon.model.graph.series import Collector, ObjectName, Series, View, parse_signal
 from tickrig.host.canmon.output.graph_file import check_graph_path, write_graph
 from tickrig.host.canmon.output.listening import follow, report, span_option, take_blocks
-from tickrig.host.canmon.sources.opening import BlockLog, block_log, open_source
+from tickrig.host.canmon.sources.source import BlockLog, block_log, open_source
 from tickrig.host.canmon.verbs.decode_options import (
     decode_options,
     explained,

@@ -13,8 +13,8 @@ from typing import Final
 import click
 
 from tickrig.host.canmon.model.logs import log_file
+from tickrig.host.canmon.model.logs.log_file import LogTally
 from tickrig.host.canmon.model.logs.log_reader import LogLines, read_log
-from tickrig.host.canmon.model.logs.mark import LogTally
 from tickrig.host.cli.messages import Refused, SourceFailed
 from tickrig.host.cli.options import PATH
 from tickrig.host.text.page_text import json_text

@@ -15,7 +15,7 @@ from tickrig.host.canmon.model.decode.node_board import NodeBoard, board_json, r
 from tickrig.host.canmon.model.decode.node_memory import EdsObjects
 from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.output.listening import Stopwatch, follow, report, span_option, take_blocks
-from tickrig.host.canmon.sources.opening import BlockLog, block_log, open_source
+from tickrig.host.canmon.sources.source import BlockLog, block_log, open_source
 from tickrig.host.canmon.verbs.decode_options import eds_option, read_eds_files, source_command
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.messages import until_unread

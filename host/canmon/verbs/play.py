@@ -18,7 +18,7 @@ from tickrig.host.canmon.model.logs.log_file import LogError
 from tickrig.host.canmon.model.logs.log_reader import LogReader, read_log
 from tickrig.host.canmon.model.traffic import bucket_of, middle_us
 from tickrig.host.canmon.output.listening import Pace, until_interrupted
-from tickrig.host.canmon.sources.opening import log_path
+from tickrig.host.canmon.sources.source import log_path
 from tickrig.host.cli.can_options import BusOptions, bus_options, fd_options
 from tickrig.host.cli.messages import Refused, SourceFailed, refusing, until_unread
 from tickrig.host.text.values import parse_time_with_unit_us

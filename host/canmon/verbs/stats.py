@@ -22,8 +22,7 @@ from tickrig.host.canmon.model.frames import (
 )
 from tickrig.host.canmon.model.traffic import BitRates, BusRow, IdRow, Traffic, TrafficSnapshot
 from tickrig.host.canmon.output import listening
-from tickrig.host.canmon.sources.opening import BlockLog, block_log, open_source
-from tickrig.host.canmon.sources.source import Source
+from tickrig.host.canmon.sources.source import BlockLog, Source, block_log, open_source
 from tickrig.host.canmon.verbs.decode_options import source_command
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.messages import until_unread

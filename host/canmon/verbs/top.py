@@ -12,7 +12,7 @@ import click
 from tickrig.host.canmon.model.top_model import TopModel
 from tickrig.host.canmon.output import listening
 from tickrig.host.canmon.output.printer import FilteredDecoder
-from tickrig.host.canmon.sources.opening import BlockLog, block_log, open_any
+from tickrig.host.canmon.sources.source import BlockLog, block_log, open_any
 from tickrig.host.canmon.verbs import decode_options
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.messages import until_unread

@@ -11,7 +11,7 @@ from click.testing import CliRunner, Result
 from tickrig.host.canmon.cli import main
 from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.trace import FrameTrace
-from tickrig.host.canmon.sources import opening as block_log
+from tickrig.host.canmon.sources import source as block_log
 from tickrig.host.canmon.tui.panels.trace_panel import TraceLines, line_text
 from tickrig.wire.can import FdFrame
 

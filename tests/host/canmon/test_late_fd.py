@@ -9,7 +9,7 @@ from click.testing import CliRunner, Result
 
 from tickrig.host.canmon.cli import main
 from tickrig.host.canmon.model.columns import column_reader
-from tickrig.host.canmon.sources import opening as block_log
+from tickrig.host.canmon.sources import source as block_log
 
 EMCY = "".join(f"({n}.000000) can0 083#3081110000000000\n" for n in range(1, 9))
 FD = "(9.000000) can0 123##1AABB\n(10.000000) can0 083#3081110000000000\n"

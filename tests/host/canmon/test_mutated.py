@@ -17,7 +17,7 @@ from click.testing import CliRunner
 from tests.host.canmon.model.decode.drive_trace import GOLDEN
 from tickrig.host.canmon.cli import main
 from tickrig.host.canmon.model.columns import column_reader
-from tickrig.host.canmon.sources import opening as block_log
+from tickrig.host.canmon.sources import source as block_log
 from tickrig.host.canmon.workspace import MonitorSetup, Workspace, WorkspaceError
 from tickrig.host.cli.messages import Refused
 

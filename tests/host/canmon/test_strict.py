@@ -8,7 +8,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from tickrig.host.canmon.cli import main
-from tickrig.host.canmon.sources import opening as block_log
+from tickrig.host.canmon.sources import source as block_log
 
 WELL = "(0000000001.000000) can0 705#7F\n"
 NOISE = "what?\n"

@@ -23,33 +23,272 @@ from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from tickrig.host.canmon.model.check import expression_rule
-from tickrig.host.canmon.model.check.demands import (
-    EVERY,
-    MOST_COUNTED,
-    Answered,
-    Changes,
-    Count,
-    Counts,
-    Dlc,
-    Every,
-    FirstWithin,
-    In,
-    Latency,
-    Never,
-    Rate,
-    RuleDemand,
-    RuleEvent,
-    Steps,
-    Toggle,
-    Truth,
-    Values,
-)
+from tickrig.host.canmon.model.check import demands
+from tickrig.host.canmon.model.check.rule import ONE_TIME, CheckedTraffic, TrafficFinding
 from tickrig.host.canmon.model.decode import filter_terms
 from tickrig.host.canmon.model.decode.decoded import Decoded, Signal
-from tickrig.host.canmon.model.decode.filter import FilterError, Token
+from tickrig.host.canmon.model.decode.filter import FilterError, FilterParser, Token
+from tickrig.host.canmon.model.frames import Record
+from tickrig.host.canmon.model.graph.series import EXTENDED, FrameSlice, parse_slice
 from tickrig.host.text.names import closest
 from tickrig.host.text.values import parse_time_us
+from tickrig.wire.can import ErrorFrame
+
+# A rule that was written as an expression, held against decoded frames one by one.
+
+
+# When a rule is in force: after something, before it, or while a condition holds.
+
+
+class RuleScope:
+    """Says whether a rule is in force.
+
+    Attributes:
+        text: as it is written.
+    """
+
+    text = ""
+
+    def holds(self, record: Record, decoded: Decoded) -> bool:
+        """Take each frame; say whether it is judged."""
+        raise NotImplementedError
+
+
+class After(RuleScope):
+    """From the first frame after an event on."""
+
+    def __init__(self, event: demands.RuleEvent) -> None:
+        self._event, self._came, self.text = event, False, f"after {event.text}"
+
+    def holds(self, record: Record, decoded: Decoded) -> bool:
+        """Hold once it came; the event itself is not judged."""
+        came = self._came
+        if not came:
+            self._came = self._event.matches(record, decoded)
+        return came
+
+
+class Before(RuleScope):
+    """Until an event."""
+
+    def __init__(self, event: demands.RuleEvent) -> None:
+        self._event, self._came, self.text = event, False, f"before {event.text}"
+
+    def holds(self, record: Record, decoded: Decoded) -> bool:
+        """Hold until it comes; the event itself is not judged."""
+        if not self._came:
+            self._came = self._event.matches(record, decoded)
+        return not self._came
+
+
+class While(RuleScope):
+    """While a condition on signals holds, by the latest frame of the bus that carries one."""
+
+    def __init__(self, event: demands.RuleEvent) -> None:
+        self._event, self._carries, self.text = event, event.carriers(), f"while {event.text}"
+        self._true: dict[str, bool] = {}
+
+    def holds(self, record: Record, decoded: Decoded) -> bool:
+        """Hold from the frame on that makes it true."""
+        if self._carries(decoded):
+            self._true[record.channel] = self._event.matches(record, decoded)
+        return self._true.get(record.channel, False)
+
+
+# Bits of frames in rules, as `canmon graph` names them: `181[2:6]s*0.001`, `181[0.3]`.
+#
+# A slice is a signal of its frames, whatever else they mean.
+
+_CAN_ID: Final = re.compile(r"[0-9A-Fa-f]{3}|[0-9A-Fa-f]{8}")
+_TYPE: Final = re.compile(r"[usfb*/+-]\S*")
+
+Slice = tuple[str, FrameSlice]
+"""Bits of a frame, under the name by which a rule asks for them."""
+
+
+class SliceParser(FilterParser):
+    """Takes slices where a filter takes signals.
+
+    Args:
+        text: the rule.
+    """
+
+    def __init__(self, text: str) -> None:
+        super().__init__(text)
+        self._slices: dict[str, FrameSlice] = {}
+
+    def _plain_term(self) -> filter_terms.Test:
+        if not self._is_slice():
+            return super()._plain_term()
+        name = self._slice()
+        self._signals.add(name)
+        if self._next.text not in filter_terms.COMPARISONS:
+            return filter_terms.signal_test(name)
+        sign, value = self._comparison(name)
+        if filter_terms.number(value) is None:
+            raise self._error(f"{value!r} is no number")
+        del self._tokens[0]
+        return filter_terms.signal_test(name, sign, value)
+
+    def _is_slice(self) -> bool:
+        word, column = self._next
+        is_id = _CAN_ID.fullmatch(word) is not None
+        return is_id and self._tokens[1] == ("[", column + len(word))
+
+    def _slice(self) -> str:
+        """Take the words of a slice; return it as it is written."""
+        begin = self._next.column - 1
+        while self._next.text not in ("]", ""):
+            del self._tokens[0]
+        end = self._next.column
+        self._expect("]")
+        if self._next.column == end + 1 and _TYPE.fullmatch(self._next.text):
+            end += len(self._tokens.pop(0).text)
+        name = self._text[begin:end]
+        try:
+            self._slices[name] = parse_slice(name)
+        except ValueError as reason:
+            raise self.wrong(self._text, begin + 1, str(reason)) from None
+        return name
+
+
+def _with_slices(record: Record, decoded: Decoded, slices: Iterable[Slice]) -> Decoded:
+    """Return what a frame says, with the slices that are of it."""
+    frame = record.frame
+    if isinstance(frame, ErrorFrame) or frame.remote:
+        return decoded
+    key = frame.can_id | EXTENDED if frame.extended else frame.can_id
+    values = [(name, cut.value(frame.data)) for name, cut in slices if cut.key == key]
+    found = [Signal(name, _plain(value)) for name, value in values if value is not None]
+    if not found:
+        return decoded
+    text = " ".join([decoded.text, *map(str, found)]).strip()
+    return decoded._replace(signals=(*decoded.signals, *found), summary=text)
+
+
+def _plain(value: float) -> float:
+    return int(value) if float(value).is_integer() else value
+
+
+# A rule that was written as an expression, held against decoded frames one by one.
+
+_MOST_NAMES: Final = 1_000
+"""So many names of signals are kept, to tell what a misspelt one may mean."""
+
+
+_UNMAPPED: Final = "unmapped"
+_NO_MAPPING: Final = "; PDOs came that nobody mapped: name them by --eds"
+
+
+class ExpressionRule:
+    """One rule, for one node where it was written for several.
+
+    A signal that it names must come: a name may be misspelt, and a rule that judges nothing
+    does not hold.
+
+    Args:
+        name: as findings and reports have it.
+        demand: what must hold.
+        scopes: when; always where there are none.
+        missing: the signals and words that it names, of which none has come yet.
+        slices: those of them that are bits of frames.
+        mapped: it speaks of what PDOs carry, or of PDOs by their numbers.
+    """
+
+    def __init__(  # noqa: PLR0913 - what a rule is made of
+        self,
+        name: str,
+        demand: demands.RuleDemand,
+        scopes: Sequence[RuleScope],
+        missing: filter_terms.MissingSignals,
+        slices: Sequence[Slice],
+        *,
+        mapped: bool,
+    ) -> None:
+        self.name, self._demand, self._scopes = name, demand, tuple(scopes)
+        self._slices = tuple(slices)
+        self._missing = missing
+        self._mapped, self._unmapped = mapped, False
+        self._looks, self._names = mapped or bool(self._missing), set[str]()
+        self._running, self._began, self._found, self._forced = False, False, False, False
+
+    @property
+    def due_us(self) -> int:
+        """Until when `advance` has nothing to say."""
+        return self._demand.due_us
+
+    def take(self, record: Record, decoded: Decoded) -> TrafficFinding | None:
+        """Return how a frame breaks it."""
+        if self._slices:
+            decoded = _with_slices(record, decoded, self._slices)
+        if self._looks:
+            self._look(record, decoded)
+        # without a scope nothing is asked once it runs: a third of the time of a rule
+        if (self._scopes or not self._running) and not self._in_force(record, decoded):
+            return None
+        text = self._demand.judge(record, decoded)
+        if not text:
+            return None
+        self._found = True
+        return TrafficFinding(record.at_us, self.name, text, record)
+
+    def advance(self, now_us: int) -> list[TrafficFinding]:
+        """Return what had not come in time before a frame of this time; listening goes on."""
+        if now_us <= self.due_us:
+            return []
+        self._found = True
+        return [
+            TrafficFinding(fault.at_us, self.name, fault.text, fault.record)
+            for fault in self._demand.expire()
+        ]
+
+    def end(self, end_us: int) -> list[TrafficFinding]:
+        """Return what is missing at a time; nothing is changed by it."""
+        texts = list(self._demand.end(end_us, self._running or not self._began))
+        if not (texts or self._found):
+            texts = [f"no signal {path} came{self._near(path)}" for path in self._missing.paths]
+            texts += [f"no frame with {word} came" for word in self._missing.words]
+        hint = "" if self._demand.came or not self._unmapped else _NO_MAPPING
+        return [TrafficFinding(end_us, self.name, text + hint) for text in texts]
+
+    def unjudged(self, evidence: CheckedTraffic) -> str:
+        """Say why it has judged nothing; empty if it has."""
+        if not self._forced:
+            return f"it was never in force: {' '.join(scope.text for scope in self._scopes)}"
+        if self._demand.timed and evidence.untimed:
+            return ONE_TIME
+        if self._demand.judged:
+            return ""
+        hint = "" if self._demand.came or not self._unmapped else _NO_MAPPING
+        return self._demand.doubt + hint
+
+    def _in_force(self, record: Record, decoded: Decoded) -> bool:
+        self._began = True
+        held = [scope.holds(record, decoded) for scope in self._scopes]  # each must see it
+        running = all(held)
+        if running != self._running:
+            self._running = running
+            if running:
+                self._forced = True
+                self._demand.begin(record.at_us)
+            else:
+                self._demand.pause()
+        return running
+
+    def _look(self, record: Record, decoded: Decoded) -> None:
+        """See which signals come, until all have, and whether PDOs come that nobody mapped."""
+        if self._mapped and decoded.kind == _UNMAPPED:
+            self._unmapped = True
+        self._missing.take(record, decoded)
+        self._looks = bool(self._missing) or (self._mapped and not self._unmapped)
+        if len(self._names) < _MOST_NAMES:
+            self._names.update(signal.name for signal in decoded.signals)
+
+    def _near(self, path: str) -> str:
+        _, name, _ = filter_terms.signal_place(path)
+        near = closest(name, [*filter_terms.KINDS, *sorted(self._names)])
+        return f"; did you mean {near[0]}?" if near and near[0] != name else ""
+
 
 # Times, tolerances and sets of values, as rules have them.
 
@@ -129,7 +368,7 @@ _UNITS: Final = ("s", "ms", "us", "%")
 _COUNT: Final = re.compile(r"[0-9]{1,9}")
 
 
-class QuantityParser(expression_rule.SliceParser):
+class QuantityParser(SliceParser):
     """Takes quantities from the words of a rule.
 
     Args:
@@ -194,13 +433,13 @@ class QuantityParser(expression_rule.SliceParser):
             raise self._error("the time before '..' is above the one behind it")
         return low_us, high_us
 
-    def _values(self) -> Values:
+    def _values(self) -> demands.Values:
         """Take what is right: `{1, 8130h, 5..9, stopped}`, or `1..5` alone."""
         begin = self._next.column - 1
         parts = [self._value()] if not self._take("{") else self._members()
         text = self._text[begin : self._next.column - 1].strip()
         try:
-            return Values(text, _values_of(parts))
+            return demands.Values(text, _values_of(parts))
         except ValueError as error:
             raise self._error(str(error)) from None
 
@@ -273,15 +512,15 @@ DEMANDS: Final = (
     *("never", "always", "once", "at most", "at least", "in", "every", "within", "to"),
     *("answered", "dlc", "toggle", "counts", "steps", "changes"),
 )
-_SCOPE: Final[dict[str, Callable[[RuleEvent], expression_rule.RuleScope]]] = {
-    "after": expression_rule.After,
-    "before": expression_rule.Before,
-    "while": expression_rule.While,
+_SCOPE: Final[dict[str, Callable[[demands.RuleEvent], RuleScope]]] = {
+    "after": After,
+    "before": Before,
+    "while": While,
 }
-_PLAIN: Final[dict[str, Callable[[RuleEvent], RuleDemand]]] = {
-    "once": lambda event: Count(event, 1, 1),
-    "dlc": Dlc,
-    "toggle": Toggle,
+_PLAIN: Final[dict[str, Callable[[demands.RuleEvent], demands.RuleDemand]]] = {
+    "once": lambda event: demands.Count(event, 1, 1),
+    "dlc": demands.Dlc,
+    "toggle": demands.Toggle,
 }
 BEHIND: Final = {
     "after": "the demand, as tpdo1 of 3 within 2ms after sync",
@@ -291,7 +530,13 @@ BEHIND: Final = {
 }
 """Words that are no demand, and what they stand behind."""
 
-_EACH_NODE: Final = (Every, FirstWithin, Latency, Count, Rate)
+_EACH_NODE: Final = (
+    demands.Every,
+    demands.FirstWithin,
+    demands.Latency,
+    demands.Count,
+    demands.Rate,
+)
 """Demands that are made of each node where several are named; the others tell them apart."""
 
 _NODES: Final = re.compile(r"\b(of|node)(\s+)([0-9]{1,3}-[0-9]{1,3})(?![\w.])")
@@ -308,7 +553,7 @@ class _RuleParser(QuantityParser):
 
     def rule(
         self,
-    ) -> tuple[RuleDemand, list[expression_rule.RuleScope], set[str], list[expression_rule.Slice]]:
+    ) -> tuple[demands.RuleDemand, list[RuleScope], set[str], list[Slice]]:
         """Return demand, scopes, signals and slices that are named; RuleError if it is no rule."""
         self._named: set[str] = set()
         demand = self._demand(self._subject())
@@ -321,14 +566,14 @@ class _RuleParser(QuantityParser):
             )
         return demand, scopes, self._named, list(self._slices.items())
 
-    def _subject(self) -> RuleEvent:
+    def _subject(self) -> demands.RuleEvent:
         if self._next.text != "dlc" or self._tokens[1].text in filter_terms.COMPARISONS:
             return self._event()
         if self._tokens[1].text != "of":
-            return EVERY
+            return demands.EVERY
         del self._tokens[1]
         nodes = self._nodes_behind()
-        return RuleEvent(EVERY.text, lambda record, decoded: decoded.node in nodes)
+        return demands.RuleEvent(demands.EVERY.text, lambda record, decoded: decoded.node in nodes)
 
     def _nodes_behind(self) -> range:
         """Take node-IDs that stand behind the next token."""
@@ -337,7 +582,7 @@ class _RuleParser(QuantityParser):
         self._tokens.insert(0, word)
         return nodes
 
-    def _event(self) -> RuleEvent:
+    def _event(self) -> demands.RuleEvent:
         """Take a filter, as far as it goes."""
         tokens, signals, nodes = list(self._tokens), self._signals, self._nodes
         self._signals, self._nodes = set(), set()
@@ -353,26 +598,26 @@ class _RuleParser(QuantityParser):
         is_signal = any(path == name or path.endswith(f".{name}") for path in paths)
         if self._next.text != "dlc":  # of an error reset, too
             test = errors_alone(test, taken, paths)
-        return RuleEvent(text, test, paths, is_signal, has_node)
+        return demands.RuleEvent(text, test, paths, is_signal, has_node)
 
-    def _condition(self) -> RuleEvent:
+    def _condition(self) -> demands.RuleEvent:
         return self._with_signals(self._event(), "while")
 
-    def _with_signals(self, event: RuleEvent, word: str) -> RuleEvent:
+    def _with_signals(self, event: demands.RuleEvent, word: str) -> demands.RuleEvent:
         if not event.paths:
             reason = f"{word!r} wants a signal or a state, as 3.statusword.fault or node 3 stopped"
             raise self._refuse_word(f"{reason}; {event.text!r} names none")
         return event
 
-    def _demand(self, event: RuleEvent) -> RuleDemand:
+    def _demand(self, event: demands.RuleEvent) -> demands.RuleDemand:
         word = self._take_one("at") or self._take_one(*DEMANDS)
         if word in _PLAIN:
             return _PLAIN[word](event)
         match word:
             case "never":
-                return Truth(event, wanted=False) if event.paths else Never(event)
+                return demands.Truth(event, wanted=False) if event.paths else demands.Never(event)
             case "always":
-                return Truth(self._with_signals(event, word), wanted=True)
+                return demands.Truth(self._with_signals(event, word), wanted=True)
             case "at":
                 return self._count(event)
             case "in" | "steps" | "counts" | "changes":
@@ -380,49 +625,55 @@ class _RuleParser(QuantityParser):
             case _:
                 return self._time_demand(event, word)
 
-    def _time_demand(self, event: RuleEvent, word: str) -> RuleDemand:
+    def _time_demand(self, event: demands.RuleEvent, word: str) -> demands.RuleDemand:
         match word:
             case "every":
-                return Every(event, *self._span())
+                return demands.Every(event, *self._span())
             case "within":
                 most_us = self._time()
                 first = self._event() if self._take("after") else None
-                return Latency(first, event, most_us) if first else FirstWithin(event, most_us)
+                return (
+                    demands.Latency(first, event, most_us)
+                    if first
+                    else demands.FirstWithin(event, most_us)
+                )
             case "to":
                 second = self._event()
-                return Latency(event, second, self._under())
+                return demands.Latency(event, second, self._under())
             case "answered":
-                return Answered(event, self._under())
+                return demands.Answered(event, self._under())
             case _:
                 raise self._error(f"{self._came()} is no demand; {self._allowed()}")
 
-    def _value_demand(self, event: RuleEvent, word: str) -> RuleDemand:
+    def _value_demand(self, event: demands.RuleEvent, word: str) -> demands.RuleDemand:
         if len(event.paths) > 1 or (event.paths and not event.is_signal):
             reason = f"{word!r} is about one signal, as 3.position, or about one kind"
             raise self._refuse_word(reason)
         match word:
             case "in":
-                return In(event, self._values())
+                return demands.In(event, self._values())
             case "steps":
                 self._expect("under")
-                return Steps(event, self._number())
+                return demands.Steps(event, self._number())
             case "changes":
-                return Changes(event, self._under())
+                return demands.Changes(event, self._under())
             case _:
-                return Counts(event)
+                return demands.Counts(event)
 
-    def _count(self, event: RuleEvent) -> RuleDemand:
+    def _count(self, event: demands.RuleEvent) -> demands.RuleDemand:
         word = self._take_one("most", "least")
         if not word:
             raise self._error(f"{self._came()} behind 'at'; wanted most or least")
         count = self._whole()
         if word == "least":
-            return Count(event, count, None)
+            return demands.Count(event, count, None)
         if not self._take("per"):
-            return Count(event, 0, count)
-        if count > MOST_COUNTED:
-            raise self._error(f"at most {count}: at most {MOST_COUNTED} can be counted in a time")
-        return Rate(event, count, self._time())
+            return demands.Count(event, 0, count)
+        if count > demands.MOST_COUNTED:
+            raise self._error(
+                f"at most {count}: at most {demands.MOST_COUNTED} can be counted in a time"
+            )
+        return demands.Rate(event, count, self._time())
 
     def _allowed(self) -> str:
         word = self._next.text
@@ -445,17 +696,17 @@ class Expression:
     name: str
     texts: tuple[str, ...]
 
-    def make(self) -> list[expression_rule.ExpressionRule]:
+    def make(self) -> list[ExpressionRule]:
         """Return new rules that have seen nothing yet."""
         return [_made(self.name, text) for text in self.texts]
 
 
-def _made(name: str, text: str) -> expression_rule.ExpressionRule:
+def _made(name: str, text: str) -> ExpressionRule:
     parser = _RuleParser(text)
     demand, scopes, paths, slices = parser.rule()
     mapped = "pdo" in text or any("." in path for path in paths)
     missing = filter_terms.MissingSignals(paths, parser.words)
-    return expression_rule.ExpressionRule(name, demand, scopes, missing, slices, mapped=mapped)
+    return ExpressionRule(name, demand, scopes, missing, slices, mapped=mapped)
 
 
 def parse_rule(text: str, name: str = "") -> Expression:

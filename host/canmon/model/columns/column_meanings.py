@@ -11,10 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from tickrig.host.canmon.model.columns.columns import Columns, Ints, by_channel, records, select
-from tickrig.host.canmon.model.decode.bus_decoder import BusDecoder, Effect, Route
 from tickrig.host.canmon.model.decode.dbc_file import DbcFile, signal_of
 from tickrig.host.canmon.model.decode.decoded import Decoded
-from tickrig.host.canmon.model.decode.decoder import Decoder
+from tickrig.host.canmon.model.decode.decoder import BusDecoder, Decoder, Effect, Route
 from tickrig.host.canmon.model.decode.node_board import NodeBoard
 from tickrig.host.canmon.model.decode.pdos import Field, PdoDecoder
 from tickrig.host.canmon.model.frames import ERROR, EXTENDED, REMOTE, Record, decoded_text

@@ -19,10 +19,9 @@ import numpy.typing as npt
 from tickrig.host.canmon.model.columns.columns import ChannelNames, Columns, Rows
 from tickrig.host.canmon.model.frames import EXTENDED, REMOTE, Record
 from tickrig.host.canmon.model.logs import can_log, log_file, log_reader
-from tickrig.host.canmon.model.logs.log_file import END_S
+from tickrig.host.canmon.model.logs.log_file import END_S, LogTally
 from tickrig.host.canmon.model.logs.log_reader import BLOCK_BYTES as PIECE
 from tickrig.host.canmon.model.logs.log_reader import HEAD, ScreenClock
-from tickrig.host.canmon.model.logs.mark import LogTally
 from tickrig.wire.can import EXTENDED_MAX, MAX_DATA_BYTES, STANDARD_MAX
 
 # Objects of a BLF log, a container at a time; needs numpy.

@@ -2,23 +2,357 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from enum import IntEnum
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
-from typing import Final, Protocol
+from typing import TYPE_CHECKING, Final, Protocol
 
-from tickrig.host.canmon.model.decode.bus_decoder import BusDecoder
+from tickrig.host.canmon.model.decode import node_memory, services
 from tickrig.host.canmon.model.decode.dbc_file import DbcFile
-from tickrig.host.canmon.model.decode.decoded import Decoded, Transfer
-from tickrig.host.canmon.model.decode.node_memory import EdsObjects, NodeMemory, read_eds_objects
+from tickrig.host.canmon.model.decode.decoded import (
+    Decoded,
+    Signal,
+    Transfer,
+    TransferOutcome,
+    write_entry,
+)
+from tickrig.host.canmon.model.decode.object_text import ObjectText
+from tickrig.host.canmon.model.decode.pdos import (
+    PDO_OBJECTS,
+    NodePdo,
+    PdoDecoder,
+    PdoTable,
+    pdos_of,
+)
 from tickrig.host.canmon.model.decode.services import decode_error
-from tickrig.host.canmon.model.frames import Record
-from tickrig.wire.can import ErrorFrame, FdFrame
+from tickrig.host.canmon.model.frames import Record, sender_of
+from tickrig.wire.can import CanFrame, ErrorFrame, FdFrame
+from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.lss import LSS_MASTER_COB_ID, LSS_SLAVE_COB_ID
+from tickrig.wire.canopen.nmt import CAN_ID_MASK, EXTENDED, INVALID, NMT_COB_ID
+from tickrig.wire.canopen.sdo_frame import REQUEST_COB_ID
+
+if TYPE_CHECKING:
+    from tickrig.host.canmon.model.decode.sdo import SdoChannel, SdoStep
+
+
+# One bus decoded: what each CAN-ID means, by the standard and by what was seen.
+
+
+# Theory of operation
+# ===================
+#
+# What a CAN-ID means is said by three voices, the later ones louder: the pre-defined
+# connection set, an EDS of the node, and SDO traffic that was heard. The decoder never asks
+# a node; it learns, and may learn in the middle of a log that it was wrong until then.
+# Nothing is decoded again: a frame means what was known when it came.
+#
+# `_routes` is a cache: by CAN-ID the function that decodes its frames. `_route` fills it,
+# in this order:
+#
+# 1. `_configured`    COB-IDs of SYNC, TIME, EMCY and additional SDO servers that were told
+# 2. NMT, SYNC, TIME, LSS
+# 3. `PdoTable`       PDOs whose CAN-ID and content are told; who sends goes before who receives
+# 4. 080h, 580h, 600h, 700h + node-ID, by the pre-defined connection set
+# 5. 181h to 57Fh with a node-ID: a PDO that nobody described (`unmapped`); all else is `raw`
+#
+# Whatever may change an answer of `_route` must take the CAN-ID out of the cache and add to
+# `changes`: `_refresh` does it for PDOs, `_configure` for the others. `changes` is how
+# `ColumnNodes` notices that it has to go on frame by frame.
+#
+# What is learnt, and where it takes effect:
+#
+# - a transfer that ended well (`_learn`): values of the communication area go into
+#   `NodeMemory`; 1400h to 1BFFh read the PDO anew, COB-ID objects are learnt, and whether a
+#   node is a drive changes the names of its objects, so all its known PDOs are read anew;
+# - a boot-up: the node has its power-on values again, unless it stored others (1010h);
+# - a guarding request (700h + node-ID, RTR): the next frame on this CAN-ID is an answer
+#   with a toggle bit and no heartbeat. Without a request a set bit 7 alone tells it.
+#
+# `effect` must stay true to all of this: it says of which frames a block-wise reader may
+# leave some out. A new way to learn from a frame needs its line there, or `canmon nodes` of
+# a log shows something else than the same log frame by frame (test_column_nodes.py compares
+# the two).
+#
+# SDO channels are one for each server and request CAN-ID (sdo.py); imports of rare decoders
+# stand in functions because `canmon check` of three lines has to start quickly
+# (tests/test_start_up.py).
+
+Route = Callable[[int, CanFrame], Decoded]
+"""Decodes the frames of a CAN-ID, each with its time."""
+
+_SYNC_ID: Final = 0x080
+_TIME_ID: Final = 0x100
+_PDO_IDS: Final = range(0x181, 0x580)
+_NODE_MASK: Final = 0x7F
+COB_ID_SYNC, COB_ID_TIME, COB_ID_EMCY = 0x1005, 0x1012, 0x1014
+_SDO_SERVERS: Final = range(0x1201, 0x1280)
+_LSS_IDS: Final = (LSS_MASTER_COB_ID, LSS_SLAVE_COB_ID)
+_PRE_DEFINED: Final[dict[int, Route]] = {
+    NMT_COB_ID: services.decode_nmt,
+    _SYNC_ID: services.decode_sync,
+    _TIME_ID: services.decode_time,
+}
+
+
+class Effect(IntEnum):
+    """Which frames with a CAN-ID can change what is known of nodes."""
+
+    NONE = 0
+    LATEST = 1
+    """The latest of each length, until one of `EACH` comes or a boot-up: a TPDO."""
+    ALONE = 2
+    """Each, but it changes nothing that a PDO does, unless it is a boot-up: error control, EMCY."""
+    EACH = 3
+
+
+class BusDecoder:
+    """Decodes the frames of one bus, in the order in which they were heard.
+
+    Which CAN-ID is what, the pre-defined connection set says, until an EDS or SDO traffic
+    says otherwise (1005h, 1012h, 1014h, 1201h.., 1400h.. to 1A00h..).
+
+    Args:
+        eds: what files say, by node-ID.
+
+    Attributes:
+        changes: how often what a CAN-ID means may have changed.
+    """
+
+    def __init__(self, eds: Mapping[int, node_memory.EdsObjects]) -> None:
+        self._eds, self.changes = eds, 0
+        self._memories: dict[int, node_memory.NodeMemory] = {}
+        self._channels: dict[tuple[int, int], SdoChannel] = {}
+        self._guarded: set[int] = set()
+        self._pdos = PdoTable()
+        self._configured: dict[int, Route] = {}
+        self._routes: dict[int, Route] = {}
+        for node, objects in eds.items():
+            self._refresh(pdos_of(node, (index for index, _ in objects.values)))
+            for index in (COB_ID_SYNC, COB_ID_TIME, COB_ID_EMCY, *_SDO_SERVERS):
+                self._learn_cob_ids(node, index)
+
+    def take(self, at_us: int, frame: CanFrame) -> Decoded:
+        """Decode a frame with an 11-bit identifier."""
+        route = self._routes.get(frame.can_id)
+        if route is None:
+            route = self._routes[frame.can_id] = self._route(frame.can_id)
+        return route(at_us, frame)
+
+    def effect(self, can_id: int) -> Effect:
+        """Say which frames with a CAN-ID can change what is known of nodes, as it is used now."""
+        route = self._routes.get(can_id) or self._route(can_id)
+        if isinstance(route, partial):
+            if route.func is _unmapped:
+                return Effect.NONE if sender_of(can_id) is None else Effect.LATEST
+            alone = route.func in (self._error_control, _emcy)
+            return Effect.ALONE if alone else Effect.EACH
+        layout = getattr(route, "__self__", None)
+        # A TPDO shows at most its latest values; an RPDO changes nothing that is known of
+        # its node.
+        if isinstance(layout, PdoDecoder):
+            return Effect.LATEST if layout.kind.startswith("tpdo") else Effect.NONE
+        return Effect.NONE if layout is None and route is not services.decode_nmt else Effect.EACH
+
+    def lasting(self, can_id: int) -> Route | None:
+        """Return what decodes a CAN-ID by the frame alone until `changes` grows; None for others.
+
+        Others are error control, SDO and multiplexed PDOs: there it counts what came before.
+        """
+        route = self._routes.get(can_id) or self._route(can_id)
+        told = route.func if isinstance(route, partial) else route
+        by_frame = told in (
+            _unmapped,
+            _emcy,
+            _raw,
+            services.decode_nmt,
+            services.decode_sync,
+            services.decode_time,
+        )
+        alone = by_frame or (can_id in _LSS_IDS and told is _lss_route())
+        return route if alone or isinstance(getattr(route, "__self__", None), PdoDecoder) else None
+
+    def pending(self, now_us: int) -> tuple[Transfer, ...]:
+        """Return the SDO transfers that run."""
+        found = (channel.pending(now_us) for channel in self._channels.values())
+        return tuple(self._named(transfer) for transfer in found if transfer)
+
+    def memory(self, node: int) -> node_memory.NodeMemory:
+        """Return what is known of a node."""
+        memory = self._memories.get(node)
+        if memory is None:
+            memory = self._memories[node] = node_memory.NodeMemory(self._eds.get(node))
+        return memory
+
+    def _route(self, can_id: int) -> Route:
+        told = self._configured.get(can_id) or _PRE_DEFINED.get(can_id)
+        if told is not None:
+            return told
+        if can_id in _LSS_IDS:
+            return _lss_route()
+        layout = self._pdos.layout(can_id)
+        if layout is not None:
+            return layout.decode
+        node = can_id & _NODE_MASK
+        return self._node_route(node, can_id) if node else _raw
+
+    def _node_route(self, node: int, can_id: int) -> Route:
+        """Return what the pre-defined connection set says of a CAN-ID with a node-ID in it."""
+        match can_id - node:
+            case 0x080:
+                return partial(_emcy, node)
+            case 0x580 | 0x600:
+                return self._sdo_route(node, can_id, REQUEST_COB_ID + node)
+            case 0x700:
+                return partial(self._error_control, node)
+            case _:
+                return partial(_unmapped, node) if can_id in _PDO_IDS else _raw
+
+    def _sdo_route(self, node: int, can_id: int, request_id: int) -> Route:
+        from tickrig.host.canmon.model.decode.sdo import SdoChannel  # noqa: PLC0415 - not on every bus
+
+        channel = self._channels.setdefault((node, request_id), SdoChannel(node))
+        take = channel.request if can_id == request_id else channel.response
+        return partial(self._sdo, node, take)
+
+    def _error_control(self, node: int, at_us: int, frame: CanFrame) -> Decoded:
+        # A node with a producer heartbeat time answers no guarding (CiA 301, error
+        # control).
+        guarded = node in self._guarded and not self.memory(node).number(
+            *node_memory.HEARTBEAT_TIME
+        )
+        decoded = services.decode_error_control(node, frame, guarded=guarded)
+        if frame.remote:
+            self._guarded.add(node)
+        else:
+            self._guarded.discard(node)
+        if decoded.kind == "boot-up" and self.memory(node).boot():
+            indices = self.memory(node).indices
+            self._refresh({*self._pdos.known(node), *pdos_of(node, indices)})
+        return decoded
+
+    def _sdo(
+        self, node: int, take: Callable[[int, bytes], SdoStep], at_us: int, frame: CanFrame
+    ) -> Decoded:
+        if frame.remote:
+            return Decoded("sdo", node, "remote frame")
+        step = take(at_us, frame.data)
+        if not step.ended:
+            return Decoded("sdo", node, step.text, (), "", step.entry, asks=step.asks)
+        for transfer in step.ended:
+            self._learn(transfer)
+        ended = tuple(self._named(transfer) for transfer in step.ended)
+        last = ended[-1]
+        signals, source = _signals(last), last.source
+        return Decoded("sdo", node, None, signals, source, step.entry, ended, step.asks)
+
+    def _named(self, transfer: Transfer) -> Transfer:
+        """Return it with name and value of its object."""
+        entry = transfer.entry
+        text = ObjectText() if entry is None else self.memory(transfer.node).describe(*entry)
+        data, sized = transfer.data, transfer.sized
+        value, written = (None, "") if data is None else text.read(data, sized=sized)
+        named = replace(transfer, name=text.name, value=value, text=written)
+        length = "" if data is None else _odd_length(text.kind, data, sized=sized)
+        return replace(named, length=length, unit=text.unit, source=text.source)
+
+    def _learn(self, transfer: Transfer) -> None:
+        """Take a transferred value as evidence."""
+        memory = self.memory(transfer.node)
+        was_drive, entry = memory.is_drive, transfer.entry
+        if not memory.learn(transfer) or entry is None:
+            return
+        if entry[0] in PDO_OBJECTS:
+            self._refresh(pdos_of(transfer.node, (entry[0],)))
+        if memory.is_drive != was_drive or entry == node_memory.DEVICE_TYPE:
+            self._refresh(self._pdos.known(transfer.node))
+        self._learn_cob_ids(transfer.node, entry[0])
+
+    def _refresh(self, pdos: Iterable[NodePdo]) -> None:
+        """Read again what is known of some PDOs."""
+        for pdo in pdos:
+            self.changes += 1
+            for can_id in self._pdos.update(pdo, self.memory(pdo.node)):
+                self._routes.pop(can_id, None)
+
+    def _learn_cob_ids(self, node: int, index: int) -> None:
+        """Learn a CAN-ID that is not that of the pre-defined connection set."""
+        if index in _SDO_SERVERS:
+            request, response = (self._configured_id(node, index, sub) for sub in (1, 2))
+            if request is not None and response is not None:
+                self._configure(request, self._sdo_route(node, request, request))
+                self._configure(response, self._sdo_route(node, response, request))
+            return
+        can_id = self._configured_id(node, index, 0)
+        if can_id is None:
+            return
+        match index:
+            case 0x1005:
+                self._configure(can_id, services.decode_sync)
+            case 0x1012:
+                self._configure(can_id, services.decode_time)
+            case 0x1014:
+                self._configure(can_id, partial(_emcy, node))
+
+    def _configured_id(self, node: int, index: int, sub: int) -> int | None:
+        cob_id = self.memory(node).number(index, sub)
+        # 1005h and 1012h: bits 31 and 30 say who consumes and produces, not that the object
+        # is off.
+        flags = EXTENDED if index in (COB_ID_SYNC, COB_ID_TIME) else EXTENDED | INVALID
+        return None if cob_id is None or cob_id & flags else cob_id & CAN_ID_MASK
+
+    def _configure(self, can_id: int, route: Route) -> None:
+        self.changes += 1
+        self._configured[can_id] = route
+        self._routes.pop(can_id, None)
+
+
+def _odd_length(kind: DataType | None, data: bytes, *, sized: bool) -> str:
+    """Say that a number of bytes was not told, or is not that of the type."""
+    if not sized:
+        return "" if kind is not None and kind.size == len(data) else "size not told"
+    if kind is None or not kind.size or kind.size == len(data):
+        return ""
+    return f"{len(data)} B where {kind.name} has {kind.size}"
+
+
+def _signals(transfer: Transfer) -> tuple[Signal, ...]:
+    told = (
+        transfer.outcome is TransferOutcome.DONE
+        and not transfer.flaws
+        and transfer.entry is not None
+    )
+    if not told or transfer.value is None:
+        return ()
+    name = transfer.name or write_entry(transfer.entry)
+    return (Signal(name, transfer.value, transfer.unit, transfer.text),)
+
+
+def _lss_route() -> Route:
+    from tickrig.host.canmon.model.decode.services import decode_lss  # noqa: PLC0415 - on few buses
+
+    return decode_lss
+
+
+def _emcy(node: int, at_us: int, frame: CanFrame) -> Decoded:
+    return services.decode_emcy(node, frame)
+
+
+def _unmapped(node: int, at_us: int, frame: CanFrame) -> Decoded:
+    return Decoded("unmapped", node, "RTR" if frame.remote else "no mapping was heard")
+
+
+def _raw(at_us: int, frame: CanFrame) -> Decoded:
+    return Decoded("raw")
+
 
 FD: Final = Decoded("fd", None, "no CANopen service")
 """CANopen is spoken in classic frames (CiA 301, 5.3); CANopen FD is another protocol."""
 
-_NO_EDS: Final[Mapping[int, Path | EdsObjects]] = MappingProxyType({})
+_NO_EDS: Final[Mapping[int, Path | node_memory.EdsObjects]] = MappingProxyType({})
 
 
 class FrameDecoder(Protocol):
@@ -47,12 +381,12 @@ class Decoder:
 
     def __init__(
         self,
-        eds: Mapping[int, Path | EdsObjects] = _NO_EDS,
+        eds: Mapping[int, Path | node_memory.EdsObjects] = _NO_EDS,
         dbc: Sequence[Path] = (),
         first: Sequence[FrameDecoder] = (),
     ) -> None:
         self._eds = {
-            node: read_eds_objects(item, node) if isinstance(item, Path) else item
+            node: node_memory.read_eds_objects(item, node) if isinstance(item, Path) else item
             for node, item in eds.items()
         }
         self.first: tuple[FrameDecoder, ...] = (*first, *map(DbcFile, dbc))
@@ -85,7 +419,7 @@ class Decoder:
         """Return the SDO transfers that run, as they would end now."""
         return tuple(item for bus in self._buses.values() for item in bus.pending(now_us))
 
-    def memory(self, channel: str, node: int) -> NodeMemory:
+    def memory(self, channel: str, node: int) -> node_memory.NodeMemory:
         """Return what is known of a node."""
         return self.bus(channel).memory(node)
 

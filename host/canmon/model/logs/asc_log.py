@@ -1,6 +1,6 @@
 """Vector's ASC logs: whatever header they have, with absolute and with relative times.
 
->>> lines, tally = _AscLines(), mark.LogTally()
+>>> lines, tally = _AscLines(), log_file.LogTally()
 >>> for line in ("base hex  timestamps relative", " 0.100000 1  705  Rx d 1 7F", " 0.1 1  705  Rx d 1 05"):
 ...     record = lines.read(line, tally)
 >>> record.at_us, record.channel, str(record.frame)
@@ -14,7 +14,7 @@ from datetime import UTC, datetime
 from typing import Final
 
 from tickrig.host.canmon.model.frames import AnyFrame, Record
-from tickrig.host.canmon.model.logs import mark
+from tickrig.host.canmon.model.logs import log_file
 from tickrig.host.canmon.model.logs.log_reader import LineLogReader, bus_name
 from tickrig.wire import can
 from tickrig.wire.errors import WireError
@@ -96,7 +96,7 @@ class _AscLines:
         self._header_us, self._block_us, self._pending = 0, 0, False
         self._now_us = 0
 
-    def read(self, line: str, tally: mark.LogTally) -> Record | str | None:
+    def read(self, line: str, tally: log_file.LogTally) -> Record | str | None:
         """Return a frame, what the line is instead, or None for a bad line."""
         timed = _TIMED.fullmatch(line)
         if timed is None:
@@ -107,12 +107,12 @@ class _AscLines:
         try:
             return self._event(event, tally)
         except WireError:
-            tally.passed_over[mark.BAD_FRAMES] += 1
-            return mark.BAD_FRAMES
+            tally.passed_over[log_file.BAD_FRAMES] += 1
+            return log_file.BAD_FRAMES
         except (ValueError, LookupError):
             return None
 
-    def _head(self, text: str, tally: mark.LogTally) -> str:
+    def _head(self, text: str, tally: log_file.LogTally) -> str:
         """Take a line without a time: what it says of those that follow."""
         if base := _BASE.match(text):
             self._base, self._guessed = 10 if base[1].lower() == "dec" else 16, False
@@ -145,7 +145,7 @@ class _AscLines:
                 self._block_us = self._header_us
         self._now_us = self._block_us + span_us
 
-    def _event(self, event: str, tally: mark.LogTally) -> Record | str | None:
+    def _event(self, event: str, tally: log_file.LogTally) -> Record | str | None:
         if classic := _CLASSIC.fullmatch(event):
             channel, ident, extended, direction, kind, length, rest = classic.groups()
             frame = self._classic(ident, bool(extended), kind.lower() == "r", length, rest)
@@ -157,13 +157,13 @@ class _AscLines:
             fd = kind.upper() == "CANFD"
             frame_or_none = (self._fd if fd else self._xl)(words.split())
             if frame_or_none is None:
-                tally.passed_over[mark.CAN_XL] += 1
-                return mark.CAN_XL
+                tally.passed_over[log_file.CAN_XL] += 1
+                return log_file.CAN_XL
             return self._record(channel, direction, frame_or_none)
         if _FRAME.match(event):
             return None
         if not _QUIET_EVENT.match(event):
-            tally.passed_over[mark.OTHER_LINES] += 1
+            tally.passed_over[log_file.OTHER_LINES] += 1
             _note_errors(event, tally)
         return event
 
@@ -235,12 +235,12 @@ class _AscLines:
         return can.CanFrame(can_id, data, False, extended).checked()
 
 
-def _note_errors(event: str, tally: mark.LogTally) -> None:
+def _note_errors(event: str, tally: log_file.LogTally) -> None:
     """Note what an event says of errors: no frame shows them."""
     if state := _STATE.match(event):
         tally.errors_told[_STATES[state[1].lower()]] += 1
     elif _STATISTIC.match(event):
-        tally.errors_told[mark.ERRORS_COUNTED] += 1
+        tally.errors_told[log_file.ERRORS_COUNTED] += 1
 
 
 def _date_us(text: str) -> int | None:

@@ -25,8 +25,7 @@ from can.util import channel2int, len2dlc
 
 from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.logs import log_file
-from tickrig.host.canmon.model.logs.log_writer import BusNumbers, TextBlock
-from tickrig.host.canmon.model.logs.mark import (
+from tickrig.host.canmon.model.logs.log_file import (
     BAD_FRAMES,
     COUNTERS_TOLD,
     ERRORS_COUNTED,
@@ -35,6 +34,7 @@ from tickrig.host.canmon.model.logs.mark import (
     LogTally,
     Mark,
 )
+from tickrig.host.canmon.model.logs.log_writer import BusNumbers, TextBlock
 from tickrig.host.canmon.model.logs.notation import LONGEST_NAME, UNNAMED
 from tickrig.host.links.can_link import to_error_frame, to_fd_frame, to_frame, to_message
 from tickrig.wire.can import STANDARD_MAX, ErrorClass, ErrorFrame

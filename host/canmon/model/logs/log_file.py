@@ -2,21 +2,268 @@
 
 >>> to_us(1.25), to_us(0)
 (1250000, 0)
+
+>>> dropped(1_500_000, 12).json()
+'{"v":1,"ev":"drop","t":1.5,"n":12,"text":"12 frames were lost"}'
+>>> gone(0, "can0", "can0: Network is down").text
+'can0 is gone: Network is down'
+>>> back(3_250_000, "can0", 3_250_000).text
+'can0 is back after 3.250000 s'
 """
 
 from __future__ import annotations
 
+import re
 import zlib
+from collections import Counter
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 from enum import StrEnum
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, Final, Literal, cast
+from typing import TYPE_CHECKING, Any, BinaryIO, Final, Literal, NamedTuple, cast
 
 from tickrig.host.text.steps import content_lines
+from tickrig.host.text.values import counted
 
 if TYPE_CHECKING:
     from io import BufferedReader
+
+
+# What a log says between its frames: what is missing there, and why it was recorded.
+
+
+DROP: Final = "drop"
+GONE: Final = "gone"
+BACK: Final = "back"
+TRIGGER: Final = "trigger"
+VERSION: Final = 1
+DROP_COUNT: Final = "DROPCOUNT:"
+
+_SAID: Final = re.compile(
+    r"(?P<lost>[0-9]{1,15}) frames were lost|trigger: (?P<trigger>.{1,400})"
+    r"|(?P<gone>\S{1,32}) is gone: (?P<why>.{1,400})"
+    r"|(?P<back>\S{1,32}) is back after (?P<s>[0-9]{1,12})\.(?P<us>[0-9]{6}) s"
+    rf"|{DROP_COUNT} dropped (?P<dropped>[0-9]{{1,15}}) CAN frames? on .{{1,100}}"
+)
+"""What the functions below write, and candump of what its socket dropped; other comments are no
+marks."""
+
+
+class Mark(NamedTuple):
+    """Something else than a frame, at its place among the frames.
+
+    Attributes:
+        at_us: when; by the clock of this machine, where no frame tells it.
+        event: its kind, one of those above.
+        text: one line for people, in ASCII.
+        channel: the bus it is about; empty for all.
+        frames: how many were lost.
+        away_us: for how long the bus was away.
+    """
+
+    at_us: int
+    event: str
+    text: str
+    channel: str = ""
+    frames: int = 0
+    away_us: int = 0
+
+    def json(self) -> str:
+        """Write it as an object; members that say nothing are left out."""
+        import json  # noqa: PLC0415 - seldom wanted
+
+        said: dict[str, object] = {"v": VERSION, "ev": self.event, "t": self.at_us / 1e6}
+        said |= {"ch": self.channel} if self.channel else {}
+        said |= {"n": self.frames} if self.frames else {}
+        said |= {"away": self.away_us / 1e6} if self.away_us else {}
+        return json.dumps(said | {"text": self.text}, separators=(",", ":"))
+
+
+def dropped(at_us: int, frames: int) -> Mark:
+    """Say that frames were lost here."""
+    return Mark(at_us, DROP, f"{frames} frames were lost", frames=frames)
+
+
+def gone(at_us: int, channel: str, why: str) -> Mark:
+    """Say that a bus went away; `why` may begin with its name."""
+    reason = _plain(why.removeprefix(f"{channel}: "))
+    return Mark(at_us, GONE, f"{_plain(channel)} is gone: {reason}", channel)
+
+
+def back(at_us: int, channel: str, away_us: int) -> Mark:
+    """Say that a bus is there again."""
+    away = f"{away_us // 1_000_000}.{away_us % 1_000_000:06d}"
+    return Mark(at_us, BACK, f"{_plain(channel)} is back after {away} s", channel, away_us=away_us)
+
+
+def triggered(at_us: int, why: str) -> Mark:
+    """Say what made somebody record this."""
+    return Mark(at_us, TRIGGER, f"trigger: {_plain(why)}")
+
+
+def lost_frames(comment: str) -> int:
+    """Return how many frames a comment of a log says were lost; 0 for any other.
+
+    >>> lost_frames("# 12 frames were lost"), lost_frames("# a note")
+    (12, 0)
+    >>> lost_frames("DROPCOUNT: dropped 1 CAN frame on 'can0' socket (total drops 1)")
+    1
+    """
+    mark = read_mark(0, comment.removeprefix("#"))
+    return mark.frames if mark else 0
+
+
+def read_mark(at_us: int, text: str) -> Mark | None:
+    """Return the mark that a log has in these words; None for others.
+
+    >>> read_mark(5, "can0 is back after 3.250000 s") == back(5, "can0", 3_250_000)
+    True
+    """
+    said = _SAID.fullmatch(text.strip())
+    if said is None:
+        return None
+    if lost := said["lost"] or said["dropped"]:
+        return dropped(at_us, int(lost))
+    if said["trigger"]:
+        return triggered(at_us, said["trigger"])
+    if said["gone"]:
+        return gone(at_us, said["gone"], said["why"])
+    return back(at_us, said["back"], int(said["s"]) * 1_000_000 + int(said["us"]))
+
+
+def _plain(text: str) -> str:
+    """Return text in one line of ASCII, as all formats can hold it."""
+    return " ".join(text.split()).encode("ascii", "backslashreplace").decode("ascii")
+
+
+# What a log holds beside frames: counted, so that nothing is lost in silence.
+
+_KEPT: Final = 5
+"""Bad lines that are kept; the others are counted."""
+
+_SHOWN: Final = 60
+"""Characters of a bad line that are shown."""
+
+
+BAD_FRAMES: Final = "frames that CAN cannot have"
+CAN_XL: Final = "CAN XL frames"
+SERIAL_LINES: Final = "lines of a serial port"
+ERRORS_COUNTED: Final = "that error frames were counted"
+COUNTERS_TOLD: Final = "that error counters are above 0"
+OTHER_LINES: Final = "lines with other events"
+OTHER_OBJECTS: Final = "objects that are no frames"
+NO_TIME: Final = "frames with what is no time"
+BAD_PACKETS: Final = "packets that are no frames"
+OTHER_PACKETS: Final = "packets of other links"
+_NO_FRAMES: Final = (SERIAL_LINES, OTHER_LINES, OTHER_OBJECTS, OTHER_PACKETS)
+"""What a log may hold beside frames."""
+
+
+_FOREIGN: Final = {
+    "***BUSMASTER": "a log of BUSMASTER",
+    "Microchip Technology": "a log of Microchip's CAN BUS Analyzer",
+    "GVRET-PC Reverse": "a CRTD log",
+    "ID,Data Bytes": "a list of frames without times",
+    "@ TEXT @": "a trace of CARBUS Analyzer",
+}
+"""Words among the first lines of other programs' logs, and whose they are."""
+
+
+@dataclass(slots=True)
+class BadLines:
+    """Lines that are none of their log.
+
+    Attributes:
+        count: how many.
+        first: number and text of the first few.
+    """
+
+    count: int = 0
+    first: list[tuple[int, str]] = field(default_factory=list)
+
+    def add(self, number: int, line: str) -> None:
+        """Count a line."""
+        self.count += 1
+        if len(self.first) < _KEPT:
+            self.first.append((number, line))
+
+    def messages(self, name: str) -> list[str]:
+        """Say it to people, one line each; nothing if there are none."""
+        texts = [line for _, line in self.first]
+        for begin, program in _FOREIGN.items():
+            if any(begin in text for text in texts):
+                hint = "SavvyCAN saves it as GVRET, which is read"
+                return [f"{name}: {program} is not read ({self.count} lines); {hint}"]
+        said = [
+            f"{name}: line {number} is no frame: {line!a:.{_SHOWN}}" for number, line in self.first
+        ]
+        if self.count > len(self.first):
+            said.append(f"{name}: {self.count} lines are no frames; the first {_KEPT} are shown")
+        return said
+
+
+@dataclass(slots=True)
+class LogTally:
+    """What was not returned as a frame.
+
+    Attributes:
+        bad_lines: lines that are none of the log.
+        passed_over: kinds of frames that are not read, as CAN XL, and of what is no
+            frame at all (`_NO_FRAMES`), and how many.
+        lost: frames that the recorder says it lost.
+        untimed: frames that have no time in the log; they got that of the frame before.
+        undated: dates that could not be read; times count from 0 there.
+        shifted_us: what was added to the times of the log.
+        errors_told: what lines and objects that are no frames say of errors on the bus, and how
+            many do.
+        without_errors: why the log has no error frames whatever happened; empty if it may.
+    """
+
+    bad_lines: BadLines = field(default_factory=BadLines)
+    passed_over: Counter[str] = field(default_factory=Counter)
+    lost: int = 0
+    untimed: int = 0
+    undated: int = 0
+    shifted_us: int = 0
+    errors_told: Counter[str] = field(default_factory=Counter)
+    without_errors: str = ""
+
+    @property
+    def unread(self) -> int:
+        """Lines and frames that came and were not returned."""
+        frames = sum(n for what, n in self.passed_over.items() if what not in _NO_FRAMES)
+        return self.bad_lines.count + frames
+
+    def messages(self, name: str) -> list[str]:
+        """Say it to people, one line each; nothing if all was returned."""
+        return self.losses(name) + self.remarks(name)
+
+    def losses(self, name: str) -> list[str]:
+        """Say what was lost or could not be taken."""
+        said = self.bad_lines.messages(name) + self._passed_over(name, no_frames=False)
+        return said + ([f"{name}: its recorder lost {self.lost} frames"] if self.lost else [])
+
+    def remarks(self, name: str) -> list[str]:
+        """Say what else there is to know of the log."""
+        said = [f"{name}: {self.untimed} frames have no time"] if self.untimed else []
+        said += [f"{name}: its date cannot be read: times begin at 0"] if self.undated else []
+        if self.shifted_us:
+            why = "they begin below 0, or their counter overflows"
+            said.append(f"{name}: {self.shifted_us} us were added to its times: {why}")
+        return self._passed_over(name, no_frames=True) + said
+
+    def errors(self, name: str) -> list[str]:
+        """Say what the log tells of errors beside its error frames, one line each."""
+        told = self.errors_told.items()
+        return [f"{name}: it says {text}: {counted(count, 'time')}" for text, count in told]
+
+    def _passed_over(self, name: str, *, no_frames: bool) -> list[str]:
+        return [
+            f"{name}: {count} {what} passed over"
+            for what, count in self.passed_over.items()
+            if count and (what in _NO_FRAMES) is no_frames
+        ]
 
 
 class LogFormat(StrEnum):

@@ -30,7 +30,7 @@ from typing import Final, Protocol
 
 from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.logs import log_file
-from tickrig.host.canmon.model.logs.mark import (
+from tickrig.host.canmon.model.logs.log_file import (
     CAN_XL,
     DROP_COUNT,
     SERIAL_LINES,

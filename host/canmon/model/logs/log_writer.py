@@ -9,15 +9,7 @@ from pathlib import Path
 from typing import Final, Protocol
 
 from tickrig.host.canmon.model.frames import Record
-from tickrig.host.canmon.model.logs import notation
-from tickrig.host.canmon.model.logs.log_file import (
-    COMPRESSED,
-    LogFormat,
-    log_format,
-    open_log,
-    writer_of,
-)
-from tickrig.host.canmon.model.logs.mark import Mark
+from tickrig.host.canmon.model.logs import log_file, notation
 from tickrig.wire.can import CanFrame, ErrorFrame
 
 _BLOCK_LINES: Final = 256
@@ -32,7 +24,7 @@ class LogWriter(Protocol):
     def write(self, record: Record, /) -> None:
         """Add a frame."""
 
-    def mark(self, mark: Mark, /) -> None:
+    def mark(self, mark: log_file.Mark, /) -> None:
         """Add what is no frame, where the format can hold it."""
 
     def flush(self) -> None:
@@ -77,7 +69,10 @@ class TextBlock(Protocol):
 
 def in_blocks(path: Path) -> bool:
     """Say whether a log is compressed, block by block."""
-    return path.suffix.lower() == COMPRESSED or log_format(path) is LogFormat.BLF
+    return (
+        path.suffix.lower() == log_file.COMPRESSED
+        or log_file.log_format(path) is log_file.LogFormat.BLF
+    )
 
 
 def write_log(path: Path) -> LogWriter:
@@ -88,8 +83,8 @@ def write_log(path: Path) -> LogWriter:
         OSError: it cannot be written.
         LogError: its format needs a library that is not there.
     """
-    kind = log_format(path)
-    writer: LogWriter = writer_of(kind)(path, kind)
+    kind = log_file.log_format(path)
+    writer: LogWriter = log_file.writer_of(kind)(path, kind)
     return writer
 
 
@@ -101,25 +96,25 @@ def log_line(record: Record) -> str:
 
 
 _LINES: Final = {
-    LogFormat.CANDUMP: log_line,
-    LogFormat.JSONL: notation.json_line,
-    LogFormat.CSV: notation.csv_row,
+    log_file.LogFormat.CANDUMP: log_line,
+    log_file.LogFormat.JSONL: notation.json_line,
+    log_file.LogFormat.CSV: notation.csv_row,
 }
 
 
-def comment(mark: Mark) -> str:
+def comment(mark: log_file.Mark) -> str:
     """Write a mark as programs pass it over that read candump's logs."""
     return f"# {mark.text}"
 
 
-_MARKS: Final = {LogFormat.CANDUMP: comment, LogFormat.JSONL: Mark.json}
+_MARKS: Final = {log_file.LogFormat.CANDUMP: comment, log_file.LogFormat.JSONL: log_file.Mark.json}
 
 
 class TextLogWriter:
     """A log in lines: candump's, JSON or CSV."""
 
-    def __init__(self, path: Path, kind: LogFormat) -> None:
-        self._file, self._lines = open_log(path, "wb"), list[str]()
+    def __init__(self, path: Path, kind: log_file.LogFormat) -> None:
+        self._file, self._lines = log_file.open_log(path, "wb"), list[str]()
         self._kind = kind
 
     def write(self, record: Record, /) -> None:
@@ -130,13 +125,13 @@ class TextLogWriter:
 
     def write_block(self, block: TextBlock, /) -> bool:
         """Add many frames at once; False where they are to be added one by one."""
-        if self._kind is not LogFormat.CANDUMP:
+        if self._kind is not log_file.LogFormat.CANDUMP:
             return False
         self._give()
         self._file.write(block.log_lines().encode())
         return True
 
-    def mark(self, mark: Mark, /) -> None:
+    def mark(self, mark: log_file.Mark, /) -> None:
         """Add a comment, or an event."""
         self._lines.append(_MARKS[self._kind](mark))
 
@@ -168,7 +163,7 @@ class TextLogWriter:
 class CsvLogWriter(TextLogWriter):
     """Rows below a header; they do not name their bus."""
 
-    def __init__(self, path: Path, kind: LogFormat) -> None:
+    def __init__(self, path: Path, kind: log_file.LogFormat) -> None:
         super().__init__(path, kind)
         self._name, self._channels, self._marks = path.name, dict[str, None](), 0
         self._lines.append(notation.LOG_HEADER)
@@ -178,7 +173,7 @@ class CsvLogWriter(TextLogWriter):
         self._channels[record.channel] = None
         super().write(record)
 
-    def mark(self, mark: Mark, /) -> None:
+    def mark(self, mark: log_file.Mark, /) -> None:
         """Count it: readers of python-can take each row for a frame."""
         self._marks += 1
 
@@ -222,7 +217,7 @@ class BusNumbers:
 class GvretLogWriter(TextLogWriter):
     """Rows as SavvyCAN reads them: data frames of at most 8 bytes, with numbers of buses."""
 
-    def __init__(self, path: Path, kind: LogFormat) -> None:
+    def __init__(self, path: Path, kind: log_file.LogFormat) -> None:
         super().__init__(path, kind)
         self._name, self._numbers, self._left_out = path.name, BusNumbers(), Counter[str]()
         self._lines.append(notation.GVRET_HEADER)
@@ -237,7 +232,7 @@ class GvretLogWriter(TextLogWriter):
             kind = "remote" if isinstance(frame, CanFrame) else "error" if is_error else "CAN FD"
             self._left_out[f"{kind} frames left out"] += 1
 
-    def mark(self, mark: Mark, /) -> None:
+    def mark(self, mark: log_file.Mark, /) -> None:
         """Count it."""
         self._left_out[MARKS] += 1
 

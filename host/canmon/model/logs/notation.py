@@ -14,15 +14,7 @@ from binascii import a2b_base64, b2a_base64
 from typing import Any, Final, Protocol
 
 from tickrig.host.canmon.model.frames import AnyFrame, LineRecord, Record
-from tickrig.host.canmon.model.logs.log_file import to_us
-from tickrig.host.canmon.model.logs.mark import (
-    DROP,
-    SERIAL_LINES,
-    LogTally,
-    Mark,
-    dropped,
-    read_mark,
-)
+from tickrig.host.canmon.model.logs import log_file
 from tickrig.wire import can
 from tickrig.wire.errors import WireError
 
@@ -103,7 +95,7 @@ def drop_line(lost: int) -> str:
     return f'{{"v":{_VERSION},"ev":"drop","n":{lost}}}'
 
 
-def parse_json_line(text: str, tally: LogTally) -> Record | str | None:
+def parse_json_line(text: str, tally: log_file.LogTally) -> Record | str | None:
     """Return a frame, the name of an event, or None for anything else."""
     import json  # noqa: PLC0415 - candump's lines are the usual ones
 
@@ -111,32 +103,34 @@ def parse_json_line(text: str, tally: LogTally) -> Record | str | None:
         said = json.loads(text)
         if "ev" in said:
             return _event(said, tally)
-        return Record(to_us(said["t"]), _name(said["ch"]), _frame(said), said.get("dir") == "tx")
+        return Record(
+            log_file.to_us(said["t"]), _name(said["ch"]), _frame(said), said.get("dir") == "tx"
+        )
     except (ValueError, KeyError, TypeError, OverflowError, RecursionError, WireError):
         return None
 
 
-def parse_json_mark(text: str) -> Mark | None:
+def parse_json_mark(text: str) -> log_file.Mark | None:
     """Return the mark that an event is; its time is 0 where it has none; None for others."""
     import json  # noqa: PLC0415 - candump's lines are the usual ones
 
     try:
         said = json.loads(text)
-        at_us = to_us(said.get("t", 0))
-        if said["ev"] == DROP:
-            return dropped(at_us, int(said["n"])) if int(said["n"]) > 0 else None
-        mark = read_mark(at_us, str(said["text"]))
+        at_us = log_file.to_us(said.get("t", 0))
+        if said["ev"] == log_file.DROP:
+            return log_file.dropped(at_us, int(said["n"])) if int(said["n"]) > 0 else None
+        mark = log_file.read_mark(at_us, str(said["text"]))
         return mark if mark and mark.event == said["ev"] else None
     except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError):
         return None
 
 
-def _event(said: dict[str, Any], tally: LogTally) -> str:
+def _event(said: dict[str, Any], tally: log_file.LogTally) -> str:
     """Take an event; one that is not known says nothing to us."""
-    if said["ev"] == DROP:
+    if said["ev"] == log_file.DROP:
         tally.lost += max(0, int(said["n"]))
     elif said["ev"] == _LINE_EVENT:
-        tally.passed_over[SERIAL_LINES] += 1
+        tally.passed_over[log_file.SERIAL_LINES] += 1
     return str(said["ev"])
 
 
@@ -248,7 +242,7 @@ def gvret_row(record: Record, bus: int) -> str:
     return f"{head},{len(frame.data)},{cells},"
 
 
-def parse_csv_line(text: str, tally: LogTally, clock: Counting) -> Record | str | None:
+def parse_csv_line(text: str, tally: log_file.LogTally, clock: Counting) -> Record | str | None:
     """Return a frame, the name of a header or of what was counted instead, or None.
 
     What a row is, itself tells: one of python-can, of `canmon dump --csv`, or of SavvyCAN.
@@ -265,7 +259,7 @@ def parse_csv_line(text: str, tally: LogTally, clock: Counting) -> Record | str 
         return None
 
 
-def _of_savvycan(match: re.Match[str], tally: LogTally, clock: Counting) -> Record:
+def _of_savvycan(match: re.Match[str], tally: log_file.LogTally, clock: Counting) -> Record:
     """Return the frame of a row; some programs do not say of a CAN-ID that it has 29 bits."""
     stamp, ident, extended, direction, bus, length, cells = match.groups()
     can_id, size = int(ident, 16), int(length)
@@ -282,12 +276,14 @@ def _of_savvycan(match: re.Match[str], tally: LogTally, clock: Counting) -> Reco
     return Record(at_us, f"can{int(bus)}", checked, (direction or "").lower() == "tx")
 
 
-def _dumped(match: re.Match[str], tally: LogTally) -> Record | str:
+def _dumped(match: re.Match[str], tally: log_file.LogTally) -> Record | str:
     stamp, channel, ident, direction, data = match.groups()
     if not ident:
-        tally.passed_over[SERIAL_LINES] += 1
-        return SERIAL_LINES
-    return Record(to_us(float(stamp)), channel, parse_frame(f"{ident}#{data}"), direction == "tx")
+        tally.passed_over[log_file.SERIAL_LINES] += 1
+        return log_file.SERIAL_LINES
+    return Record(
+        log_file.to_us(float(stamp)), channel, parse_frame(f"{ident}#{data}"), direction == "tx"
+    )
 
 
 def _logged(cells: list[str]) -> Record:
@@ -303,4 +299,4 @@ def _logged(cells: list[str]) -> Record:
         frame = can.FdFrame(can_id, data, extended == "1", flags).checked()
     else:
         frame = can.CanFrame(can_id, data, False, extended == "1").checked()
-    return Record(to_us(float(stamp)), UNNAMED, frame, text.rstrip().endswith(_SENT))
+    return Record(log_file.to_us(float(stamp)), UNNAMED, frame, text.rstrip().endswith(_SENT))

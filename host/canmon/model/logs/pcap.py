@@ -25,19 +25,8 @@ from pathlib import Path
 from typing import BinaryIO, Final, NamedTuple, cast
 
 from tickrig.host.canmon.model.frames import AnyFrame, Record
-from tickrig.host.canmon.model.logs.log_file import END_S, LogError, LogFormat, open_log
+from tickrig.host.canmon.model.logs import log_file
 from tickrig.host.canmon.model.logs.log_reader import Item
-from tickrig.host.canmon.model.logs.mark import (
-    BAD_PACKETS,
-    CAN_XL,
-    DROP,
-    NO_TIME,
-    OTHER_PACKETS,
-    LogTally,
-    Mark,
-    dropped,
-    read_mark,
-)
 from tickrig.host.canmon.model.logs.notation import LONGEST_NAME, UNNAMED
 from tickrig.wire import can
 
@@ -139,7 +128,7 @@ def packet(frame: AnyFrame) -> bytes:
 def _parse_packet(data: bytes) -> AnyFrame | str | None:
     """Return the frame of a packet, `CAN_XL`, or None for what is no frame or was cut."""
     if len(data) < _DATA_AT or data[_LENGTH_AT] & _XL:
-        return None if len(data) < _DATA_AT else CAN_XL
+        return None if len(data) < _DATA_AT else log_file.CAN_XL
     flagged, length, flags = _HEAD.unpack_from(data)
     content = data[_DATA_AT : _DATA_AT + length]
     if flagged & can.ERROR_FLAG:
@@ -169,7 +158,7 @@ _CUT: Final = "it is cut"
 _READ_BYTES: Final = 1 << 16
 _MICROS: Final = 1_000_000
 _USUAL_BYTES: Final = 48
-_END_US: Final = END_S * _MICROS
+_END_US: Final = log_file.END_S * _MICROS
 _END_HIGH: Final = _END_US >> 32
 
 
@@ -209,7 +198,7 @@ class _PcapngReader:
         marks: give marks among the frames, too: a comment of a frame is in front of it.
     """
 
-    def __init__(self, name: str, tally: LogTally, marks: bool = False) -> None:
+    def __init__(self, name: str, tally: log_file.LogTally, marks: bool = False) -> None:
         self._name, self._tally, self._marks = name, tally, marks
         self._order, self._interfaces = "<", list[_Interface]()
         self._usual: _Usual | None = None
@@ -236,7 +225,9 @@ class _PcapngReader:
             yield from records
             more = bool(data) and not self._damage
         if begun:
-            raise LogError(f"{self._name}: {self._damage or _CUT} after {self._blocks} blocks")
+            raise log_file.LogError(
+                f"{self._name}: {self._damage or _CUT} after {self._blocks} blocks"
+            )
 
     def _take(self, data: bytes, records: list[Item]) -> int:
         """Add the frames of the blocks that are whole; return where the next one begins."""
@@ -321,7 +312,7 @@ class _PcapngReader:
             elif kind == STATISTICS:
                 self._comment(options(order, content[12:]), records)
         except struct.error:
-            self._tally.passed_over[BAD_PACKETS] += 1
+            self._tally.passed_over[log_file.BAD_PACKETS] += 1
 
     def _add_interface(self, content: bytes) -> None:
         link_type, _, snap = struct.unpack_from(f"{self._order}HHI", content)
@@ -352,11 +343,11 @@ class _PcapngReader:
     ) -> None:
         """Add the frame of a packet; without a time it has that of the packet before."""
         if number >= len(self._interfaces) or size > len(data):
-            self._tally.passed_over[BAD_PACKETS] += 1
+            self._tally.passed_over[log_file.BAD_PACKETS] += 1
             return
         where = self._interfaces[number]
         if not where.is_can:
-            self._tally.passed_over[OTHER_PACKETS] += 1
+            self._tally.passed_over[log_file.OTHER_PACKETS] += 1
             return
         told = dict(options(self._order, data[size + -size % 4 :]))
         drops = int.from_bytes(
@@ -367,11 +358,11 @@ class _PcapngReader:
         self._drop(drops, records)
         self._comment(options(self._order, data[size + -size % 4 :]), records)
         if self._at_us >= _END_US:
-            self._tally.passed_over[NO_TIME] += 1
+            self._tally.passed_over[log_file.NO_TIME] += 1
             return
         frame = _parse_packet(data[:size])
         if frame is None or isinstance(frame, str):
-            self._tally.passed_over[frame or BAD_PACKETS] += 1
+            self._tally.passed_over[frame or log_file.BAD_PACKETS] += 1
             return
         flags = told.get(_PACKET_FLAGS, b"")
         sent = int.from_bytes(flags, "little" if self._order == "<" else "big") & _DIRECTION
@@ -381,15 +372,15 @@ class _PcapngReader:
         """Count frames that were lost."""
         self._tally.lost += frames
         if frames and self._marks:
-            records.append(dropped(self._at_us, frames))
+            records.append(log_file.dropped(self._at_us, frames))
 
     def _comment(self, given: Iterator[tuple[int, bytes]], records: list[Item]) -> None:
         """Add the marks that comments are; frames that were lost have a number, too."""
         if not self._marks:
             return
         texts = (value.decode("utf-8", "replace") for code, value in given if code == _COMMENT)
-        marks = (read_mark(self._at_us, text) for text in texts)
-        records += [mark for mark in marks if mark and mark.event != DROP]
+        marks = (log_file.read_mark(self._at_us, text) for text in texts)
+        records += [mark for mark in marks if mark and mark.event != log_file.DROP]
 
 
 def _damage_of(size: int, rest: int, block: bytes) -> str:
@@ -424,8 +415,8 @@ _LINK_TYPE_AT: Final = 20
 class PcapReader:
     """A reader of the frames in a capture."""
 
-    def __init__(self, path: Path, kind: LogFormat) -> None:
-        self._path, self.tally = path, LogTally()
+    def __init__(self, path: Path, kind: log_file.LogFormat) -> None:
+        self._path, self.tally = path, log_file.LogTally()
 
     def __iter__(self) -> Iterator[Record]:
         """Read the file."""
@@ -436,14 +427,14 @@ class PcapReader:
         return self._items(marks=True)
 
     def _items(self, *, marks: bool) -> Iterator[Item]:
-        self.tally = LogTally()
+        self.tally = log_file.LogTally()
         try:
-            with open_log(self._path) as file:
+            with log_file.open_log(self._path) as file:
                 yield from self._frames(file, marks)
         except (EOFError, zlib.error, OSError) as error:
             if isinstance(error, OSError) and error.errno is not None:
                 raise
-            raise LogError(f"{self._path}: {error}") from error
+            raise log_file.LogError(f"{self._path}: {error}") from error
 
     def _frames(self, file: BinaryIO, marks: bool) -> Iterator[Item]:
         first = file.read(4)
@@ -452,32 +443,36 @@ class PcapReader:
         elif first in _PCAP:
             yield from self._packets(file, *_PCAP[first])
         else:
-            raise LogError(f"{self._path} is no capture: it begins with {first.hex() or 'nothing'}")
+            raise log_file.LogError(
+                f"{self._path} is no capture: it begins with {first.hex() or 'nothing'}"
+            )
 
     def _packets(self, file: BinaryIO, order: str, parts: int) -> Iterator[Record]:
         """Yield the frames of a pcap file, which names no bus."""
         head = file.read(_HEAD_BYTES - 4)
         if len(head) < _HEAD_BYTES - 4:
-            raise LogError(f"{self._path}: it is cut in its header")
+            raise log_file.LogError(f"{self._path}: it is cut in its header")
         (link_type,) = struct.unpack_from(f"{order}I", head, _LINK_TYPE_AT - 4)
         # Seconds, fraction, bytes that are here, bytes that were on the wire.
         heading, count = struct.Struct(f"{order}4I"), 0
         while begun := file.read(heading.size):
             size = heading.unpack(begun)[2] if len(begun) == heading.size else 0
             if size > _MOST_BYTES:
-                raise LogError(f"{self._path}: a packet of {size} bytes behind {count} packets")
+                raise log_file.LogError(
+                    f"{self._path}: a packet of {size} bytes behind {count} packets"
+                )
             data = file.read(size)
             if len(begun) < heading.size or len(data) < size:
-                raise LogError(f"{self._path}: it is cut after {count} packets")
+                raise log_file.LogError(f"{self._path}: it is cut after {count} packets")
             count += 1
             seconds, fraction, _, _ = heading.unpack(begun)
             # Above 16 bits pcap keeps the length of a frame check sequence.
             if link_type & 0xFFFF != _LINK_TYPE:
-                self.tally.passed_over[OTHER_PACKETS] += 1
+                self.tally.passed_over[log_file.OTHER_PACKETS] += 1
                 continue
             frame = _parse_packet(data)
             if frame is None or isinstance(frame, str):
-                self.tally.passed_over[frame or BAD_PACKETS] += 1
+                self.tally.passed_over[frame or log_file.BAD_PACKETS] += 1
             else:
                 yield Record(seconds * 1_000_000 + fraction // parts, UNNAMED, frame)
 
@@ -504,10 +499,10 @@ class PcapngWriter:
         OSError: the file cannot be written.
     """
 
-    def __init__(self, path: Path, kind: LogFormat) -> None:
-        if kind is LogFormat.PCAP:
-            raise LogError(f"{path}: pcap is read alone; a name in .pcapng is written")
-        self._file, self._blocks = open_log(path, "wb"), list[bytes]()
+    def __init__(self, path: Path, kind: log_file.LogFormat) -> None:
+        if kind is log_file.LogFormat.PCAP:
+            raise log_file.LogError(f"{path}: pcap is read alone; a name in .pcapng is written")
+        self._file, self._blocks = log_file.open_log(path, "wb"), list[bytes]()
         self._interfaces: dict[str, int] = {}
         self._options = self._comments = b""  # of the frame that comes next
         self._at_us = 0
@@ -538,9 +533,9 @@ class PcapngWriter:
         if len(self._blocks) >= _BLOCK_FRAMES:
             self._give()
 
-    def mark(self, mark: Mark, /) -> None:
+    def mark(self, mark: log_file.Mark, /) -> None:
         """Note it at the next frame, frames that were lost as a number too."""
-        if mark.event == DROP:
+        if mark.event == log_file.DROP:
             self._options += _option(_DROP_COUNT, struct.pack("<Q", mark.frames))
         self._comments += _option(_COMMENT, mark.text.encode())
 

@@ -10,9 +10,8 @@ from pathlib import Path
 from typing import BinaryIO
 
 from tickrig.host.canmon.model.frames import Record
-from tickrig.host.canmon.model.logs.log_file import LogError, LogFormat, open_log
-from tickrig.host.canmon.model.logs.mark import SERIAL_LINES, LogTally
-from tickrig.host.canmon.model.logs.mark import Mark as LogMark
+from tickrig.host.canmon.model.logs import log_file
+from tickrig.host.canmon.model.logs.log_file import Mark as LogMark
 from tickrig.host.text import bench_header
 from tickrig.host.text.bench_record import BenchParser, BenchRecord
 from tickrig.host.text.trace import Mark, TraceError
@@ -31,8 +30,8 @@ _MARKS = {True: Mark.TO_DEVICE, False: Mark.FROM_DEVICE}
 class TraceLogWriter:
     """A trace of one bus, as a host sees it: that of the first frame; its times begin with it."""
 
-    def __init__(self, path: Path, kind: LogFormat) -> None:
-        self._file, self._name = open_log(path, "wb"), path.name
+    def __init__(self, path: Path, kind: log_file.LogFormat) -> None:
+        self._file, self._name = log_file.open_log(path, "wb"), path.name
         self._channel, self._began_us, self._latest_us = "", 0, 0
         self._left_out: Counter[str] = Counter()
 
@@ -98,14 +97,14 @@ class TraceLogReader:
     were sent, or first received: what several nodes received of the host is one frame.
     """
 
-    def __init__(self, path: Path, kind: LogFormat) -> None:
-        self._path, self.tally = path, LogTally()
+    def __init__(self, path: Path, kind: log_file.LogFormat) -> None:
+        self._path, self.tally = path, log_file.LogTally()
 
     def __iter__(self) -> Iterator[Record]:
         """Read the file."""
-        self.tally = LogTally(without_errors=_WITHOUT_ERRORS)
+        self.tally = log_file.LogTally(without_errors=_WITHOUT_ERRORS)
         try:
-            with open_log(self._path) as file:
+            with log_file.open_log(self._path) as file:
                 header = bench_header.parse_bench_header(
                     file.readline().decode("ascii").rstrip("\n")
                 )
@@ -114,11 +113,11 @@ class TraceLogReader:
                     if isinstance(record.traffic, CanFrame):
                         yield from passed.take(record, record.traffic)
                     elif record.traffic:
-                        self.tally.passed_over[SERIAL_LINES] += 1
+                        self.tally.passed_over[log_file.SERIAL_LINES] += 1
         except (EOFError, zlib.error, TraceError) as error:
-            raise LogError(f"{self._path}: {error}") from error
+            raise log_file.LogError(f"{self._path}: {error}") from error
         except UnicodeDecodeError:
-            raise LogError(f"{self._path}: it is not ASCII") from None
+            raise log_file.LogError(f"{self._path}: it is not ASCII") from None
 
     def items(self) -> Iterator[Record]:
         """Read the file; it holds no marks."""

@@ -1,6 +1,6 @@
 """PEAK's traces (TRC), of versions 1.0 to 3.0, with their error frames.
 
->>> lines, tally = _TrcLines(), mark.LogTally()
+>>> lines, tally = _TrcLines(), log_file.LogTally()
 >>> lines.read(";$FILEVERSION=1.1", tally)
 ';$FILEVERSION=1.1'
 >>> record = lines.read("     6)      1349.2  Error      0008  4  00 19 08 08", tally)
@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 from tickrig.host.canmon.model.frames import AnyFrame, Record
-from tickrig.host.canmon.model.logs import mark
+from tickrig.host.canmon.model.logs import log_file
 from tickrig.host.canmon.model.logs.log_file import END_S
 from tickrig.host.canmon.model.logs.log_reader import LineLogReader, bus_name
 from tickrig.wire import can
@@ -88,7 +88,7 @@ class _TrcLines:
         self._version, self._start_us = "1.0", 0
         self._columns: Sequence[str] = _VERSIONS["1.0"]
 
-    def read(self, line: str, tally: mark.LogTally) -> Record | str | None:
+    def read(self, line: str, tally: log_file.LogTally) -> Record | str | None:
         """Return a frame, what the line is instead, or None for a bad line.
 
         Raises:
@@ -107,12 +107,12 @@ class _TrcLines:
         try:
             return self._row(number, words, tally)
         except WireError:
-            tally.passed_over[mark.BAD_FRAMES] += 1
-            return mark.BAD_FRAMES
+            tally.passed_over[log_file.BAD_FRAMES] += 1
+            return log_file.BAD_FRAMES
         except (ValueError, LookupError):
             return None
 
-    def _head(self, word: str, value: str, tally: mark.LogTally) -> None:
+    def _head(self, word: str, value: str, tally: log_file.LogTally) -> None:
         """Take what the file says of itself."""
         match word:
             case "FILEVERSION":
@@ -124,10 +124,10 @@ class _TrcLines:
                 tally.undated += start_us is None
                 self._start_us = start_us or 0
 
-    def _row(self, number: str, words: list[str], tally: mark.LogTally) -> Record | str | None:
+    def _row(self, number: str, words: list[str], tally: log_file.LogTally) -> Record | str | None:
         at_us, row = self._at_us(words[0]), self._cells([number, *words])
         kind = row.cells.get("T", "Rx")
-        what = mark.NO_TIME if not 0 <= at_us < END_S * 1_000_000 else _aside(row, kind, tally)
+        what = log_file.NO_TIME if not 0 <= at_us < END_S * 1_000_000 else _aside(row, kind, tally)
         if what:
             tally.passed_over[what] += 1
             return what
@@ -169,19 +169,19 @@ class _TrcLines:
         return _Row(cells, data)
 
 
-def _aside(row: _Row, kind: str, tally: mark.LogTally) -> str:
+def _aside(row: _Row, kind: str, tally: log_file.LogTally) -> str:
     """Say what a line is that is no frame of CAN or CAN FD, and note what it says of errors."""
     if kind == "XL":
-        return mark.CAN_XL
+        return log_file.CAN_XL
     # Version 1.0 has no type; a status has the CAN-ID FFFFFFFFh there.
     if kind in _STATES or row.cells.get("I") == "FFFFFFFF":
         _note_status(row.hex_bytes(), tally)
     elif kind == _COUNTERS:
         if any(row.hex_bytes()):
-            tally.errors_told[mark.COUNTERS_TOLD] += 1
+            tally.errors_told[log_file.COUNTERS_TOLD] += 1
     elif kind != _EVENT:
         return ""
-    return mark.OTHER_LINES
+    return log_file.OTHER_LINES
 
 
 def _start_us(days: str) -> int | None:
@@ -246,7 +246,7 @@ def _error(row: _Row) -> can.ErrorFrame:
     return can.ErrorFrame(int(error_class), bytes(said))
 
 
-def _note_status(status: bytes, tally: mark.LogTally) -> None:
+def _note_status(status: bytes, tally: log_file.LogTally) -> None:
     """Note what a status says of errors; 0 says that all is well."""
     bits = int.from_bytes(status, "big")
     text = next((text for bit, text in _STATUS.items() if bits & bit), None)

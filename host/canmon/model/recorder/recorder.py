@@ -10,19 +10,18 @@ from typing import TYPE_CHECKING, Final, Protocol, cast
 
 from tickrig.host.canmon.model.decode.filter_terms import MissingSignals
 from tickrig.host.canmon.model.frames import Record, decoded_text
-from tickrig.host.canmon.model.logs.log_file import LogError
-from tickrig.host.canmon.model.logs.mark import Mark, dropped, triggered
-from tickrig.host.canmon.model.recorder.files import Files
-from tickrig.host.canmon.model.recorder.plan import (
+from tickrig.host.canmon.model.logs.log_file import LogError, Mark, dropped, triggered
+from tickrig.host.canmon.model.recorder.files import (
     DEFAULT_SPAN,
     MAX_PRE_FRAMES,
+    Files,
     RecordingPlan,
     TriggerSpan,
 )
 from tickrig.host.text.values import counted
 
 if TYPE_CHECKING:
-    from tickrig.host.canmon.model.check.alarms import Alarms
+    from tickrig.host.canmon.model.check.checker import Alarms
     from tickrig.host.canmon.model.decode.decoded import Decoded
     from tickrig.host.canmon.model.decode.filter import Filter
     from tickrig.host.canmon.model.frames import AnyRecord

@@ -12,7 +12,7 @@ from textual.content import Content
 from textual.widgets import Static, TabbedContent, TextArea
 
 from tickrig.host.canmon.extensions import load_rule
-from tickrig.host.canmon.model.check.alarms import RULE, Alarms, AlarmState, render_alarms
+from tickrig.host.canmon.model.check.checker import RULE, Alarms, AlarmState, render_alarms
 from tickrig.host.canmon.model.check.rules import SWITCHES, VALUES, Rules, parse_rules
 from tickrig.host.canmon.tui.panels.panel import Panel, read_help
 from tickrig.host.canmon.tui.session import DecodedFrame, Model, Session, Task

@@ -18,8 +18,7 @@ from tickrig.host.canmon.model.node_dictionary import (
     render_dictionary,
 )
 from tickrig.host.canmon.risks import write_risk
-from tickrig.host.canmon.tui.controls import ChoiceView, PromptLine, TitleLine
-from tickrig.host.canmon.tui.panels.panel import Panel, read_help
+from tickrig.host.canmon.tui.panels.panel import ChoiceView, Panel, PromptLine, TitleLine, read_help
 from tickrig.host.canmon.tui.session import DecodedFrame, Model, Session, Task
 from tickrig.host.canmon.workspace import SettingError, text_of
 from tickrig.host.canopen.dialogue import Dialogue, Failure, QueuedScript, Script

@@ -18,11 +18,9 @@ from textual.binding import Binding, BindingType
 
 from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.graph.plot import LABEL_WIDTH, LiveGraph, ViewMode
-from tickrig.host.canmon.model.graph.series import LEAST_US
-from tickrig.host.canmon.model.graph.signal_spec import CurveSpec, parse_signal
+from tickrig.host.canmon.model.graph.series import LEAST_US, CurveSpec, parse_signal
 from tickrig.host.canmon.output.graph_file import check_graph_path, write_graph
-from tickrig.host.canmon.tui.controls import PictureView, PromptLine, TitleLine
-from tickrig.host.canmon.tui.panels.panel import Panel, read_help
+from tickrig.host.canmon.tui.panels import panel
 from tickrig.host.canmon.tui.session import DecodedFrame, Model, Session, Task
 from tickrig.host.canmon.workspace import below, text_of, texts_of
 from tickrig.host.text.values import parse_time_with_unit_us
@@ -71,12 +69,12 @@ _QUESTION: Final = "[LABEL=]SIGNAL[@AXIS], as 5.velocity, 5.statusword.fault, 18
 _EMPTY: Final = "no signals: a adds one, F1 shows how"
 
 
-class GraphPanel(Panel):
+class GraphPanel(panel.Panel):
     """Curves with a cursor, several axes, zoom in both directions."""
 
     title = "graph"
     section = "graph"
-    HELP = read_help(__file__)
+    HELP = panel.read_help(__file__)
     DEFAULT_CSS = "GraphPanel #state { background: $boost; }"
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("a", "add", "add"),
@@ -111,14 +109,14 @@ class GraphPanel(Panel):
 
     def compose(self) -> ComposeResult:
         """Lay out state and picture."""
-        yield TitleLine("state")
-        yield PictureView()
-        yield PromptLine()
+        yield panel.TitleLine("state")
+        yield panel.PictureView()
+        yield panel.PromptLine()
 
     def snapshot(self, model: Model) -> None:
         """Draw the picture: it reads the samples."""
         self.graph.now_us = model.now_us
-        width, height = self.query_one(PictureView).size
+        width, height = self.query_one(panel.PictureView).size
         if self.graph.words:
             self._lines = [_colour_line(line) for line in self.graph.render(width, height)]
         else:
@@ -126,8 +124,8 @@ class GraphPanel(Panel):
 
     def paint(self) -> None:
         """Show it."""
-        self.query_one("#state", TitleLine).show(self._state())
-        self.query_one(PictureView).show(self._lines)
+        self.query_one("#state", panel.TitleLine).show(self._state())
+        self.query_one(panel.PictureView).show(self._lines)
 
     def load(self, settings: Mapping[str, Any]) -> None:
         """Take signals and window."""
@@ -144,12 +142,12 @@ class GraphPanel(Panel):
 
     def action_add(self) -> None:
         """Ask for a signal."""
-        self.query_one(PromptLine).prompt(_QUESTION, "", self._add)
+        self.query_one(panel.PromptLine).prompt(_QUESTION, "", self._add)
 
     def action_remove(self) -> None:
         """Ask which signal is shown no more."""
         if self._texts:
-            self.query_one(PromptLine).prompt("take out", self._texts[-1], self._remove)
+            self.query_one(panel.PromptLine).prompt("take out", self._texts[-1], self._remove)
 
     def action_graph(self, change: str, *arguments: Any) -> None:
         """Change what is seen, as a method of the graph does: `zoom`, `move`, `fit` and others."""
@@ -157,13 +155,15 @@ class GraphPanel(Panel):
 
     def action_write(self) -> None:
         """Ask for a file, and write the picture or the samples."""
-        self.query_one(PromptLine).prompt("file: .svg .html .png .csv", "graph.svg", self._write)
+        self.query_one(panel.PromptLine).prompt(
+            "file: .svg .html .png .csv", "graph.svg", self._write
+        )
 
-    def on_picture_view_pointed(self, event: PictureView.Pointed) -> None:
+    def on_picture_view_pointed(self, event: panel.PictureView.Pointed) -> None:
         """Put the cursor where the mouse is."""
         with self.session.lock:
             view = self.graph.view()
-            inner = max(1, self.query_one(PictureView).size.width - LABEL_WIDTH - 1)
+            inner = max(1, self.query_one(panel.PictureView).size.width - LABEL_WIDTH - 1)
             share = min(max(0.0, (event.x - LABEL_WIDTH - 1) / inner), 1.0)
             self.graph.cursor_us = view.from_us + round(view.span_us * share)
             self.graph.move_cursor(0)

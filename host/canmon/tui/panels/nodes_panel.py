@@ -14,9 +14,8 @@ from textual.widgets import TabbedContent, TabPane
 from tickrig.host.canmon.model.decode import node_board
 from tickrig.host.canmon.model.decode.node_memory import DEVICE_TYPE
 from tickrig.host.canmon.risks import nmt_risk
-from tickrig.host.canmon.tui.controls import ChoiceView, PromptLine, TitleLine
 from tickrig.host.canmon.tui.panels.dictionary_panel import DictionaryPanel
-from tickrig.host.canmon.tui.panels.panel import Panel, read_help
+from tickrig.host.canmon.tui.panels.panel import ChoiceView, Panel, PromptLine, TitleLine, read_help
 from tickrig.host.canmon.tui.session import DecodedFrame, Model, Session, Task
 from tickrig.host.tui import Line, LineView, line_text, line_width, plain
 from tickrig.wire.can import CanFrame, Frames

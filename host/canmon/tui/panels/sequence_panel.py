@@ -32,8 +32,7 @@ from tickrig.host.canmon.model.sequence import (
 )
 from tickrig.host.canmon.model.sequence import Sequence as Steps
 from tickrig.host.canmon.model.transmit import PdoFrames
-from tickrig.host.canmon.tui.controls import PromptLine, TitleLine
-from tickrig.host.canmon.tui.panels.panel import SendingPanel, read_help
+from tickrig.host.canmon.tui.panels.panel import PromptLine, SendingPanel, TitleLine, read_help
 from tickrig.host.canmon.tui.session import DecodedFrame, Model, Session, Task
 from tickrig.host.canmon.workspace import below, tables, text_of
 from tickrig.host.text.steps import StepError

@@ -30,8 +30,7 @@ from tickrig.host.canmon.model.logs.log_file import SUFFIXES
 from tickrig.host.canmon.model.top_model import meaning_text
 from tickrig.host.canmon.model.trace import DisplayFilter, Latest, Ring, TraceRow
 from tickrig.host.canmon.output.recording import write_records
-from tickrig.host.canmon.tui.controls import PromptLine
-from tickrig.host.canmon.tui.panels.panel import Panel, read_help
+from tickrig.host.canmon.tui.panels.panel import Panel, PromptLine, read_help
 from tickrig.host.canmon.tui.session import DecodedFrame, Model, Session, Task
 from tickrig.host.canmon.workspace import SettingError, choice, text_of, truth
 from tickrig.host.tui import Line, LineView, line_text

@@ -14,8 +14,7 @@ from textual.binding import Binding, BindingType
 
 from tickrig.host.canmon.model import transmit
 from tickrig.host.canmon.model.decode.node_memory import EdsObjects
-from tickrig.host.canmon.tui.controls import ChoiceView, PromptLine, TitleLine
-from tickrig.host.canmon.tui.panels.panel import SendingPanel, read_help
+from tickrig.host.canmon.tui.panels import panel
 from tickrig.host.canmon.tui.session import DecodedFrame, Model, Session, Task
 from tickrig.host.canmon.workspace import below, tables, text_of, texts_of
 from tickrig.host.tui import plain
@@ -114,12 +113,12 @@ class TransmitTask(Task):
 _QUESTION = "FRAME [--every TIME] [--counter BYTE:LOW..HIGH] [--checksum BYTE:KIND] [--name NAME]"
 
 
-class TransmitPanel(SendingPanel):
+class TransmitPanel(panel.SendingPanel):
     """Rows, each with a frame, a period, and fields that change."""
 
     title = "transmit"
     section = "transmit"
-    HELP = read_help(__file__)
+    HELP = panel.read_help(__file__)
     DEFAULT_CSS = "TransmitPanel #head { text-style: bold; }"
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("space", "enable", "on/off"),
@@ -138,14 +137,14 @@ class TransmitPanel(SendingPanel):
 
     def compose(self) -> ComposeResult:
         """Lay out the list."""
-        yield TitleLine("head")
-        yield ChoiceView()
-        yield PromptLine()
+        yield panel.TitleLine("head")
+        yield panel.ChoiceView()
+        yield panel.PromptLine()
 
     @property
     def chosen(self) -> int:
         """The number of the chosen row."""
-        return self.query_one(ChoiceView).chosen
+        return self.query_one(panel.ChoiceView).chosen
 
     def snapshot(self, model: Model) -> None:
         """Keep the list."""
@@ -155,9 +154,9 @@ class TransmitPanel(SendingPanel):
         """Show it."""
         head, *rows = self._lines
         bus = f"   bus {self.transmit.channel}" if self.transmit.channel else ""
-        self.query_one("#head", TitleLine).show(head + bus)
+        self.query_one("#head", panel.TitleLine).show(head + bus)
         rows = rows or ["no rows: a adds one"]
-        self.query_one(ChoiceView).show(
+        self.query_one(panel.ChoiceView).show(
             [plain(row, "bold green" if row.startswith(transmit.ON) else "") for row in rows]
         )
 
@@ -184,13 +183,13 @@ class TransmitPanel(SendingPanel):
 
     def action_add(self) -> None:
         """Write a new row."""
-        self.query_one(PromptLine).prompt(_QUESTION, "", self._add)
+        self.query_one(panel.PromptLine).prompt(_QUESTION, "", self._add)
 
     def action_edit(self) -> None:
         """Write the chosen row anew."""
         number = self.chosen
         if number < len(self.transmit.words):
-            self.query_one(PromptLine).prompt(
+            self.query_one(panel.PromptLine).prompt(
                 _QUESTION, str(self.transmit.words[number]), lambda text: self._change(number, text)
             )
 
@@ -212,7 +211,7 @@ class TransmitPanel(SendingPanel):
     def _add(self, text: str) -> None:
         words = transmit.parse_row_text(text)
         self.change(lambda: self.transmit.add(words))
-        self.query_one(ChoiceView).choose(len(self.transmit.words) - 1)
+        self.query_one(panel.ChoiceView).choose(len(self.transmit.words) - 1)
 
     def _change(self, number: int, text: str) -> None:
         words: transmit.RowText = transmit.parse_row_text(text)

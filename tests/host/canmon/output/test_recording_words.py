@@ -8,7 +8,7 @@ from contextlib import suppress
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.host.canmon.model.recorder.plan import AtLimit
+from tickrig.host.canmon.model.recorder.files import AtLimit
 from tickrig.host.canmon.output.recording import read_recording
 from tickrig.host.cli.messages import Refused
 

@@ -13,10 +13,9 @@ from tickrig.emulators.can.outside.interface import CHANNELS
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig
 from tickrig.host.canmon.model.frames import AnyFrame, Record
-from tickrig.host.canmon.model.logs.mark import LogTally
+from tickrig.host.canmon.model.logs.log_file import LogTally
 from tickrig.host.canmon.sources.bus_source import BusSource, merged
-from tickrig.host.canmon.sources.opening import open_source
-from tickrig.host.canmon.sources.source import BusSpec, Source
+from tickrig.host.canmon.sources.source import BusSpec, Source, open_source
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.messages import Refused, SourceFailed
 from tickrig.host.links.can_link import to_message

@@ -10,7 +10,7 @@ from types import FrameType
 from typing import Any
 
 from tickrig.host.canmon.model.frames import Record
-from tickrig.host.canmon.model.logs.mark import LogTally
+from tickrig.host.canmon.model.logs.log_file import LogTally
 from tickrig.host.canmon.sources.live_source import LiveSource
 from tickrig.host.links.link import LinkClosed
 

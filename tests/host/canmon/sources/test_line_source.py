@@ -15,8 +15,7 @@ from click.testing import CliRunner, Result
 from tests.emulators.serial.test_realtime import Child
 from tickrig.host.canmon.cli import main
 from tickrig.host.canmon.model.frames import AnyRecord, LineRecord
-from tickrig.host.canmon.sources.opening import open_any
-from tickrig.host.canmon.sources.source import AnySource, LineSpec, parse_source
+from tickrig.host.canmon.sources.source import AnySource, LineSpec, open_any, parse_source
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.wire.rtc_lite.codes import LiteCommand
 from tickrig.wire.rtc_lite.frame import Checksum, LiteFrame

@@ -17,7 +17,7 @@ import pytest
 from tests.host.canmon.terminal import Terminal
 from tickrig.host.canmon.model.frames import CandumpFilter, Record
 from tickrig.host.canmon.model.logs.can_log import channel_name
-from tickrig.host.canmon.model.logs.mark import BACK, GONE, LogTally, Mark
+from tickrig.host.canmon.model.logs.log_file import BACK, GONE, LogTally, Mark
 from tickrig.host.canmon.sources.live_source import REOPEN_US, LiveSource, ReopeningReader
 from tickrig.host.cli.messages import SourceFailed
 from tickrig.host.links.link import LinkClosed

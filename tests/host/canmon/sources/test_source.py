@@ -7,8 +7,7 @@ from pathlib import Path
 import pytest
 
 from tickrig.host.canmon.model.frames import Record
-from tickrig.host.canmon.sources.opening import StdinSource, open_source
-from tickrig.host.canmon.sources.source import Source
+from tickrig.host.canmon.sources.source import Source, StdinSource, open_source
 from tickrig.host.cli.messages import Refused, SourceFailed
 from tickrig.wire.can import CanFrame, parse_log
 

@@ -10,8 +10,7 @@ from typing import Any
 from textual.app import App
 
 from tests.host.canmon.wire import Wire
-from tickrig.host.canmon.sources.opening import FileSource
-from tickrig.host.canmon.sources.source import FileSpec
+from tickrig.host.canmon.sources.source import FileSource, FileSpec
 from tickrig.host.canmon.tui.app import MonitorApp
 from tickrig.host.canmon.tui.panels.nodes_panel import NodesPanel
 from tickrig.host.canmon.tui.panels.panel import Panel

@@ -2,8 +2,8 @@ from __future__ import annotations
 
 from tests.host.canmon.tui.panel_pilot import Desk, at_desk
 from tests.host.canmon.tui.rig_session import RigSession
-from tickrig.host.canmon.tui.controls import ChoiceView
 from tickrig.host.canmon.tui.panels.dictionary_panel import DictionaryPanel
+from tickrig.host.canmon.tui.panels.panel import ChoiceView
 
 
 def test_the_chosen_line_stays_in_view() -> None:

@@ -7,11 +7,11 @@ from hypothesis import strategies as st
 
 from tests.host.canmon.model.decode.test_noise import CAN_IDS, ERRORS, REMOTE, SDO, WIDE
 from tests.host.canmon.model.strategies import data_frame
-from tickrig.host.canmon.model.check.alarms import render_alarms
+from tickrig.host.canmon.model.check.checker import render_alarms
 from tickrig.host.canmon.model.check.rules import parse_rules
 from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.graph.plot import LiveGraph, ViewMode
-from tickrig.host.canmon.model.graph.signal_spec import parse_signal
+from tickrig.host.canmon.model.graph.series import parse_signal
 from tickrig.host.canmon.model.node_dictionary import render_dictionary
 from tickrig.host.canmon.tui.panels.alarms_panel import AlarmTask
 from tickrig.host.canmon.tui.panels.dictionary_panel import DictionaryTask

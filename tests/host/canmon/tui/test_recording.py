@@ -11,8 +11,8 @@ import pytest
 from tests.host.canmon.tui.pilot import drive_session, on_monitor, wire_session
 from tests.host.canmon.wire import Wire
 from tickrig.host.canmon.model.frames import AnyRecord
+from tickrig.host.canmon.model.logs.log_file import Mark, gone
 from tickrig.host.canmon.model.logs.log_reader import read_log
-from tickrig.host.canmon.model.logs.mark import Mark, gone
 from tickrig.host.canmon.sources.source import AnySource
 from tickrig.host.canmon.tui.app import MonitorApp, RecorderTask, StatusLine
 from tickrig.host.canmon.tui.session import Model, Session

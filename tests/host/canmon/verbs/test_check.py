@@ -14,7 +14,7 @@ from click.testing import CliRunner, Result
 
 from tests.host.canmon.wire import new_wire
 from tickrig.host.canmon.cli import main
-from tickrig.host.canmon.sources import opening as block_log
+from tickrig.host.canmon.sources import source as block_log
 
 DRIVE_EDS = Path(__file__).parents[4] / "examples/eds/epos.eds"
 PAGE = (Path(__file__).parents[4] / "docs/reference/canmon/canmon-model.md").read_text("utf-8")

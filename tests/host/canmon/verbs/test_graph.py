@@ -60,7 +60,7 @@ def test_an_object_is_drawn_like_the_slice_that_it_is(log: str) -> None:
 
 def test_a_large_log_is_drawn_like_a_small_one(log: str, monkeypatch: pytest.MonkeyPatch) -> None:
     one_by_one = canmon(log, "185[2:6]s")
-    monkeypatch.setattr("tickrig.host.canmon.sources.opening.SMALL_BYTES", 0)
+    monkeypatch.setattr("tickrig.host.canmon.sources.source.SMALL_BYTES", 0)
     at_once = canmon(log, "185[2:6]s")
     assert (at_once.stdout, at_once.stderr) == (one_by_one.stdout, "")
 

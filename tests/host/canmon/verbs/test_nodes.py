@@ -11,7 +11,7 @@ from click.testing import CliRunner, Result
 from tests.host.canmon.model.decode.drive_trace import TRACE
 from tests.host.canmon.terminal import PROGRAM
 from tickrig.host.canmon.cli import main
-from tickrig.host.canmon.sources import opening as block_log
+from tickrig.host.canmon.sources import source as block_log
 
 EPOS = Path(__file__).parents[4] / "examples" / "eds" / "epos.eds"
 

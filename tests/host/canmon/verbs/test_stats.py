@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from tickrig.host.canmon.cli import main
-from tickrig.host.canmon.sources import opening as block_log
+from tickrig.host.canmon.sources import source as block_log
 
 LOG = "".join(
     f"({n // 100}.{n % 100:02d}0000) can0 {0x181 + n % 2:03X}#{n:04X}\n" for n in range(150)

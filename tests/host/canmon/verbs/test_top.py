@@ -6,7 +6,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from tickrig.host.canmon.cli import main
-from tickrig.host.canmon.sources import opening as block_log
+from tickrig.host.canmon.sources import source as block_log
 
 LOG = "(1.000000) can0 181#00\n(1.100000) can0 181#01\n(1.150000) can0 701#05\n"
 

@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from tests.host.canmon.model.record_log import hear
-from tickrig.host.canmon.model.check.alarms import (
+from tickrig.host.canmon.model.check.checker import (
     GRACE_US,
     KEPT,
     LATE_US,

@@ -15,10 +15,9 @@ from tickrig.host.canmon.model.columns import column_reader
 from tickrig.host.canmon.model.columns.column_reader import CandumpBlock, ColumnReader, read_columns
 from tickrig.host.canmon.model.columns.columns import ChannelNames, Columns, NoColumnsError, Rows
 from tickrig.host.canmon.model.frames import Record, flagged_id
-from tickrig.host.canmon.model.logs.log_file import LogError
+from tickrig.host.canmon.model.logs.log_file import LogError, LogTally
 from tickrig.host.canmon.model.logs.log_reader import LogLines, LogReader, read_log
 from tickrig.host.canmon.model.logs.log_writer import write_log
-from tickrig.host.canmon.model.logs.mark import LogTally
 from tickrig.wire.can import CanFrame, FdFrame
 
 HEX = "0123456789abcdefABCDEF"

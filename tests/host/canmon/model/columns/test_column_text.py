@@ -18,7 +18,7 @@ from tickrig.host.canmon.model.columns import column_reader
 from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.logs import log_reader
 from tickrig.host.canmon.model.logs.log_writer import log_line, write_log
-from tickrig.host.canmon.sources import opening
+from tickrig.host.canmon.sources import source
 from tickrig.wire.can import CanFrame
 
 MARKS = st.sampled_from(
@@ -55,7 +55,7 @@ def said(small_bytes: int, *words: object) -> tuple[object, ...]:
     """Return status, output and messages of a verb, which reads in pieces or frame by frame."""
     with ExitStack() as held:
         patch = mock.patch.object
-        held.enter_context(patch(opening, "SMALL_BYTES", small_bytes))
+        held.enter_context(patch(source, "SMALL_BYTES", small_bytes))
         held.enter_context(patch(log_reader, "BLOCK_BYTES", PIECE))
         held.enter_context(patch(column_reader, "PIECE", PIECE))
         held.enter_context(patch(column_reader, "BLOCK_BYTES", 30 * PIECE))
@@ -114,6 +114,6 @@ def test_late_times_are_written_alike(at_us: int, tmp_path: Path) -> None:
 def test_usual_logs_are_read_in_pieces(tmp_path: Path) -> None:
     path = tmp_path / "run.log"
     path.write_text("(0000000001.000000) can0 123#01\n" * 39 + "(0000000001.000000) can0 123#R\n")
-    pieces = list(opening.PieceLog(path).pieces())
+    pieces = list(source.PieceLog(path).pieces())
     assert [len(piece) for piece in pieces] == [40, 0]
     assert not isinstance(pieces[0], list)

@@ -11,8 +11,7 @@ from tests.host.canmon.model.decode.drive_trace import GOLDEN
 from tickrig.host.canmon.model.columns.column_reader import read_columns
 from tickrig.host.canmon.model.decode.decoder import Decoder
 from tickrig.host.canmon.model.frames import Record
-from tickrig.host.canmon.model.graph.series import Collector
-from tickrig.host.canmon.model.graph.signal_spec import parse_signal
+from tickrig.host.canmon.model.graph.series import Collector, parse_signal
 from tickrig.host.canmon.model.logs.log_reader import read_log
 from tickrig.wire.can import NO_ACK, CanFrame
 

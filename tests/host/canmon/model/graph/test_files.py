@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.host.canmon.model.graph.chart import html_page, svg
+from tickrig.host.canmon.model.graph.plot import html_page, svg
 from tickrig.host.canmon.model.graph.series import Series, View
 from tickrig.host.canmon.output.graph_file import write_csv, write_png
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from tickrig.host.canmon.model.graph.signal_spec import FrameSlice, parse_slice
+from tickrig.host.canmon.model.graph.series import FrameSlice, parse_slice
 
 DATA = bytes.fromhex("0180FF7F0000C03F")
 

@@ -7,7 +7,7 @@ import pytest
 from tests.host.canmon.model.record_log import hear
 from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.graph.plot import LiveGraph, ViewMode
-from tickrig.host.canmon.model.graph.signal_spec import parse_signal
+from tickrig.host.canmon.model.graph.series import parse_signal
 from tickrig.wire.can import CanFrame
 
 S = 1_000_000

@@ -8,8 +8,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.host.canmon.model.graph.chart import chart, decimate, ticks, widened
-from tickrig.host.canmon.model.graph.plot import Canvas, read_out, render
+from tickrig.host.canmon.model.graph.plot import (
+    Canvas,
+    chart,
+    decimate,
+    read_out,
+    render,
+    ticks,
+    widened,
+)
 from tickrig.host.canmon.model.graph.series import Series, View
 
 

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from tests.host.canmon.model.logs.test_log_lines import FRAMES
 from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.logs.can_log import to_record
+from tickrig.host.canmon.model.logs.log_file import LogTally, dropped
 from tickrig.host.canmon.model.logs.log_reader import LogLines, read_log
 from tickrig.host.canmon.model.logs.log_writer import log_line, write_log
-from tickrig.host.canmon.model.logs.mark import LogTally, dropped
 from tickrig.host.canmon.model.logs.notation import DUMP_HEADER
 from tickrig.host.canmon.output.printer import csv_printer
 from tickrig.wire.can import CanFrame, ErrorFrame, FdFrame

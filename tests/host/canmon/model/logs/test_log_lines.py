@@ -5,9 +5,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tickrig.host.canmon.model.frames import Record
+from tickrig.host.canmon.model.logs.log_file import LogTally
 from tickrig.host.canmon.model.logs.log_reader import LONGEST, LogLines, WholeLines, parse_log_line
 from tickrig.host.canmon.model.logs.log_writer import log_line
-from tickrig.host.canmon.model.logs.mark import LogTally
 from tickrig.host.canmon.model.logs.notation import json_line
 from tickrig.wire.can import FD_LENGTHS, CanFrame, ErrorFrame, FdFrame
 

@@ -11,10 +11,9 @@ import can
 import pytest
 
 from tickrig.host.canmon.model.frames import Record
-from tickrig.host.canmon.model.logs.log_file import LogError
+from tickrig.host.canmon.model.logs.log_file import LogError, Mark, back, dropped, gone, triggered
 from tickrig.host.canmon.model.logs.log_reader import LogReader, read_log
 from tickrig.host.canmon.model.logs.log_writer import LogWriter, in_blocks, write_log
-from tickrig.host.canmon.model.logs.mark import Mark, back, dropped, gone, triggered
 from tickrig.wire.can import CanFrame
 
 START_US = 1_700_000_000_000_000

@@ -11,8 +11,8 @@ from tests.host.canmon.model.columns.test_column_reader import rows_by_line, row
 from tests.host.canmon.model.logs.test_log_lines import FRAMES
 from tickrig.host.canmon.model.columns.column_reader import read_columns
 from tickrig.host.canmon.model.frames import AnyFrame, DumpLines, Record, Stamp
+from tickrig.host.canmon.model.logs.log_file import LogTally
 from tickrig.host.canmon.model.logs.log_reader import LogLines, parse_log_line, read_log
-from tickrig.host.canmon.model.logs.mark import LogTally
 from tickrig.host.canmon.verbs.info import read_head
 
 CANDUMP = """\

@@ -9,9 +9,9 @@ from typing import Any
 
 from tickrig.host.canmon.model.decode.decoder import Decoder
 from tickrig.host.canmon.model.frames import Record
+from tickrig.host.canmon.model.logs.log_file import Mark
 from tickrig.host.canmon.model.logs.log_reader import read_log
-from tickrig.host.canmon.model.logs.mark import Mark
-from tickrig.host.canmon.model.recorder.plan import RecordingPlan
+from tickrig.host.canmon.model.recorder.files import RecordingPlan
 from tickrig.host.canmon.model.recorder.recorder import Recorder
 from tickrig.wire.can import CanFrame
 

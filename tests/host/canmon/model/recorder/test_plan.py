@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from tickrig.host.canmon.model.recorder.plan import AtLimit, TriggerSpan, read_plan
+from tickrig.host.canmon.model.recorder.files import AtLimit, TriggerSpan, read_plan
 
 RUN = Path("run.log")
 

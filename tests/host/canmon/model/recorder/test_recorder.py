@@ -23,9 +23,9 @@ from tests.host.canmon.model.recorder.bench import (
     parts,
     record,
 )
+from tickrig.host.canmon.model.logs.log_file import back, gone
 from tickrig.host.canmon.model.logs.log_reader import read_log
-from tickrig.host.canmon.model.logs.mark import back, gone
-from tickrig.host.canmon.model.recorder.plan import RecordingPlan, read_plan
+from tickrig.host.canmon.model.recorder.files import RecordingPlan, read_plan
 from tickrig.host.canmon.model.recorder.recorder import Recorder, RecorderState
 
 FORMATS = [

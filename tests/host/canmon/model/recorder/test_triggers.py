@@ -15,13 +15,13 @@ from tests.host.canmon.model.recorder.bench import (
     parts,
     record,
 )
-from tickrig.host.canmon.model.check.alarms import Alarms
+from tickrig.host.canmon.model.check.checker import Alarms
 from tickrig.host.canmon.model.check.rules import parse_rules
 from tickrig.host.canmon.model.decode.filter import parse_filter
 from tickrig.host.canmon.model.frames import Record
+from tickrig.host.canmon.model.logs.log_file import gone
 from tickrig.host.canmon.model.logs.log_reader import read_log
-from tickrig.host.canmon.model.logs.mark import gone
-from tickrig.host.canmon.model.recorder.plan import (
+from tickrig.host.canmon.model.recorder.files import (
     MAX_PRE_FRAMES,
     RecordingPlan,
     TriggerSpan,

@@ -15,10 +15,9 @@ from hypothesis import strategies as st
 
 from tests.host.canmon.model.logs.test_log_lines import HEARDS
 from tickrig.host.canmon.model.frames import AnyFrame, Record
-from tickrig.host.canmon.model.logs.log_file import LogError
+from tickrig.host.canmon.model.logs.log_file import LogError, dropped, gone
 from tickrig.host.canmon.model.logs.log_reader import LogReader, read_log
 from tickrig.host.canmon.model.logs.log_writer import write_log
-from tickrig.host.canmon.model.logs.mark import dropped, gone
 from tickrig.host.canmon.model.logs.notation import parse_frame
 from tickrig.host.canmon.model.logs.pcap import packet
 from tickrig.wire.can import FD_LENGTHS, CanFrame, ErrorFrame, FdFrame
