@@ -11,14 +11,14 @@ from tickrig.host.cli.options import LazyGroup, version_option
 
 _HERE: Final = "tickrig.host.canmon.verbs"
 _VERBS: Final = {
-    "dump": (f"{_HERE}.dump:command", "Show frames as they come, and what they mean."),
-    "conv": (f"{_HERE}.conv:command", "Write what SOURCE holds into the file LOG."),
+    "dump": (f"{_HERE}.dump:dump", "Show frames as they come, and what they mean."),
+    "conv": (f"{_HERE}.dump:conv", "Write what SOURCE holds into the file LOG."),
     "info": (f"{_HERE}.info:command", "Say what log files are."),
     "top": (f"{_HERE}.top:command", "Show all identifiers: counts, rates, gaps, jitter."),
     "stats": (f"{_HERE}.stats:command", "Count a log: rates, gaps, jitter, missed cycles."),
     "check": (f"{_HERE}.check:command", "Hold traffic against rules."),
     "conform": (f"{_HERE}.conform:command", "Judge one CANopen node, clause by clause."),
-    "eds": ("tickrig.host.canmon.eds.group:command", "Check, mend, compare and show EDS files."),
+    "eds": ("tickrig.host.canmon.cli:eds", "Check, mend, compare and show EDS files."),
     "net": ("tickrig.host.canmon.net.group:command", "Set a CANopen network to work."),
     "gateway": (
         "tickrig.host.canmon.gateway:command",
@@ -59,4 +59,25 @@ def main() -> None:
     \b
     Completion of verbs and options in the shell:
     eval "$(_CANMON_COMPLETE=bash_source canmon)"
+    """  # noqa: D301 - click wants the backspace
+
+
+_EDS: Final = "tickrig.host.canmon.eds_verbs"
+_EDS_VERBS: Final = {
+    "check": (f"{_EDS}:check_all", "Tell all that is wrong in EDS files."),
+    "fix": (f"{_EDS}:mend", "Mend an EDS."),
+    "diff": (f"{_EDS}:compare", "Compare the devices of two EDS files."),
+    "show": (f"{_EDS}:show", "Show the device of an EDS."),
+}
+
+
+@click.group(cls=LazyGroup, commands=_EDS_VERBS)
+def eds() -> None:
+    """Check, mend, compare and show EDS files: EDS, DCF, XDD, XDC.
+
+    \b
+    canmon eds check drive.eds                    all findings, with line, clause and fix
+    canmon eds fix drive.eds -o mended.eds        what needs no knowledge of the device
+    canmon eds diff old.eds new.xdd               what is another device
+    canmon eds show drive.eds 6040                an object; without it, all of them
     """  # noqa: D301 - click wants the backspace

@@ -16,8 +16,7 @@ from math import isfinite
 from typing import Final, NamedTuple
 
 from tickrig.host.canmon.model.decode.decoded import Decoded, Transfer, TransferOutcome, write_entry
-from tickrig.host.canmon.model.decode.node_memory import Entry, NodeMemory
-from tickrig.host.canmon.model.decode.object_text import ObjectText
+from tickrig.host.canmon.model.decode.node_memory import Entry, NodeMemory, ObjectText
 from tickrig.host.canmon.model.frames import s_text
 from tickrig.host.text.values import parse_setting
 from tickrig.wire.canopen.datatypes import DataType

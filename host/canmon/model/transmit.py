@@ -24,8 +24,7 @@ from typing import Final, NamedTuple
 import crcmod
 
 from tickrig.host.canmon.model.decode.decoded import write_entry
-from tickrig.host.canmon.model.decode.node_memory import EdsObjects, NodeMemory
-from tickrig.host.canmon.model.decode.object_text import ObjectText
+from tickrig.host.canmon.model.decode.node_memory import EdsObjects, NodeMemory, ObjectText
 from tickrig.host.canmon.model.decode.pdos import PDOS, NodePdo, can_id_of
 from tickrig.host.text.values import Setting, parse_setting, parse_time_with_unit_us
 from tickrig.wire.can import CanFrame, FdFrame

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from tickrig.host.canmon.eds_document import read_device_document
-from tickrig.host.canmon.model.decode import object_text
+from tickrig.host.canmon.model.decode import node_memory
 from tickrig.host.canmon.model.decode.decoded import write_entry
 from tickrig.host.canmon.model.decode.node_memory import NodeMemory, eds_objects
 from tickrig.host.canmon.model.node_dictionary import encode_value
@@ -47,9 +47,9 @@ def _standard_names() -> Mapping[str, tuple[int, int]]:
     for row in table:
         head = table.objects[row.index]
         whole = (
-            "" if head.code is object_table.ObjectCode.VAR else f"{object_text.slug(head.name)}."
+            "" if head.code is object_table.ObjectCode.VAR else f"{node_memory.slug(head.name)}."
         )
-        found[f"{whole}{object_text.slug(row.name)}"] = row.index, row.sub
+        found[f"{whole}{node_memory.slug(row.name)}"] = row.index, row.sub
     return found
 
 
@@ -106,7 +106,7 @@ class NamedObjects:
         """Take what the node says of itself, as its device type."""
         self._memory.read(entry, data)
 
-    def text(self, entry: Entry) -> object_text.ObjectText:
+    def text(self, entry: Entry) -> node_memory.ObjectText:
         """Return name, type and unit of an object."""
         return self._memory.describe(*entry)
 
@@ -143,9 +143,9 @@ class NamedObjects:
             if name := self.text(entry).name:
                 found.setdefault(name, entry)
         for entry in self.rows:  # those of the standards mean the same object, where it is there
-            standard = object_text.describe_standard(*entry)
+            standard = node_memory.describe_standard(*entry)
             if standard is None and self.is_drive:
-                standard = object_text.describe_drive(*entry)
+                standard = node_memory.describe_drive(*entry)
             if standard is not None:
                 found.setdefault(standard.name, entry)
         for name, entry in _standard_names().items():
@@ -160,10 +160,10 @@ def _names_by_standard(is_drive: bool) -> Mapping[str, Entry]:
     found: dict[str, Entry] = {}
     for index in _COMMUNICATION:
         for sub in _SUBS:
-            if (text := object_text.describe_standard(index, sub)) is not None:
+            if (text := node_memory.describe_standard(index, sub)) is not None:
                 found.setdefault(text.name, (index, sub))
     for index in _DRIVE if is_drive else ():
-        if (text := object_text.describe_drive(index, 0)) is not None:
+        if (text := node_memory.describe_drive(index, 0)) is not None:
             found.setdefault(text.name, (index, 0))
     return {**found, **_standard_names(), **found}  # in this order: a mistake lists the first
 
@@ -262,7 +262,7 @@ def shown(objects: NamedObjects, entry: Entry, data: bytes) -> str:
         return f"{len(data)} bytes, {data[:8].hex(' ').upper()} ..."
     value, said = text.read(data)
     if entry == _STATUSWORD and objects.is_drive and isinstance(value, int):
-        return f"{said} {object_text.drive_state(value)}"
+        return f"{said} {node_memory.drive_state(value)}"
     if text.in_hex or text.kind is None:
         return said
     unit = f" {text.unit}" if text.unit else ""
@@ -280,7 +280,7 @@ def encoded(objects: NamedObjects, entry: Entry, words: str) -> bytes:
     text = objects.text(entry)
     kind, colon, rest = words.partition(":")
     if colon and kind in TYPES:
-        text, words = object_text.ObjectText(text.name, TYPES[kind]), rest
+        text, words = node_memory.ObjectText(text.name, TYPES[kind]), rest
     if text.kind is None:
         raise Refused(
             f"the type of {objects.title(entry)} is not known: give its EDS (--eds FILE), or the"
@@ -293,7 +293,7 @@ def encoded(objects: NamedObjects, entry: Entry, words: str) -> bytes:
     return data
 
 
-def _range(text: object_text.ObjectText) -> str:
+def _range(text: node_memory.ObjectText) -> str:
     """Say which numbers a whole number may be."""
     kind = text.kind
     if kind is None or not kind.is_integer:

@@ -20,7 +20,8 @@ from tickrig.wire.can import CanFrame, ErrorFrame
 if TYPE_CHECKING:
     from tickrig.host.canmon.model.columns import column_meanings, column_text
     from tickrig.host.canmon.model.columns import columns as column_blocks
-    from tickrig.host.canmon.model.decode import filter_terms, services
+    from tickrig.host.canmon.model.decode import filter as filters
+    from tickrig.host.canmon.model.decode import services
     from tickrig.host.canmon.model.decode.decoded import Decoded
     from tickrig.host.canmon.model.decode.decoder import Decoder
     from tickrig.host.canmon.model.decode.filter import Filter
@@ -29,7 +30,7 @@ else:  # slow; seldom wanted; numpy
     column_meanings = LazyModule("tickrig.host.canmon.model.columns.column_meanings")
     column_text = LazyModule("tickrig.host.canmon.model.columns.column_text")
     column_blocks = LazyModule("tickrig.host.canmon.model.columns.columns")
-    filter_terms = LazyModule("tickrig.host.canmon.model.decode.filter_terms")
+    filters = LazyModule("tickrig.host.canmon.model.decode.filter")
     services = LazyModule("tickrig.host.canmon.model.decode.services")
 
 
@@ -49,9 +50,9 @@ class FilteredDecoder:
 
     def __init__(self, decoder: Decoder | None, wanted: Filter | None) -> None:
         self._decoder, self._wanted = decoder, wanted
-        self._missing: filter_terms.MissingSignals | None = None
+        self._missing: filters.MissingSignals | None = None
         if wanted is not None and (wanted.signals or wanted.words):
-            self._missing = filter_terms.MissingSignals(wanted.signals, wanted.words)
+            self._missing = filters.MissingSignals(wanted.signals, wanted.words)
 
     def take(self, records: Sequence[AnyRecord]) -> Iterator[DecodedFrame]:
         """Pass on what is wanted; all frames are decoded, for the decoder learns from each."""

@@ -40,10 +40,10 @@ from tickrig.wire.can import CanFrame, FdFrame
 from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
-    from tickrig.host.canmon.output import transmitter
+    from tickrig.host.canmon.sources import bus_source
     from tickrig.host.canmon.sources.bus_source import OpenBus
 else:  # python-can is slow
-    transmitter = LazyModule("tickrig.host.canmon.output.transmitter")
+    bus_source = LazyModule("tickrig.host.canmon.sources.bus_source")
 
 
 # Theory of operation
@@ -332,7 +332,7 @@ def open_session(words: Sequence[str], options: BusOptions, model: Model) -> Ses
 
 def _send(bus: OpenBus, frame: CanFrame | FdFrame) -> None:
     """Send on a bus as it was opened last."""
-    transmitter.send_on(bus.bus, bus.name, frame)
+    bus_source.send_on(bus.bus, bus.name, frame)
 
 
 def _take_pipe() -> int:

@@ -26,9 +26,9 @@ from tickrig.wire.can import CanFrame, ErrorFrame, FdFrame
 from tickrig.wire.errors import FieldError, WireError
 
 if TYPE_CHECKING:
-    from tickrig.host.canmon.output import transmitter
+    from tickrig.host.canmon.sources import bus_source
 else:  # python-can is slow
-    transmitter = LazyModule("tickrig.host.canmon.output.transmitter")
+    bus_source = LazyModule("tickrig.host.canmon.sources.bus_source")
 
 
 # What of a log is sent where and when.
@@ -204,7 +204,7 @@ def command(log: str, buses: Sequence[str], step: bool, **options: Any) -> None:
     reader = read_log(path)
     plan = _plan(reader, route, options)
     receives = wait_rx is not None
-    with transmitter.transmitters(words, BusOptions(**options), receives=receives) as opened:
+    with bus_source.transmitters(words, BusOptions(**options), receives=receives) as opened:
         _play(
             plan, {word or "": bus for word, bus in zip(words, opened, strict=True)}, step, wait_rx
         )
@@ -283,7 +283,7 @@ def _can_id(text: str | None) -> CanFrame | None:
 
 def _play(
     plan: ReplayPlan,
-    buses: dict[str, transmitter.Transmitter],
+    buses: dict[str, bus_source.Transmitter],
     step: bool,
     wait_rx: CanFrame | None,
 ) -> None:
@@ -314,7 +314,7 @@ def _due(plan: ReplayPlan) -> Iterator[_Due]:
         raise SourceFailed(str(error)) from error
 
 
-def _wait_for(wanted: CanFrame, buses: Sequence[transmitter.Transmitter]) -> None:
+def _wait_for(wanted: CanFrame, buses: Sequence[bus_source.Transmitter]) -> None:
     """Return when one of the buses carried a frame with this CAN-ID."""
     while True:
         for bus in buses:

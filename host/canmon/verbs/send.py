@@ -19,9 +19,9 @@ from tickrig.wire.can import CanFrame, FdFrame, LogLine, parse_sent
 from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
-    from tickrig.host.canmon.output import transmitter
+    from tickrig.host.canmon.sources import bus_source
 else:  # python-can is slow
-    transmitter = LazyModule("tickrig.host.canmon.output.transmitter")
+    bus_source = LazyModule("tickrig.host.canmon.sources.bus_source")
 
 
 @click.command()
@@ -61,7 +61,7 @@ def command(words: Sequence[str], eds: Sequence[str], **options: Any) -> None:
     period_us = _period_us(every, count)
     cyclic = _cyclic(made, period_us, count or (0 if every else 1), fields)
     with (
-        transmitter.transmitters([bus], BusOptions(**options)) as (out,),
+        bus_source.transmitters([bus], BusOptions(**options)) as (out,),
         until_interrupted(),
         until_unread(),
     ):
@@ -111,7 +111,7 @@ def _cyclic(
         return [transmit.TransmitRow("", frame, period_us, fields, 0, count) for frame in frames]
 
 
-def _run(cyclic: Sequence[transmit.TransmitRow], out: transmitter.Transmitter, quiet: bool) -> None:
+def _run(cyclic: Sequence[transmit.TransmitRow], out: bus_source.Transmitter, quiet: bool) -> None:
     pace = Pace()
     while (due_us := min(one.due_us for one in cyclic)) < NEVER:
         pace.wait_until(due_us)

@@ -34,9 +34,9 @@ from tickrig.host.text.steps import StepError
 from tickrig.wire.can import Frames
 
 if TYPE_CHECKING:
-    from tickrig.host.canmon.output import transmitter
+    from tickrig.host.canmon.sources import bus_source
 else:  # python-can is slow
-    transmitter = LazyModule("tickrig.host.canmon.output.transmitter")
+    bus_source = LazyModule("tickrig.host.canmon.sources.bus_source")
 
 
 class ConditionDecoder:
@@ -134,7 +134,7 @@ def _carry_out(
     run: SequenceRun, bus: str | None, options: BusOptions, watch: ConditionDecoder, quiet: bool
 ) -> None:
     with (
-        transmitter.transmitters([bus], options, receives=True) as (out,),
+        bus_source.transmitters([bus], options, receives=True) as (out,),
         until_interrupted(),
         until_unread(),
     ):
@@ -152,7 +152,7 @@ def _carry_out(
     _show(run, quiet)
 
 
-def _send(out: transmitter.Transmitter, watch: ConditionDecoder, frames: Frames) -> None:
+def _send(out: bus_source.Transmitter, watch: ConditionDecoder, frames: Frames) -> None:
     for frame in frames:
         out.send(frame)
         watch.take(Record(time.time_ns() // 1_000, out.name, frame, sent=True))

@@ -12,8 +12,7 @@ from click.testing import CliRunner, Result
 from tickrig.host.canmon.cli import main
 from tickrig.host.canmon.model.traffic import BitRates
 from tickrig.host.canmon.output.listening import bit_rates_of
-from tickrig.host.canmon.output.transmitter import Transmitter
-from tickrig.host.canmon.sources.bus_source import merged
+from tickrig.host.canmon.sources.bus_source import Transmitter, merged
 from tickrig.host.canmon.sources.source import BusSpec, parse_source
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.messages import SourceFailed

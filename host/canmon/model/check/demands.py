@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 from tickrig.host.canmon.model.decode.decoded import Decoded, Signal, TransferOutcome
-from tickrig.host.canmon.model.decode.filter_terms import Test, signal_reader
+from tickrig.host.canmon.model.decode.filter import Test, signal_reader
 from tickrig.host.canmon.model.frames import ERROR, Record, any_ident, ms_text
 from tickrig.host.text.values import counted
 from tickrig.wire.can import CanFrame, ErrorFrame

@@ -25,7 +25,7 @@ from typing import Final
 
 from tickrig.host.canmon.model.check import demands
 from tickrig.host.canmon.model.check.rule import ONE_TIME, CheckedTraffic, TrafficFinding
-from tickrig.host.canmon.model.decode import filter_terms
+from tickrig.host.canmon.model.decode import filter as filters
 from tickrig.host.canmon.model.decode.decoded import Decoded, Signal
 from tickrig.host.canmon.model.decode.filter import FilterError, FilterParser, Token
 from tickrig.host.canmon.model.frames import Record
@@ -117,18 +117,18 @@ class SliceParser(FilterParser):
         super().__init__(text)
         self._slices: dict[str, FrameSlice] = {}
 
-    def _plain_term(self) -> filter_terms.Test:
+    def _plain_term(self) -> filters.Test:
         if not self._is_slice():
             return super()._plain_term()
         name = self._slice()
         self._signals.add(name)
-        if self._next.text not in filter_terms.COMPARISONS:
-            return filter_terms.signal_test(name)
+        if self._next.text not in filters.COMPARISONS:
+            return filters.signal_test(name)
         sign, value = self._comparison(name)
-        if filter_terms.number(value) is None:
+        if filters.number(value) is None:
             raise self._error(f"{value!r} is no number")
         del self._tokens[0]
-        return filter_terms.signal_test(name, sign, value)
+        return filters.signal_test(name, sign, value)
 
     def _is_slice(self) -> bool:
         word, column = self._next
@@ -200,7 +200,7 @@ class ExpressionRule:
         name: str,
         demand: demands.RuleDemand,
         scopes: Sequence[RuleScope],
-        missing: filter_terms.MissingSignals,
+        missing: filters.MissingSignals,
         slices: Sequence[Slice],
         *,
         mapped: bool,
@@ -285,8 +285,8 @@ class ExpressionRule:
             self._names.update(signal.name for signal in decoded.signals)
 
     def _near(self, path: str) -> str:
-        _, name, _ = filter_terms.signal_place(path)
-        near = closest(name, [*filter_terms.KINDS, *sorted(self._names)])
+        _, name, _ = filters.signal_place(path)
+        near = closest(name, [*filters.KINDS, *sorted(self._names)])
         return f"; did you mean {near[0]}?" if near and near[0] != name else ""
 
 
@@ -329,14 +329,13 @@ def _values_of(parts: Sequence[tuple[str, ...]]) -> Callable[[Signal], bool]:
     [True, False, True]
     """
     tests = [
-        filter_terms.comparison("=", part[0]) if len(part) == 1 else _within(*part)
-        for part in parts
+        filters.comparison("=", part[0]) if len(part) == 1 else _within(*part) for part in parts
     ]
     return lambda signal: any(test(signal) for test in tests)
 
 
 def _within(low: str, high: str) -> Callable[[Signal], bool]:
-    least, most = filter_terms.number(low or "-inf"), filter_terms.number(high or "inf")
+    least, most = filters.number(low or "-inf"), filters.number(high or "inf")
     for text, end in ((low, least), (high, most)):
         if end is None or end != end:  # noqa: PLR0124 - what is no number
             raise ValueError(f"{text!r} is no number, as an end of a range is")
@@ -384,7 +383,7 @@ class QuantityParser(SliceParser):
         return int(self._tokens.pop(0).text)
 
     def _number(self) -> float:
-        found = filter_terms.number(self._next.text)
+        found = filters.number(self._next.text)
         if found is None or found != found:  # noqa: PLR0124 - what is no number
             raise self._error(f"{self._came()} is no number")
         del self._tokens[0]
@@ -406,7 +405,7 @@ class QuantityParser(SliceParser):
     def _blank(self) -> str:
         """Say so where a blank stands between a number and its unit."""
         value, unit = self._tokens[0].text, self._tokens[1:2]
-        if filter_terms.number(value) is None or not unit or unit[0].text not in _UNITS:
+        if filters.number(value) is None or not unit or unit[0].text not in _UNITS:
             return ""
         return f"; without a blank, as {value}{unit[0].text}"
 
@@ -486,8 +485,8 @@ _OTHERS: Final = frozenset(["not", "!", "!="])
 
 
 def errors_alone(
-    test: filter_terms.Test, tokens: Iterable[Token], signals: Collection[str]
-) -> filter_terms.Test:
+    test: filters.Test, tokens: Iterable[Token], signals: Collection[str]
+) -> filters.Test:
     """Return the test of frames as events: an EMCY of code 0000h is none.
 
     It stays one where the filter does not name `emcy`, has a `not`, or names a signal, as
@@ -526,7 +525,7 @@ BEHIND: Final = {
     "after": "the demand, as tpdo1 of 3 within 2ms after sync",
     "before": "the demand, as emcy never before sync",
     "while": "the demand, as emcy never while node 3 stopped",
-    **dict.fromkeys(filter_terms.NMT_STATES, "a node, as node 3 stopped"),
+    **dict.fromkeys(filters.NMT_STATES, "a node, as node 3 stopped"),
 }
 """Words that are no demand, and what they stand behind."""
 
@@ -567,7 +566,7 @@ class _RuleParser(QuantityParser):
         return demand, scopes, self._named, list(self._slices.items())
 
     def _subject(self) -> demands.RuleEvent:
-        if self._next.text != "dlc" or self._tokens[1].text in filter_terms.COMPARISONS:
+        if self._next.text != "dlc" or self._tokens[1].text in filters.COMPARISONS:
             return self._event()
         if self._tokens[1].text != "of":
             return demands.EVERY
@@ -679,7 +678,7 @@ class _RuleParser(QuantityParser):
         word = self._next.text
         if word in BEHIND:
             return f"it stands behind {BEHIND[word]}"
-        near = closest(word, [*DEMANDS, *SCOPES, *filter_terms.NMT_STATES]) if word else []
+        near = closest(word, [*DEMANDS, *SCOPES, *filters.NMT_STATES]) if word else []
         meant = f"; did you mean {near[0]!r}?" if near else ""
         return f"wanted {', '.join(DEMANDS)}, or 'and', 'or'{meant}"
 
@@ -705,7 +704,7 @@ def _made(name: str, text: str) -> ExpressionRule:
     parser = _RuleParser(text)
     demand, scopes, paths, slices = parser.rule()
     mapped = "pdo" in text or any("." in path for path in paths)
-    missing = filter_terms.MissingSignals(paths, parser.words)
+    missing = filters.MissingSignals(paths, parser.words)
     return ExpressionRule(name, demand, scopes, missing, slices, mapped=mapped)
 
 

@@ -19,7 +19,7 @@ from tickrig.host.canmon.model.decode.decoded import (
     TransferOutcome,
     write_entry,
 )
-from tickrig.host.canmon.model.decode.object_text import ObjectText
+from tickrig.host.canmon.model.decode.node_memory import ObjectText
 from tickrig.host.canmon.model.decode.pdos import (
     PDO_OBJECTS,
     NodePdo,

@@ -27,8 +27,8 @@ from tickrig.host.canmon.model.decode.node_memory import (
     HEARTBEAT_TIME,
     Heartbeats,
     NodeMemory,
+    drive_state,
 )
-from tickrig.host.canmon.model.decode.object_text import drive_state
 from tickrig.host.canmon.model.decode.pdos import (
     DUMMIES,
     MPDO,

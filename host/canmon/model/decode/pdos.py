@@ -6,8 +6,12 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Final, NamedTuple
 
 from tickrig.host.canmon.model.decode.decoded import Decoded, Signal, write_entry
-from tickrig.host.canmon.model.decode.node_memory import STATUSWORD, NodeMemory
-from tickrig.host.canmon.model.decode.object_text import ObjectText, drive_state
+from tickrig.host.canmon.model.decode.node_memory import (
+    STATUSWORD,
+    NodeMemory,
+    ObjectText,
+    drive_state,
+)
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.datatypes import DataType, Value
 from tickrig.wire.canopen.nmt import CAN_ID_MASK, EXTENDED, INVALID

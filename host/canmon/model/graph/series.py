@@ -30,7 +30,7 @@ from operator import le
 from typing import TYPE_CHECKING, Final
 
 from tickrig.host.canmon.model.decode.decoded import Decoded, Signal
-from tickrig.host.canmon.model.decode.object_text import BITS
+from tickrig.host.canmon.model.decode.node_memory import BITS
 from tickrig.host.canmon.model.frames import Record
 from tickrig.wire.can import MAX_DATA_BYTES, ErrorFrame
 

@@ -8,7 +8,7 @@ from enum import StrEnum
 from itertools import groupby
 from typing import TYPE_CHECKING, Final, Protocol, cast
 
-from tickrig.host.canmon.model.decode.filter_terms import MissingSignals
+from tickrig.host.canmon.model.decode.filter import MissingSignals
 from tickrig.host.canmon.model.frames import Record, decoded_text
 from tickrig.host.canmon.model.logs.log_file import LogError, Mark, dropped, triggered
 from tickrig.host.canmon.model.recorder.files import (

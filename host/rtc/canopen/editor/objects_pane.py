@@ -7,8 +7,12 @@ from pathlib import Path
 from typing import Final
 
 from tickrig.host.canmon.model.decode.decoded import write_entry
-from tickrig.host.canmon.model.decode.node_memory import EdsObjects, Entry, read_eds_objects
-from tickrig.host.canmon.model.decode.object_text import ObjectText
+from tickrig.host.canmon.model.decode.node_memory import (
+    EdsObjects,
+    Entry,
+    ObjectText,
+    read_eds_objects,
+)
 from tickrig.host.rtc.canopen.editor.widgets import CursorRow, CursorView
 from tickrig.host.rtc.canopen.served_node import NodePhase
 from tickrig.host.rtc.canopen.view import PendingTransfer, ServerView

@@ -11,7 +11,7 @@ from click.testing import CliRunner, Result
 
 from tests.host.canmon.model.decode.drive_trace import GOLDEN
 from tickrig.host.canmon.cli import main
-from tickrig.host.canmon.model.decode.filter_terms import KNOWN_WORDS
+from tickrig.host.canmon.model.decode.filter import KNOWN_WORDS
 from tickrig.host.canmon.model.logs.log_reader import read_log
 
 CANMON = (sys.executable, "-c", "from tickrig.host.canmon.cli import main; main()")

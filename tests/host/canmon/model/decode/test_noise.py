@@ -8,9 +8,8 @@ from hypothesis import strategies as st
 from tests.host.canmon.model.decode.drive_trace import record
 from tickrig.host.canmon.model.decode.decoder import Decoder
 from tickrig.host.canmon.model.decode.node_board import NodeBoard, board_json, render_board
-from tickrig.host.canmon.model.decode.rtc_lite_lines import RtcLiteLine
 from tickrig.host.canmon.model.frames import Record
-from tickrig.host.canmon.sources.line_source import RrcLines
+from tickrig.host.canmon.sources.line_source import RrcLines, RtcLiteLine
 from tickrig.wire.can import CanFrame, ErrorFrame
 
 CAN_IDS = st.sampled_from((0x000, 0x080, 0x085, 0x100, 0x185, 0x205, 0x585, 0x605, 0x705, 0x7E4))

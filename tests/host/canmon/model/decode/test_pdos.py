@@ -4,8 +4,7 @@ import pytest
 
 from tests.host.canmon.model.decode.traces import decode, last, trace
 from tickrig.host.canmon.model.decode.decoder import Decoder
-from tickrig.host.canmon.model.decode.node_memory import EdsObjects
-from tickrig.host.canmon.model.decode.object_text import ObjectText
+from tickrig.host.canmon.model.decode.node_memory import EdsObjects, ObjectText
 from tickrig.wire.canopen.datatypes import DataType
 
 WRITTEN = " ".join(

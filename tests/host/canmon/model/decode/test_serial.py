@@ -3,8 +3,7 @@ from __future__ import annotations
 import pytest
 
 from tickrig.host.canmon.model.decode.filter import parse_filter
-from tickrig.host.canmon.model.decode.rtc_lite_lines import RtcLiteLine
-from tickrig.host.canmon.sources.line_source import RrcLines
+from tickrig.host.canmon.sources.line_source import RrcLines, RtcLiteLine
 from tickrig.wire.rtc_lite.codes import LiteCommand
 from tickrig.wire.rtc_lite.frame import Checksum, LiteFrame
 from tickrig.wire.rtc_lite.messages import (

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.host.canmon.model.decode.object_text import ObjectText
+from tickrig.host.canmon.model.decode.node_memory import ObjectText
 from tickrig.host.canmon.model.node_dictionary import encode_value
 from tickrig.wire.canopen.datatypes import DataType
 

@@ -6,8 +6,7 @@ from pathlib import Path
 import pytest
 
 from tickrig.host.canmon.model.decode.decoder import Decoder
-from tickrig.host.canmon.model.decode.node_memory import EdsObjects, read_eds_objects
-from tickrig.host.canmon.model.decode.object_text import ObjectText
+from tickrig.host.canmon.model.decode.node_memory import EdsObjects, ObjectText, read_eds_objects
 from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.transmit import PdoFrames
 from tickrig.wire.canopen.datatypes import DataType
