@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from csv import reader
 from math import isfinite
 from typing import Final
 
@@ -138,3 +139,24 @@ def _parse_fraction(word: str) -> float:
     if not isfinite(value):
         raise ValueError
     return value
+
+
+# Lists with commas between, as command lines take them.
+
+
+def split_list(text: str) -> list[str]:
+    """Split a list at its commas; an item with commas stands in double quotes.
+
+    >>> split_list('"sdo_slow=1s,count=2", drop')
+    ['sdo_slow=1s,count=2', 'drop']
+    """
+    return [item.strip() for row in reader([text], skipinitialspace=True) for item in row]
+
+
+def list_item(text: str) -> str:
+    """Write an item of a list, in quotes if it has commas.
+
+    >>> list_item("drop"), list_item("sdo_slow=1s,count=2")
+    ('drop', '"sdo_slow=1s,count=2"')
+    """
+    return f'"{text}"' if "," in text else text

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 from tickrig.emulators.testing.campaign.order import CampaignOrder, CampaignRefusal, Collected, Run
+from tickrig.host.text.values import list_item
 
 # Seeds of a campaign, as people write them: `0-9999`, `3,17,100-199`.
 
@@ -170,7 +171,7 @@ class CampaignPlan:
             words += ["--bench", self.order.bench]
         words += ["--bench-seed", str(self.run(number).seed)]
         for name, value in test.values.items():
-            words += ["--bench-param", f"{name}={value}"]
+            words += ["--bench-param", f"{name}={list_item(value)}"]
         return shlex.join([*words, "--bench-artifacts", _KEPT])
 
     @property

@@ -21,7 +21,7 @@ from tickrig.emulators.testing.plugin.settings import SETTINGS
 from tickrig.emulators.testing.plugin.stash import BENCHED, TestWithBench
 from tickrig.emulators.testing.report.bench_report import Outcome
 from tickrig.host.text.trace import Mark
-from tickrig.host.text.values import format_time
+from tickrig.host.text.values import format_time, list_item
 from tickrig.host.text.whole_file import write_whole
 from tickrig.wire.can import LogLine
 
@@ -171,7 +171,7 @@ def repeat_command(item: pytest.Item) -> str:
     ):
         words += [] if value is None else [flag, value]
     for name, word in words_of(item).items():
-        words += ["--bench-param", f"{name}={word}"]
+        words += ["--bench-param", f"{name}={list_item(word)}"]
     return shlex.join(words)
 
 

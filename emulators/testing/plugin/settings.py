@@ -8,6 +8,8 @@ from typing import Final, NamedTuple
 
 import pytest
 
+from tickrig.host.text.values import split_list
+
 MODES: Final = ("virtual", "real", "hardware")
 RANDOM: Final = "random"
 _FAILED: Final = "failed"
@@ -163,8 +165,8 @@ def _parameters(text: str) -> tuple[BenchParameter, ...]:
     found: dict[str, BenchParameter] = {}
     for line in filter(None, map(str.strip, text.splitlines())):
         name, _, values = line.partition("=")
-        words = tuple(dict.fromkeys(word.strip() for word in values.split(",")))
-        if not (name.isidentifier() and all(words)):
+        words = tuple(dict.fromkeys(split_list(values)))
+        if not (name.isidentifier() and words and all(words)):
             raise pytest.UsageError(f"--bench-param {line}: write NAME=VALUE,VALUE, as flip=0.001")
         if name in found:
             raise pytest.UsageError(f"--bench-param {line}: {name} has values already")

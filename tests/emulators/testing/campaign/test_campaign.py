@@ -247,6 +247,37 @@ def test_where_the_disk_is_full_it_ends_and_goes_on_later(folder: Path, tickrig:
     assert (folder / "campaign.csv").read_bytes() == (folder / "b.csv").read_bytes()
 
 
+NODE_TEST = """
+import pytest
+from tickrig.wire.can import CanFrame
+
+@pytest.fixture
+def bench_config():
+    return "2=epos"
+
+@pytest.fixture
+def spec():
+    return "drop=rate=0.001"
+
+def test_one(bench, spec):
+    bench.run_for("10ms")
+    bench["epos"].fault(spec)
+    bench.link.send((CanFrame.parse("602#4081600000000000"),))
+    bench.run_for("10ms")
+    assert " < 582#4381600" in bench.transcript()
+"""
+
+
+def test_a_fault_with_commas_is_one_value(folder: Path, tickrig: Campaign) -> None:
+    (folder / "test_node.py").write_text(NODE_TEST)
+    values = 'spec="sdo_slow=1s,count=2",sdo_twice'
+    words = ["test_node.py", "--seeds", "0-1", "--param", values, "-o", "node.csv"]
+    assert "--bench-param 'spec=\"sdo_slow=1s,count=2\"'" in tickrig(*words, status=1).stdout
+    table = (folder / "node.csv").read_text().splitlines()
+    outcomes = [("passed" in line, "sdo_twice" in line) for line in table[1:]]
+    assert sorted(outcomes) == [(False, False)] * 2 + [(True, True)] * 2
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
