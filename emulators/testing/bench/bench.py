@@ -15,9 +15,8 @@ from tickrig.device.twin.snapshot import MachineSnapshot
 from tickrig.emulators.bench.operator import parse_fault_spec
 from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.emulators.testing.bench import tasks
-from tickrig.emulators.testing.bench.bench_rig import BenchDescription, Parts
+from tickrig.emulators.testing.bench.bench_rig import BenchDescription, Parts, text_of
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
-from tickrig.emulators.testing.bench.journal import text_of
 from tickrig.emulators.testing.bench.modes.mode import BenchMode
 from tickrig.emulators.testing.bench.modes.virtual_mode import VirtualMode
 from tickrig.emulators.testing.bench.plan_parts import (

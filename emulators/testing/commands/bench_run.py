@@ -18,9 +18,8 @@ from tickrig.emulators.rig.emulated import read_signal
 from tickrig.emulators.rig.event_queue import EventQueue
 from tickrig.emulators.scenario import ScenarioParser, ScenarioPlayer, ScenarioStep
 from tickrig.emulators.serial.pty_port import PtyPort
-from tickrig.emulators.testing.bench.bench_rig import BenchOperator, BenchRig
+from tickrig.emulators.testing.bench.bench_rig import BenchOperator, BenchRig, line_text
 from tickrig.emulators.testing.bench.errors import PortGone
-from tickrig.emulators.testing.bench.journal import line_text
 from tickrig.emulators.testing.bench.modes.doors import OutsideEnds
 from tickrig.emulators.testing.bench.mounts import BusMount, LineMount, Mount
 from tickrig.emulators.testing.bench.plan_parts import parts_of, rig_of

@@ -13,8 +13,8 @@ from typing import Final
 import pytest
 
 from tickrig.emulators.testing.bench.bench import Bench
+from tickrig.emulators.testing.bench.bench_rig import missing_of
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
-from tickrig.emulators.testing.bench.journal import missing_of
 from tickrig.emulators.testing.plugin.journal_text import buses_of, frame_of, last_lines
 from tickrig.emulators.testing.plugin.parameters import words_of
 from tickrig.emulators.testing.plugin.settings import SETTINGS

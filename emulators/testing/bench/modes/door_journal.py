@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 from weakref import WeakSet
 
-from tickrig.emulators.testing.bench.journal import Journal
+from tickrig.emulators.testing.bench.bench_rig import Journal
 from tickrig.emulators.testing.bench.modes.door_watch import DoorWatch, HostPace, Seen
 from tickrig.emulators.testing.bench.mounts import LineMount, Mount
 from tickrig.emulators.testing.rig_file.plan import RigPlan

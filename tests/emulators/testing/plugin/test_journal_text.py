@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.host.canopen.master.joints import cell
-from tickrig.emulators.testing.bench import journal
+from tickrig.emulators.testing.bench import bench_rig as journal
 from tickrig.emulators.testing.plugin.journal_text import last_lines
 
 
