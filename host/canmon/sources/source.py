@@ -25,6 +25,7 @@ from itertools import islice, takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Generic, TypeVar, cast
 
+from tickrig._lazy import LazyModule
 from tickrig.host.canmon.model.frames import CandumpFilter, Record, flagged_id
 from tickrig.host.canmon.model.logs import log_file
 from tickrig.host.canmon.model.logs.log_reader import Item, LogLines, among, read_log
@@ -39,6 +40,12 @@ if TYPE_CHECKING:
     from tickrig.host.canmon.model.columns.columns import Columns
     from tickrig.host.canmon.model.frames import AnyRecord
     from tickrig.host.canmon.sources import bus_source, line_source, live_source
+else:  # numpy, threads, python-can, pyserial: imported for what wants them
+    column_reader = LazyModule("tickrig.host.canmon.model.columns.column_reader")
+    column_blocks = LazyModule("tickrig.host.canmon.model.columns.columns")
+    bus_source = LazyModule("tickrig.host.canmon.sources.bus_source")
+    line_source = LazyModule("tickrig.host.canmon.sources.line_source")
+    live_source = LazyModule("tickrig.host.canmon.sources.live_source")
 
 
 # Where frames come from: buses, log files or standard input, under one face.

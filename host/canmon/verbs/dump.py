@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from tickrig._lazy import LazyModule
 from tickrig.host.canmon.model.frames import DumpLines, Stamp
 from tickrig.host.canmon.model.recorder.files import RecordingPlan
 from tickrig.host.canmon.model.recorder.recorder import FilterTrigger
@@ -50,6 +51,9 @@ if TYPE_CHECKING:
     from tickrig.host.canmon.model.frames import AnyRecord
     from tickrig.host.canmon.model.logs.log_file import Mark
     from tickrig.host.canmon.model.logs.log_writer import TextBlock
+else:  # numpy
+    column_text = LazyModule("tickrig.host.canmon.model.columns.column_text")
+    column_blocks = LazyModule("tickrig.host.canmon.model.columns.columns")
 
 
 # Triggers by hand: Enter in the terminal, or a signal.
