@@ -493,8 +493,9 @@ class Operator(Copyable):
     def _end(self, name: str) -> None:
         self._begun.pop(name, None)
         if name in self._wire.fault_types:
-            self._wire.clear(name)
-            self.note(f"{name}=0")
+            if name in self._wire.armed:
+                self._wire.clear(name)
+                self.note(f"{name}=0")
         else:
             self._put(name, 0)
 

@@ -93,8 +93,10 @@ def _faults(world: World, for_: Sequence[str]) -> st.SearchStrategy[HostStep]:
         wait_us = draw(timing())
         name = draw(st.sampled_from(list(world.faults)))
         form = world.faults[name]
-        rate = f"=rate={draw(st.sampled_from(_RATES))}" if form.rated else ""
-        rate = rate if form.arguments else rate.replace("rate=", "")
+        rate = draw(st.sampled_from(_RATES)) if form.rated else ""
+        if form.arguments:  # a bare word is one of them
+            rate = "" if rate == "1" else f"rate={rate}"
+        rate = f"={rate}" if rate else ""
         return HostStep(wait_us, "fault", name + rate, us_of(draw(st.sampled_from(for_))))
 
     return fault()
