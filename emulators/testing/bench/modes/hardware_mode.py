@@ -11,17 +11,17 @@ from typing import TYPE_CHECKING, Any, Final, NoReturn, TypeVar
 
 from tickrig.emulators.bench.operator import FaultOrder, FaultSpec
 from tickrig.emulators.bench.running_emulator import keeping_time
-from tickrig.emulators.record.wire_log import WireLine
-from tickrig.emulators.testing.bench.bench_rig import BenchDescription, BenchRig, RigState
+from tickrig.emulators.testing.bench.bench_rig import BenchRig, RigState
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
 from tickrig.emulators.testing.bench.modes.door_journal import DoorJournal, PortRecord
 from tickrig.emulators.testing.bench.modes.door_watch import CpuWaits, HostPace, too_slow
 from tickrig.emulators.testing.bench.modes.doors import Doors, LinePlace
+from tickrig.emulators.testing.bench.modes.mode import BenchMode
 from tickrig.emulators.testing.bench.modes.operators import Operators, Terminal
 from tickrig.emulators.testing.bench.mounts import LineMount, Mount
 from tickrig.emulators.testing.bench.plan_parts import parts_of
 from tickrig.emulators.testing.bench.tasks import Condition, text_of
-from tickrig.emulators.testing.rig_file.plan import BusPlan, HardwarePlan, RigPlan, Tolerances
+from tickrig.emulators.testing.rig_file.plan import BusPlan, HardwarePlan, RigPlan
 from tickrig.host.control.requests import Object
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ _POLL_US: Final = 5_000
 """How often a condition is asked."""
 
 
-class HardwareMode:
+class HardwareMode(BenchMode):
     """A `BenchMode` of real devices. What the rig file says of them is not made, but believed.
 
     A device is at a port or on a bus; its operator is a human at the terminal, or the control
@@ -82,19 +82,19 @@ class HardwareMode:
             raise ValueError("the rig file has no [hardware], which says where the devices are")
         self._plan, self._where = plan, plan.hardware
         self._terminal, self._begun_ns = terminal or Terminal(), time.monotonic_ns()
-        self._like = BenchRig("bench", RigState(parts_of(_without_stores(plan)), keeps=False))
+        like = BenchRig("bench", RigState(parts_of(_without_stores(plan)), keeps=False))
+        super().__init__(like, plan.hardware.tolerance)
         self._pace, self._pending = HostPace(), list[tuple[Condition, _Begin]]()
         self._looking = self._begun = False
-        self.orders = list[FaultOrder]()
-        mounts = self._like.state.mounts
+        mounts = like.state.mounts
         self._record = PortRecord(plan, mounts, lambda: self.now_us)
-        self._journal = DoorJournal(lambda: self.now_us, self._look, self._record)
+        journal = like.journal = DoorJournal(lambda: self.now_us, self._look, self._record)
         places = _places_of(plan, self._where, mounts)
         self.doors = Doors(
-            places, lambda wire: self._journal.watch(mounts[wire], self._pace), self._begin
+            places, lambda wire: journal.watch(mounts[wire], self._pace), self._begin
         )
         self._waits = CpuWaits()
-        self._operators = Operators(plan, self._where, self._like, self._terminal, self._journal)
+        self._operators = Operators(plan, self._where, like, self._terminal, journal)
         self._stack = ExitStack()
         self._stack.enter_context(keeping_time())
         for close in (self._operators.close, self.doors.close):
@@ -115,15 +115,6 @@ class HardwareMode:
         """The time since the bench was opened."""
         return (time.monotonic_ns() - self._begun_ns) // 1_000
 
-    @property
-    def tolerance(self) -> Tolerances:
-        """What the rig file says of the operator and the devices."""
-        return self._where.tolerance
-
-    def wire_of(self, device: str) -> str:
-        """Return the name of the wire that a device is on."""
-        return self._like.state.wire_of(device)
-
     def request(self, do: str, **fields: Any) -> Object:
         """Have the operator do what a control socket would; ValueError if it is refused."""
         return self._operators.request(do, fields)
@@ -135,20 +126,12 @@ class HardwareMode:
         text = "" if condition is None else text_of(condition)
         order = FaultOrder(spec, self.now_us, for_us, text)
         begin = self._operators.fault(owner, order)
-        self.orders.append(order)
+        self._rig.orders.append(order)
         if condition is None:
             begin(self.now_us)
         else:
             self._pending.append((condition, begin))
             self._look()
-
-    def check_fault(self, owner: str, name: str) -> None:
-        """Raise ValueError unless the devices that these are like have a fault of this name."""
-        self._like.state.full_fault_name(owner, name)
-
-    def describe(self, owner: str) -> BenchDescription:
-        """Return what there is at the devices that these are like."""
-        return self._like.describe(owner)
 
     def clear(self, owner: str, fault: str) -> None:
         """Have a fault mended."""
@@ -158,16 +141,10 @@ class HardwareMode:
         """Have the supply of a device switched, of all if it is empty."""
         self._operators.switch_power(owner, on=on)
 
-    def hear(self, listener: Callable[[WireLine], None]) -> None:
-        """Tell of each line and frame from now on."""
-        self._journal.listeners.append(listener)
-
     def observe(self, owner: str, text: str, seen: Condition, within_us: int) -> bool:
         """Ask the human at a device whether something is seen; an emulator is looked at."""
         answer = self._operators.sees(owner, text)
-        if answer is not None:
-            return answer
-        return self.wait_until(seen, within_us + self.tolerance.time_us)
+        return super().observe(owner, text, seen, within_us) if answer is None else answer
 
     def perform(self, owner: str, text: str, do: Callable[[], object]) -> None:
         """Have something done that is more than one act."""
@@ -196,18 +173,6 @@ class HardwareMode:
             wait_us = min(left_us, _POLL_US)
             with self._pace.waiting(wait_us):
                 time.sleep(wait_us / 1e6)
-
-    def journal(self) -> tuple[WireLine, ...]:
-        """Return what passed the doors last, and what the operator did."""
-        return self._journal.lines()
-
-    def mappings(self) -> tuple[WireLine, ...]:
-        """Return the frames before the journal's which say what PDOs carry."""
-        return self._journal.mappings()
-
-    def unfinished(self) -> tuple[WireLine, ...]:
-        """Return what has begun at the doors of serial lines and did not end."""
-        return self._journal.unfinished()
 
     def too_slow(self) -> str:
         """Say why no failure is to be believed; empty if one is, or a human has said no."""

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Protocol, TypeVar
 
 from tickrig.emulators.bench.control import EmulatorControl
 from tickrig.emulators.bench.operator import FaultOrder, FaultSpec
@@ -58,147 +58,34 @@ class HostDoors(Protocol):
         """Return where a program opens a wire by itself."""
         ...
 
+    def close(self) -> None:
+        """Close what is open, and offer nothing any more."""
 
-class BenchMode(Protocol):
+
+class BenchMode(ABC):
     """Where the devices are, and how time passes.
 
     What a mode cannot do raises `NotOnThisBench`.
-    """
-
-    @property
-    def name(self) -> str:
-        """`virtual`, `real` or `hardware`."""
-        ...
-
-    @property
-    def devices(self) -> tuple[str, ...]:
-        """The names of all devices."""
-        ...
-
-    @property
-    def wires(self) -> tuple[str, ...]:
-        """The names of all wires."""
-        ...
-
-    @property
-    def now_us(self) -> int:
-        """The time since the bench was opened."""
-        ...
-
-    def wire_of(self, device: str) -> str:
-        """Return the name of the wire that a device is on."""
-        ...
-
-    @property
-    def tolerance(self) -> Tolerances:
-        """What is still right."""
-        ...
-
-    def request(self, do: str, **fields: object) -> Object:
-        """Ask as the control socket is asked; ValueError if it is refused."""
-        ...
-
-    def act(self, action: Callable[[BenchRig], T]) -> T:
-        """Do something to the rig between two ticks."""
-        ...
-
-    def fault(
-        self, owner: str, spec: FaultSpec, condition: Condition | None, for_us: int | None
-    ) -> None:
-        """Let a fault of a device, a wire or (empty) any come, or note that it shall."""
-
-    @property
-    def orders(self) -> Sequence[FaultOrder]:
-        """The faults that were ordered, in this order."""
-        ...
-
-    def check_fault(self, owner: str, name: str) -> None:
-        """Raise ValueError unless a device, a wire or (empty) any has a fault of this name."""
-
-    def describe(self, owner: str) -> BenchDescription:
-        """Return what there is at a device, at all of them if it is empty."""
-        ...
-
-    def clear(self, owner: str, fault: str) -> None:
-        """Let a fault go, and its future too."""
-
-    def switch_power(self, owner: str, *, on: bool) -> None:
-        """Give or take the supply of a device, of all if it is empty."""
-
-    def hear(self, listener: Callable[[WireLine], None]) -> None:
-        """Tell of each line and frame from now on."""
-
-    def observe(self, owner: str, text: str, seen: Condition, within_us: int) -> bool:
-        """Say whether something is seen at a device, or by a human who is asked the text."""
-        ...
-
-    def perform(self, owner: str, text: str, do: Callable[[], object]) -> None:
-        """Have something done at a device: by the test itself, or by a human who is told."""
-
-    def meanwhile(self, host: Callable[[int], object]) -> None:
-        """Let a host go on, so many microseconds at a time, while a human is asked."""
-
-    def run_for(self, duration_us: int) -> None:
-        """Let time pass."""
-
-    def wait_until(self, done: Callable[[], bool], within_us: int) -> bool:
-        """Let time pass until something is so; False if it was not in time."""
-        ...
-
-    @property
-    def doors(self) -> HostDoors:
-        """Where hosts come in; the first one that does lets time begin."""
-        ...
-
-    def save_trace(self, path: Path) -> None:
-        """Write a trace of all that happened; OSError if it cannot be."""
-
-    def journal(self) -> tuple[WireLine, ...]:
-        """Return the latest lines and frames, and what was done."""
-        ...
-
-    def mappings(self) -> tuple[WireLine, ...]:
-        """Return the frames before the journal's which say what PDOs carry."""
-        ...
-
-    def unfinished(self) -> tuple[WireLine, ...]:
-        """Return what has begun on serial lines and did not end."""
-        ...
-
-    def too_slow(self) -> str:
-        """Say why no failure is to be believed: real time was not kept; empty if it was."""
-        ...
-
-    def fork(self) -> BenchMode:
-        """Return a twin that goes on by itself from here."""
-        ...
-
-    def close(self) -> None:
-        """Give everything back."""
-
-
-# What benches of emulated devices have in common, in virtual and in real time.
-
-POWER: Final = {"rrc_power": 1, "power_cut": 0, "power_off": 0}
-"""Inputs that are the supply of a device, each with its value while that is there."""
-
-
-class EmulatedMode(ABC):
-    """The part of a `BenchMode` that does not ask what time it is.
 
     Args:
-        rig: the rig.
+        rig: with the devices, or, of real devices, with such ones: it does not run then.
         tolerance: what is still right.
+
+    Attributes:
+        name: `virtual`, `real` or `hardware`.
+        tolerance: what is still right.
+        doors: where hosts come in; the first one that does lets time begin.
     """
 
-    def __init__(self, rig: BenchRig, tolerance: Tolerances) -> None:
-        self._rig = rig
-        self.tolerance = tolerance
+    name: ClassVar[str]
+    doors: HostDoors
 
-    @cached_property
-    def _control(self) -> EmulatorControl:
-        """What answers requests."""
-        return EmulatorControl(self._rig)
+    def __init__(self, rig: BenchRig, tolerance: Tolerances) -> None:
+        self._rig, self.tolerance = rig, tolerance
+
+    def _ask(self, question: Callable[[BenchRig], T]) -> T:
+        """Return what the rig says; nothing is done to it."""
+        return question(self._rig)
 
     @property
     def devices(self) -> tuple[str, ...]:
@@ -210,17 +97,118 @@ class EmulatedMode(ABC):
         """The names of all wires."""
         return tuple(self._rig.state.mounts)
 
+    @property
+    @abstractmethod
+    def now_us(self) -> int:
+        """The time since the bench was opened."""
+
     def wire_of(self, device: str) -> str:
         """Return the name of the wire that a device is on."""
         return self._rig.state.wire_of(device)
+
+    @abstractmethod
+    def request(self, do: str, **fields: Any) -> Object:
+        """Ask as the control socket is asked; ValueError if it is refused."""
 
     @abstractmethod
     def act(self, action: Callable[[BenchRig], T]) -> T:
         """Do something to the rig between two ticks."""
 
     @abstractmethod
+    def fault(
+        self, owner: str, spec: FaultSpec, condition: Condition | None, for_us: int | None
+    ) -> None:
+        """Let a fault of a device, a wire or (empty) any come, or note that it shall."""
+
+    @property
+    def orders(self) -> Sequence[FaultOrder]:
+        """The faults that were ordered, by the rig file too, in this order."""
+        return self._rig.orders
+
+    def check_fault(self, owner: str, name: str) -> None:
+        """Raise ValueError unless a device, a wire or (empty) any has a fault of this name."""
+        self._ask(lambda rig: rig.state.full_fault_name(owner, name))
+
+    def describe(self, owner: str) -> BenchDescription:
+        """Return what there is at a device, at all of them if it is empty."""
+        return self._ask(lambda rig: rig.describe(owner))
+
+    @abstractmethod
+    def clear(self, owner: str, fault: str) -> None:
+        """Let a fault go, and its future too."""
+
+    @abstractmethod
+    def switch_power(self, owner: str, *, on: bool) -> None:
+        """Give or take the supply of a device, of all if it is empty."""
+
+    def hear(self, listener: Callable[[WireLine], None]) -> None:
+        """Tell of each line and frame from now on."""
+        self._ask(lambda rig: rig.journal.listeners.append(listener))
+
+    def observe(self, owner: str, text: str, seen: Condition, within_us: int) -> bool:
+        """Say whether something is seen at a device, or by a human who is asked the text."""
+        return self.wait_until(seen, within_us + self.tolerance.time_us)
+
+    def perform(self, owner: str, text: str, do: Callable[[], object]) -> None:
+        """Have something done at a device: by the test itself, or by a human who is told."""
+        do()
+
+    def meanwhile(self, host: Callable[[int], object]) -> None:  # noqa: B027 - nothing to do
+        """Let a host go on, so many microseconds at a time, while a human is asked."""
+
+    @abstractmethod
+    def run_for(self, duration_us: int) -> None:
+        """Let time pass."""
+
+    @abstractmethod
     def wait_until(self, done: Callable[[], bool], within_us: int) -> bool:
         """Let time pass until something is so; False if it was not in time."""
+
+    @abstractmethod
+    def save_trace(self, path: Path) -> None:
+        """Write a trace of all that happened; OSError if it cannot be."""
+
+    def journal(self) -> tuple[WireLine, ...]:
+        """Return the latest lines and frames, and what was done."""
+        return self._ask(lambda rig: rig.journal.lines())
+
+    def mappings(self) -> tuple[WireLine, ...]:
+        """Return the frames before the journal's which say what PDOs carry."""
+        return self._ask(lambda rig: rig.journal.mappings())
+
+    def unfinished(self) -> tuple[WireLine, ...]:
+        """Return what has begun on serial lines and did not end."""
+        return self._ask(lambda rig: rig.journal.unfinished())
+
+    @abstractmethod
+    def too_slow(self) -> str:
+        """Say why no failure is to be believed: real time was not kept; empty if it was."""
+
+    @abstractmethod
+    def fork(self) -> BenchMode:
+        """Return a twin that goes on by itself from here."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Give everything back."""
+
+
+# What benches of emulated devices have in common, in virtual and in real time.
+
+POWER: Final = {"rrc_power": 1, "power_cut": 0, "power_off": 0}
+"""Inputs that are the supply of a device, each with its value while that is there."""
+
+
+class EmulatedMode(BenchMode):
+    """The part of a `BenchMode` of emulated devices that does not ask what time it is."""
+
+    @cached_property
+    def _control(self) -> EmulatorControl:
+        """What answers requests."""
+        return EmulatorControl(self._rig)
+
+    def _ask(self, question: Callable[[BenchRig], T]) -> T:
+        return self.act(question)
 
     def request(self, do: str, **fields: object) -> Object:
         """Ask as the control socket is asked; ValueError if it is refused."""
@@ -245,34 +233,9 @@ class EmulatedMode(ABC):
             )
         )
 
-    @property
-    def orders(self) -> Sequence[FaultOrder]:
-        """The faults that were ordered, by the rig file too."""
-        return self._rig.orders
-
-    def check_fault(self, owner: str, name: str) -> None:
-        """Raise ValueError unless there is a fault of this name."""
-        self.act(lambda rig: rig.state.full_fault_name(owner, name))
-
-    def describe(self, owner: str) -> BenchDescription:
-        """Return what there is at a device, at all of them if it is empty."""
-        return self.act(lambda rig: rig.describe(owner))
-
     def clear(self, owner: str, fault: str) -> None:
         """Let a fault go, and its future too."""
         self.act(lambda rig: rig.operator.clear(rig.state.full_fault_name(owner, fault)))
-
-    def hear(self, listener: Callable[[WireLine], None]) -> None:
-        """Tell of each line and frame from now on."""
-        self.act(lambda rig: rig.journal.listeners.append(listener))
-
-    def observe(self, owner: str, text: str, seen: Condition, within_us: int) -> bool:
-        """Say whether something is seen; False if it was not in time."""
-        return self.wait_until(seen, within_us + self.tolerance.time_us)
-
-    def perform(self, owner: str, text: str, do: Callable[[], object]) -> None:
-        """Do something that is more than one act."""
-        do()
 
     def switch_power(self, owner: str, *, on: bool) -> None:
         """Give or take the supply of a device, of all if it is empty."""
@@ -284,24 +247,9 @@ class EmulatedMode(ABC):
             full = self._rig.state.assembly.full_name(name, found)
             self.request("set", name=full, value=POWER[found] if on else 1 - POWER[found])
 
-    def meanwhile(self, host: Callable[[int], object]) -> None:  # noqa: B027 - nothing to do
-        """Nothing: nobody is asked who takes his time."""
-
     def save_trace(self, path: Path) -> None:
         """Write a trace of all that happened; OSError if it cannot be."""
         self.act(lambda rig: rig.save_trace(path))
-
-    def journal(self) -> tuple[WireLine, ...]:
-        """Return the latest lines and frames, and what was done."""
-        return self.act(lambda rig: rig.journal.lines())
-
-    def mappings(self) -> tuple[WireLine, ...]:
-        """Return the frames before the journal's which say what PDOs carry."""
-        return self.act(lambda rig: rig.journal.mappings())
-
-    def unfinished(self) -> tuple[WireLine, ...]:
-        """Return what has begun on serial lines and did not end."""
-        return self.act(lambda rig: rig.journal.unfinished())
 
 
 def _answer_of(answer: Object) -> Object:
