@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Final, Generic, TypeVar
 
 import click
 
@@ -38,17 +38,24 @@ class RunOptions:
     trace: Path | None = None
     verbose: int = 0
 
+    @property
+    def in_real_time(self) -> bool:
+        """Whether time is that of this machine."""
+        raise NotImplementedError
 
-class EmulatorRun(ABC):
+
+OptionsT = TypeVar("OptionsT", bound=RunOptions)
+
+
+class EmulatorRun(ABC, Generic[OptionsT]):
     """One run.
 
     Args:
         options: the command line.
-        in_real_time: not a scenario alone, which runs in virtual time.
     """
 
-    def __init__(self, options: RunOptions, *, in_real_time: bool) -> None:
-        self._shared, self._in_real_time = options, in_real_time
+    def __init__(self, options: OptionsT) -> None:
+        self._options, self._in_real_time = options, options.in_real_time
         self._clock = ServingClock()
         self._running: RunningEmulator | None = None
         self._stopped = False
@@ -68,7 +75,7 @@ class EmulatorRun(ABC):
                 stack.enter_context(stopped_by_signals(self._stop))
             bench = self._running = self._open(stack)
             stack.callback(bench.close)
-            if path := self._shared.control:
+            if path := self._options.control:
                 stack.enter_context(serving_control(path, EmulatorControl(bench), self._clock))
             if self._in_real_time:
                 self._greet(bench)
@@ -117,13 +124,18 @@ class EmulatorRun(ABC):
         """Read all that can be wrong before anything is opened."""
         hands, parser = self._make()
         with messages.refused_at("--fault"):
-            faults = [parse_fault_spec(text, hands.check_clear) for text in self._shared.faults]
+            faults = [parse_fault_spec(text, hands.check_clear) for text in self._options.faults]
             for spec in faults:
                 hands.check_fault(spec)
         try:
-            return faults, parser.parse(*_read(self._shared.scenario))
+            return faults, parser.parse(*_read(self._options.scenario))
         except ValueError as error:
             raise messages.Refused(str(error)) from None
+
+    def _say_how(self, otherwise: str) -> None:
+        """Say how to operate it, or which option is needed for that."""
+        control = self._options.control
+        messages.say(f"  tickrig ctl {control} describe" if control else otherwise)
 
     def _go_on(self, bench: RunningEmulator) -> None:
         """Step until somebody stops it."""

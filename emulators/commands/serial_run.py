@@ -67,7 +67,7 @@ def run_device(device_type: DeviceType, options: Mapping[str, Any]) -> int:
         return _SerialRun(configured, shared).run()
 
 
-class _SerialRun(EmulatorRun):
+class _SerialRun(EmulatorRun[_Options]):
     """One run.
 
     Args:
@@ -76,10 +76,9 @@ class _SerialRun(EmulatorRun):
     """
 
     def __init__(self, configured: ConfiguredDevice, options: _Options) -> None:
-        super().__init__(options, in_real_time=options.in_real_time)
+        super().__init__(options)
         self._type, self._device = configured.type, configured.device
         self._config = configured.config
-        self._options = options
         with refused_at("--serve"):
             self._urls = [parse_serve_url(url) for url in options.serve]
         self._places: list[str] = []
@@ -191,13 +190,8 @@ class _SerialRun(EmulatorRun):
         if self._options.panel:
             return
         click.echo("\n".join(self._places))
-        control = self._options.control
         shown, baud = self._type, self._type.line.baud
         talk = shown.talk(bench.link, baud)
         say(f"{shown.title} at {', '.join(self._places)}, {baud} 8N1. Ctrl-C ends.{talk}")
         way = "--control PATH or --panel" if shown.panel else "--control PATH"
-        say(
-            f"  tickrig ctl {control} describe"
-            if control
-            else f"Add {way} to press buttons and make faults."
-        )
+        self._say_how(f"Add {way} to press buttons and make faults.")

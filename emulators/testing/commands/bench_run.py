@@ -46,6 +46,11 @@ class BenchOptions(RunOptions):
     virtual: bool = False
     for_us: int | None = None
 
+    @property
+    def in_real_time(self) -> bool:
+        """Unless virtual time is asked for."""
+        return not self.virtual
+
 
 def run_bench(
     file: Path, *, virtual: bool, control: Path | None, seed: int | None, **others: Any
@@ -80,7 +85,7 @@ def run_bench(
         return BenchRun(plan, options).run()
 
 
-class BenchRun(EmulatorRun):
+class BenchRun(EmulatorRun[BenchOptions]):
     """One run.
 
     Args:
@@ -89,8 +94,8 @@ class BenchRun(EmulatorRun):
     """
 
     def __init__(self, plan: RigPlan, options: BenchOptions) -> None:
-        super().__init__(options, in_real_time=not options.virtual)
-        self._plan, self._options = plan, options
+        super().__init__(options)
+        self._plan = plan
         self._outside: OutsideEnds | None = None
         self._mounts: list[Mount] = []
         self._is_over = False
@@ -156,13 +161,8 @@ class BenchRun(EmulatorRun):
     def _greet(self, bench: RunningEmulator) -> None:
         for line in columns(self._row(mount) for mount in self._mounts):
             click.echo(line)
-        control = self._options.control
         say(f"{self._plan.path} in real time. Ctrl-C ends.")
-        say(
-            f"  tickrig ctl {control} describe"
-            if control
-            else "Add --control PATH to press buttons and make faults."
-        )
+        self._say_how("Add --control PATH to press buttons and make faults.")
         for mount in self._mounts:
             if isinstance(mount, BusMount) and self._place(mount) == _NOWHERE:
                 say(_ALONE.format(wire=mount.name))

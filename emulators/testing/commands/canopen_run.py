@@ -46,6 +46,7 @@ from tickrig.wire.canopen.eds.eds_writer import write_eds as format_eds
 _VIRTUAL_CHANNEL: Final = "can0"
 _BIT_RATE: Final = 1_000_000
 _SHOWN_NODES: Final = 8
+_HOW: Final = "Add --control PATH to set the objects from the inside, -vv to see the frames."
 _NO_NODE: Final = (
     "no node: give --eds FILE --node-id N, --model NAME, --rtc, --node, --rig FILE or --bus FILE"
 )
@@ -131,12 +132,11 @@ class _CanopenOptions(RunOptions):
         return not self.scenario or bool(self.bus or self.control)
 
 
-class _CanopenRun(EmulatorRun):
+class _CanopenRun(EmulatorRun[_CanopenOptions]):
     """One run; see `_CanopenOptions`."""
 
     def __init__(self, options: _CanopenOptions) -> None:
-        super().__init__(options, in_real_time=options.in_real_time)
-        self._options = options
+        super().__init__(options)
         self._described: list[build.Described] = []
         self._channel = _VIRTUAL_CHANNEL
 
@@ -252,7 +252,7 @@ class _CanopenRun(EmulatorRun):
         nodes = [f"{item.name} ({item.description.file})" for item in self._described]
         more = f" and {len(nodes) - _SHOWN_NODES} more" if len(nodes) > _SHOWN_NODES else ""
         say(f"CANopen slave {', '.join(nodes[:_SHOWN_NODES])}{more} on {bench.link}. Ctrl-C ends.")
-        self._say_how()
+        self._say_how(_HOW)
 
     def _greet_bus(self, bench: RunningEmulator, file: Path) -> None:
         """Say which nodes there are, a line each."""
@@ -262,15 +262,7 @@ class _CanopenRun(EmulatorRun):
             sheet = Path(item.description.file).name
             say(f"  {item.name}  node-ID {item.node_id}  {sheet}  {what}")
         say("Ctrl-C ends.")
-        self._say_how()
-
-    def _say_how(self) -> None:
-        control = self._options.control
-        say(
-            f"  tickrig ctl {control} describe"
-            if control
-            else "Add --control PATH to set the objects from the inside, -vv to see the frames."
-        )
+        self._say_how(_HOW)
 
 
 def parse_send(rest: str) -> Send:
