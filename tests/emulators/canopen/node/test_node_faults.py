@@ -445,3 +445,31 @@ def test_hash_seeds_make_no_difference(tmp_path: Path) -> None:
         for seed in (1, 2)
     }
     assert hashes == {f"{all_trips(tmp_path)}\n"}
+
+
+@pytest.mark.realtime
+def test_faults_of_a_node_in_real_time(tmp_path: Path) -> None:
+    logging.disable(logging.CRITICAL)
+    with Bench(axis2="2=epos", mode="real") as bench:
+        bench.run_for("50ms")
+        master = Master(bench)
+        master.write()
+        bench.fault("sdo_abort=6081h:0x06090030,count=1")
+        with pytest.raises(canopen.SdoAbortedError, match=r"0x06090030|Value range"):
+            master.write()
+        master.write()
+        bench.fault("sdo_mute", for_="2s")
+        with pytest.raises(canopen.SdoCommunicationError, match="No SDO response"):
+            master.read()
+        bench.clear("sdo_mute")
+        bench.fault("boots_again=count=1")
+        assert bench.wait_until(lambda: "702#00" in [text for _, text in master.heard], "5s")
+        bench.fault("emcy_storm=count=1")
+        assert bench.wait_until(
+            lambda: [one.code for one in master.node.emcy.log] == [0x8110], "5s"
+        )
+        bench.fault("bus_off")
+        assert bench.wait_until(lambda: bench.get("can_state") == "bus-off", "5s")
+        bench.clear("bus_off")
+        assert bench.wait_until(lambda: bench.get("can_state") == "error-active", "5s")
+    logging.disable(logging.NOTSET)
