@@ -404,6 +404,7 @@ class Operator(Copyable):
 
         It takes the place of those of its name whose time it shares.
         """
+        spec = replace(spec, name=self.full_name_of(spec.name))
         self.check_fault(spec)
         if spec.to_us <= now_us:
             raise ValueError(f"fault {spec.name} would have ended before now")
@@ -422,7 +423,7 @@ class Operator(Copyable):
     def check_fault(self, spec: FaultSpec) -> None:
         """Raise ValueError unless there is such a fault and it takes these arguments."""
         self.check_clear(spec.name)
-        if spec.name in self._wire.fault_types:
+        if self.full_name_of(spec.name) in self._wire.fault_types:
             self._wire.check(spec.name, *spec.arguments)
         else:
             bind_arguments(spec.name, _PHYSICAL, spec.arguments)
@@ -430,13 +431,20 @@ class Operator(Copyable):
     def clear(self, name: str) -> None:
         """Let a fault go, and its future too; ValueError if there is none of this name."""
         self.check_clear(name)
+        name = self.full_name_of(name)
         self._drop_fault(name)
         self._end(name)
 
     def check_clear(self, name: str) -> None:
         """Raise ValueError unless there is a fault of this name."""
-        if name not in self.faults:
+        if self.full_name_of(name) not in self.faults:
             raise ValueError(f"no fault {name!r}; {near(name, self.faults)}")
+
+    def full_name_of(self, name: str) -> str:
+        """Return how a fault is called; the name of a lone node need not stand before it."""
+        bare = name.rpartition("/")[2]
+        more = bare != name and name in self._wire.fault_types and name not in self.faults
+        return bare if more else name
 
     @property
     def faults(self) -> tuple[str, ...]:

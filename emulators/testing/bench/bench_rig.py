@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 from tickrig.device.physical import InputSignal, OutputSignal, SignalType
 from tickrig.device.twin import Copyable
-from tickrig.emulators.bench.operator import AssemblyFaults, FaultOrder, FaultSpec, Operator
+from tickrig.emulators.bench.operator import AssemblyFaults, FaultOrder, Operator
 from tickrig.emulators.bench.running_emulator import RunningEmulator
 from tickrig.emulators.can.faults import CanFaults
 from tickrig.emulators.canopen.body import BodyOnDrives
@@ -346,18 +346,6 @@ class BenchOperator(Operator):
         hands = cls(assembly.inputs, assembly.tick_us, queue, faults)
         hands._assembly, hands._wires = assembly, faults.wires
         return hands
-
-    def fault(self, now_us: int, spec: FaultSpec) -> None:
-        """Let a fault come; one of a lone device or wire may have its name before it."""
-        super().fault(now_us, replace(spec, name=self.full_name_of(spec.name)))
-
-    def clear(self, name: str) -> None:
-        """Let a fault go."""
-        super().clear(self.full_name_of(name))
-
-    def check_clear(self, name: str) -> None:
-        """Raise ValueError unless there is a fault of this name."""
-        super().check_clear(self.full_name_of(name))
 
     def full_name_of(self, name: str) -> str:
         """Return how a fault is called, which need not have its device or wire before it."""

@@ -282,6 +282,18 @@ def test_the_trace_is_the_log(tmp_path: Path) -> None:
     assert trace.read_text("ascii") == result.stdout
 
 
+@pytest.mark.parametrize("spec", ["sdo_mute", "5/sdo_mute", "5/drop", "sdo_slow=1s@10ms-2s"])
+def test_a_fault_hits_one_node(spec: str) -> None:
+    nodes = (["--node", f"5={EDS}"], ["--node", f"5={EDS}", "--node", f"6={EDS}"])
+    text = "20ms send 605#4000100000000000\n20ms send 606#4000100000000000\n100ms end\n"
+    for words in nodes if "/" in spec else nodes[:1]:
+        heard = [frame[:3] for frame in frames(play(text, *words, "--fault", spec))]
+        assert "585" not in heard or "drop" in spec
+        assert ("586" in heard) is (len(words) > 2)
+    result = play(f"10ms fault {spec}\n{text}", "--node", f"5={EDS}")
+    assert f"{spec.partition('@')[0].removeprefix('5/')}\n" in result.stderr
+
+
 def test_lss_finds_a_node_without_node_id() -> None:
     result = play("10ms send 7E5#4C00000000000000\n20ms end\n", "--eds", EDS, "--node-id", "lss")
     assert frames(result) == ["7E5#4C00000000000000", "7E4#5000000000000000"]
