@@ -73,7 +73,7 @@ def test_mistakes_are_one_line(tmp_path: Path) -> None:
             (str(bad),): "line 1: no key 'ucode'",
             (str(table), "--port", port): f"--port {port}: Address already in use",
             (str(table), "--fault", "nope"): "--fault: no fault 'nope'",
-            (str(table), "--fault", "slow=0.5"): "--fault: slow takes no rate",
+            (str(table), "--fault", "slow=0.5"): "--fault: slow takes no argument",
         }.items():
             result = CliRunner().invoke(resolver, list(words))
             assert result.exit_code == 2
