@@ -203,7 +203,8 @@ def columns(rows: Iterable[tuple[str, ...]]) -> Iterator[str]:
 
 def _setting_shown(mount: LineMount) -> Callable[[str], None]:
     def show(setting: str) -> None:
-        say(f"{mount.name}: the host has set its port to {setting}, not {mount.settings.baud} 8N1.")
+        own = mount.line.b.uart.setting
+        say(f"{mount.name}: the host has set its port to {setting}, not {own}.")
 
     return show
 

@@ -34,20 +34,52 @@ def test_it_names_the_files_that_it_wrote() -> None:
     assert not any("$" in path.read_text("utf-8") for path in paths)
 
 
-def test_a_binary_device_is_green_when_it_is_made() -> None:
-    made = new("my-gadget", "--binary")
-    assert Path("my-gadget/my_gadget/frames.py") in map(Path, made.stdout.splitlines())
-    path = os.pathsep.join([".", str(ROOT / "src")])
-    done = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider"],
-        cwd="my-gadget",
-        env={**os.environ, "PYTHONPATH": path},
+def run_tests(folder: str, *words: str) -> subprocess.CompletedProcess[str]:
+    """Run the tests of a package that is not installed."""
+    return subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *words],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([".", str(ROOT / "src")])},
         capture_output=True,
         text=True,
         check=False,
     )
+
+
+def test_a_binary_device_is_green_when_it_is_made() -> None:
+    made = new("my-gadget", "--binary")
+    assert Path("my-gadget/my_gadget/frames.py") in map(Path, made.stdout.splitlines())
+    done = run_tests("my-gadget")
     assert (done.returncode, done.stderr) == (0, ""), done.stdout
     assert "passed" in done.stdout
+
+
+FAILS = """
+import pytest
+
+from gadget.device_type import DEVICE
+from gadget.frames import Command, encode
+
+
+@pytest.fixture
+def bench_config():
+    return DEVICE
+
+
+def test_fails(bench):
+    port = bench.serial(timeout=0.05)
+    port.write(encode(Command.READ, 0))
+    assert port.read(8) == b""
+"""
+
+
+def test_a_failure_and_the_page_of_a_report_show_frames_by_field() -> None:
+    new("gadget", "--binary")
+    Path("gadget/tests/test_fails.py").write_text(FAILS)
+    done = run_tests("gadget", "tests/test_fails.py", "--bench-report", "page.html")
+    assert "gadget > command=READ address=0\n" in done.stdout
+    assert "gadget < command=READ_ANSWER address=0 value=4660\n" in done.stdout
+    assert "command=READ_ANSWER address=0 value=4660" in Path("gadget/page.html").read_text("utf-8")
 
 
 @pytest.mark.parametrize(
