@@ -104,7 +104,7 @@ class DeadMan:
         self._until_us = now_us + DEAD_MAN_US
 
     def release(self) -> None:
-        """Let go at once."""
+        """Release it at once."""
         self._until_us = None
 
     def holds(self, now_us: int) -> bool:

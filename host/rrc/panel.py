@@ -33,10 +33,10 @@ HELP: Final = """\
 space   dead-man key: the chair drives while it is held, or
         pressed again within 1 s; on a game pad any button
 arrows  aim forward, back, left, right, by 10 %
-x       let go, and aim at 0
+x       release the key, and aim at 0
 h       the host drives: the aim, while the key is held
 s       the stick drives, within the limit; + - change it
-n       nobody drives
+n       stop the chair
 1-5     speed mode, 1 is the slowest
 b       beep
 P       stop VR2 by force
@@ -83,10 +83,10 @@ class ChairPanel(FramedApp):
         Binding("down", "aim(-1,0)", "back", show=False, priority=True),
         Binding("left", "aim(0,-1)", "left", show=False, priority=True),
         Binding("right", "aim(0,1)", "aim", key_display="←↑↓→", priority=True),
-        Binding("x", "let_go", "let go"),
+        Binding("x", "release", "release"),
         Binding("h", "take('host')", "host"),
         Binding("s", "take('stick')", "stick"),
-        Binding("n", "take('nobody')", "nobody"),
+        Binding("n", "take('stopped')", "stop"),
         Binding("plus", "limit(1)", "limit", key_display="+ -"),
         Binding("minus", "limit(-1)", "limit down", show=False),
         *[
@@ -142,8 +142,8 @@ class ChairPanel(FramedApp):
         """Change the aim by steps of 10 %."""
         self._pilot.aim(v_steps * _STEP_PCT, w_steps * _STEP_PCT)
 
-    def action_let_go(self) -> None:
-        """Let the dead-man key go."""
+    def action_release(self) -> None:
+        """Release the dead-man key."""
         self._pilot.release()
 
     def action_take(self, drives: str) -> None:
@@ -193,12 +193,12 @@ def _pane(name: str, title: str) -> Static:
 def state_pane(view: PilotView) -> Text:
     """Show who drives, what comes of it, and what the RRC reports."""
     sa, (aim_v, aim_w) = view.status, view.aim_pct
-    key = (" DRIVES ", "bold black on green") if view.held else (" let go ", "reverse dim")
-    who = f" {view.drives} drives"
+    key = (" DRIVES ", "bold black on green") if view.held else (" released ", "reverse dim")
+    who = f" {view.drives.text}"
     if view.drives is Drives.STICK:
         who += f", at most {view.most_pct} %"
     rows = [
-        Text.assemble(key if view.drives is Drives.HOST else ("        ", ""), (who, "bold")),
+        Text.assemble(key if view.drives is Drives.HOST else ("", ""), (who, "bold")),
         Text.assemble(
             *("aim    ", f"v {gauges.signed(aim_v)} %  w {gauges.signed(aim_w)} %"),
             *("   stick ", "" if sa is None else f"{sa.in_v_pct:+} {sa.in_w_pct:+}"),

@@ -20,9 +20,14 @@ _KEPT_LINES: Final = 60
 class Drives(StrEnum):
     """Who drives the chair, as far as the panel has chosen."""
 
-    NOBODY = "nobody"
+    STOPPED = "stopped"
     HOST = "host"
     STICK = "stick"
+
+    @property
+    def text(self) -> str:
+        """What people read."""
+        return "stopped" if self is Drives.STOPPED else f"{self} drives"
 
 
 class PadStick(Protocol):
@@ -50,7 +55,7 @@ class PilotView:
     """
 
     now_us: int
-    drives: Drives = Drives.NOBODY
+    drives: Drives = Drives.STOPPED
     aim_pct: tuple[int, int] = (0, 0)
     held: bool = False
     speed_mode: int = 1
@@ -75,7 +80,7 @@ class Pilot:
         self._chair, self._pad = chair, pad
         self._client = chair.client
         self._dead_man = DeadMan()
-        self._drives, self._aim_pct = Drives.NOBODY, (0, 0)
+        self._drives, self._aim_pct = Drives.STOPPED, (0, 0)
         self._speed_mode, self._most_pct = 1, 50
         self._acts: deque[Callable[[], None]] = deque()
         self._lines: deque[tuple[int, str, str]] = deque(maxlen=_KEPT_LINES)
@@ -90,7 +95,7 @@ class Pilot:
         self._dead_man.press(self._client.now_us)
 
     def release(self) -> None:
-        """Let the dead-man key go, and aim at 0."""
+        """Release the dead-man key, and aim at 0."""
         self._dead_man.release()
         self._aim_pct = 0, 0
 
@@ -100,7 +105,7 @@ class Pilot:
         self._aim_pct = max(-100, min(100, v + v_pct)), max(-100, min(100, w + w_pct))
 
     def take(self, drives: Drives) -> None:
-        """Let the host, the stick or nobody drive."""
+        """Let the host or the stick drive, or stop the chair."""
         self.release()
         self._acts.append(lambda: self._take(drives))
 
@@ -151,7 +156,7 @@ class Pilot:
         except RrcStopped as refused:
             self._note("!", str(refused))
             self._client.resume()
-            self._drives = Drives.NOBODY
+            self._drives = Drives.STOPPED
         except DeviceRefused as refused:
             self._note("!", str(refused))
         self.view = self._look()
@@ -176,14 +181,14 @@ class Pilot:
         else:
             self._chair.stop()
         self._drives = drives
-        self._note(">", f"{drives} drives")
+        self._note(">", drives.text)
 
     def _power_off(self) -> None:
         self._client.poweroff()
         self._note(">", "power off")
 
     def _stopped(self, stop: ChairStopped) -> None:
-        self._drives = Drives.NOBODY
+        self._drives = Drives.STOPPED
         self.release()
         if stop.kind is None:
             self._note("!", str(stop))

@@ -41,7 +41,7 @@ _TAKEN_US: Final = 100_000
 class Operator(Protocol):
     """The person at the chair. Time passes on the chair while it is waited for."""
 
-    def tell(self, text: str) -> None:
+    def instruct(self, text: str) -> None:
         """Say what to do."""
 
     def confirms(self, question: str) -> bool:
@@ -150,7 +150,7 @@ class Procedure:
     def _power_on(self) -> None:
         if self.chair.status() is not None:
             return
-        self.operator.tell("Press the power button of the controller: VR2 starts.")
+        self.operator.instruct("Press the power button of the controller: VR2 starts.")
         self._await_event(RrcEvent.POWER_ON_SUCCESS)
         self._await(lambda sa: True, "a status line")
 
@@ -159,14 +159,14 @@ class Procedure:
 
     def _limit(self) -> None:
         self.chair.drive_by_stick(cmd.Limit(50, 50))
-        self.operator.tell("Push the stick forward, as far as it goes, and hold it.")
+        self.operator.instruct("Push the stick forward, as far as it goes, and hold it.")
         sa = self._await(lambda sa: sa.in_v_pct >= _PUSHED_PCT, "the stick forward")
         if not 0 < sa.out_v_pct <= 50:
             raise _Failed(f"stick at {sa.in_v_pct} %, output at {sa.out_v_pct} %, not 1..50 %")
         self._rest()
 
     def _output(self) -> None:
-        self.operator.tell("The wheels turn forward for 1 s.")
+        self.operator.instruct("The wheels turn forward for 1 s.")
         self.chair.take_over()
         until_us = self.chair.client.now_us + _DRIVE_US
         while self.chair.client.now_us < until_us:
@@ -180,7 +180,7 @@ class Procedure:
     def _speed(self) -> None:
         self.chair.client.speedmode(4)
         self._await(lambda sa: sa.speed_mode == 4, "speed mode 4", _SECOND_US)
-        self.operator.tell("Press the speed-up button.")
+        self.operator.instruct("Press the speed-up button.")
         self._await(lambda sa: sa.speed_mode == 5, "speed mode 5")
         self.chair.client.speedmode(1)
 
@@ -188,12 +188,14 @@ class Procedure:
         self._rest()
         self.chair.client.joystick(cmd.Joystick(reverse_mode=3))
         self.chair.drive_by_stick(cmd.Limit(50, 50))
-        self.operator.tell("Pull the stick straight back and hold it: the chair backs.")
+        self.operator.instruct("Pull the stick straight back and hold it: the chair backs.")
         sa = self._await(lambda sa: sa.in_v_pct <= -_PUSHED_PCT, "the stick back")
         if sa.out_v_pct >= 0:
             raise _Failed(f"stick at {sa.in_v_pct} {sa.in_w_pct} %, output at {sa.out_v_pct} %")
         self._rest()
-        self.operator.tell("Push it to the right, then back to 45 degrees: the chair turns only.")
+        self.operator.instruct(
+            "Push it to the right, then back to 45 degrees: the chair turns only."
+        )
         sa = self._await(lambda sa: sa.in_w_pct >= 40 and sa.in_v_pct <= -40, "right and back")
         if sa.out_v_pct or sa.out_w_pct <= 0:
             said = f"output at {sa.out_v_pct} {sa.out_w_pct}"
@@ -217,7 +219,9 @@ class Procedure:
         client = self.chair.client
         self.chair.take_over()
         client.watchdog(_SECOND_US)
-        self.operator.tell("Nothing is sent for 1 s: VR2 stops, and the controller's LED blinks.")
+        self.operator.instruct(
+            "Nothing is sent for 1 s: VR2 stops, and the controller's LED blinks."
+        )
         waited_us = self.chair.stay_silent(RrcEvent.BY_WATCHDOG, 3 * _SECOND_US)
         if waited_us is None:
             raise _Failed("no EV:PowerOffWaitByWatchdog in 3 s")
@@ -231,7 +235,7 @@ class Procedure:
         self._power_cycle()
 
     def _power_cycle(self) -> None:
-        self.operator.tell("Press the power button: VR2 goes off.")
+        self.operator.instruct("Press the power button: VR2 goes off.")
         self._await_event(RrcEvent.INITIALIZED)
         self.chair.client.run_for(_TAKEN_US)
         self.chair.set_guard()
@@ -243,7 +247,7 @@ class Procedure:
             raise _Failed(f"the operator says no: {question}")
 
     def _rest(self) -> None:
-        self.operator.tell("Let the stick go.")
+        self.operator.instruct("Let the stick go.")
         self._await(lambda sa: not (sa.in_v_pct or sa.in_w_pct), "the stick at rest")
         self.chair.client.run_for(300_000)  # takes the gear out
 

@@ -178,7 +178,7 @@ class _Keys:
             raise ChairStopped(f"the terminal is gone: {error.strerror}") from error
         if b" " in keys:
             self._dead_man.press(now_us)
-        if keys.strip(b" "):  # any other key lets go
+        if keys.strip(b" "):  # any other key releases it
             self._dead_man.release()
         self.leaves = self.leaves or b"q" in keys
         return self._drive if self._dead_man.holds(now_us) else (0, 0)
@@ -380,7 +380,7 @@ class _TerminalOperator:
         self._chair, self._ended = chair, ended
         self._typed = b""
 
-    def tell(self, text: str) -> None:
+    def instruct(self, text: str) -> None:
         say(f"   {text}")
 
     def confirms(self, question: str) -> bool:

@@ -275,7 +275,7 @@ def test_the_end_of_the_panel_stops_the_chair(
 ) -> None:
     live, port = bench
     child = spawned(port, "--panel")
-    child.expect_exact("nobody drives")
+    child.expect_exact(" stopped")
     child.send(b"h")
     live.await_output("state", "Output")
     child.send(b"\x1b[A" * 3)
@@ -288,7 +288,7 @@ def test_the_end_of_the_panel_stops_the_chair(
 def test_a_device_that_is_gone_ends_the_panel(bench: Bench) -> None:
     live, port = bench
     child = spawned(port, "--panel")
-    child.expect_exact("nobody drives")
+    child.expect_exact(" stopped")
     live.set("rrc_power", 0)
     child.expect_exact(
         f"Error: {port.path}: no status line for 300 ms: is the RRC still there?\r\n"

@@ -61,7 +61,7 @@ def test_the_chair_drives_while_the_key_is_pressed_again() -> None:
             assert " DRIVES  host drives" in seat.shown("state")
         seat.step(200_000)
         assert seat.bench.out_pct() == (0, 0)
-        assert " let go  host drives" in seat.shown("state")
+        assert " released  host drives" in seat.shown("state")
 
     on_panel(act)
 
@@ -115,7 +115,7 @@ def test_a_power_cycle_sets_the_guard_again() -> None:
         seat.step(1_000_000)
         assert "EV:PowerOffWaitByButton" in seat.shown("lines")
         assert "VR2 is off: press its power button" in seat.shown("state")
-        assert seat.pilot.view.drives is Drives.NOBODY
+        assert seat.pilot.view.drives is Drives.STOPPED
         client = seat.bench.chair.client
         assert (client.stable, client.watchdog_us) == (True, 500_000)
         seat.bench.rrc.inputs.set("power_button", 1)
@@ -220,4 +220,4 @@ def test_a_pad_that_is_gone_stops_the_chair() -> None:
     pilot.step()
     assert bench.out_pct() == (0, 0)
     assert [text for _, _, text in pilot.view.lines][-1] == "the pad is gone"
-    assert pilot.view.drives is Drives.NOBODY
+    assert pilot.view.drives is Drives.STOPPED

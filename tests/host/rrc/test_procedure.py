@@ -35,7 +35,7 @@ class Willing:
         self.told: list[str] = []
         self.pressed: list[str] = []
 
-    def tell(self, text: str) -> None:
+    def instruct(self, text: str) -> None:
         self.told.append(text)
         inputs = self.bench.rrc.inputs
         for begins, (v_pct, w_pct) in STICK.items():
@@ -113,9 +113,9 @@ def test_a_chair_that_does_something_else_fails_the_step() -> None:
 
 def test_a_stick_that_nobody_moves_is_waited_for_a_minute() -> None:
     class Idle(Willing):
-        def tell(self, text: str) -> None:
+        def instruct(self, text: str) -> None:
             if "forward, as far" not in text:
-                super().tell(text)
+                super().instruct(text)
 
     procedure = run(Idle(bench()))
     assert procedure.results[1].reason == "waited 60 s for the stick forward"
