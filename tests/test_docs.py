@@ -55,7 +55,9 @@ def test_the_program_of_a_page_runs(page: str, monkeypatch: pytest.MonkeyPatch) 
 
 @pytest.mark.realtime
 def test_the_host_program_of_the_rrc_page_runs() -> None:
-    (program,) = blocks("docs/reference/devices/rrc.md", "python")
+    (program,) = (
+        block for block in blocks("docs/reference/devices/rrc.md", "python") if "/tmp/rrc" in block
+    )
     with pty() as port, live_rrc(port) as rrc:
         with RrcClient.open(port.path) as client:
             rrc.set("power_button", 1)
@@ -67,6 +69,13 @@ def test_the_host_program_of_the_rrc_page_runs() -> None:
             {},
         )
         assert (rrc.read("state"), rrc.read("out_v_pct")) == ("Output", 30)
+
+
+def test_the_control_loop_of_the_rrc_page_runs() -> None:
+    (program,) = (
+        block for block in blocks("docs/reference/devices/rrc.md", "python") if "Bench" in block
+    )
+    exec(compile(program, "docs/reference/devices/rrc.md", "exec"), {})
 
 
 @pytest.mark.parametrize("page", PAGES, ids=[page.name for page in PAGES])

@@ -71,6 +71,11 @@ OUTPUTS: Final = {
         OutputSignal("margin_pct", "100 minus load_pct; below 0 the RRC falls behind", "%"),
         OutputSignal("backlog_pct", "work that the RRC is behind, of a period; 300 stops VR2", "%"),
         OutputSignal("pace_lines_s", "lines a second that a host may send, at 90 % load", "1/s"),
+        OutputSignal("speed_mm_s", "true speed of the vehicle, forward is positive", "mm/s"),
+        OutputSignal("turn_mrad_s", "true turning speed, right is positive", "mrad/s"),
+        OutputSignal("distance_mm", "way of the vehicle, backing counts negative", "mm"),
+        OutputSignal("heading_mrad", "how far the vehicle has turned to the right", "mrad"),
+        OutputSignal("battery_permille", "how full the battery of the vehicle is", "0.1 %"),
     )
 }
 

@@ -11,6 +11,7 @@ from tickrig.device.physical import InputBank, OutputSignal
 from tickrig.device.rrc.board import OUTPUTS, Buzzer, LoadAccount, PowerSequence, new_inputs
 from tickrig.device.rrc.drive import Drive, chosen_mode, count_button_edges
 from tickrig.device.rrc.settings import NEXT_STATE, POWERED_ON, Move, RrcConfig, RrcState, Settings
+from tickrig.device.rrc.vehicle import Vehicle
 from tickrig.device.twin import Copyable
 from tickrig.wire.errors import ChecksumError
 from tickrig.wire.instant import NEVER
@@ -37,7 +38,7 @@ from tickrig.wire.rrc.replies import StatusA as Status
 # 2. buttons, faults, time    EV lines of power-on, power-off and faults
 # 3. lines, up to the quota   OK, ER, and the answers of device, version and date
 # 4. watchdog                 EV:PowerOffWaitByWatchdog
-# 5. motors                   nothing is sent; the SA line of step 6 shows what they get
+# 5. motors, vehicle          nothing is sent; the SA line of step 6 shows what they get
 # 6. SA line, load account    SA, then EV:PowerOffWaitByOverTime
 # 7. buzzer                   nothing is sent
 #
@@ -167,9 +168,9 @@ _MOVES: Final[dict[type[cmd.Command], Move]] = {
 class Rrc(Copyable):
     """The Robotic Relay Communicator with the VR2 wheelchair around it; a `Device[bytes]`.
 
-    Not emulated: the traffic on the VR2 bus itself, how fast the vehicle drives
-    in which speed mode, what the alarm button's horn sounds like, the USB
-    serial driver.
+    The vehicle is there if `config.vehicle` says so; its numbers are ours (vehicle.py).
+    Not emulated: the traffic on the VR2 bus itself, what the alarm button's horn
+    sounds like, the USB serial driver.
 
     Attributes:
         type_name: what its device type is called, for traces.
@@ -186,6 +187,7 @@ class Rrc(Copyable):
     _buffer: ReceiveBuffer = field(init=False)
     _power: PowerSequence = field(init=False)
     _drive: Drive = field(init=False)
+    _vehicle: Vehicle = field(init=False)
     _buzzer: Buzzer = field(init=False)
     _load: LoadAccount = field(init=False)
     _renewed: int = field(default=0, init=False)  # tick of the latest correct command
@@ -215,12 +217,17 @@ class Rrc(Copyable):
         return OUTPUTS
 
     def reset(self) -> None:
-        """Forget everything but configuration and physical inputs, as a power cut does."""
+        """Forget everything but configuration and physical inputs; the vehicle stands again."""
+        self._vehicle = Vehicle(self.config.battery_wh)
+        self._lose_power()
+        self._due_us = 0
+
+    def _lose_power(self) -> None:
+        """Forget what a power cut of the RRC takes; the vehicle rolls on."""
         self.state = RrcState.OFF
         self._buffer = ReceiveBuffer(self.config.buffer_bytes)
         self._power, self._load = PowerSequence(self.config), LoadAccount()
         self._wipe()
-        self._due_us = 0
 
     def read(self, name: str, /) -> int | str:
         """Look at an output, as it was left by the latest tick.
@@ -256,8 +263,9 @@ class Rrc(Copyable):
         tick = now_us // TICK_US
         self.inputs.changed = False
         if not self.inputs["rrc_power"]:
-            self.reset()
-            self._due_us = NEVER
+            self._lose_power()
+            self._roll()
+            self._due_us = now_us + TICK_US if self._rolls else NEVER
             return b""
         if self.state is RrcState.OFF:
             self._boot(tick)
@@ -268,6 +276,7 @@ class Rrc(Copyable):
         self._work(tick)
         self._watch(tick)
         self._drive.step(tick, self.state, self._settings, self.inputs)
+        self._roll()
         self._report_and_account(tick, rx.count(b"\n"), overflows)
         running = self.state in POWERED_ON
         self._buzzer.tick(tick, self._drive.alarm_since if running else None)
@@ -377,6 +386,18 @@ class Rrc(Copyable):
         self._move(Move.FORCED, tick)
         self._sent.append(replies.Event(cause).encode())
 
+    @property
+    def _rolls(self) -> bool:
+        """Whether the vehicle changes in each tick: it moves, or VR2 uses the battery."""
+        return self.config.vehicle and (self.state in POWERED_ON or self._vehicle.moving)
+
+    def _roll(self) -> None:
+        """Move the vehicle, if there is one."""
+        if self.config.vehicle:
+            self._vehicle.set_gauge(self.inputs["gauge"])
+            running = self.state in POWERED_ON
+            self._vehicle.step(self._drive.out_pct, self._settings.speed_mode, running=running)
+
     def _report_and_account(self, tick: int, line_feeds: int, overflows: int) -> None:
         """Send the SA line, then see whether the period was long enough for it all."""
         load, status = self._load, self._settings.status
@@ -397,7 +418,7 @@ class Rrc(Copyable):
             inputs["stick_v_pct"],
             inputs["stick_w_pct"],
             *self._drive.out_pct,
-            inputs["gauge"],
+            self._vehicle.shown_gauge if self.config.vehicle else inputs["gauge"],
             settings.speed_mode,
             settings.speed_up_count,
             settings.speed_down_count,
@@ -438,6 +459,7 @@ class Rrc(Copyable):
         """Return the next tick at which something happens without input, `NEVER` if none does."""
         settings, running = self._settings, self.state in POWERED_ON
         busy = self._buffer or not self._load.settled or (settings.status and running)
+        busy = busy or self._rolls
         if busy or self._moved == tick:  # a new state looks at buttons from the next tick on
             return tick + 1
         due = self._power.due_tick(self.state)
@@ -463,5 +485,10 @@ _READERS: Final[dict[str, Callable[[Rrc], int | str]]] = {
     "margin_pct": lambda rrc: PERIOD_PCT - rrc._load.load_pct,
     "backlog_pct": lambda rrc: rrc._load.backlog_pct,
     "pace_lines_s": lambda rrc: rrc._pace_lines_s,
+    "speed_mm_s": lambda rrc: round(rrc._vehicle.speed_mm_s),
+    "turn_mrad_s": lambda rrc: round(rrc._vehicle.turn_mrad_s),
+    "distance_mm": lambda rrc: round(rrc._vehicle.distance_mm),
+    "heading_mrad": lambda rrc: round(rrc._vehicle.heading_mrad),
+    "battery_permille": lambda rrc: round(rrc._vehicle.charge * 1_000),
 }
 """What `Rrc.read` returns for each of `outputs`; only the signal that is read is computed."""

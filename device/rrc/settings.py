@@ -97,9 +97,11 @@ class RrcConfig(Immutable):
         fault_hold_ticks: how long a fault must last to be detected (DECISION R25).
         buffer_bytes: size of the receive buffer (DECISION R27).
         overtime: whether too much work stops VR2 (DECISION R27).
+        vehicle: whether there is a vehicle behind VR2, with speed, way and battery.
+        battery_wh: what its battery holds, Wh.
 
     Raises:
-        ValueError: a time or size below 1, or an event name the manual does not know.
+        ValueError: a time, size or battery below 1, or an event name the manual does not know.
     """
 
     device_name: str = "RRC"
@@ -115,6 +117,8 @@ class RrcConfig(Immutable):
     fault_hold_ticks: int = 10
     buffer_bytes: int = 256
     overtime: bool = True
+    vehicle: bool = False
+    battery_wh: int = 1_200
 
     def __post_init__(self) -> None:
         """Refuse what no RRC could be."""
@@ -124,6 +128,7 @@ class RrcConfig(Immutable):
         for name in (
             *("initialize_ticks", "power_on_ticks", "power_on_timeout_ticks"),
             *("button_off_ticks", "forced_off_ticks", "fault_hold_ticks", "buffer_bytes"),
+            "battery_wh",
         ):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} is {getattr(self, name)}, at least 1 is needed")

@@ -13,4 +13,18 @@ FIELDS: Final = (
         default="PowerOnTrigger",
         help="Name of the power-on event, as in the field or as in the manual.",
     ),
+    DeviceField(
+        name="vehicle",
+        kind=bool,
+        help="A vehicle behind VR2: speed, way and battery, with numbers of ours.",
+    ),
+    DeviceField(
+        name="battery_wh",
+        kind=int,
+        low=1,
+        high=100_000,
+        default=1_200,
+        unit="WH",
+        help="What the battery of the vehicle holds.",
+    ),
 )

@@ -28,6 +28,7 @@ from tickrig.device.canopen.stack import make_slave
 from tickrig.device.rh3.base import Rh3Base
 from tickrig.device.rh3.parameters import BaseParameters
 from tickrig.device.rrc.machine import Rrc
+from tickrig.device.rrc.settings import RrcConfig
 from tickrig.device.rtc_lite.component import LiteEcho
 from tickrig.device.rtc_lite.node import RtcLiteNode
 from tickrig.device.rtc_lite.server import LiteConfig
@@ -191,6 +192,12 @@ KINDS: dict[str, dict[str, Any]] = {
     "RRC": {"device_type": Rrc, "traffic": strategies.chunks(RRC_LINES)},
     "RRC that is on": {
         "device_type": Rrc,
+        "traffic": strategies.chunks(RRC_LINES),
+        "start": RRC_ON,
+        "max_examples": examples(20),
+    },
+    "RRC with a vehicle": {
+        "device_type": partial(Rrc, RrcConfig(vehicle=True, battery_wh=1)),
         "traffic": strategies.chunks(RRC_LINES),
         "start": RRC_ON,
         "max_examples": examples(20),

@@ -1,0 +1,122 @@
+"""The vehicle behind VR2: what its speed and its battery make of the output.
+
+The manual has no numbers of the vehicle. All values here are ours: those of a common electric
+wheelchair with a top speed of 6 km/h.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Final
+
+TOP_MM_S: Final = (333.0, 667.0, 1_000.0, 1_333.0, 1_667.0)
+"""Forward speed at an output of 100 %, by speed mode."""
+
+BACKING: Final = 0.5
+"""Part of it that is left when it backs."""
+
+TURN_MRAD_S: Final = (300.0, 600.0, 900.0, 1_200.0, 1_500.0)
+"""Turning speed at an output of 100 %, by speed mode."""
+
+_SPEEDING_MM_S2: Final = 800.0
+_SLOWING_MM_S2: Final = 1_200.0
+_BRAKING_MM_S2: Final = 3_000.0
+"""VR2 that is off lets the brakes fall in."""
+
+_TURN_PER_SPEED: Final = 3.0
+"""mrad/s² of turning for each mm/s² of translation."""
+
+_IDLE_W: Final = 10.0
+_ROLLING_N: Final = 30.0
+_MASS_KG: Final = 150.0
+_TURNING_W: Final = 60.0
+_EFFICIENCY: Final = 0.6
+
+_STEP_S: Final = 0.01
+_J_PER_WH: Final = 3_600.0
+_GAUGE_TOP: Final = 10
+
+
+@dataclass(slots=True)
+class Vehicle:
+    """Speed, way and battery of the vehicle, period by period.
+
+    Args:
+        battery_wh: what the battery holds.
+
+    Attributes:
+        gauge: how full the battery was set to be, 1..10.
+        speed_mm_s: true speed, forward positive.
+        turn_mrad_s: true turning speed, to the right positive.
+        distance_mm: way along its path; backing counts negative.
+        heading_mrad: how far it has turned to the right.
+        charge: how full the battery is, 0..1.
+    """
+
+    battery_wh: int
+    gauge: int = field(default=_GAUGE_TOP, init=False)
+    speed_mm_s: float = field(default=0.0, init=False)
+    turn_mrad_s: float = field(default=0.0, init=False)
+    distance_mm: float = field(default=0.0, init=False)
+    heading_mrad: float = field(default=0.0, init=False)
+    charge: float = field(default=1.0, init=False)
+
+    @property
+    def moving(self) -> bool:
+        """Whether it has not come to rest yet."""
+        return self.speed_mm_s != 0.0 or self.turn_mrad_s != 0.0
+
+    @property
+    def shown_gauge(self) -> int:
+        """What the voltage gauge shows of the battery, 1..10."""
+        return max(1, -int(-self.charge * _GAUGE_TOP // 1))
+
+    def set_gauge(self, gauge: int) -> None:
+        """Charge or discharge the battery, if the input is another one than before."""
+        if gauge != self.gauge:
+            self.gauge, self.charge = gauge, gauge / _GAUGE_TOP
+
+    def step(self, out_pct: tuple[int, int], speed_mode: int, *, running: bool) -> None:
+        """Move for one period of 10 ms.
+
+        Args:
+            out_pct: translation and rotation that the motors get.
+            speed_mode: 1..5.
+            running: whether VR2 is on; the brakes are on otherwise.
+        """
+        v_pct, w_pct = out_pct if self.charge > 0.0 else (0, 0)
+        top_mm_s = TOP_MM_S[speed_mode - 1] * (BACKING if v_pct < 0 else 1.0)
+        before_mm_s, before_mrad_s = self.speed_mm_s, self.turn_mrad_s
+        slowing = _SLOWING_MM_S2 if running else _BRAKING_MM_S2
+        self.speed_mm_s = _toward(before_mm_s, top_mm_s * v_pct / 100, _SPEEDING_MM_S2, slowing)
+        self.turn_mrad_s = _toward(
+            before_mrad_s,
+            TURN_MRAD_S[speed_mode - 1] * w_pct / 100,
+            _SPEEDING_MM_S2 * _TURN_PER_SPEED,
+            slowing * _TURN_PER_SPEED,
+        )
+        self.distance_mm += (before_mm_s + self.speed_mm_s) / 2 * _STEP_S
+        self.heading_mrad += (before_mrad_s + self.turn_mrad_s) / 2 * _STEP_S
+        if running:
+            self._use(abs(before_mm_s) / 1_000)
+
+    def _use(self, before_m_s: float) -> None:
+        """Take from the battery what this period needs."""
+        speed_m_s = abs(self.speed_mm_s) / 1_000
+        pushing_n = max(0.0, speed_m_s - before_m_s) / _STEP_S * _MASS_KG
+        wheels_w = (_ROLLING_N + pushing_n) * speed_m_s
+        turning_w = _TURNING_W * abs(self.turn_mrad_s) / TURN_MRAD_S[-1]
+        used_j = (_IDLE_W + wheels_w / _EFFICIENCY + turning_w) * _STEP_S
+        self.charge = max(0.0, self.charge - used_j / (self.battery_wh * _J_PER_WH))
+
+
+def _toward(value: float, wanted: float, speeding: float, slowing: float) -> float:
+    """Return a speed one period later: it passes zero before it turns round.
+
+    >>> _toward(0.0, 100.0, 800.0, 1_200.0), _toward(5.0, -100.0, 800.0, 1_200.0)
+    (8.0, 0.0)
+    """
+    if value * wanted < 0.0:
+        wanted = 0.0
+    change = (speeding if abs(wanted) > abs(value) else slowing) * _STEP_S
+    return min(wanted, value + change) if wanted > value else max(wanted, value - change)
