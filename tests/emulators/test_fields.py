@@ -84,6 +84,8 @@ def typed(device_type: DeviceType, word: str, text: str) -> tuple[object, str]:
 def test_a_rig_file_reads_a_value_as_the_command_line_does(name: str, text: str) -> None:
     device_type = DEVICES.load(name)
     for field in device_type.fields:
+        if field.kind is bool:  # a flag has no value on a command line
+            continue
         try:
             read = read_config(name, device_type.fields, {field.word: text})
             found = read[field.name], ""

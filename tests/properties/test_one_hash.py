@@ -52,7 +52,7 @@ from tickrig.host.rtc.motion.geometry import Pose
 from tickrig.wire.can import CanFrame
 from tickrig.wire.modbus import encode_frame, encode_request
 
-ONE_HASH: Final = "1a10df6f27058796123e8c8222bb641057d296d30a067dcec125f617f99e357d"
+ONE_HASH: Final = "1d4d2cd397dd0d59807f202bbf6953ba183f4bc4c2754f43577c64f59c8312e5"
 """Renew it where a device is meant to do something else than before."""
 
 LIBM: Final = "574a9963050bcfdf2120e6d203e0430883376a31cfa780fdc74e39ea730c6536"
