@@ -55,11 +55,15 @@ def rtc() -> None:
     "--lite",
     "lites",
     multiple=True,
-    metavar="NAME=URL[@BAUD]",
-    help="A device of RTC-Lite at a pyserial URL; its proxy is NAME0. May be repeated.",
+    metavar="NAME=URL[@BAUD][,rtno][,boot=TIME]",
+    help="A device of RTC-Lite, or a board with RTno, at a pyserial URL; its proxy is NAME0."
+    " May be repeated.",
 )
 @click.option(
-    "--lite-boot", default="0s", metavar="TIME", help="Silence once a line is open, as 3s."
+    "--lite-boot",
+    default="0s",
+    metavar="TIME",
+    help="Silence once a line is open, as 3s.  [0s, rtno 3s]",
 )
 @click.option(
     "--rate", "rate_hz", type=NumberRange(1e-6, 1e6), metavar="HZ", help="Rate of all components."
@@ -84,6 +88,7 @@ def run(lite_boot: str, **options: Any) -> None:
     tickrig rtc run system.xml --component my_rtc.py:Scale --save after.toml
     seq 1 5 | tickrig rtc run chain.toml --console
     tickrig rtc run lite.toml --lite LiteA=/dev/ttyUSB0@57600 --lite LiteB=/tmp/lite-b
+    tickrig rtc run board.toml --lite Board=/dev/ttyACM0,rtno,boot=2s
     tickrig rtc run system.toml --openrtm localhost:2809
     tickrig rtc run system.toml --ros2 --ros2-table topics.toml
     """  # noqa: D301 - click wants the backspace

@@ -7,7 +7,7 @@ from contextlib import ExitStack, closing
 from dataclasses import dataclass, field, replace
 from typing import Final
 
-from tickrig.host.cli.messages import Refused, say
+from tickrig.host.cli.messages import Refused, refused_at, say
 from tickrig.host.links.link import Link, LinkClosed, ReopeningLink
 from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.rtc.component import ExecutionContext
@@ -17,7 +17,10 @@ from tickrig.host.rtc.lite.request_channel import POLL_US, ProxySettings, Reques
 from tickrig.host.rtc.states import RtcRefused
 from tickrig.host.rtc.system.manager import Manager
 from tickrig.host.text.log import log_of
+from tickrig.host.text.names import near
+from tickrig.host.text.values import parse_time_us
 from tickrig.wire.rtc_lite.codes import LiteCommand
+from tickrig.wire.rtc_lite.frame import Framing
 
 
 class DeviceWatcher:
@@ -183,11 +186,14 @@ def attach(  # noqa: PLR0913 - options, by keyword
     return attachment.proxy
 
 
-# `--lite NAME=URL[@BAUD]`: devices of RTC-Lite as the command line of `tickrig rtc` names them.
+# `--lite NAME=URL[@BAUD][,rtno][,boot=TIME]`: devices as the command line of `tickrig rtc` names
+# them. An Arduino with RTno resets when its port is opened, so a line of RTno waits by itself.
 
 _BAUD: Final = 57_600
+_RTNO_BOOT_US: Final = 3_000_000
 
-_WORD: Final = re.compile(r"([A-Za-z]\w*)=(.+?)(?:@(\d{1,8}))?", re.ASCII)
+_FORM: Final = "NAME=URL[@BAUD][,rtno][,boot=TIME]"
+_WORD: Final = re.compile(r"([A-Za-z]\w*)=([^,]+?)(?:@(\d{1,8}))?((?:,[^,]*)*)", re.ASCII)
 
 
 def attach_lite(
@@ -197,16 +203,15 @@ def attach_lite(
 
     Args:
         manager: of the system.
-        word: `NAME=URL[@BAUD]`; the proxy is `NAME0`.
+        word: `NAME=URL[@BAUD][,rtno][,boot=TIME]`; the proxy is `NAME0`.
         stack: closes the line.
-        boot_us: silence after the line was opened.
+        boot_us: silence after the line was opened, unless the word has `boot`.
         rate_hz: of the proxy; 10 Hz if None.
 
     Raises:
         Refused: no such word, no such line, or nobody answers there.
     """
-    name, url, baud = _parse_lite(word)
-    settings = ProxySettings(boot_us=boot_us, rediscover=True)
+    name, url, baud, settings = _parse_lite(word, boot_us)
     try:
         link = stack.enter_context(closing(ReopeningLink(lambda: SerialLink(url, baud))))
         attach(manager, link, name, settings, listener=_report, rate_hz=rate_hz or _RATE_HZ)
@@ -214,16 +219,33 @@ def attach_lite(
         raise Refused(f"--lite {word}: {error}") from None
 
 
-def _parse_lite(word: str) -> tuple[str, str, int]:
-    """Read name, URL and bit rate; Refused if it is not so written.
+def _parse_lite(word: str, boot_us: int = 0) -> tuple[str, str, int, ProxySettings]:
+    """Read name, URL, bit rate and settings; Refused if it is not so written.
 
-    >>> _parse_lite("LiteA=/dev/ttyUSB0"), _parse_lite("B=socket://localhost:7000@9600")
+    >>> _parse_lite("LiteA=/dev/ttyUSB0")[:3], _parse_lite("B=socket://localhost:7000@9600")[:3]
     (('LiteA', '/dev/ttyUSB0', 57600), ('B', 'socket://localhost:7000', 9600))
+    >>> _parse_lite("A=/dev/ttyACM0,rtno")[3].boot_us, _parse_lite("A=x,boot=200ms")[3].boot_us
+    (3000000, 200000)
     """
     match = _WORD.fullmatch(word)
     if match is None:
-        raise Refused(f"--lite {word!r} is not NAME=URL[@BAUD], as LiteA=/dev/ttyUSB0@57600")
-    return match[1], match[2], int(match[3] or _BAUD)
+        raise Refused(f"--lite {word!r} is not {_FORM}, as LiteA=/dev/ttyUSB0@57600")
+    framing, own_boot_us = Framing.LITE, None
+    for option in match[4].split(",")[1:]:
+        key, equals, value = option.partition("=")
+        if option == "rtno":
+            framing = Framing.RTNO
+        elif key == "boot" and equals:
+            with refused_at(f"--lite {word}"):
+                own_boot_us = parse_time_us(value)
+        else:
+            raise Refused(
+                f"--lite {word}: no option {option!r}; {near(key, ('rtno', 'boot=TIME'))}"
+            )
+    if own_boot_us is None:
+        own_boot_us = boot_us or (_RTNO_BOOT_US if framing is Framing.RTNO else 0)
+    settings = ProxySettings(framing=framing, boot_us=own_boot_us, rediscover=True)
+    return match[1], match[2], int(match[3] or _BAUD), settings
 
 
 def _report(event: ProxyEvent) -> None:

@@ -126,7 +126,9 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         ),
         ("chain.toml --component twice.py:Bare", "has no attribute 'spec'"),
         ("chain.toml --control no/dir/ctl", "control no/dir/ctl: No such file or directory"),
-        ("chain.toml --lite x", "--lite 'x' is not NAME=URL[@BAUD], as LiteA=/dev/ttyUSB0@57600"),
+        ("chain.toml --lite x", "--lite 'x' is not NAME=URL[@BAUD][,rtno][,boot=TIME], as LiteA"),
+        ("chain.toml --lite A=tty,rtn", "A=tty,rtn: no option 'rtn'; did you mean 'rtno'?"),
+        ("chain.toml --lite A=tty,boot=x", "--lite A=tty,boot=x: 'x' is not a time"),
         ("chain.toml --lite A=no/tty", "--lite A=no/tty: cannot open 'no/tty'"),
         ("chain.toml --lite-boot x", "--lite-boot: 'x' is not a time: write 1.5s, 200ms or 250us"),
     ],
@@ -271,6 +273,18 @@ def test_a_device_takes_part_by_its_proxy_and_is_not_left_active(folder: Path) -
             assert hand.request("get", names=["state"])["values"] == {"state": "Active"}
             child.end(signal.SIGTERM)
         assert hand.request("get", names=["state"])["values"] == {"state": "Inactive"}
+
+
+@pytest.mark.realtime
+def test_a_board_with_rtno_and_a_device_of_rtc_lite_take_part_side_by_side(folder: Path) -> None:
+    Path("lite.toml").write_text(chain_through("Lite", "RtcLiteProxy"), "utf-8")
+    lite, board = running("tickrig.emulators.rtc_lite.cli"), "tickrig.emulators.rtc_lite.cli"
+    with lite as other, running(board, "--framing", "rtno") as device:
+        lines = [f"Lite={device.link},rtno,boot=10ms", f"Other={other.link}"]
+        words = [word for line in lines for word in ("--lite", line)]
+        with run(folder, "lite.toml", "--rate", "50", *words) as child:
+            child.type(42)
+            assert child.lines(1) == ["ConsoleOut0 42"]
 
 
 CART = Path(__file__).parents[4] / "examples" / "rh3_cart.toml"
