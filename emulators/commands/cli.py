@@ -12,19 +12,19 @@ from tickrig.host.cli.options import LazyGroup, version_option
 
 DEMOS: Final = {
     "rrc": (
-        "tickrig.emulators.demos.rrc_cli:rrc",
+        "tickrig.emulators.demos.cli:rrc",
         "Drive an RRC on a pty through power-on, all samples, output mode and a watchdog trip.",
     ),
     "rtc-lite": (
-        "tickrig.emulators.demos.rtc_lite_cli:rtc_lite",
+        "tickrig.emulators.demos.cli:rtc_lite",
         "Send numbers through two emulated PICs, cut the power of one, and see it come back.",
     ),
     "tkernel": (
-        "tickrig.emulators.demos.tkernel_cli:tkernel",
+        "tickrig.emulators.demos.cli:tkernel",
         "Let a robot keep its position by ucodes while the service that resolves them is gone.",
     ),
     "fig120": (
-        "tickrig.emulators.demos.fig120_cli:fig120",
+        "tickrig.emulators.demos.cli:fig120",
         "Let a potentiometer at one CANopen node turn the motor of another, without a PC in"
         " between.",
     ),

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from math import hypot, pi
 from typing import Any, Final
 
+import click
+
 from tickrig.device.rh3.base import LOOK_US, Rh3Base
 from tickrig.device.rh3.parameters import BaseParameters
 from tickrig.device.ucode_reader import Marker, UcodeReader
@@ -259,6 +261,11 @@ class Moment:
     outage: bool
     error_m: float
     odometry_error_m: float
+
+
+def show(*, no_caches: bool) -> None:
+    """Run the demonstration on the terminal."""
+    run_demo(CorridorStage(caches=not no_caches), click.echo)
 
 
 def run_demo(stage: CorridorStage, echo: _Echo) -> list[Moment]:

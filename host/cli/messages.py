@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final, NoReturn
 
 import click
 
-from tickrig.host.cli.start import FULL
+from tickrig.host.cli.start import FULL, raise_of_output
 
 if TYPE_CHECKING:
     from tickrig.wire.canopen.eds.eds_file import Finding
@@ -44,6 +44,19 @@ def refused_at(option: str) -> Iterator[None]:
         yield
     except ValueError as error:
         raise Refused(f"{option}: {error}") from None
+
+
+@contextmanager
+def failing(*errors: type[Exception]) -> Iterator[None]:
+    """Raise ClickException, which is exit status 1, in place of these errors.
+
+    An error of printing stays as it is.
+    """
+    try:
+        yield
+    except errors as error:
+        raise_of_output(error)
+        raise click.ClickException(str(error)) from error
 
 
 def refuse_path(what: str, error: OSError) -> NoReturn:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
@@ -18,8 +17,10 @@ from tickrig.host.cli.options import (
     NumberRange,
     add_options,
     version_option,
+    works_in,
 )
-from tickrig.host.cli.start import load, loading
+
+_WORK: Final = "tickrig.emulators.rh3.commands.motion_verbs"
 
 _COORDINATES: Final = {"ignore_unknown_options": True}
 """So that `-1` is a number and no option."""
@@ -64,13 +65,6 @@ _PLOT: Final[Decorator] = click.option(
 )
 
 
-def _verb(name: str) -> Callable[..., None]:
-    """Return a function of `motion_verbs`; help and completion do without them."""
-    with loading():
-        verb: Callable[..., None] = load(f"tickrig.emulators.rh3.commands.motion_verbs:{name}")
-    return verb
-
-
 @click.group(cls=LazyGroup, commands={})
 @version_option()
 def main() -> None:
@@ -95,6 +89,7 @@ def main() -> None:
 @click.argument("theta", type=float)
 @_PLOT
 @_SHARED
+@works_in(f"{_WORK}:go_to")
 def goto(x: float, y: float, theta: float, **options: Any) -> None:
     """Drive to X and Y in metres, and turn to THETA in radians.
 
@@ -102,13 +97,13 @@ def goto(x: float, y: float, theta: float, **options: Any) -> None:
     rh3 goto 1 0.5 1.57
     rh3 goto -1 0 0 --set tuned
     """  # noqa: D301
-    _verb("go_to")(x, y, theta, options)
 
 
 @main.command("path")
 @click.argument("file", type=PATH)
 @_PLOT
 @_SHARED
+@works_in(f"{_WORK}:go_along")
 def along_path(file: Path, **options: Any) -> None:
     """Drive along the points of FILE: lines with x, y in metres, and a heading in radians.
 
@@ -118,14 +113,19 @@ def along_path(file: Path, **options: Any) -> None:
     printf '2 0\\n2 2\\n0 2\\n0 0 0\\n' > corners.txt
     rh3 path corners.txt
     """  # noqa: D301
-    _verb("go_along")(file, options)
 
 
 @main.command()
 @click.option("--runs", type=click.IntRange(1, 100), help="Each way.  [1, 5 where chance is]")
-@click.option("--side", type=NumberRange(0.2, 100), metavar="M", help="Of the squares.  [4]")
+@click.option(
+    "--side",
+    type=NumberRange(0.2, 100),
+    metavar="M",
+    help="Of the squares.  [4]",
+)
 @click.option("--save", type=PATH, help="Write the corrected Odometry.conf here.")
 @_SHARED
+@works_in(f"{_WORK}:go_round")
 def square(runs: int | None, side: float | None, save: Path | None, **options: Any) -> None:
     """Drive squares both ways (UMBmark), and calibrate the odometry by them.
 
@@ -136,7 +136,6 @@ def square(runs: int | None, side: float | None, save: Path | None, **options: A
     rh3 square --tread-m 0.459 --save Odometry.conf
     rh3 square --tread-m 0.459 --odometry-conf Odometry.conf
     """  # noqa: D301
-    _verb("go_round")(runs, side, save, options)
 
 
 @main.command()
@@ -156,6 +155,7 @@ def square(runs: int | None, side: float | None, save: Path | None, **options: A
     help="Control socket, for tickrig ctl PATH goal and tickrig rtc --at PATH.",
 )
 @_SHARED
+@works_in(f"{_WORK}:serve")
 def serve(**options: Any) -> None:
     """Run the six components in real time until Ctrl-C, for you and others to work with.
 
@@ -168,4 +168,3 @@ def serve(**options: Any) -> None:
     rh3 serve --openrtm localhost:2809 --device /dev/ttyUSB0
     rh3 serve --ros2 --room 6 4
     """  # noqa: D301
-    _verb("serve")(options)

@@ -196,7 +196,7 @@ def _conf(wheels: Wheels) -> str:
     )
 
 
-def go_to(x: float, y: float, theta: float, options: dict[str, Any]) -> None:
+def go_to(x: float, y: float, theta: float, **options: Any) -> None:
     """Drive to a pose, in metres and radians."""
     if not plausible(x, y, theta):
         raise Refused(f"{x:g} {y:g} {theta:g} is no pose: metres, metres, radians")
@@ -205,7 +205,7 @@ def go_to(x: float, y: float, theta: float, options: dict[str, Any]) -> None:
     _drive(_checked(options), [goal], f"rh3 goto {x:g} {y:g} {theta:g}")
 
 
-def go_along(file: Path, options: dict[str, Any]) -> None:
+def go_along(file: Path, **options: Any) -> None:
     """Drive along the points of a file."""
     try:
         points = read_path(file)
@@ -214,16 +214,14 @@ def go_along(file: Path, options: dict[str, Any]) -> None:
     _drive(_checked(options), points, f"rh3 path {file.name}")
 
 
-def go_round(
-    runs: int | None, side_m: float | None, save: Path | None, options: dict[str, Any]
-) -> None:
+def go_round(runs: int | None, side: float | None, save: Path | None, **options: Any) -> None:
     """Drive squares both ways, `runs` times or as often as is of use."""
     checked = _checked(options)
     by_chance = checked.device is not None or checked.base.noise
-    run_squares(checked, SquarePlan(runs or (5 if by_chance else 1), side_m or SIDE_M), save)
+    run_squares(checked, SquarePlan(runs or (5 if by_chance else 1), side or SIDE_M), save)
 
 
-def serve(options: dict[str, Any]) -> None:
+def serve(**options: Any) -> None:
     """Run a cart in real time until Ctrl-C."""
     room_m = options["room_m"]
     if room_m and options["device"]:

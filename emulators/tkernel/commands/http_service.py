@@ -123,11 +123,6 @@ _LOOK_US = 20_000
 """How often it looks at its faults."""
 
 
-def print_example() -> None:
-    """Print a table to begin with."""
-    click.echo(EXAMPLE, nl=False)
-
-
 def _read_table(path: Path) -> UcodeTable:
     """Read the table of a file; Refused if it is none."""
     try:
@@ -139,13 +134,16 @@ def _read_table(path: Path) -> UcodeTable:
 
 
 def run_service(
-    table: Path | None, *, port: int, control: Path | None, faults: tuple[str, ...]
+    table: Path | None, *, port: int, control: Path | None, faults: tuple[str, ...], example: bool
 ) -> None:
-    """Serve until somebody stops it.
+    """Serve until somebody stops it; or print a table to begin with.
 
     Raises:
         Refused: the command line asks for something that cannot be done.
     """
+    if example:
+        click.echo(EXAMPLE, nl=False)
+        return
     if table is None:
         raise Refused("give a TABLE, or --example for one to begin with")
     service = ResolutionService(_read_table(table), "")

@@ -6,10 +6,8 @@ from typing import Any
 
 import click
 
-from tickrig.host.cli.engine_options import openrtm_options, take_engines
-from tickrig.host.cli.messages import time_us
-from tickrig.host.cli.options import PATH, HarmlessCommand, version_option
-from tickrig.host.cli.start import load, loading
+from tickrig.host.cli.engine_options import openrtm_options
+from tickrig.host.cli.options import PATH, HarmlessCommand, version_option, works_in
 
 
 @click.command(cls=HarmlessCommand)
@@ -34,7 +32,8 @@ from tickrig.host.cli.start import load, loading
 )
 @openrtm_options
 @version_option()
-def main(connectors: int, message_octets: int, tick: str, boot: str, **options: Any) -> None:
+@works_in("tickrig.emulators.tkernel.commands.node_run:run_node")
+def main(**options: Any) -> None:
     """Emulate a board with OpenRTM on T-Kernel, until Ctrl-C.
 
     Its RT components are those of Figs. 122 and 123 of the NEDO report, or of
@@ -49,12 +48,3 @@ def main(connectors: int, message_octets: int, tick: str, boot: str, **options: 
     tickrig ctl /tmp/board fault power_cut
     tkernel-emu --ucode /tmp/ucode --openrtm localhost
     """  # noqa: D301 - click wants the backspace
-    limits = {
-        "connectors": connectors,
-        "message_octets": message_octets,
-        "tick_us": time_us("--tick", tick),
-        "boot_us": time_us("--boot", boot),
-    }
-    with loading():
-        run_node = load("tickrig.emulators.tkernel.commands.node_run:run_node")
-    run_node(limits, engines=take_engines(options), **options)

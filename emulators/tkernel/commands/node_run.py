@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,8 +16,8 @@ from tickrig.emulators.tkernel import node_manager
 from tickrig.emulators.tkernel.board import Board
 from tickrig.emulators.tkernel.operated import Operated
 from tickrig.host.cli.control import serving_control, stopped_by_signals
-from tickrig.host.cli.engine_options import FORMAT, EngineOptions
-from tickrig.host.cli.messages import Refused, refused_at, say, warnings_shown
+from tickrig.host.cli.engine_options import FORMAT, EngineOptions, take_engines
+from tickrig.host.cli.messages import Refused, refused_at, say, time_us, warnings_shown
 from tickrig.host.cli.start import load
 from tickrig.host.control.clock import ServingClock
 from tickrig.host.links.serial_link import SerialLink
@@ -50,6 +50,19 @@ class NodeOptions:
     limits: node_manager.NodeLimits
     faults: tuple[str, ...] = ()
     engines: EngineOptions
+
+
+def run_node(connectors: int, message_octets: int, tick: str, boot: str, **options: Any) -> None:
+    """Run the node of a command line; Refused if there can be none."""
+    engines = take_engines(options)
+    tick_us, boot_us = time_us("--tick", tick), time_us("--boot", boot)
+    try:
+        limits = node_manager.NodeLimits(
+            connectors=connectors, message_octets=message_octets, tick_us=tick_us, boot_us=boot_us
+        )
+    except ValueError as error:
+        raise Refused(str(error)) from None
+    NodeRun(NodeOptions(limits=limits, engines=engines, **options)).run()
 
 
 class _Door:
@@ -86,23 +99,6 @@ class _Boot:
     def stop(self) -> None:
         """End the command."""
         self._runner.stop()
-
-
-def run_node(limits: Mapping[str, int], **options: Any) -> None:
-    """Run a node until Ctrl-C.
-
-    Args:
-        limits: of the node, as `NodeLimits` has them.
-        options: the other fields of `NodeOptions`.
-
-    Raises:
-        Refused: the command line asks for something that cannot be done.
-    """
-    try:
-        checked = node_manager.NodeLimits(**limits)
-    except ValueError as error:
-        raise Refused(str(error)) from None
-    NodeRun(NodeOptions(limits=checked, **options)).run()
 
 
 class NodeRun:

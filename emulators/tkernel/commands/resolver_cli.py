@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import click
 
-from tickrig.host.cli.options import PATH, HarmlessCommand, version_option
-from tickrig.host.cli.start import load, loading
+from tickrig.host.cli.options import PATH, HarmlessCommand, version_option, works_in
 
 
 @click.command(cls=HarmlessCommand)
@@ -29,7 +27,8 @@ from tickrig.host.cli.start import load, loading
 )
 @click.option("--example", is_flag=True, help="Print a table to begin with, and end.")
 @version_option()
-def main(table: Path | None, *, example: bool, **options: Any) -> None:
+@works_in("tickrig.emulators.tkernel.commands.http_service:run_service")
+def main(**options: Any) -> None:
     """Serve a TABLE of ucodes over HTTP on loopback, until Ctrl-C.
 
     GET /ucodes/UCODE answers with the address of its information, GET
@@ -43,10 +42,3 @@ def main(table: Path | None, *, example: bool, **options: Any) -> None:
     tickrig ctl /tmp/resolver.ctl fault slow@0s-10s
     tickrig ctl /tmp/resolver.ctl get requests found
     """  # noqa: D301 - click wants the backspace
-    with loading():
-        print_example = load("tickrig.emulators.tkernel.commands.http_service:print_example")
-        run_service = load("tickrig.emulators.tkernel.commands.http_service:run_service")
-    if example:
-        print_example()
-    else:
-        run_service(table, **options)

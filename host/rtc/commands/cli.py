@@ -6,10 +6,8 @@ from typing import Any
 
 import click
 
-from tickrig.host.cli.engine_options import openrtm_options, ros2_options, take_engines
-from tickrig.host.cli.messages import time_us
-from tickrig.host.cli.options import PATH, NumberRange
-from tickrig.host.cli.start import loading
+from tickrig.host.cli.engine_options import openrtm_options, ros2_options
+from tickrig.host.cli.options import PATH, NumberRange, works_in
 from tickrig.host.rtc.commands.request import VARIABLE, default_path
 from tickrig.host.rtc.commands.verbs import SYSTEM_VERBS, VERBS, conf
 
@@ -72,7 +70,8 @@ def rtc() -> None:
 @click.option("--console", is_flag=True, help="Lines typed here go to components that take them.")
 @openrtm_options
 @ros2_options
-def run(lite_boot: str, **options: Any) -> None:
+@works_in("tickrig.host.rtc.commands.run:run_system")
+def run(**options: Any) -> None:
     """Run the system of a file in real time, until Ctrl-C.
 
     SYSTEM is a .toml file of ours, or an RTSProfile .xml as rtcryo and RT
@@ -92,11 +91,6 @@ def run(lite_boot: str, **options: Any) -> None:
     tickrig rtc run system.toml --openrtm localhost:2809
     tickrig rtc run system.toml --ros2 --ros2-table topics.toml
     """  # noqa: D301 - click wants the backspace
-    with loading():
-        from tickrig.host.rtc.commands.run import SystemOptions, run_system  # noqa: PLC0415 - slow
-
-    engines, boot_us = take_engines(options), time_us("--lite-boot", lite_boot)
-    run_system(SystemOptions(lite_boot_us=boot_us, engines=engines, **options))
 
 
 for _command in (*VERBS, *SYSTEM_VERBS, conf):

@@ -6,13 +6,13 @@ import sys
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import click
 
 from tickrig.host.cli.control import serving_control, stopped_by_signals
-from tickrig.host.cli.engine_options import EngineOptions
-from tickrig.host.cli.messages import Refused, say, warnings_shown
+from tickrig.host.cli.engine_options import EngineOptions, take_engines
+from tickrig.host.cli.messages import Refused, say, time_us, warnings_shown
 from tickrig.host.cli.start import load
 from tickrig.host.control.clock import ServingClock
 from tickrig.host.rtc.commands.console import Console
@@ -46,12 +46,14 @@ class SystemOptions:
     engines: EngineOptions = field(default_factory=EngineOptions)
 
 
-def run_system(options: SystemOptions) -> None:
-    """Run until somebody stops it.
+def run_system(lite_boot: str, **given: Any) -> None:
+    """Run the system of a command line until somebody stops it.
 
     Raises:
         Refused: the command line asks for something that cannot be done.
     """
+    engines, boot_us = take_engines(given), time_us("--lite-boot", lite_boot)
+    options = SystemOptions(lite_boot_us=boot_us, engines=engines, **given)
     system = System() if options.system is None else read_system(options.system)
     if options.save is not None:
         check_system(options.save)

@@ -13,7 +13,7 @@ import click
 from tickrig.host.cli.control import refused_by
 from tickrig.host.cli.messages import Refused, time_us
 from tickrig.host.cli.options import PATH, NumberRange
-from tickrig.host.cli.start import loading
+from tickrig.host.cli.start import load
 from tickrig.host.control.client import ControlClient
 from tickrig.host.rtc.commands.request import (
     SYSTEM,
@@ -378,20 +378,21 @@ VERBS: Final = (ls, cat, create, con, dis, *_MOVES, exit_, inject, print_)
 
 # The verbs of `tickrig rtc` about a system as a whole.
 
+_FILES: Final = "tickrig.host.rtc.system.system_file"
+"""Named by its path: most verbs do without it."""
+
 
 @click.command()
 @click.argument("file", type=PATH, required=False)
 @at
 def save(at: Path, file: Path | None) -> None:
     """Write the system as it is to FILE, .toml or .xml; without FILE print it as TOML."""
-    with loading():
-        from tickrig.host.rtc.system.system_file import file_format, write_system  # noqa: PLC0415
-
-    text = request_system(at, "save", format="toml" if file is None else file_format(file))["text"]
+    file_format = "toml" if file is None else load(f"{_FILES}:file_format")(file)
+    text = request_system(at, "save", format=file_format)["text"]
     if file is None:
         click.echo(text)
     else:
-        write_system(text, file)
+        load(f"{_FILES}:write_system")(text, file)
 
 
 @click.command()
@@ -423,10 +424,8 @@ def check(at: Path, file: Path) -> None:
     States are compared with a .toml file; RTSProfile has none. What is there
     beside it does not matter.
     """
-    with loading():
-        from tickrig.host.rtc.system.system_file import file_format, lacking  # noqa: PLC0415
-
-    lines = lacking(file, request_system(at, "save", format=file_format(file))["text"])
+    text = request_system(at, "save", format=load(f"{_FILES}:file_format")(file))["text"]
+    lines = load(f"{_FILES}:lacking")(file, text)
     for line in lines:
         click.echo(line)
     if lines:
@@ -441,9 +440,7 @@ def dot(at: Path) -> None:
     \b
     tickrig rtc dot | dot -Tsvg -o system.svg
     """  # noqa: D301 - click wants the backspace
-    from tickrig.host.rtc.system.dot import system_graph  # noqa: PLC0415
-
-    click.echo(system_graph(components(at)))
+    click.echo(load("tickrig.host.rtc.system.dot:system_graph")(components(at)))
 
 
 SYSTEM_VERBS: Final = (save, status, stop, check, dot)

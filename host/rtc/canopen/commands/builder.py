@@ -9,7 +9,7 @@ import click
 
 from tickrig.host.cli.messages import NEEDS_YAML, Refused
 from tickrig.host.cli.options import PATH, HarmlessCommand, version_option
-from tickrig.host.cli.start import loading
+from tickrig.host.cli.start import load
 from tickrig.host.rtc.canopen.builder.profile_file import EXAMPLE
 
 
@@ -43,8 +43,7 @@ def main(
     if profile is None:
         raise Refused("give a PROFILE, or --example for one to begin with")
     try:
-        with loading():
-            from tickrig.host.rtc.canopen.builder.build import run_builder  # noqa: PLC0415 - [rtc]
+        run_builder = load("tickrig.host.rtc.canopen.builder.build:run_builder")
     except ModuleNotFoundError:
         raise Refused(NEEDS_YAML) from None
     warn = partial(click.echo, err=True)

@@ -11,7 +11,7 @@ import click
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
 from tickrig.host.cli.messages import Refused
 from tickrig.host.cli.options import PATH, version_option
-from tickrig.host.cli.start import loading
+from tickrig.host.cli.start import load
 from tickrig.host.rtc.canopen.commands.server import component_option
 
 
@@ -37,8 +37,7 @@ def main(
     rtc-canopen-editor robot.yaml --component Logger0=parts.py:Logger
     """  # noqa: D301 - click wants the backspace
     try:
-        with loading():
-            from tickrig.host.rtc.canopen.commands.editor_run import run_editor  # noqa: PLC0415 - an extra
+        run_editor = load("tickrig.host.rtc.canopen.commands.editor_run:run_editor")
     except ImportError as error:
         raise Refused(f"the editor needs Textual: pip install 'tickrig[tui]' ({error})") from None
     run_editor(file, log, components, start, BusOptions(**options))

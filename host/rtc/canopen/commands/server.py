@@ -11,7 +11,7 @@ from tickrig.host.cli.can_options import BusCommand, bus_options
 from tickrig.host.cli.engine_options import openrtm_options, ros2_options, take_engines
 from tickrig.host.cli.messages import NEEDS_YAML, Refused
 from tickrig.host.cli.options import PATH, Decorator, version_option
-from tickrig.host.cli.start import loading
+from tickrig.host.cli.start import load
 from tickrig.host.text.values import parse_time_us
 from tickrig.wire.instant import NEVER
 
@@ -58,8 +58,7 @@ def main(file: Path, span: str | None, **options: Any) -> None:
     """  # noqa: D301 - click wants the backspace
     span_us, engines = _span_us(span), take_engines(options)
     try:
-        with loading():
-            from tickrig.host.rtc.canopen.commands.opening import run_server  # noqa: PLC0415 - slow
+        run_server = load("tickrig.host.rtc.canopen.commands.opening:run_server")
     except ModuleNotFoundError:
         raise Refused(NEEDS_YAML) from None
     run_server(file, span_us, engines, options)
