@@ -11,13 +11,8 @@ from enum import StrEnum
 from functools import partial
 from typing import Any, Final, Generic, Protocol, TypeVar
 
+from tickrig.host.rtc.ports import connector
 from tickrig.host.rtc.ports.connect import refuse_known_id
-from tickrig.host.rtc.ports.connector import (
-    Connector,
-    ConnectorOptions,
-    DataflowType,
-    SubscriptionType,
-)
 from tickrig.host.rtc.ports.data_port import DataPort, InPort, OutPort
 from tickrig.host.rtc.ports.port import ConnectorProfile
 from tickrig.host.rtc.ports.ring_buffer import BufferOptions, FullPolicy, RingBuffer
@@ -115,14 +110,14 @@ class PeerEnd:
     name: str = ""
 
     @property
-    def options(self) -> ConnectorOptions:
+    def options(self) -> connector.ConnectorOptions:
         """What the properties say; RtcRefused if they cannot be."""
         lengths = {"dataport.buffer.length", "dataport.outport.buffer.length"}
         if lengths.isdisjoint(self.properties):
-            return ConnectorOptions.parse(
+            return connector.ConnectorOptions.parse(
                 {**self.properties, "dataport.outport.buffer.length": _SEND_LENGTH}
             )
-        return ConnectorOptions.parse(self.properties)
+        return connector.ConnectorOptions.parse(self.properties)
 
     def profile(self, port: DataPort[Any]) -> ConnectorProfile:
         """Return how the connector with a port of ours is described.
@@ -259,11 +254,11 @@ class OutPortConsumer(Protocol[P_co]):
         ...
 
 
-class _InPortConnector(Connector[T], Generic[T, P]):
+class _InPortConnector(connector.Connector[T], Generic[T, P]):
     """Decodes what comes from a peer; the first of what cannot be decoded is logged."""
 
     def __init__(self, port: InPort[T], end: PeerEnd, codec: Codec[T, P], calls: CallQueue) -> None:
-        push, flush = DataflowType.PUSH, SubscriptionType.FLUSH
+        push, flush = connector.DataflowType.PUSH, connector.SubscriptionType.FLUSH
         options = replace(end.options, dataflow=push, subscription=flush)  # the peer's matter
         super().__init__(end.profile(port), (port,), options)
         self._codec, self._calls, self._way = codec, calls, f"{end.port} to {port.full_name}"
@@ -445,7 +440,7 @@ class InPortConsumer(Protocol[P_contra]):
         ...
 
 
-class OutPortPushConnector(Connector[Any], Generic[T, P]):
+class OutPortPushConnector(connector.Connector[Any], Generic[T, P]):
     """Pushes values from an OutPort to a peer, in the thread of that peer.
 
     `write` encodes, and puts what passes into a buffer; nothing waits. A value that the peer
@@ -478,7 +473,7 @@ class OutPortPushConnector(Connector[Any], Generic[T, P]):
         consumer: InPortConsumer[P],
         thread: PeerCaller,
     ) -> None:
-        options = replace(end.options, dataflow=DataflowType.PUSH)
+        options = replace(end.options, dataflow=connector.DataflowType.PUSH)
         super().__init__(end.profile(port), (port,), options)
         self.buffer = SendBuffer(options.outport, partial(thread.submit, self._send))
         self._codec, self._consumer, self._thread = codec, consumer, thread
@@ -523,7 +518,7 @@ class OutPortPushConnector(Connector[Any], Generic[T, P]):
         return 0
 
 
-class OutPortPullConnector(Connector[Any], Generic[T, P]):
+class OutPortPullConnector(connector.Connector[Any], Generic[T, P]):
     """Holds values of an OutPort until a peer takes them.
 
     Args:
@@ -538,7 +533,7 @@ class OutPortPullConnector(Connector[Any], Generic[T, P]):
     buffer: LockedBuffer[P]
 
     def __init__(self, port: OutPort[T], end: PeerEnd, codec: Codec[T, P]) -> None:
-        options = replace(end.options, dataflow=DataflowType.PULL)
+        options = replace(end.options, dataflow=connector.DataflowType.PULL)
         super().__init__(end.profile(port), (port,), options)
         self.buffer, self._codec = LockedBuffer(options.outport), codec
 

@@ -16,13 +16,8 @@ from tickrig.host.rtc.ports.port import AnyPort
 from tickrig.host.rtc.states import ReturnCode, RtcRefused
 from tickrig.host.text.log import log_of
 from tickrig.wire.errors import FieldError, WireError
+from tickrig.wire.rtc_lite import messages
 from tickrig.wire.rtc_lite.codes import LiteCommand, LiteContextType, LiteState, LiteStatus
-from tickrig.wire.rtc_lite.messages import (
-    LitePortData,
-    LitePortProfile,
-    LiteReply,
-    parse_component_profile,
-)
 from tickrig.wire.rtc_lite.values import PORT_TYPES, LitePortType
 from tickrig.wire.rtc_types import rtc
 from tickrig.wire.rtc_types.rtc import Time
@@ -42,8 +37,8 @@ class DeviceProfile:
     """
 
     type_name: str
-    in_ports: tuple[LitePortProfile, ...]
-    out_ports: tuple[LitePortProfile, ...]
+    in_ports: tuple[messages.LitePortProfile, ...]
+    out_ports: tuple[messages.LitePortProfile, ...]
     context: LiteContextType
 
     @property
@@ -78,7 +73,7 @@ def _start_up(channel: RequestChannel, boot_us: int) -> DeviceProfile:
 
 def _request_profile(channel: RequestChannel) -> DeviceProfile:
     reply = _demand(LiteCommand.PROFILE, channel.request_again(LiteCommand.PROFILE))
-    announced = parse_component_profile(reply.fields)
+    announced = messages.parse_component_profile(reply.fields)
     ins, outs = tuple(channel.in_ports), tuple(channel.out_ports)
     if (len(ins), len(outs)) != (announced.in_ports, announced.out_ports):
         counts = f"{announced.in_ports} in-ports and {announced.out_ports} out-ports"
@@ -97,7 +92,7 @@ def _request_context(channel: RequestChannel) -> LiteContextType:
         raise DeviceRefused(text, "BB") from None
 
 
-def _demand(command: LiteCommand, reply: LiteReply | None) -> LiteReply:
+def _demand(command: LiteCommand, reply: messages.LiteReply | None) -> messages.LiteReply:
     """Return a reply that is there and OK."""
     name = command.value.decode()
     if reply is None:
@@ -131,12 +126,12 @@ class InPortBridge:
     port_type: LitePortType[Any]
 
     @classmethod
-    def of(cls, profile: LitePortProfile) -> InPortBridge:
+    def of(cls, profile: messages.LitePortProfile) -> InPortBridge:
         """Make the InPort of an in-port; DeviceRefused if its type is not known."""
         name, port_type = _read(profile)
         return cls(InPort(name, _KINDS[port_type.name]), profile.name, port_type)
 
-    def take(self) -> LitePortData | None:
+    def take(self) -> messages.LitePortData | None:
         """Return the oldest value that was not read, if there is one.
 
         Raises:
@@ -150,7 +145,7 @@ class InPortBridge:
             bare = tuple(bare)
         elif self.port.data_type is rtc.TimedCharSeq:
             bare = "".join(bare)
-        return LitePortData(self.name, self.port_type.encode(bare))
+        return messages.LitePortData(self.name, self.port_type.encode(bare))
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,7 +156,7 @@ class OutPortBridge:
     port_type: LitePortType[Any]
 
     @classmethod
-    def of(cls, profile: LitePortProfile) -> OutPortBridge:
+    def of(cls, profile: messages.LitePortProfile) -> OutPortBridge:
         """Make the OutPort of an out-port; DeviceRefused if its type is not known."""
         name, port_type = _read(profile)
         return cls(OutPort(name, _KINDS[port_type.name]), port_type)
@@ -177,7 +172,7 @@ class OutPortBridge:
         self.port.write(kind(Time.from_us(now_us), value))
 
 
-def _read(profile: LitePortProfile) -> tuple[str, LitePortType[Any]]:
+def _read(profile: messages.LitePortProfile) -> tuple[str, LitePortType[Any]]:
     name = profile.name.decode("latin-1")
     if (port_type := PORT_TYPES.get(profile.code)) is None:
         known = " ".join(PORT_TYPES)
@@ -206,7 +201,9 @@ class PortBridges:
     """
 
     def __init__(
-        self, ins: Iterable[LitePortProfile] = (), outs: Iterable[LitePortProfile] = ()
+        self,
+        ins: Iterable[messages.LitePortProfile] = (),
+        outs: Iterable[messages.LitePortProfile] = (),
     ) -> None:
         self._ins = [InPortBridge.of(profile) for profile in ins]
         self._outs = {profile.name: OutPortBridge.of(profile) for profile in outs}
@@ -217,7 +214,7 @@ class PortBridges:
         """The InPorts, then the OutPorts."""
         return chain((relay.port for relay in self._ins), (r.port for r in self._outs.values()))
 
-    def fresh(self) -> Iterator[LitePortData]:
+    def fresh(self) -> Iterator[messages.LitePortData]:
         """Take one new value from each InPort that has one."""
         for relay in self._ins:
             try:
@@ -228,7 +225,7 @@ class PortBridges:
                 if data is not None:
                     yield data
 
-    def give(self, at_us: int, data: LitePortData) -> None:
+    def give(self, at_us: int, data: messages.LitePortData) -> None:
         """Write to an OutPort what arrived from the device."""
         if (relay := self._outs.get(data.name)) is None:
             self._drop("an out-port that was not described", repr(data.name))
@@ -499,6 +496,6 @@ class RtcLiteProxy(RtComponent):
         )
 
 
-def _code_of(reply: LiteReply | None) -> ReturnCode:
+def _code_of(reply: messages.LiteReply | None) -> ReturnCode:
     error = ReturnCode.RTC_ERROR
     return error if reply is None else _CODES.get(reply.status, error)

@@ -11,16 +11,12 @@ from tickrig.host.canopen.conform.binding.binding import Binding, BoundObject
 from tickrig.host.canopen.conform.bus.sdo import SdoClient
 from tickrig.host.canopen.dialogue import Script, SdoFrame, SdoRequest
 from tickrig.host.canopen.errors import SdoMisnamed, SdoTimeout
+from tickrig.wire.canopen import sdo_frame
 from tickrig.wire.canopen.eds.eds_device import EdsDevice, read_device
 from tickrig.wire.canopen.eds.eds_file import EdsFile
 from tickrig.wire.canopen.eds.eds_value import parse_number, plain_numbers
 from tickrig.wire.canopen.eds.object_table import DeviceInfo, EntryDescription, ObjectDescription
 from tickrig.wire.canopen.sdo import Abort
-from tickrig.wire.canopen.sdo_frame import (
-    AbortCode,
-    BlockUploadInitiateRequest,
-    BlockUploadInitiateResponse,
-)
 
 _OF_OBJECTS: Final[Mapping[str, tuple[str, ...]]] = {
     "heartbeat": ("heartbeat",),
@@ -209,11 +205,13 @@ def _has_block_upload(client: SdoClient) -> bool:
 
 
 def _try_block_upload() -> Script[bool]:
-    request = BlockUploadInitiateRequest(_DEVICE_TYPE, 0, crc=True, block_size=1, threshold=0)
+    request = sdo_frame.BlockUploadInitiateRequest(
+        _DEVICE_TYPE, 0, crc=True, block_size=1, threshold=0
+    )
     answer = yield SdoRequest(request.encode(), _DEVICE_TYPE, 0)
-    if not isinstance(answer, BlockUploadInitiateResponse):
+    if not isinstance(answer, sdo_frame.BlockUploadInitiateResponse):
         return False
-    yield SdoFrame(Abort(_DEVICE_TYPE, 0, AbortCode.GENERAL).encode())
+    yield SdoFrame(Abort(_DEVICE_TYPE, 0, sdo_frame.AbortCode.GENERAL).encode())
     return True
 
 

@@ -11,13 +11,8 @@ from tickrig.host.canopen.data_sheet.document import Document
 from tickrig.host.canopen.data_sheet.rule import Edit, EditPlace, RuleFinding
 from tickrig.host.canopen.data_sheet.rules import known_keys
 from tickrig.host.canopen.data_sheet.rules.list_rules import are_whole
+from tickrig.wire.canopen.eds import eds_value
 from tickrig.wire.canopen.eds.eds_file import shorten
-from tickrig.wire.canopen.eds.eds_value import (
-    object_section,
-    parse_number,
-    plain_numbers,
-    without_comment,
-)
 
 _NEEDED: Final = ("DeviceInfo", "MandatoryObjects")
 _DATE: Final = re.compile(r"[0-9]{2}-[0-9]{2}-[0-9]{4}", re.ASCII)
@@ -43,7 +38,7 @@ _IDENTITY: Final = (("VendorNumber", 1), ("ProductNumber", 2), ("RevisionNumber"
 def number(document: Document, section: str, key: str) -> int | None:
     """Return the number of a keyword; None where there is none of 32 bits."""
     try:
-        found = parse_number(plain_numbers(document.file.value(section, key)))
+        found = eds_value.parse_number(eds_value.plain_numbers(document.file.value(section, key)))
     except ValueError:
         return None
     return found if found.bit_length() <= _WIDEST else None
@@ -72,7 +67,7 @@ def file_info(document: Document) -> Iterator[RuleFinding]:
             what = f"{key} is missing"
             yield document.found("file-info-missing", what, "FileInfo", key)
     for key, (form, wanted) in _FORMS.items():
-        text = without_comment(file.value("FileInfo", key))
+        text = eds_value.without_comment(file.value("FileInfo", key))
         if text and not form.fullmatch(text):
             what = f"{key}={shorten(text)} is not {wanted}"
             yield document.found("file-info-form", what, "FileInfo", key)
@@ -163,7 +158,7 @@ def dummy_usage(document: Document) -> Iterator[RuleFinding]:
     """Judge [DummyUsage]."""
     for line in document.lines_of("DummyUsage"):
         match = _DUMMY.fullmatch(line.key.lower())
-        said = without_comment(line.value)
+        said = eds_value.without_comment(line.value)
         if match is None or int(match[1], 16) not in _DUMMY_TYPES or said not in ("0", "1"):
             what = f"{shorten(line.content)} is not Dummy0001=0 to Dummy001F=1"
             yield document.found("dummy-usage", what, "DummyUsage", line.number)
@@ -200,7 +195,7 @@ def commissioning(document: Document) -> Iterator[RuleFinding]:
     if file.is_dcf:
         return
     for line in () if file.is_xml else file.lines:
-        kept = line.is_keyword and object_section(line.section) is not None
+        kept = line.is_keyword and eds_value.object_section(line.section) is not None
         if kept and line.key.lower() in _DCF_KEYS:
             what = f"{line.key} stands in an EDS"
             yield document.found("dcf-key", what, line.section, line.number)

@@ -10,20 +10,10 @@ from typing import Any, Final
 
 from tickrig.host.cli.engine_options import Ros2Options
 from tickrig.host.rtc.component import RtComponent
-from tickrig.host.rtc.engines.peer_ports import (
-    Codec,
-    InPortPushConnector,
-    OutPortPushConnector,
-    PeerEnd,
-)
+from tickrig.host.rtc.engines import peer_ports
+from tickrig.host.rtc.engines.ros2 import participant
 from tickrig.host.rtc.engines.ros2.conversions import IN, OUT
 from tickrig.host.rtc.engines.ros2.message_types import Stamps, message_type
-from tickrig.host.rtc.engines.ros2.participant import (
-    DdsParticipant,
-    ForeignEndpoints,
-    OwnEndpoint,
-    dds_topic,
-)
 from tickrig.host.rtc.engines.ros2.table_reader import parse_table
 from tickrig.host.rtc.engines.ros2.topic_entry import TopicEntry, TopicTable, usual_entry
 from tickrig.host.rtc.engines.ros2.topics import TopicReader, TopicWriter
@@ -193,13 +183,15 @@ class _Ros2Engine:
         self, options: Ros2Options, table: TopicTable, manager: Manager, calls: CallQueue
     ) -> None:
         self._table, self._manager, self._calls = table, manager, calls
-        self._participant = DdsParticipant(options.domain, options.interface)
+        self._participant = participant.DdsParticipant(options.domain, options.interface)
         self._stamps = Stamps(lambda: manager.now_us)
-        self._writing: dict[str, OwnEndpoint] = {}
-        self._reading: dict[str, OwnEndpoint] = {}
+        self._writing: dict[str, participant.OwnEndpoint] = {}
+        self._reading: dict[str, participant.OwnEndpoint] = {}
         self._out, self._in = PeerThread("ros2 out"), PeerThread("ros2 in")
         self._endpoints: list[TopicReader | TopicWriter] = []
-        self._foreign = ForeignEndpoints(self._participant, self._writing, self._reading)
+        self._foreign = participant.ForeignEndpoints(
+            self._participant, self._writing, self._reading
+        )
         calls.post(self._stamps.start)  # again, when the clock has started
         for component in manager.components:
             self.join(component)
@@ -248,7 +240,7 @@ class _Ros2Engine:
             connector, endpoint = self._take(port, entry)
             thread, own = self._in, self._reading
         connector.begin()
-        own[dds_topic(entry.topic)] = endpoint
+        own[participant.dds_topic(entry.topic)] = endpoint
         self._endpoints.append(endpoint)
         thread.submit(endpoint.open)
 
@@ -262,8 +254,8 @@ class _Ros2Engine:
     def _push(self, port: OutPort[Any], entry: TopicEntry) -> tuple[Any, TopicWriter]:
         writer = TopicWriter(self._participant, entry)
         encode = OUT[entry.type, port.data_type](entry, self._stamps)
-        codec = Codec(_logging(entry, encode), _no_value)
-        return OutPortPushConnector(port, _end(entry), codec, writer, self._out), writer
+        codec = peer_ports.Codec(_logging(entry, encode), _no_value)
+        return peer_ports.OutPortPushConnector(port, _end(entry), codec, writer, self._out), writer
 
     def _take(self, port: InPort[Any], entry: TopicEntry) -> tuple[Any, TopicReader]:
         convert = IN[entry.type, port.data_type](entry, self._stamps)
@@ -272,8 +264,8 @@ class _Ros2Engine:
         def decode(message: Any) -> Any:
             return zero if message is None else convert(message)
 
-        codec = Codec(_no_value, decode)
-        connector = InPortPushConnector(port, _end(entry), codec, self._calls)
+        codec = peer_ports.Codec(_no_value, decode)
+        connector = peer_ports.InPortPushConnector(port, _end(entry), codec, self._calls)
         return connector, TopicReader(self._participant, entry, self._in, connector.put)
 
     def _add_diagnostics(self) -> _Diagnostics:
@@ -286,7 +278,7 @@ class _Ros2Engine:
 
         item = _Diagnostics(self._manager, self._stamps, period_us, send)
         if topic:
-            self._writing[dds_topic(topic)] = writer
+            self._writing[participant.dds_topic(topic)] = writer
             self._endpoints.append(writer)
             self._out.submit(writer.open)
             self._manager.add_item(item)
@@ -296,9 +288,11 @@ class _Ros2Engine:
 _ID: Final = "ros2:/"
 
 
-def _end(entry: TopicEntry) -> PeerEnd:
+def _end(entry: TopicEntry) -> peer_ports.PeerEnd:
     properties = {"ros2.type": entry.type}
-    return PeerEnd(f"{_ID}{entry.topic}", f"{_ID}{entry.topic}", properties, f"/{entry.topic}")
+    return peer_ports.PeerEnd(
+        f"{_ID}{entry.topic}", f"{_ID}{entry.topic}", properties, f"/{entry.topic}"
+    )
 
 
 def _no_value(value: Any) -> Any:

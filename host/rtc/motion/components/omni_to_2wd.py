@@ -7,11 +7,7 @@ from typing import ClassVar, Final
 
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.host.rtc.motion import ports
-from tickrig.host.rtc.motion.components.position_input import (
-    END_POINT,
-    INTERMEDIATE_POINT,
-    START_POINT,
-)
+from tickrig.host.rtc.motion.components import position_input
 from tickrig.host.rtc.motion.geometry import Pose
 from tickrig.host.text.log import log_of
 from tickrig.wire.rtc_types import iis
@@ -72,10 +68,10 @@ class OmniTo2WD(RtComponent):
     def _take(self, message: iis.TimedPose2D) -> None:
         """Take a goal, or a point of a path; what came before gives way."""
         kind = message.id[0] if message.id else None
-        if kind not in (INTERMEDIATE_POINT, END_POINT):
+        if kind not in (position_input.INTERMEDIATE_POINT, position_input.END_POINT):
             self._points = []
         self._points.append(ports.to_pose(message.data))
-        if kind in (START_POINT, INTERMEDIATE_POINT):
+        if kind in (position_input.START_POINT, position_input.INTERMEDIATE_POINT):
             return
         plausible = [point for point in self._points if point is not None]
         if len(plausible) == len(self._points):
