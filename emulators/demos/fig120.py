@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import partial
 from math import cos, pi
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import can
 import canopen
@@ -198,33 +198,6 @@ CAST: Final = {PALETTE: "f-palette", MOTOR: "motor-core-unit"}
 _EMULATOR: Final = "tickrig.emulators.canopen.cli"
 
 
-class Fig120Stage(Protocol):
-    """Both devices, and the bus that the master is on at first.
-
-    Attributes:
-        network: the master.
-        step_us: how often it can be looked at.
-    """
-
-    network: canopen.Network
-    step_us: int
-
-    @property
-    def now_us(self) -> int:
-        """Time on the stage."""
-        ...
-
-    def run_to(self, at_us: int, /) -> None:
-        """Let time pass."""
-
-    def get(self, name: str, /) -> Setting:
-        """Look at a thing of a node, as `32/angle_deg`."""
-        ...
-
-    def set(self, name: str, value: Setting, /) -> None:
-        """Set a signal of a node, as `16/ai1_v`."""
-
-
 class VirtualStage:
     """A rig in virtual time.
 
@@ -287,6 +260,10 @@ class _BusStage:
     def set(self, name: str, value: Setting) -> None:
         """Tell the emulator."""
         self._hand.request("set", name=name, value=value)
+
+
+Fig120Stage = VirtualStage | _BusStage
+"""Both devices, and the bus that the master is on at first."""
 
 
 @contextmanager

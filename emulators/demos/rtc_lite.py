@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, closing, contextmanager, suppress
-from typing import Final, Protocol
+from typing import Final
 
 import click
 
@@ -28,7 +28,6 @@ from tickrig.host.rtc.lite import ProxyEvent, ProxyEventType, ProxySettings, att
 from tickrig.host.rtc.states import RtcRefused
 from tickrig.host.rtc.system.manager import Manager
 from tickrig.host.rtc.system.schedule import RealTime
-from tickrig.wire.rtc_types.rtc import TimedLong
 
 # Where the demonstration is played: two devices on ptys in real time, or a rig in virtual time.
 
@@ -41,26 +40,6 @@ _PATIENCE_S: Final = 30.0
 """How long an emulator may take to answer on a busy machine."""
 
 _POWER_CUT: Final = "power_cut"
-
-
-class DemoSetup(Protocol):
-    """Two devices, and a system that is not yet there.
-
-    Attributes:
-        manager: of the system.
-        links: the lines to the devices.
-        places: where the devices are, for people.
-    """
-
-    manager: Manager
-    links: Mapping[str, Link[bytes]]
-    places: Mapping[str, str]
-
-    def step(self) -> None:
-        """Let time pass until the system has done something."""
-
-    def power(self, name: str, *, on: bool) -> None:
-        """Cut a device's power, or give it back."""
 
 
 class VirtualSetup:
@@ -110,6 +89,9 @@ class PtySetup:
             self._controls[name].request("clear", name=_POWER_CUT)
         else:
             self._controls[name].request("fault", spec=_POWER_CUT)
+
+
+DemoSetup = VirtualSetup | PtySetup
 
 
 @contextmanager
@@ -224,7 +206,7 @@ class _DemoRun:
         for name in NODES:
             self._attach(name)
         self._sink = manager.add(ConsoleOut("ConsoleOut0"), context=context)
-        self._sink.show = self._arrived
+        self._sink.show = lambda value: self._say(f"ConsoleOut0 received {value.data}")
         context.start()
         self._restore()
         self._show_system()
@@ -317,9 +299,6 @@ class _DemoRun:
     def _on_event(self, event: ProxyEvent) -> None:
         self._events.append(event)
         self._say(f"* {event.kind} of {event.instance_name}")
-
-    def _arrived(self, value: TimedLong) -> None:
-        self._say(f"ConsoleOut0 received {value.data}")
 
     def _states(self) -> dict[str, str]:
         names = [component.instance_name for component in self._manager.components]

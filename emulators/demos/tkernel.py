@@ -10,10 +10,10 @@ from typing import Any, Final
 
 import click
 
-from tickrig.device.rh3.base import LOOK_US, Rh3Base
+from tickrig.device.rh3.base import Rh3Base
 from tickrig.device.rh3.parameters import BaseParameters
 from tickrig.device.ucode_reader import Marker, UcodeReader
-from tickrig.emulators.rh3.closed_loop import ClosedLoop
+from tickrig.emulators.rh3.closed_loop import PLACE, ClosedLoop, Mounted
 from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.serial_line import SerialLine
@@ -25,7 +25,6 @@ from tickrig.host.rtc import InPort
 from tickrig.host.rtc.motion.geometry import Pose
 from tickrig.host.rtc.ports.connect import connect
 from tickrig.host.rtc.ucode.lookup import Lookup
-from tickrig.wire.instant import NEVER
 from tickrig.wire.rtc_types.rtc import TimedLongSeq, TimedPoint2D, TimedStringSeq
 from tickrig.wire.ucode import BAUD, MAX_LEVEL
 
@@ -84,7 +83,6 @@ _WORN: Final = 1.12
 
 _BASE: Final = "http://127.0.0.1:8640"
 _WIDE: Final = {"dataport.buffer.length": "64"}
-_PLACE: Final = ("x_m", "y_m", "heading_rad")
 
 
 def _corridor() -> tuple[tuple[Marker, ...], UcodeTable]:
@@ -101,8 +99,8 @@ def _corridor() -> tuple[tuple[Marker, ...], UcodeTable]:
     return markers, UcodeTable(dict(zip(ucodes, names, strict=True)), contents)
 
 
-class _MountedReader:
-    """A reader in the middle of the axle, as a coupling of the rig.
+class _MountedReader(Mounted):
+    """A reader in the middle of the axle.
 
     Args:
         base: what carries it.
@@ -118,19 +116,9 @@ class _MountedReader:
         self._base, self.reader, self.line = base, UcodeReader(markers=markers), SerialLine(BAUD)
         self.station: Station[bytes] = Station(self.reader, self.line.a)
 
-    @property
-    def tick_us(self) -> int:
-        """As often as the world looks at the base."""
-        return LOOK_US
-
-    @property
-    def due_us(self) -> int:
-        """Never: a base that moves has work."""
-        return NEVER
-
     def act(self, now_us: int, /) -> None:
         """Put the reader where the base has taken it."""
-        for name in _PLACE:
+        for name in PLACE:
             if self.reader.inputs[name] != (value := self._base.read(name)):
                 self.reader.inputs.set(name, value)
 

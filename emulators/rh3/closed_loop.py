@@ -33,11 +33,25 @@ _AHEAD_M: Final = 0.2
 _OUTLINE_M: Final = 0.25
 """How wide a robot looks to others: a post around the middle of its axle; a choice."""
 
-_PLACE: Final = ("x_m", "y_m", "heading_rad")
+PLACE: Final = ("x_m", "y_m", "heading_rad")
 
 
-class MountedUrg:
-    """A sensor in front of the axle, as a coupling of the rig.
+class Mounted:
+    """Something that a base carries, as a coupling of the rig."""
+
+    @property
+    def tick_us(self) -> int:
+        """As often as the world looks at the base."""
+        return LOOK_US
+
+    @property
+    def due_us(self) -> int:
+        """Never: a base that moves has work."""
+        return NEVER
+
+
+class MountedUrg(Mounted):
+    """A sensor in front of the axle.
 
     Not emulated: what it would see of its own robot, and the outline of others, which are
     round.
@@ -57,22 +71,12 @@ class MountedUrg:
         self._base, self._others, self.world = base, tuple(others), world
         self.urg, self.line = Urg(world=world), SerialLine(_USB_BAUD)
 
-    @property
-    def tick_us(self) -> int:
-        """As often as the world looks at the base."""
-        return LOOK_US
-
-    @property
-    def due_us(self) -> int:
-        """Never: a base that moves has work."""
-        return NEVER
-
     def act(self, now_us: int, /) -> None:
         """Put the sensor where the base has taken it, and others where they are."""
         read, inputs = self._base.read, self.urg.inputs
         x_m, y_m, heading = read("x_m"), read("y_m"), read("heading_rad")
         place = (x_m + _AHEAD_M * cos(heading), y_m + _AHEAD_M * sin(heading), heading)
-        for name, value in zip(_PLACE, place, strict=True):
+        for name, value in zip(PLACE, place, strict=True):
             if inputs[name] != value:
                 inputs.set(name, value)
         posts = [Post(base.read("x_m"), base.read("y_m"), _OUTLINE_M) for base in self._others]

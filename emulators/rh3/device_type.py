@@ -11,24 +11,18 @@ from tickrig.device.rh3.base import Rh3Base
 from tickrig.device.rh3.driver import TABLE
 from tickrig.device.rh3.parameters import BaseParameters
 from tickrig.emulators.commands.device_type import ConfiguredDevice, DeviceType, check_config
-from tickrig.emulators.record.wire_log import Splitter, WireLine
 from tickrig.emulators.rh3.fields import FIELDS
 from tickrig.emulators.scenario import Send, Sender, parse_raw
 from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.emulators.serial.rs485_line import Rs485Line
 from tickrig.host.text.names import near
-from tickrig.host.text.trace import Config, Mark
+from tickrig.host.text.trace import Config
 from tickrig.wire import modbus
 from tickrig.wire.errors import WireError
 
 # Cut what passes on the line into frames, shown in hex without their CRC: `01 03 00 00 00 02`.
 
 _CRC_BYTES = 2
-
-
-def _frame_splitter(mark: Mark) -> Splitter:
-    """Return what makes frames of one direction."""
-    return _FrameSplitter().split
 
 
 class _FrameSplitter:
@@ -182,10 +176,6 @@ def _configure(base: DeviceType, options: Mapping[str, Any], seed: int) -> Confi
     return ConfiguredDevice(base, Rh3Base(parameters), _config_to_trace(parameters))
 
 
-def _is_event(line: WireLine) -> bool:
-    return not line.data.startswith(_CYCLE)
-
-
 RH3_BASE: Final = DeviceType(
     name="rh3-base",
     title="RH3 base",
@@ -193,6 +183,6 @@ RH3_BASE: Final = DeviceType(
     fields=FIELDS,
     configure=_configure,
     config_of=lambda base: _config_to_trace(base.parameters),
-    line=LineSettings(splitter=_frame_splitter, wire=Rs485Line),
-    is_event=_is_event,
+    line=LineSettings(splitter=lambda _: _FrameSplitter().split, wire=Rs485Line),
+    is_event=lambda line: not line.data.startswith(_CYCLE),
 )

@@ -47,10 +47,6 @@ def _configure(rrc: DeviceType, options: Mapping[str, Any], seed: int) -> Config
     return ConfiguredDevice(rrc, Rrc(config), _config_to_trace(config))
 
 
-def _with_check(text: bytes) -> bytes:
-    return text + check_digit(text) + b"\n"
-
-
 def _is_event(line: WireLine) -> bool:
     return line.mark is Mark.FROM_DEVICE and line.data.startswith(_EVENTS)
 
@@ -66,7 +62,7 @@ RRC: Final = DeviceType(
     fields=FIELDS,
     configure=_configure,
     config_of=lambda rrc: _config_to_trace(rrc.config),
-    encoders={"check": _with_check},
+    encoders={"check": lambda text: text + check_digit(text) + b"\n"},
     is_event=_is_event,
     panel=_panel,
 )

@@ -12,7 +12,6 @@ from tickrig.device.rtc_lite.node import RtcLiteNode
 from tickrig.device.rtc_lite.server import DEFAULT_RATE_HZ, LiteConfig
 from tickrig.emulators.commands.device_type import ConfiguredDevice, DeviceType, check_config
 from tickrig.emulators.fields import named
-from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.rtc_lite.fields import FIELDS
 from tickrig.emulators.rtc_lite.line import LINE_FAULTS, frame_splitter, verbs
 from tickrig.emulators.serial.emulator import LineSettings
@@ -128,10 +127,6 @@ def _talk(link: str, baud: int) -> str:
     return f" Its proxy opens this path:\n  tickrig rtc run SYSTEM.toml --lite NAME={link}@{baud}"
 
 
-def _is_event(line: WireLine) -> bool:
-    return line.data[:2] not in _ROUTINE
-
-
 RTC_LITE: Final = DeviceType(
     name="rtc-lite",
     title="RTC-Lite node",
@@ -139,6 +134,6 @@ RTC_LITE: Final = DeviceType(
     fields=FIELDS,
     configure=_configure,
     config_of=_config_of,
-    is_event=_is_event,
+    is_event=lambda line: line.data[:2] not in _ROUTINE,
     talk=_talk,
 )

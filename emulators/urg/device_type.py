@@ -16,7 +16,6 @@ from tickrig.emulators.commands.device_type import (
     check_config,
 )
 from tickrig.emulators.fields import named
-from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.emulators.urg.fields import FIELDS, USB_BAUD
@@ -138,10 +137,6 @@ def _talk(scip: str, link: str, baud: int) -> str:
     return switch + by_miniterm(link, _USUAL_BAUD if baud == USB_BAUD else baud)
 
 
-def _is_event(line: WireLine) -> bool:
-    return line.mark is Mark.TO_DEVICE
-
-
 URG: Final = DeviceType(
     name="urg",
     title="URG-04LX",
@@ -150,5 +145,5 @@ URG: Final = DeviceType(
     configure=_configure,
     config_of=lambda urg: _config_to_trace(urg.parameters, urg.world),
     line=LineSettings(wire=partial(SerialLine, buffer_bytes=_BUFFER_BYTES)),
-    is_event=_is_event,
+    is_event=lambda line: line.mark is Mark.TO_DEVICE,
 )

@@ -16,6 +16,7 @@ import sys
 import time
 from collections.abc import Callable, Collection
 from contextlib import suppress
+from functools import partial
 from typing import Any, Final
 
 import can
@@ -275,7 +276,7 @@ class BusReceiver:
         self._bus, self._name, self._ends, self._gone = bus, name, ends, gone
         self._raises, self._read = raises, read or bus.recv
         self.faults, self.last, self.closed = 0, "", False
-        self.on_fault: Callable[[str], object] = _warn
+        self.on_fault: Callable[[str], object] = partial(_log.warning, "%s")
         self._row, self._since_s = 0, 0.0
 
     def receive(self, timeout_s: float | None) -> can.Message | None:
@@ -345,10 +346,6 @@ class BusReceiver:
                 self._bus.flush()  # of slcan
         if hasattr(self._bus, _SOCKETCAND_BUFFER):
             setattr(self._bus, _SOCKETCAND_BUFFER, "")
-
-
-def _warn(text: str) -> None:
-    _log.warning("%s", text)
 
 
 _TOLD: Final = frozenset(10**power for power in range(10))

@@ -47,15 +47,6 @@ _SCAN: Final = Path(__file__).with_name("scan_topic.toml").read_text("utf-8")
 # A run as a picture: path, cross-track error and velocities; needs the extra `plot`.
 
 
-def _write_track(run: MotionRun, points: Sequence[Pose], title: str, path: Path) -> None:
-    """Draw a run into a file, PNG, SVG or HTML by its name.
-
-    Raises:
-        OSError: the file cannot be written.
-    """
-    write_figure(_draw(run, points, title), title, path)
-
-
 def _draw(run: MotionRun, points: Sequence[Pose], title: str) -> Figure:
     figure = new_figure(9, 9)
     figure.suptitle(title)
@@ -264,6 +255,6 @@ def _drive(options: MotionOptions, points: Sequence[Pose], title: str) -> None:
         click.echo(line)
     if options.plot is not None:
         try:
-            _write_track(run, points, title, options.plot)
+            write_figure(_draw(run, points, title), title, options.plot)
         except OSError as error:
             refuse_path("plot", error)

@@ -8,7 +8,6 @@ from typing import Any, Final
 from tickrig.device.ucode_reader import Marker, ReaderParameters, UcodeReader
 from tickrig.emulators.commands.device_type import ConfiguredDevice, DeviceType, check_config
 from tickrig.emulators.fields import named
-from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.emulators.tkernel.reader.fields import FIELDS
 from tickrig.host.text.trace import Config, Mark
@@ -62,10 +61,6 @@ def _configure(reader: DeviceType, options: Mapping[str, Any], seed: int) -> Con
     return ConfiguredDevice(reader, UcodeReader(parameters, markers), config)
 
 
-def _is_event(line: WireLine) -> bool:
-    return line.mark is Mark.TO_DEVICE
-
-
 UCODE_READER: Final = DeviceType(
     name="ucode-reader",
     title="ucode reader",
@@ -74,5 +69,5 @@ UCODE_READER: Final = DeviceType(
     configure=_configure,
     config_of=lambda reader: _config_to_trace(reader.parameters, reader.markers),
     line=LineSettings(baud=BAUD),
-    is_event=_is_event,
+    is_event=lambda line: line.mark is Mark.TO_DEVICE,
 )

@@ -110,7 +110,7 @@ class CanopenMaster(Closing):
 
     def run_for(self, duration: _Duration) -> None:
         """Let time pass: microseconds, or a text as `"100ms"`."""
-        self.wait_until(_never, duration)
+        self.wait_until(lambda: False, duration)
 
     def wait_until(self, done: Callable[[], bool], within: _Duration) -> bool:
         """Let time pass until something is so.
@@ -216,10 +216,6 @@ def _failure(slave: NetworkSlave) -> str:
         return _verdict(slave)
     step = slave.steps[-1][1]
     return f"{_verdict(slave)}; {step.request}: {step.answer}"
-
-
-def _never() -> bool:
-    return False
 
 
 # The master that a bus.yml describes, on a bus.

@@ -72,12 +72,6 @@ _NODE_IDS: Final = range(1, 128)
 _FUNCTION: Final = 0x780
 """The bits of a CAN-ID that are no node-ID."""
 
-_COMMANDED: Final = {
-    nmt.NmtCommand.START: nmt.NmtState.OPERATIONAL,
-    nmt.NmtCommand.STOP: nmt.NmtState.STOPPED,
-    nmt.NmtCommand.ENTER_PRE_OPERATIONAL: nmt.NmtState.PRE_OPERATIONAL,
-}
-
 
 class NmtMaster:
     """Boots and starts slaves as Lely's master does; it has no clock and no bus, it is ticked.
@@ -140,8 +134,8 @@ class NmtMaster:
         """Send an NMT command, and expect of the slaves what it commands."""
         self.send(nmt.NMT_COB_ID, bytes((command, node_id)))
         for slave in self.slaves.values():
-            if node_id in (nmt.ALL_NODES, slave.assignment.node_id) and command in _COMMANDED:
-                slave.expect(_COMMANDED[command])
+            if node_id in (nmt.ALL_NODES, slave.assignment.node_id) and command in nmt.COMMANDED:
+                slave.expect(nmt.COMMANDED[command])
 
     def _guard(self, can_id: int) -> None:
         self._out.append(CanFrame(can_id, remote=True, remote_length=1))

@@ -6,17 +6,13 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from tickrig.host.canopen.eds import read_sound
 from tickrig.wire.canopen.eds.eds_device import EdsDevice
 from tickrig.wire.canopen.eds.eds_file import EdsError, Finding
 from tickrig.wire.canopen.pdo import MappedObject
 from tickrig.wire.rtc_canopen import PortDirection
-
-if TYPE_CHECKING:
-    pass
-
 
 # What RTC-CANopen raises where a person is to read it.
 #

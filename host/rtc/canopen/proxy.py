@@ -47,7 +47,8 @@ class _PortShape:
         elif len(fields) == 1:
             self.types = (fields[0].type.one,)
         else:
-            self.names = tuple(f"{name}_{_suffix(field)}" for field in fields)
+            ends = (f"{one.mapped.index:04X}_{one.mapped.sub:02X}" for one in fields)
+            self.names = tuple(f"{name}_{end}" for end in ends)
             self.types = tuple(field.type.one for field in fields)
 
 
@@ -132,10 +133,6 @@ class PdoSink:
         encoded = self.layout.encode(tuple(latest))
         self._latest = latest
         return encoded
-
-
-def _suffix(field: pdo_layout.PdoField) -> str:
-    return f"{field.mapped.index:04X}_{field.mapped.sub:02X}"
 
 
 # Ports that SDO carries: texts, and what is wider than a PDO (ours: K5).

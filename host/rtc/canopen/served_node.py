@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
 from enum import Enum
 from typing import Final, Protocol
 
@@ -16,7 +15,7 @@ from tickrig.host.rtc.canopen.operations import NodeOperations, kind_of
 from tickrig.host.rtc.canopen.pdo_layout import PdoLayout
 from tickrig.host.rtc.canopen.proxy import ProxyRtc
 from tickrig.host.rtc.states import LifeCycleState
-from tickrig.wire.canopen.nmt import NMT_COB_ID, NmtCommand, NmtState
+from tickrig.wire.canopen.nmt import COMMANDED, NMT_COB_ID, NmtCommand, NmtState
 from tickrig.wire.canopen.sdo import UploadInitiateResponse, parse_response
 from tickrig.wire.errors import WireError
 from tickrig.wire.instant import NEVER
@@ -40,12 +39,6 @@ _CREDIT: Final = 3
 
 _IDENTITY: Final = frozenset({0x1000, 0x1018})
 """Objects whose values no node changes."""
-
-_COMMANDED: Final[Mapping[int, NmtState]] = {
-    NmtCommand.START: NmtState.OPERATIONAL,
-    NmtCommand.STOP: NmtState.STOPPED,
-    NmtCommand.ENTER_PRE_OPERATIONAL: NmtState.PRE_OPERATIONAL,
-}
 
 
 class DuplicateNodeDetector:
@@ -92,7 +85,7 @@ class DuplicateNodeDetector:
 
     def command(self, command: int) -> None:
         """Hear an NMT command of anybody to the node."""
-        if (state := _COMMANDED.get(command)) is not None:
+        if (state := COMMANDED.get(command)) is not None:
             self._commanded[state] = min(self._commanded[state] + 1, _CREDIT)
 
     def answer(self, data: bytes) -> None:

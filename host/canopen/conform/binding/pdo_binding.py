@@ -94,7 +94,8 @@ def _kinds(way: str) -> Iterator[_PdoKind]:
         f"{pdo} that is enabled, synchronous and has a mapping",
         lambda pdo: pdo.enabled and bool(pdo.mapping) and pdo.transmission_type in _CYCLIC,
     )
-    yield _PdoKind(f"{way}_remappable", f"{pdo} with a mapping that may be changed", _is_remappable)
+    what = f"{pdo} with a mapping that may be changed"
+    yield _PdoKind(f"{way}_remappable", what, lambda pdo: pdo.remappable and not pdo.restless)
     yield _PdoKind(
         f"{way}_event_timer",
         f"{pdo} with an event timer",
@@ -122,10 +123,6 @@ def _carrying(way: str) -> Iterator[_PdoKind]:
 def _carries(address: tuple[int, int], pdo: BoundPdo) -> bool:
     driven = pdo.enabled and pdo.transmission_type in _EVENT_DRIVEN
     return driven and pdo.place(address) is not None
-
-
-def _is_remappable(pdo: BoundPdo) -> bool:
-    return pdo.remappable and not pdo.restless
 
 
 _TPDO_KINDS: Final = (

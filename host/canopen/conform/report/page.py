@@ -67,7 +67,7 @@ def _template() -> PageTemplate:
     """Return the template; it is compiled once."""
     names = {
         "counts": counts_text,
-        "slug": _slug,
+        "slug": lambda verdict: verdict.name.lower(),
         "hint": hint,
         "words": step_words,
         "Verdict": CheckVerdict,
@@ -76,7 +76,3 @@ def _template() -> PageTemplate:
         "SAME": SAME,
     }
     return PageTemplate(__package__, names)
-
-
-def _slug(verdict: CheckVerdict) -> str:
-    return verdict.name.lower()

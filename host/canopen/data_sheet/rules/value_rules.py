@@ -311,10 +311,6 @@ def _contradicting(document: Document, title: eds_value.EdsLine) -> list[str]:
     ]
 
 
-def _compact(document: Document, finding: Finding, line: eds_value.EdsLine) -> tuple[Edit, ...]:
-    return compact_edits(document, finding.section)
-
-
 _MENDS: Final[dict[str, Callable[[Document, Finding, eds_value.EdsLine], tuple[Edit, ...]]]] = {
     "number-form": _plain,
     "number-word": _word,
@@ -328,7 +324,7 @@ _MENDS: Final[dict[str, Callable[[Document, Finding, eds_value.EdsLine], tuple[E
     "no-keyword": _comment,
     "doubled-key": _doubled_key,
     "doubled-section": _doubled_section,
-    "compact-record": _compact,
+    "compact-record": lambda document, finding, _: compact_edits(document, finding.section),
 }
 
 _OF_LINES: Final = ("inline-comment", "sub0-missing")

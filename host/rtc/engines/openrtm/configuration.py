@@ -80,17 +80,13 @@ class ConfigurationServant:
         """Return none: all parameters are in sets."""
         return []
 
-    def get_configuration_parameter_values(self) -> list[Any]:
-        """Return none."""
-        return []
+    get_configuration_parameter_values = get_configuration_parameters
 
-    def get_configuration_parameter_value(self, name: str) -> Any:
+    def get_configuration_parameter_value(self, name: str, *_: object) -> Any:
         """Refuse: there is none."""
         raise self._sdo.InvalidParameter(f"no parameter {name!r} outside of sets")
 
-    def set_configuration_parameter(self, name: str, value: Any) -> bool:
-        """Refuse: there is none."""
-        raise self._sdo.InvalidParameter(f"no parameter {name!r} outside of sets")
+    set_configuration_parameter = get_configuration_parameter_value
 
     def set_device_profile(self, profile: Any) -> bool:
         """Refuse, as all that follow."""

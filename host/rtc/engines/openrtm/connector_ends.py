@@ -437,7 +437,8 @@ class ServiceEnd(ConnectorEnd):
         for consumer in self._port.consumers:
             wanted = consumer.profile
             if wanted.type_name in _OPERATIONS and (ior := self._ior(wanted, values)):
-                calls = self._calls(self.reference(ior, _interface(wanted.type_name)), wanted)
+                kind = getattr(stubs().services, wanted.type_name)
+                calls = self._calls(self.reference(ior, kind), wanted)
                 peer.provide(Provider[Any](wanted.instance_name, wanted.type_name, calls))
         names = {"name": self._place.name, "connector_id": self._place.connector_id}
         return connect(self._port, peer, values, **names)
@@ -500,7 +501,3 @@ def _call(operation: Callable[[], None], watch: peer_ports.PeerWatch) -> None:
 
 def _old_name(interface: InterfaceProfile) -> str:
     return f"port.{interface.type_name}.{interface.instance_name}"
-
-
-def _interface(type_name: str) -> Any:
-    return getattr(stubs().services, type_name)

@@ -130,7 +130,8 @@ class AttachedContexts:
 
     def get_participating_contexts(self) -> list[Reference]:
         """Return all others that it takes part in."""
-        return self._calls.call(lambda: [*self._references.all_of(self._others()), *self._peers()])
+        peers = (reference for reference, _ in self._foreign.values())
+        return self._calls.call(lambda: [*self._references.all_of(self._others()), *peers])
 
     def get_context(self, exec_handle: int) -> Reference:
         """Return the context of a handle; nil if there is none."""
@@ -172,9 +173,6 @@ class AttachedContexts:
     def _others(self) -> list[ExecutionContext]:
         own = self._component.own_contexts
         return [context for context in self._component.contexts if context not in own]
-
-    def _peers(self) -> list[Reference]:
-        return [reference for reference, _ in self._foreign.values()]
 
     def _by_handle(self) -> dict[int, Reference]:
         own, others = self._component.own_contexts, self._others()

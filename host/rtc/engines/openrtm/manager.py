@@ -20,21 +20,9 @@ SPEC: Final = ModuleSpec(NAME, category=NAME)
 
 _LOG: Final = log_of(__name__)
 _UNSET: Final = (
-    "naming_formats",
-    "refstring_path",
-    "components.precreate",
-    *(
-        f"modules.{key}"
-        for key in (
-            "load_path",
-            "config_path",
-            "preload",
-            "init_func_prefix",
-            "init_func_suffix",
-            "download_allowed",
-            "abs_path_allowed",
-        )
-    ),
+    *("naming_formats", "refstring_path", "components.precreate", "modules.load_path"),
+    *("modules.config_path", "modules.preload", "modules.init_func_prefix"),
+    *("modules.init_func_suffix", "modules.download_allowed", "modules.abs_path_allowed"),
 )
 """What rtcat misses of a profile where it is not there."""
 
@@ -106,24 +94,14 @@ class ManagerServant:
         ]
 
     def get_loadable_modules(self) -> list[Any]:
-        """Return none."""
+        """Return none, as those that follow."""
         return []
 
-    def get_loaded_modules(self) -> list[Any]:
-        """Return none."""
-        return []
+    get_loaded_modules = get_master_managers = get_slave_managers = get_loadable_modules
 
     def is_master(self) -> bool:
         """Return True: nobody commands it."""
         return True
-
-    def get_master_managers(self) -> list[Reference]:
-        """Return none."""
-        return []
-
-    def get_slave_managers(self) -> list[Reference]:
-        """Return none."""
-        return []
 
     def shutdown(self) -> Any:
         """End the process, as Ctrl-C does."""

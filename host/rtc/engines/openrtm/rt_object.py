@@ -81,13 +81,7 @@ class RtObjectServant:
         """End the component."""
         return self._code(self._exit)
 
-    def on_initialize(self) -> Any:
-        """Refuse, as `initialize`."""
-        return self.initialize()
-
-    def on_finalize(self) -> Any:
-        """Refuse, as `finalize`."""
-        return self.finalize()
+    on_initialize, on_finalize = initialize, finalize
 
     def get_sdo_id(self) -> str:
         """Return its instance name."""
@@ -108,37 +102,21 @@ class RtObjectServant:
         """Return its configuration."""
         return self.configuration
 
-    def get_organizations(self) -> list[Reference]:
-        """Return none."""
+    def get_organizations(self) -> list[Any]:
+        """Return none, as those that follow."""
         return []
 
-    def get_owned_organizations(self) -> list[Reference]:
-        """Return none."""
-        return []
+    get_owned_organizations = get_service_profiles = get_status_list = get_organizations
 
-    def get_service_profiles(self) -> list[Any]:
-        """Return none."""
-        return []
+    def get_service_profile(self, name: str) -> Any:
+        """Refuse, as those that follow: it has none."""
+        raise self._stubs.sdo.InvalidParameter(f"it has no {name!r}")
 
-    def get_service_profile(self, id: str) -> Any:  # noqa: A002 - as the IDL has it
-        """Refuse: it has none."""
-        raise self._stubs.sdo.InvalidParameter(f"no service {id!r}")
-
-    def get_sdo_service(self, id: str) -> Any:  # noqa: A002 - as the IDL has it
-        """Refuse: it has none."""
-        raise self._stubs.sdo.InvalidParameter(f"no service {id!r}")
+    get_sdo_service = get_status = get_service_profile
 
     def get_monitoring(self) -> Any:
         """Refuse: there is none."""
         raise self._stubs.sdo.InterfaceNotImplemented("no Monitoring")
-
-    def get_status_list(self) -> list[Any]:
-        """Return none."""
-        return []
-
-    def get_status(self, name: str) -> Any:
-        """Refuse: it has none."""
-        raise self._stubs.sdo.InvalidParameter(f"no status {name!r}")
 
     def _exit(self) -> ReturnCode:
         if self._references.fixed:

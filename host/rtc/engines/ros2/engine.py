@@ -274,7 +274,7 @@ class _Ros2Engine:
         writer = TopicWriter(self._participant, entry)
 
         def send(message: Any) -> None:
-            self._out.submit(partial(_written, writer, message))
+            self._out.submit(partial(writer.put, message))
 
         item = _Diagnostics(self._manager, self._stamps, period_us, send)
         if topic:
@@ -297,10 +297,6 @@ def _end(entry: TopicEntry) -> peer_ports.PeerEnd:
 
 def _no_value(value: Any) -> Any:
     raise ValueError("this connector goes the other way")
-
-
-def _written(writer: TopicWriter, message: Any) -> None:
-    writer.put(message)
 
 
 def _logging(entry: TopicEntry, encode: Any) -> Any:

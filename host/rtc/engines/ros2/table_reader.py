@@ -45,10 +45,6 @@ def _is_topic(word: str) -> bool:
     return _TOPIC.fullmatch(word) is not None and "__" not in word
 
 
-def _is_topic_or_none(word: str) -> bool:
-    return not word or _is_topic(word)
-
-
 def _time(value: object) -> int:
     return parse_time_with_unit_us(str(value))
 
@@ -94,7 +90,7 @@ _ENTRY: Final[Schema] = {
 }
 _DIAGNOSTICS: Final[Schema] = {
     "topic": Field(
-        matching(_is_topic_or_none, "a topic, as diagnostics, or empty for none"),
+        matching(lambda w: not w or _is_topic(w), "a topic, as diagnostics, or empty for none"),
         *("a topic", "of the states", "diagnostics"),
     ),
     "period": Field(_period, "10ms..3600s", "how often they are sent", "1s"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from functools import partial
 from math import isfinite
 from typing import Any, Final
 
@@ -132,7 +133,9 @@ class TopicReader:
         """Be there for peers; what cannot be is logged in a line."""
         try:
             if not self._closed:
-                self._reader = self._participant.reader(self.entry, _Arrivals(self._arrived))
+                self._reader = self._participant.reader(
+                    self.entry, _Arrivals(partial(self._thread.submit, self._take))
+                )
         except DDSException as error:
             _LOG.warning("%s: no topic %s: %s", self.entry, self.entry.topic, reason_of(error))
 
@@ -144,9 +147,6 @@ class TopicReader:
     def close(self) -> None:
         """Be gone."""
         self._reader, self._closed = None, True
-
-    def _arrived(self) -> None:
-        self._thread.submit(self._take)
 
     def _take(self) -> float | None:
         """Take what has come, one by one: a message that is none costs no other."""

@@ -67,7 +67,7 @@ class PathFollower(RtComponent):
             RunMode.TO_POINT: self._to_point,
             RunMode.CIRCLEFOLLOW: self._circle,
             RunMode.SPIN: self._turn,
-            RunMode.VEL: self._velocity,
+            RunMode.VEL: lambda path, target, pose: Twist(path.v, path.w),
             RunMode.WHEEL_VEL: self._wheels,
         }
         self._configure()
@@ -142,9 +142,6 @@ class PathFollower(RtComponent):
     def _turn(self, path: Path, target: Pose, pose: Pose) -> Twist:
         most = min(abs(path.w), self.max_w.value)
         return self._spin.turn(target.heading, pose.heading, most, self.twist)
-
-    def _velocity(self, path: Path, target: Pose, pose: Pose) -> Twist:
-        return Twist(path.v, path.w)
 
     def _wheels(self, path: Path, target: Pose, pose: Pose) -> Twist:
         radius = self.radius.value
