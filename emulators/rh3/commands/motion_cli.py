@@ -117,12 +117,7 @@ def along_path(file: Path, **options: Any) -> None:
 
 @main.command()
 @click.option("--runs", type=click.IntRange(1, 100), help="Each way.  [1, 5 where chance is]")
-@click.option(
-    "--side",
-    type=NumberRange(0.2, 100),
-    metavar="M",
-    help="Of the squares.  [4]",
-)
+@click.option("--side", type=NumberRange(0.2, 100), metavar="M", help="Of the squares.  [4]")
 @click.option("--save", type=PATH, help="Write the corrected Odometry.conf here.")
 @_SHARED
 @works_in(f"{_WORK}:go_round")
