@@ -11,29 +11,432 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import click
 
 from tickrig.emulators.commands.picture import check_plot, new_figure, write_figure
-from tickrig.emulators.rh3.commands.cart_options import (
-    MotionOptions,
-    RunWatcher,
-    require_arrival,
-    watched,
-)
-from tickrig.emulators.rh3.commands.served_cart import serve_cart
 from tickrig.emulators.rh3.device_type import read_parameters
 from tickrig.emulators.rh3.fields import PARAMETERS
 from tickrig.host.cli.engine_options import take_engines
 from tickrig.host.cli.messages import Refused, refuse_path
 from tickrig.host.cli.options import NumberRange
-from tickrig.host.rtc.motion.drive import BaseConnection, drive, limits_of, stop, table
+from tickrig.host.rtc.motion.drive import (
+    SIDE_M,
+    BaseConnection,
+    Umbmark,
+    drive,
+    limits_of,
+    run_umbmark,
+    square,
+    stop,
+    table,
+)
 from tickrig.host.rtc.motion.geometry import Pose, Wheels
 from tickrig.host.rtc.motion.motion_run import MotionRun
 from tickrig.host.rtc.motion.path_file import FARTHEST_M, read_path, within_reach
 from tickrig.host.rtc.motion.ports import plausible
-from tickrig.host.rtc.motion.umbmark import SIDE_M, Umbmark, run_umbmark, square
 from tickrig.host.text.whole_file import write_whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field, replace
+from functools import partial
+from math import degrees
+from shutil import get_terminal_size
+
+from tickrig.device.rh3.parameters import BaseParameters
+from tickrig.device.urg.world import room
+from tickrig.emulators.rh3.closed_loop import ClosedLoop, MountedUrg
+from tickrig.emulators.rig.sim_link import SimLink
+from tickrig.host.cli.control import serving_control, stopped_by_signals
+from tickrig.host.cli.engine_options import EngineOptions
+from tickrig.host.cli.messages import say, warnings_shown
+from tickrig.host.cli.start import INTERRUPTED, paint
+from tickrig.host.control.clock import RealClock, ServingClock
+from tickrig.host.control.requests import Object, short
+from tickrig.host.control.server import ControlServer
+from tickrig.host.links.serial_link import SerialLink
+from tickrig.host.rtc import Manager, connect
+from tickrig.host.rtc.commands.console import Console
+from tickrig.host.rtc.commands.system_control import SystemControl
+from tickrig.host.rtc.engines.engines_joined import engines_joined
+from tickrig.host.rtc.motion.chain import RATE_HZ, MotionChain
+from tickrig.host.rtc.motion.drive import PERIOD_US, start
+from tickrig.host.rtc.motion.geometry import Twist
+from tickrig.host.rtc.motion.motion_run import WIDTH, LiveMap, TrackMap, TrackSample
+from tickrig.host.rtc.motion.options.lrf_capture_urg import LrfCaptureUrg
+from tickrig.host.rtc.motion.path_file import in_degrees
+from tickrig.host.rtc.states import RtcRefused
+from tickrig.host.rtc.system.call_queue import CallQueue
+from tickrig.host.rtc.system.schedule import LATE_US, RealTime
+
+# A cart in real time, for others to work with: `rh3 serve`.
+_NOT_HERE: Final = ("create", "delete", "save")
+"""Requests of a system that a cart refuses: it has its six components."""
+
+
+class CartClock(ServingClock):
+    """The machine's clock, which serves while it waits and notes what is late.
+
+    Attributes:
+        late_ticks: how many waits began more than `LATE_US` late.
+        worst_late_us: by how much the worst of them was late.
+    """
+
+    late_ticks = 0
+    worst_late_us = 0
+
+    def wait_until(self, t_us: int, /) -> int:
+        """Serve, then sleep until `t_us`."""
+        late_us = super().wait_until(t_us)
+        self.late_ticks += late_us > LATE_US
+        self.worst_late_us = max(self.worst_late_us, late_us)
+        return late_us
+
+
+class ServedCart:
+    """Moves a cart on until somebody stops it; others are served while it waits.
+
+    Args:
+        connection: the cart, with its components.
+        clock: what the cart waits by.
+
+    Attributes:
+        running: False once `stop` was called.
+        after_tick: called with the time in us after each period.
+        server: the control socket, None without one.
+    """
+
+    def __init__(self, connection: BaseConnection, clock: CartClock) -> None:
+        self._connection, self._clock, self.running = connection, clock, True
+        self.server: ControlServer | None = None
+        self.after_tick: list[Callable[[int], None]] = []
+
+    @property
+    def late_ticks(self) -> int:
+        """How many periods began late."""
+        return self._clock.late_ticks
+
+    @property
+    def worst_late_us(self) -> int:
+        """By how much the worst of them was late."""
+        return self._clock.worst_late_us
+
+    def attach(self, calls: CallQueue) -> None:
+        """Make the calls of other threads while it waits."""
+        if self.server is not None:
+            self.server.attach(calls, calls.make)
+        else:
+            self._clock.serve = calls.serve
+
+    def run(self) -> None:
+        """Run until somebody calls `stop`."""
+        while self.running:
+            self._connection.run_to(self._connection.now_us + PERIOD_US)
+            for listener in tuple(self.after_tick):
+                listener(self._connection.now_us)
+
+    def stop(self) -> None:
+        """End `run` after the present period."""
+        self.running = False
+
+
+class CartControl(SystemControl):
+    """Answers requests about a cart: those of a system, and the commands of PositionInput.
+
+    Args:
+        connection: the cart; it must not be moved on meanwhile.
+        cart: what moves it on.
+    """
+
+    def __init__(self, connection: BaseConnection, cart: ServedCart) -> None:
+        super().__init__(connection.chain.manager, cart)
+        self._connection, self._entered = connection, connection.chain.position_input
+        self._verbs = {
+            **{name: verb for name, verb in self._verbs.items() if name not in _NOT_HERE},
+            "goal": (self._goal, ("pose",)),
+            "path": (self._path, ("points",)),
+            "end": (self._end, ()),
+        }
+
+    def _goal(self, request: Object) -> Object:
+        self._entered.require_open()
+        self._entered.goal(_pose(request.get("pose"), 3))
+        return {}
+
+    def _path(self, request: Object) -> Object:
+        self._entered.require_open()
+        points = request.get("points", [])
+        if not isinstance(points, list):
+            raise ValueError(f"points is a list of [x, y] or [x, y, deg], not {short(points)}")
+        self._entered.path([_pose(point, 2) for point in points] or self._entered.defined_path)
+        return {}
+
+    def _end(self, request: Object) -> Object:
+        self._entered.require_open()
+        self._entered.end()
+        return {}
+
+    def _status(self, request: Object) -> Object:
+        pose = self._connection.chain.odometry.pose
+        return {
+            **super()._status(request),
+            "finished": self._entered.finished,
+            "idle": self._entered.idle,
+            "x_m": pose.x,
+            "y_m": pose.y,
+            "heading_deg": degrees(pose.heading),
+        }
+
+
+def _pose(value: object, least: int) -> Pose:
+    numbers = value if isinstance(value, list) else []
+    if len(numbers) < least or not all(
+        isinstance(each, int | float) and not isinstance(each, bool) for each in numbers
+    ):
+        raise ValueError(f"a pose is [x, y, deg] in metres and degrees, not {short(value)}")
+    return in_degrees(numbers, short(value))
+
+
+def serve_cart(options: MotionOptions, engines: EngineOptions, control: Path | None = None) -> None:
+    """Run a cart until Ctrl-C, or until a peer ends it; then its components are deactivated.
+
+    Lines typed on standard input are commands of PositionInput. When standard input ends and
+    no other program can reach the cart, the run ends after the last command.
+
+    Where velocities come from a topic, it obeys these while no command of PositionInput runs.
+
+    Raises:
+        Refused: there is no cart, or an engine or control socket cannot be.
+    """
+    clock = CartClock()
+    connection = replace(options, clock=clock).begin()
+    cart = ServedCart(connection, clock)
+    chain = connection.chain
+    names = ", ".join(component.instance_name for component in chain.components)
+    reachable = bool(engines) or control is not None
+    with warnings_shown(), stopped_by_signals(cart.stop):
+        with ExitStack() as stack:
+            if control is not None:
+                requests = CartControl(connection, cart)
+                cart.server = stack.enter_context(serving_control(control, requests, clock))
+            if engines:
+                stack.enter_context(
+                    engines_joined(engines, chain.manager, cart.attach, cart.stop, fixed=True)
+                )
+            say(f"{names}. Ctrl-C ends.")
+            _open_console(cart, chain, reachable=reachable)
+            _share_the_helm(cart, chain)
+            cart.run()
+        clock.serve = None
+        failed = not reachable and chain.ref_hard.instance_name in chain.in_error
+        stop(connection)
+    pose = connection.pose
+    click.echo(f"ran {connection.now_us / 1e6:.3f} s; at {pose.x:.3f} {pose.y:.3f} m")
+    if failed:
+        raise click.ClickException(chain.ref_hard.error_reason)
+
+
+def _open_console(cart: ServedCart, chain: MotionChain, *, reachable: bool) -> None:
+    """Read standard input after each period; stop the cart when no command can come."""
+    console = Console(chain.manager, click.echo, say)
+    try:
+        descriptor = sys.stdin.fileno()
+    except (AttributeError, OSError, ValueError):  # none, closed, or no file
+        console.is_open = False
+
+    def read(now_us: int) -> None:
+        if console.is_open:
+            console.read(descriptor)
+        elif not reachable and (chain.position_input.idle or chain.in_error):
+            cart.stop()
+
+    cart.after_tick.append(read)
+
+
+def _share_the_helm(cart: ServedCart, chain: MotionChain) -> None:
+    """Where velocities come from a peer, let PathFollower drive only while a command runs."""
+    follower, base = chain.path_follower.velocity, chain.ref_hard.velocity
+    if all(connector.joins_components for connector in base.connectors):
+        return
+
+    def steer(now_us: int) -> None:
+        connector = follower.connector_to(base)
+        stands = chain.path_follower.twist == Twist()
+        if not (chain.position_input.idle and stands):
+            if connector is None:
+                connect(follower, base)
+        elif connector is not None:
+            connector.end()
+
+    steer(0)
+    cart.after_tick.append(steer)
+
+
+# What the verbs of `rh3` share: a cart as the options say, and how a run of it ends.
+_SCANNER: Final = "LRFCapture_URG0"
+"""The component of a range finder, if the cart has one."""
+
+
+class RunStopped(Exception):  # noqa: N818 - no error
+    """Somebody ended the run."""
+
+
+@dataclass(frozen=True, slots=True)
+class MotionOptions:
+    """The options that all verbs have.
+
+    Attributes:
+        set_id: configuration set.
+        device: a serial port, None for an emulated base in virtual time.
+        baud: its bit rate.
+        any_device: whether to drive it without asking who it is.
+        pace: how many times as fast as the machine's virtual time passes, None as it goes.
+        conf: Odometry.conf.
+        show_map: draw the track while it runs.
+        base: what the emulated base is like.
+        plot: file for a picture.
+        clock: what the cart waits by, in real time and with a pace.
+        room_m: width and depth of a room around the origin; with one, an emulated base carries a
+            range finder.
+    """
+
+    set_id: str
+    device: str | None
+    baud: int
+    pace: float | None
+    conf: Path | None
+    show_map: bool
+    base: BaseParameters
+    plot: Path | None = None
+    clock: RealClock = field(default_factory=RealClock)
+    room_m: tuple[float, float] | None = None
+    any_device: bool = False
+
+    def begin(self, wheels: Wheels | None = None) -> BaseConnection:
+        """Return a cart at the origin with its components active."""
+        connection = self._connection()
+        try:
+            if self.conf is not None:
+                connection.chain.odometry.load(self.conf)
+            if wheels is not None:
+                connection.chain.odometry.calibrate(wheels)
+        except RtcRefused as error:
+            raise Refused(str(error)) from None
+        except OSError as error:
+            refuse_path("odometry-conf", error)
+        start(connection, self.set_id)
+        if connection.chain.in_error:
+            raise Refused(connection.chain.ref_hard.error_reason)
+        return connection
+
+    def _connection(self) -> BaseConnection:
+        if self.device is not None:
+            connection = _SerialBaseConnection(self.device, self.baud, self.clock)
+            connection.chain.ref_hard.configuration.set("AnyDevice", str(int(self.any_device)))
+            return connection
+        world = room(*self.room_m) if self.room_m else None
+        loop = ClosedLoop(self.base, world=world, pace=self.pace, clock=self.clock)
+        for eye in loop.range_finders:
+            _add_scanner(loop, eye)
+        return loop
+
+
+def _add_scanner(loop: ClosedLoop, eye: MountedUrg) -> None:
+    """Have the scans of a range finder written to a port."""
+    scanner = LrfCaptureUrg(_SCANNER, lambda name: SimLink(loop.rig, eye.line.b))
+    loop.manager.add(scanner, RATE_HZ)
+    loop.manager.activate(_SCANNER)
+
+
+class _SerialBaseConnection:
+    """A `BaseConnection` in real time, over a serial port: a base, or `rh3-emu`.
+
+    Args:
+        url: what DeviceFileName is set to; a path or a pyserial URL.
+        baud: bit rate in bit/s.
+        clock: what it waits by.
+
+    Attributes:
+        chain: its components.
+    """
+
+    def __init__(self, url: str, baud: int, clock: RealClock | None = None) -> None:
+        self._manager = Manager()
+        self.chain = MotionChain(self._manager, partial(SerialLink, baud=baud))
+        self.chain.ref_hard.configuration.set("DeviceFileName", url)
+        self._runner = RealTime(self._manager, clock or RealClock())
+
+    @property
+    def now_us(self) -> int:
+        """Time since the start."""
+        return self._manager.now_us
+
+    @property
+    def pose(self) -> Pose:
+        """Where odometry takes it to be: nobody else knows."""
+        return self.chain.odometry.pose
+
+    def run_to(self, t_us: int) -> None:
+        """Wait until it is so late, and run what is due meanwhile."""
+        while self.now_us < t_us:
+            self._runner.step()
+
+
+class RunWatcher:
+    """Draws samples if they are to be drawn, and raises `RunStopped` when a signal has come."""
+
+    def __init__(self, options: MotionOptions, points: Sequence[Pose]) -> None:
+        self._ended = self._asking = False
+        width = min(WIDTH, get_terminal_size().columns - 1)
+        drawn = partial(paint, sys.stdout)
+        self._map = LiveMap(TrackMap(points, width), drawn) if options.show_map else None
+
+    def end(self) -> None:
+        """Let the next sample be the last; a question is left at once."""
+        self._ended = True
+        if self._asking:
+            raise KeyboardInterrupt
+
+    @contextmanager
+    def asking(self) -> Iterator[None]:
+        """Ask somebody something: no samples come; `RunStopped` if that was the answer."""
+        self._asking = True
+        try:
+            yield
+        except (click.Abort, KeyboardInterrupt):
+            raise RunStopped from None
+        finally:
+            self._asking = False
+        if self._ended:  # click.pause passes Ctrl-C over
+            raise RunStopped
+
+    def watch(self, sample: TrackSample) -> None:
+        """Take a sample."""
+        if self._map is not None:
+            self._map.watch(sample)
+        if self._ended:
+            raise RunStopped
+
+
+@contextmanager
+def watched(options: MotionOptions, points: Sequence[Pose]) -> Iterator[RunWatcher]:
+    """Watch a run; Ctrl-C ends it with exit status 130."""
+    watcher = RunWatcher(options, points)
+    with stopped_by_signals(watcher.end):
+        try:
+            yield watcher
+        except RunStopped:
+            click.echo("stopped", err=True)
+            raise SystemExit(INTERRUPTED) from None
+
+
+def require_arrival(connection: BaseConnection, run: MotionRun) -> None:
+    """End with a line and exit status 1 if the goal was not reached."""
+    if connection.chain.in_error:
+        raise click.ClickException(connection.chain.ref_hard.error_reason)
+    if run.reached_s is None:
+        raise click.ClickException(f"not there after {run.duration_s:.1f} s")
 
 
 # Topics of ROS 2 for a cart, where no table names others.

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from tickrig.host.canopen.conform.check import Check, Level
-from tickrig.host.canopen.conform.verdict import (
+from tickrig.host.canopen.conform.check import (
+    Check,
     CheckOutcome,
     CheckVerdict,
     Direction,
     FrameLine,
+    Level,
     Report,
     Result,
 )
