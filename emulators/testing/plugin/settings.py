@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import pytest
 
-from tickrig.host.text.values import split_list
+from tickrig._lazy import LazyModule
+
+if TYPE_CHECKING:
+    from tickrig.host.text import values
+else:  # --bench-param alone needs them
+    values = LazyModule("tickrig.host.text.values")
 
 MODES: Final = ("virtual", "real", "hardware")
 RANDOM: Final = "random"
@@ -164,8 +169,8 @@ def _parameters(text: str) -> tuple[BenchParameter, ...]:
     """Read the lines `NAME=VALUE,VALUE`."""
     found: dict[str, BenchParameter] = {}
     for line in filter(None, map(str.strip, text.splitlines())):
-        name, _, values = line.partition("=")
-        words = tuple(dict.fromkeys(split_list(values)))
+        name, _, listed = line.partition("=")
+        words = tuple(dict.fromkeys(values.split_list(listed)))
         if not (name.isidentifier() and words and all(words)):
             raise pytest.UsageError(f"--bench-param {line}: write NAME=VALUE,VALUE, as flip=0.001")
         if name in found:
