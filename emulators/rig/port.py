@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sized
-from dataclasses import dataclass, field
 from typing import Protocol
 
 from tickrig.device.core import W
+from tickrig.device.twin import Part
 from tickrig.wire.uart import UartSetting
 
 
@@ -26,9 +26,11 @@ class Port(Protocol[W]):
         """Put one tick's traffic on the wire at `now_us`."""
 
 
-@dataclass(slots=True)
-class LineUart:
+class LineUart(Part):
     """The setting of the device on a line.
+
+    Args:
+        setting: the first setting.
 
     Attributes:
         setting: the setting, with the latest change.
@@ -36,9 +38,9 @@ class LineUart:
         listeners: called with that time and the new setting; they are copied with the line.
     """
 
-    setting: UartSetting
-    since_us: int = 0
-    listeners: list[Callable[[int, UartSetting], None]] = field(default_factory=list)
+    def __init__(self, setting: UartSetting) -> None:
+        self.setting, self.since_us = setting, 0
+        self.listeners: list[Callable[[int, UartSetting], None]] = []
 
 
 class ByteEnd(Port[bytes], Protocol):
