@@ -194,3 +194,18 @@ def test_a_wrong_line_of_a_journal_is_named(row: str) -> None:
     text = f'{{"tickrig-report":1,"runs":[{{"date":"d"}}],"tests":[{test}]}}'
     with pytest.raises(ReportError, match=r"^\.tests\[0\]\.journal\[1\]"):
         from_json(text)
+
+
+def test_values_that_come_again_keep_their_type_and_sign() -> None:
+    points = ((1, 0.0), (2, -0.0), (3, 1.0), (4, 1.0))
+    mixed = ((1, 1), (2, 1.0), (3, 2), (4, "1"))
+    series = (SignalSeries("speed", "", points), SignalSeries("state", "", mixed))
+    record = replace(REPORT.tests[0], series=series)
+    text = to_json(replace(REPORT, tests=(record, record)))
+    assert to_json(from_json(text)) == text
+
+
+@pytest.mark.parametrize("cut", range(0, 60, 7))
+def test_a_report_is_read_in_pieces_of_any_size(cut: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(report_file, "_PIECE", cut + 1)
+    assert from_json(to_json(REPORT)) == REPORT
