@@ -413,6 +413,11 @@ def test(*, json_path: str | None) -> None:
     """Lead through the test procedure."""
     if sys.platform == "win32":
         raise Refused("the test procedure needs a POSIX terminal")
+    else:  # noqa: RET506 - mypy leaves out the branch of the other system
+        _lead(json_path)
+
+
+def _lead(json_path: str | None) -> None:
     ended = Ended()
     results: list[StepResult] = []
     quits = ""
