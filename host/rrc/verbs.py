@@ -26,6 +26,7 @@ from tickrig.host.rrc.client import RrcClient
 from tickrig.host.rrc.procedure import STEPS, Procedure, Quit, StepResult
 from tickrig.host.text.page_text import json_text
 from tickrig.host.text.values import counted, format_time, parse_time_with_unit_us
+from tickrig.host.text.whole_file import write_whole
 from tickrig.wire.instant import NEVER
 from tickrig.wire.rrc.commands import Joystick, Limit
 from tickrig.wire.rrc.replies import StatusA
@@ -418,6 +419,8 @@ def test(*, json_path: str | None) -> None:
 
 
 def _lead(json_path: str | None) -> None:
+    if json_path is not None and not (folder := Path(json_path).parent).is_dir():
+        raise Refused(f"results {json_path}: no directory {folder}")  # now, not at the end
     ended = Ended()
     results: list[StepResult] = []
     quits = ""
@@ -458,6 +461,6 @@ def _write_json(path: str, document: object) -> None:
         click.echo(json_text(document))
         return
     try:
-        Path(path).write_text(json_text(document) + "\n", "utf-8")
+        write_whole(Path(path), json_text(document) + "\n")
     except OSError as error:
         refuse_path("results", error)

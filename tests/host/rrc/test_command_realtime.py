@@ -258,6 +258,7 @@ def test_vr2_that_is_off_is_not_driven() -> None:
         ("--panel status", "--panel and status: give one of them"),
         ("--watchdog 3s status", "--watchdog 3000ms is not 10ms..2550ms in steps of 10ms"),
         ("--watchdog 1s --no-watchdog status", "--watchdog and --no-watchdog: give one of them"),
+        ("test --json none/a.json", "results none/a.json: no directory none"),
         ("", "a verb is missing"),
         ("--pad /dev/null drive 30 0", "/dev/null"),
     ],
