@@ -551,7 +551,8 @@ class ConformRun:
         self._exchange.played = self._subject.names.peer
         if self._stray.stamps:
             self._stray.compare(self._client.number(*HEARTBEAT))
-        self._care.prepare(self._subject.restorable(self._plan.level))
+        subject = self._subject
+        self._care.prepare(subject.restorable(self._plan.level), subject.binding.held)
 
     def _object_checks(self) -> list[Check]:
         """Make the chosen checks of the objects of the EDS; without one there are none."""

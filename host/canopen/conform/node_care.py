@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Set
+from collections.abc import Callable, Collection, Iterable, Mapping, Set
 from contextlib import suppress
 from functools import partial
+from types import MappingProxyType
 from typing import Final, TypeVar
 
 from tickrig.host.canopen.conform.binding.pdo_binding import PATIENCE
@@ -36,6 +37,7 @@ _CONSUMERS: Final = 0x1016
 _PDOS: Final = (*range(0x1400, 0x1600), *range(0x1800, 0x1A00))
 INHIBIT_TIME, EVENT_TIMER = 3, 5
 _TEXTS: Final = range(0x1008, 0x100B)
+_NONE: Final[Mapping[Address, bytes]] = MappingProxyType({})
 _NUMBERS: Final = range(9)
 """So many bytes are a number, not a text."""
 
@@ -69,10 +71,18 @@ class KnownState:
         self._moved: dict[str, set[Address]] = {}  # what resets of a kind have changed
         self._silent = 0
 
-    def learn(self, addresses: Iterable[Address]) -> None:
-        """Read objects that are not known yet; what cannot be read is not restored."""
+    def learn(self, addresses: Iterable[Address], held: Mapping[Address, bytes] = _NONE) -> None:
+        """Read objects that are not known yet; what cannot be read is not restored.
+
+        Args:
+            addresses: of the objects.
+            held: what was read of them just now: it is not read again.
+        """
         for at in addresses:
-            if at not in self.original and (value := self._read(at)) is not None:
+            if at in self.original:
+                continue
+            value = held[at] if at in held else self._read(at)
+            if value is not None:
                 self.original[at] = self._begin[at] = value
 
     def prepare(self) -> None:
@@ -288,16 +298,17 @@ class NodeCare:
         """What could not be written back, one a line."""
         return tuple(self._state.unrestored)
 
-    def prepare(self, addresses: Iterable[Address]) -> None:
+    def prepare(self, addresses: Iterable[Address], held: Mapping[Address, bytes] = _NONE) -> None:
         """Learn how the node is, and bring it into the state in which checks begin.
 
         Args:
             addresses: of the objects that may change in the run.
+            held: what was read of the node just now.
         """
         if self._level is Level.READ_ONLY:
             return
         self._exchange.begin(_CARE_US)
-        self._state.learn(addresses)
+        self._state.learn(addresses, held)
         self._nmt_state = self._learn_state()
         self._moved = True
         self._command(NmtCommand.ENTER_PRE_OPERATIONAL)

@@ -270,6 +270,7 @@ class Binding:
         findings: where EDS and node contradict each other, one a line.
         known: the objects are those of an EDS.
         entries: the objects by index and sub-index.
+        held: what was read of them.
     """
 
     device: EdsDevice
@@ -278,6 +279,7 @@ class Binding:
     findings: tuple[str, ...] = ()
     known: bool = True
     entries: Mapping[_Place, EntryDescription] = field(default_factory=dict)
+    held: Mapping[_Place, bytes] = field(default_factory=dict)
 
 
 @dataclass(slots=True)
@@ -333,7 +335,8 @@ def bind(
     search.bound.update(pdos)
     search.reasons.update(missing)
     findings = (*reader.findings, *search.findings)
-    return Binding(found, search.bound, search.reasons, findings, search.known, entries)
+    bound, reasons = search.bound, search.reasons
+    return Binding(found, bound, reasons, findings, search.known, entries, reader.held)
 
 
 def _bind_object(search: _Search, wanted: WantedObject) -> None:

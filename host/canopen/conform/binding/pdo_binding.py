@@ -44,6 +44,11 @@ class ObjectReader:
         self._silent = 0
         self.findings: list[str] = []
 
+    @property
+    def held(self) -> dict[tuple[int, int], bytes]:
+        """What was read so far."""
+        return {at: value for at, value in self._known.items() if isinstance(value, bytes)}
+
     def read(self, entry: object_table.EntryDescription) -> bytes | None:
         """Return what a described object holds, None where it cannot be read or has another size.
 
