@@ -54,7 +54,7 @@ def driven(
     loop = loop or ClosedLoop(seed=7)
     start(loop, set_id)
     if loss:
-        loop.cart.port.arm("drop", 1 - (1 - loss) ** (1 / EXCHANGE_BYTES))
+        loop.cart.port.arm("drop", str(1 - (1 - loss) ** (1 / EXCHANGE_BYTES)))
     run = drive(loop, points)
     assert run.reached_s is not None
     if loss:
