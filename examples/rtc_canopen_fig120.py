@@ -8,7 +8,7 @@ from typing import Any
 
 from tickrig import open_bench
 from tickrig.host.rtc.canopen.definition import RtConnection  # internal
-from tickrig.host.rtc.canopen.definition_file import read_definition  # internal
+from tickrig.host.rtc.canopen.definition_reader import read_definition  # internal
 from tickrig.host.rtc.canopen.serve import read_files, serve  # internal
 from tickrig.host.rtc.canopen.server import RtcCanopenServer  # internal
 

@@ -31,7 +31,8 @@ from tickrig.host.canmon.cli import main as canmon
 from tickrig.host.canmon.workspace import Workspace, WorkspaceError
 from tickrig.host.cli.messages import Refused
 from tickrig.host.rtc.canopen.commands.builder import main as rtc_canopen_builder
-from tickrig.host.rtc.canopen.definition_file import parse_definition, save_definition
+from tickrig.host.rtc.canopen.definition_reader import parse_definition
+from tickrig.host.rtc.canopen.definition_writer import save_definition
 from tickrig.host.rtc.system.system_file import write_system
 from tickrig.host.text.whole_file import replacing, write_whole
 

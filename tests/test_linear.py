@@ -37,7 +37,7 @@ from tickrig.emulators.testing.report.report_file import from_json
 from tickrig.emulators.testing.rig_file.reader import parse_rig_file
 from tickrig.emulators.testing.signals.formula import parse_formula
 from tickrig.emulators.testing.signals.table import read_points
-from tickrig.emulators.tkernel.resolution import parse_table as parse_ucodes
+from tickrig.emulators.tkernel.ucode_table import parse_table as parse_ucodes
 from tickrig.host.canmon.eds_document import read_document
 from tickrig.host.canmon.model.check.rule_parser import parse_rule
 from tickrig.host.canmon.model.check.rules import parse_rule_file
@@ -57,14 +57,15 @@ from tickrig.host.canopen.gateway import GatewayError, parse_request
 from tickrig.host.cli.messages import Refused
 from tickrig.host.control.requests import RequestDispatcher
 from tickrig.host.rtc.canopen.builder.profile_file import parse_project
-from tickrig.host.rtc.canopen.definition_file import parse_definition
+from tickrig.host.rtc.canopen.definition_reader import parse_definition
 from tickrig.host.rtc.configuration import Constraint
 from tickrig.host.rtc.engines.ros2.table_reader import parse_table as parse_topics
 from tickrig.host.rtc.motion.components.odometry import read_conf
 from tickrig.host.rtc.motion.path_file import read_path
 from tickrig.host.rtc.states import RtcRefused
-from tickrig.host.rtc.system.system_file import parse_rts_profile, parse_toml
-from tickrig.host.rtc.ucode.lookup import parse_contents
+from tickrig.host.rtc.system.rts_profile import parse_rts_profile
+from tickrig.host.rtc.system.system_file import parse_toml
+from tickrig.host.rtc.ucode.contents_interpretation import parse_contents
 from tickrig.host.text.byte_text import unescape
 from tickrig.host.text.names import near
 from tickrig.host.text.toml_reader import read_toml
@@ -166,7 +167,7 @@ READERS: Final = {
     "host.text.yaml_reader": Reader(
         lambda text: decode_bus_file(text.encode(), Path("bus.yml")), ("nodes: ",), SLOW
     ),
-    "host.rtc.canopen.definition_file": Reader(parse_definition, ("nodes: ",), SLOW),
+    "host.rtc.canopen.definition_reader": Reader(parse_definition, ("nodes: ",), SLOW),
     "emulators.testing.rig_file": Reader(
         lambda text: parse_rig_file(text, Path("rig.toml")), ("[device.a]\ntype = ", "# ")
     ),
@@ -193,7 +194,7 @@ READERS: Final = {
         of_file(lambda path: read_points(path, None), "p.csv"), ("t,a\n0,", 't,"')
     ),
     "emulators.testing.signals.formula": Reader(parse_formula, ("1 + ", "- ")),
-    "emulators.tkernel.resolution": Reader(parse_ucodes, ("x = ", "a.")),
+    "emulators.tkernel.ucode_table": Reader(parse_ucodes, ("x = ", "a.")),
     "host.canmon.workspace": Reader(Workspace, ("x = ",)),
     "host.canopen.conform.report.baseline": Reader(of_file(Baseline.read, "b.txt")),
     "host.rtc.engines.ros2.table_reader": Reader(
@@ -230,9 +231,9 @@ READERS: Final = {
     "host.rtc.motion.components.odometry": Reader(of_file(read_conf, "a.conf"), ("conf.a.b: ",)),
     "host.rtc.motion.path_file": Reader(of_file(read_path, "p.txt"), ("1 2 ",)),
     "host.rtc.configuration": Reader(Constraint, ("x<", "(")),
-    "host.rtc.system.system_file, XML": Reader(parse_rts_profile, ("<a>",)),
+    "host.rtc.system.rts_profile": Reader(parse_rts_profile, ("<a>",)),
     "host.rtc.system.system_file": Reader(parse_toml, ('[[component]]\nname = "', "x = ", "a.")),
-    "host.rtc.ucode.lookup": Reader(parse_contents, ('{"a": ',)),
+    "host.rtc.ucode.contents_interpretation": Reader(parse_contents, ('{"a": ',)),
     "host.rtc.canopen.builder.profile_file": Reader(parse_project, ("x = ", "a.")),
 }
 """Each by its module, or by a name beside it where a module reads several kinds."""
@@ -266,9 +267,6 @@ ELSEWHERE: Final = {
     "host.canmon.conform.stimulus": "of a program that the user names, its first line",
     "host.canmon.tui.panels.alarms_panel": "`parse_rules`, as of a file",
     "host.canmon.tui.sequence_task": "`TomlSequence`",
-    "host.canopen.conform.binding.binding": "our own table",
-    "host.canopen.data_sheet.rule": "our own tables",
-    "host.rtc.engines.ros2.message_types": "our own table",
     "host.control.client": "of our own emulator",
     "host.links.serial_link": "of the kernel",
     "host.canmon.model.check.report": "our own findings",

@@ -17,7 +17,7 @@ import pytest
 
 from tests.host.canmon.terminal import Terminal
 from tests.interop.buses import GROUP, PORT
-from tickrig.emulators.tkernel.resolution import EXAMPLE
+from tickrig.emulators.tkernel.ucode_table import EXAMPLE
 from tickrig.host.links.terminal import MOST_WAITING
 
 pytestmark = pytest.mark.realtime

@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from tickrig import open_bench
-from tickrig.host.rtc.canopen.editor.app import EditorSession, SystemEditor
+from tickrig.host.rtc.canopen.editor.app import SystemEditor
+from tickrig.host.rtc.canopen.editor.session import EditorSession
 from tickrig.host.rtc.canopen.serve import open_server
 
 FONTS: Final = re.compile(r"\s*@font-face \{.*?\}", re.DOTALL)

@@ -14,7 +14,8 @@ from tickrig.emulators.bench.child import running
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.emulators.rig.station import Station
-from tickrig.emulators.rtc_lite.device_type import COMPONENTS, MonitoredLink
+from tickrig.emulators.rtc_lite.device_type import COMPONENTS
+from tickrig.emulators.rtc_lite.line import MonitoredLink
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.host.cli.messages import failing, warnings_shown
 from tickrig.host.control.client import ControlClient

@@ -18,8 +18,9 @@ from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.emulators.tkernel import node_manager
-from tickrig.emulators.tkernel.node_manager import Board
-from tickrig.emulators.tkernel.resolution import ResolutionService, UcodeTable, opener
+from tickrig.emulators.tkernel.board import Board
+from tickrig.emulators.tkernel.resolution import ResolutionService, opener
+from tickrig.emulators.tkernel.ucode_table import UcodeTable
 from tickrig.host.rtc import InPort
 from tickrig.host.rtc.motion.geometry import Pose
 from tickrig.host.rtc.ports.connect import connect

@@ -24,7 +24,7 @@ from binascii import Error
 from collections.abc import Callable, Collection, Mapping, Sequence
 from enum import IntEnum
 from math import isnan
-from typing import Final, NamedTuple, Self
+from typing import Final, NamedTuple
 
 from tickrig.host.canopen.commissioning.lss_master import SCAN_US, LssFailed, LssMaster
 from tickrig.host.canopen.commissioning.node_bus import NodeBus
@@ -44,27 +44,36 @@ from tickrig.wire.errors import FieldError
 class GatewayErrorCode(IntEnum):
     """Internal error code."""
 
-    NOT_SUPPORTED = 100, "request not supported"
-    SYNTAX = 101, "syntax error"
-    INTERNAL_STATE = 102, "not possible now"
-    TIME_OUT = 103, "no answer in time"
-    NO_DEFAULT_NET = 104, "no default net is set"
-    NO_DEFAULT_NODE = 105, "no default node is set"
-    UNSUPPORTED_NET = 106, "there is no such net"
-    UNSUPPORTED_NODE = 107, "there can be no such node"
-    LOST_CONNECTION = 201, "the bus is gone"
-    LSS_MANUFACTURER = 501, "LSS: an error of the maker of the slave"
-    LSS_NODE_ID = 502, "LSS: the slave does not take this node-ID"
-    LSS_BIT_RATE = 503, "LSS: the slave does not take this bit rate"
-    LSS_STORE = 504, "LSS: the slave cannot store"
+    NOT_SUPPORTED = 100
+    SYNTAX = 101
+    INTERNAL_STATE = 102
+    TIME_OUT = 103
+    NO_DEFAULT_NET = 104
+    NO_DEFAULT_NODE = 105
+    UNSUPPORTED_NET = 106
+    UNSUPPORTED_NODE = 107
+    LOST_CONNECTION = 201
+    LSS_MANUFACTURER = 501
+    LSS_NODE_ID = 502
+    LSS_BIT_RATE = 503
+    LSS_STORE = 504
 
-    text: str
 
-    def __new__(cls, value: int, text: str) -> Self:
-        """Make a member of its value and what it means, in words."""
-        one = int.__new__(cls, value)
-        one._value_, one.text = value, text
-        return one
+_TEXTS: Final = {
+    GatewayErrorCode.NOT_SUPPORTED: "request not supported",
+    GatewayErrorCode.SYNTAX: "syntax error",
+    GatewayErrorCode.INTERNAL_STATE: "not possible now",
+    GatewayErrorCode.TIME_OUT: "no answer in time",
+    GatewayErrorCode.NO_DEFAULT_NET: "no default net is set",
+    GatewayErrorCode.NO_DEFAULT_NODE: "no default node is set",
+    GatewayErrorCode.UNSUPPORTED_NET: "there is no such net",
+    GatewayErrorCode.UNSUPPORTED_NODE: "there can be no such node",
+    GatewayErrorCode.LOST_CONNECTION: "the bus is gone",
+    GatewayErrorCode.LSS_MANUFACTURER: "LSS: an error of the maker of the slave",
+    GatewayErrorCode.LSS_NODE_ID: "LSS: the slave does not take this node-ID",
+    GatewayErrorCode.LSS_BIT_RATE: "LSS: the slave does not take this bit rate",
+    GatewayErrorCode.LSS_STORE: "LSS: the slave cannot store",
+}
 
 
 class GatewayError(Exception):
@@ -76,7 +85,7 @@ class GatewayError(Exception):
     """
 
     def __init__(self, code: GatewayErrorCode, text: str = "") -> None:
-        super().__init__(text or code.text)
+        super().__init__(text or _TEXTS[code])
         self.code = code
 
 

@@ -47,7 +47,8 @@ from dataclasses import asdict, dataclass, field
 from typing import ClassVar, Final, ParamSpec, TypeVar
 
 from tickrig.host.rtc.configuration import Configuration
-from tickrig.host.rtc.ports.port import AnyPort, PortProfile, call_listeners
+from tickrig.host.rtc.listeners import call_listeners
+from tickrig.host.rtc.ports.port import AnyPort, PortProfile
 from tickrig.host.rtc.states import (
     MAX_RATE_HZ,
     MIN_RATE_HZ,

@@ -17,7 +17,7 @@ from tickrig.device.rtc_lite.server import LiteConfig
 from tickrig.emulators.rig.faults import FaultyPort
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
-from tickrig.emulators.rtc_lite.device_type import LINE_FAULTS
+from tickrig.emulators.rtc_lite.line import LINE_FAULTS
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.wire.rtc_lite.codes import LiteContextType
 from tickrig.wire.rtc_lite.values import LONG

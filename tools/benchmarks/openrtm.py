@@ -24,7 +24,8 @@ from tickrig.host.rtc.engines.openrtm.orb import Orb
 from tickrig.host.rtc.engines.openrtm.port_service import ComponentPorts, SystemPorts
 from tickrig.host.rtc.engines.openrtm.stubs import DATA_TYPES, IDL, compile_idl, stubs
 from tickrig.host.rtc.engines.peer_ports import OutPortPushConnector, PeerEnd, cdr
-from tickrig.host.rtc.system.call_queue import CallQueue, PeerThread
+from tickrig.host.rtc.system.call_queue import CallQueue
+from tickrig.host.rtc.system.peer_thread import PeerThread
 from tickrig.host.rtc.system.schedule import RealTime
 from tickrig.wire.rtc_types.cdr import decode, encode
 from tickrig.wire.rtc_types.idl import Struct

@@ -43,7 +43,7 @@ import sys, time
 sys.path.insert(0, sys.argv[1])
 from tickrig.host.rtc.engines.ros2.participant import DdsParticipant
 from tickrig.host.rtc.engines.ros2.message_types import message_type
-from tickrig.host.rtc.engines.ros2.conversions import TopicEntry
+from tickrig.host.rtc.engines.ros2.topic_entry import TopicEntry
 kind, does, seconds = sys.argv[2], sys.argv[3], float(sys.argv[4])
 participant, count = DdsParticipant({domain}), 0
 entries = [TopicEntry("", f"C{{n}}/port", kind) for n in range({ports})]

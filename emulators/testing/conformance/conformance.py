@@ -35,11 +35,12 @@ from tickrig.host.canmon.conform.conformance import decoded_frames, file_text
 from tickrig.host.canmon.conform.stimulus import Consent
 from tickrig.host.canopen.conform.binding.capabilities import NodeDescription
 from tickrig.host.canopen.conform.bus.exchange import NotAllowed
-from tickrig.host.canopen.conform.check import ConformancePlan, Level, Report, Stimulus
+from tickrig.host.canopen.conform.check import ConformancePlan, Level, Stimulus
 from tickrig.host.canopen.conform.conform_run import ConformRun
 from tickrig.host.canopen.conform.report.baseline import NONE_KNOWN, Baseline
 from tickrig.host.canopen.conform.report.report_json import report_json
 from tickrig.host.canopen.conform.report.text import text_report
+from tickrig.host.canopen.conform.verdict import Report
 from tickrig.host.canopen.eds import open_eds
 from tickrig.host.text.page_text import one_line
 from tickrig.host.text.whole_file import write_whole

@@ -24,11 +24,12 @@ from tickrig.emulators.testing.conformance.conformance import (
 )
 from tickrig.emulators.testing.conformance.slave import is_step
 from tickrig.host.canmon.conform.conformance import decoded_frames
-from tickrig.host.canopen.conform.check import Check, CheckVerdict, ConformancePlan, Report, Result
+from tickrig.host.canopen.conform.check import Check, ConformancePlan
 from tickrig.host.canopen.conform.object_checks import object_checks
 from tickrig.host.canopen.conform.report.baseline import Baseline
 from tickrig.host.canopen.conform.report.overview import cut, hint
 from tickrig.host.canopen.conform.suite import OBJECTS, chosen_checks
+from tickrig.host.canopen.conform.verdict import CheckVerdict, Report, Result
 from tickrig.host.canopen.eds import open_eds
 from tickrig.wire.canopen.eds.eds_device import EdsDevice, read_device
 

@@ -14,7 +14,8 @@ import click
 from tickrig.emulators.bench.control import EmulatorControl
 from tickrig.emulators.bench.operator import parse_fault_spec
 from tickrig.emulators.tkernel.operated import Operated
-from tickrig.emulators.tkernel.resolution import EXAMPLE, ResolutionService, UcodeTable, parse_table
+from tickrig.emulators.tkernel.resolution import ResolutionService
+from tickrig.emulators.tkernel.ucode_table import EXAMPLE, UcodeTable, parse_table
 from tickrig.host.cli.control import serving_control, stopped_by_signals
 from tickrig.host.cli.messages import Refused, refuse_path, refused_at, say, warnings_shown
 from tickrig.host.control.clock import ServingClock

@@ -13,7 +13,7 @@ from tickrig.emulators.bench.control import EmulatorControl
 from tickrig.emulators.bench.operator import parse_fault_spec
 from tickrig.emulators.bench.running_emulator import keeping_time
 from tickrig.emulators.tkernel import node_manager
-from tickrig.emulators.tkernel.node_manager import Board
+from tickrig.emulators.tkernel.board import Board
 from tickrig.emulators.tkernel.operated import Operated
 from tickrig.host.cli.control import serving_control, stopped_by_signals
 from tickrig.host.cli.engine_options import FORMAT, EngineOptions, take_engines
@@ -30,7 +30,7 @@ from tickrig.host.rtc.system.schedule import RealTime, Schedule
 from tickrig.host.rtc.system.system import System, restore
 from tickrig.host.rtc.system.system_file import read_system
 from tickrig.host.rtc.ucode.http_source import HttpSource
-from tickrig.host.rtc.ucode.lookup import OPEN_SERIAL
+from tickrig.host.rtc.ucode.infrared_rays_reader import OPEN_SERIAL
 
 _JOIN_ENGINES: Final = "tickrig.host.rtc.engines.engines_joined:engines_joined"
 _NAMES: Final = f"{node_manager.HOST}.host_cxt/%n.rtc"

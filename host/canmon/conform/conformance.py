@@ -30,20 +30,15 @@ from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.output.listening import until_interrupted
 from tickrig.host.canopen.conform.binding.capabilities import NodeDescription
 from tickrig.host.canopen.conform.bus.exchange import LEFT_OUT
-from tickrig.host.canopen.conform.check import (
-    BUS_FAILED,
-    ConformancePlan,
-    Direction,
-    FrameLine,
-    Level,
-    Report,
-)
+from tickrig.host.canopen.conform.check import ConformancePlan, Level
 from tickrig.host.canopen.conform.conform_run import ConformRun
 from tickrig.host.canopen.conform.report.baseline import NONE_KNOWN, Baseline, baseline_text
 from tickrig.host.canopen.conform.report.ci import badge, report_junit
+from tickrig.host.canopen.conform.report.issue import issue_text
 from tickrig.host.canopen.conform.report.overview import ShowFrames, frame_of, plain_frame
 from tickrig.host.canopen.conform.report.report_json import report_json
-from tickrig.host.canopen.conform.report.text import issue_text, text_report
+from tickrig.host.canopen.conform.report.text import text_report
+from tickrig.host.canopen.conform.verdict import BUS_FAILED, Direction, FrameLine, Report
 from tickrig.host.canopen.data_sheet.check import check, severities
 from tickrig.host.canopen.data_sheet.document import Document
 from tickrig.host.cli.can_options import BusOptions

@@ -17,8 +17,9 @@ import click
 from tickrig.host.canmon.conform.conform_source import ConformSource
 from tickrig.host.canmon.output.listening import until_interrupted
 from tickrig.host.canopen.conform.bus.exchange import Disturbed, NotAllowed
-from tickrig.host.canopen.conform.check import NOTHING_JUDGED, CheckVerdict, Level, Result, Stimulus
+from tickrig.host.canopen.conform.check import Level, Stimulus
 from tickrig.host.canopen.conform.notation import LSS_TO_ALL
+from tickrig.host.canopen.conform.verdict import NOTHING_JUDGED, CheckVerdict, Result
 from tickrig.host.cli.messages import Refused, refused_at, say, until_unread
 from tickrig.host.cli.start import INTERRUPTED, paint
 from tickrig.host.control.client import ControlClient, ControlRefused

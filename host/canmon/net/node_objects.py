@@ -14,7 +14,7 @@ from tickrig.host.canmon.model.decode.decoded import write_entry
 from tickrig.host.canmon.model.decode.node_memory import NodeMemory, eds_objects
 from tickrig.host.canmon.model.node_dictionary import encode_value
 from tickrig.host.canmon.net.session import NetSession, NodeFailed, failure_text
-from tickrig.host.canopen.commissioning.node_bus import Values, same
+from tickrig.host.canopen.commissioning.configuration import Values, same
 from tickrig.host.canopen.conform.subject import TOLD, other_device
 from tickrig.host.canopen.errors import SdoAborted, SdoFailed, SdoTimeout
 from tickrig.host.cli.messages import Refused, say

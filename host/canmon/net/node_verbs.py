@@ -15,7 +15,8 @@ from tickrig.host.canmon.net.node_objects import DEVICE_TYPE, NamedObjects
 from tickrig.host.canmon.net.session import NetSession, NodeFailed, net_session
 from tickrig.host.canmon.risks import nmt_risk, write_risk
 from tickrig.host.canopen.bus_file.bus_file import read_bus_file
-from tickrig.host.canopen.commissioning.node_bus import NetworkScan, NodeFound, dcf_values, writes
+from tickrig.host.canopen.commissioning.configuration import dcf_values, writes
+from tickrig.host.canopen.commissioning.node_bus import NetworkScan, NodeFound
 from tickrig.host.canopen.errors import SdoAborted, SdoFailed
 from tickrig.host.canopen.master import boot_slave
 from tickrig.host.canopen.master.assignment import ObjectWrite, SlaveAssignment

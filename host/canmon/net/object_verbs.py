@@ -26,7 +26,7 @@ from tickrig.host.canmon.net.session import (
     of_node,
 )
 from tickrig.host.canmon.risks import write_risk
-from tickrig.host.canopen.commissioning.node_bus import (
+from tickrig.host.canopen.commissioning.configuration import (
     Values,
     dcf_values,
     default_values,

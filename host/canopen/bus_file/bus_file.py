@@ -28,12 +28,13 @@ from pathlib import Path
 from typing import Final
 
 from tickrig.host.canopen.bus_file import bus_checks
-from tickrig.host.canopen.bus_file.bus_checks import Layout, read_layout
 from tickrig.host.canopen.bus_file.bus_values import BusDefaults, BusMaster, BusSlave, Identity
 from tickrig.host.canopen.bus_file.known_keys import MASTER, OPTIONS, check_keys
+from tickrig.host.canopen.bus_file.layout import Layout, read_layout
 from tickrig.host.canopen.bus_file.notes import UNSIGNED8, UNSIGNED16, BusFileNotes, BusFileSection
+from tickrig.host.canopen.bus_file.pdo_reader import CobIds, pdos_after
 from tickrig.host.canopen.bus_file.sheet import UNSET, Sheet, Sheets, Writes
-from tickrig.host.canopen.bus_file.slave_reader import CobIds, SlaveReader, pdos_after, read_extra
+from tickrig.host.canopen.bus_file.slave_reader import SlaveReader, read_extra
 from tickrig.host.canopen.data_sheet.rule import RuleFinding, Severity
 from tickrig.host.text.document import FilePlace
 from tickrig.wire.canopen.eds.eds_device import HIGHEST_NODE_ID

@@ -1,51 +1,9 @@
 """A run of the tester: which checks are judged, in which order, and what came of them."""
 
-
-# Theory of operation.
-#
-# A run listens for a second, reads the node (`subject.examine`), brings it into the state in which
-# all checks begin (`NodeCare.prepare`), judges each check, and restores the node. This file is the
-# part between: one check in, one `Result` out. The order below is what a verdict means, so do not
-# change one part alone.
-#
-# 1. Bind. Names become the numbers of this node. A check that lacks an object, a feature, the level
-#    or a yes is NOT_APPLICABLE. Nothing has been sent for it by then. What it would write must have
-#    been read before, else the check is INCONCLUSIVE: what cannot be written back is not written.
-# 2. Play. `care.begin` notes what may change, `exchange.begin` forgets old frames and starts the
-#    clock of the check. Steps run until one fails; steps `at_end` run after that, and fail nothing.
-# 3. Judge. The first rule that fits decides:
-#      a step must not be done at this level                  NOT_APPLICABLE
-#      the host, the bus or another node disturbed            INCONCLUSIVE
-#      the program of the node raised                         FAIL, whatever else was seen
-#      a `given` step failed, or an object that CiA 301       NOT_APPLICABLE if the abort code says
-#        lets be constant was not written                       that the node need not take it, else
-#                                                               INCONCLUSIVE
-#      an upload went wrong in a step that only reads, in a   INCONCLUSIVE: group US judges uploads
-#        check that is not about uploads
-#      a disturbance was noted meanwhile                      INCONCLUSIVE
-#      another node may have sent the LSS answer              INCONCLUSIVE: 7E4h names no node
-#      the node had an error before the run, and was started  INCONCLUSIVE
-#      the clause leaves the answer to the device             IMPLEMENTATION_DEFINED
-#      none of these                                          FAIL
-# 4. Tidy. `care.tidy` writes back and reads again. If the node does not come back, a failure
-#    becomes BLOCKED: the check may have met a node that was already gone.
-# 5. Again. A failure is played a second time. A pass then makes the result INCONCLUSIVE; if the
-#    second go could not be prepared, the first one counts, as it has changed the state of the node.
-#
-# What couples to what. The evidence belongs to the exchange, and `exchange.begin` drops it: lines
-# and crashes are taken before `care.tidy`, which begins anew. `boots` is compared across the check,
-# because a node that booted has lost all that was written, not only what the check wrote.
-# `_wanted` is what the last failed step expected; reports show it.
-#
-# Numbers. Times are bus time since the start of the run, never the clock of this host. A check may
-# last the sum of all its waits and 2 s more (`notation.bind_check`); an answer is awaited for 1 s,
-# as CiA 301 gives no time.
-
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable
 from contextlib import suppress
-from dataclasses import replace
 from random import Random
 from typing import Final
 
@@ -57,274 +15,30 @@ from tickrig.host.canopen.conform.bus.exchange import (
     PERIOD_TOLERANCE,
     BusExchange,
     Disturbed,
-    NotAllowed,
     Presence,
     StepFailed,
-    abort_of,
-    matches,
 )
+from tickrig.host.canopen.conform.bus.frame_pattern import matches
 from tickrig.host.canopen.conform.bus.sdo import SdoClient
 from tickrig.host.canopen.conform.bus.steps import StepPlayer
-from tickrig.host.canopen.conform.check import (
-    ANSWER_MS,
-    INTERRUPTED,
-    STIMULUS,
-    Action,
-    Check,
-    CheckOutcome,
-    CheckVerdict,
-    ConformancePlan,
-    FrameLine,
-    Hold,
-    Level,
-    Macro,
-    Read,
-    ReadOther,
-    Report,
-    Result,
-    Send,
-    Step,
-    Write,
-)
+from tickrig.host.canopen.conform.check import ANSWER_MS, Check, ConformancePlan, Level
+from tickrig.host.canopen.conform.judge import Judge
 from tickrig.host.canopen.conform.node_care import HEARTBEAT, NodeCare
-from tickrig.host.canopen.conform.notation import BoundCheck, Unbound, bind_check, step_head
 from tickrig.host.canopen.conform.object_checks import object_checks
 from tickrig.host.canopen.conform.permission import Permission
 from tickrig.host.canopen.conform.subject import Subject, examine, other_device
 from tickrig.host.canopen.conform.suite import OBJECTS, chosen_checks
+from tickrig.host.canopen.conform.verdict import (
+    INTERRUPTED,
+    CheckOutcome,
+    CheckVerdict,
+    Report,
+    Result,
+)
 from tickrig.host.canopen.errors import SdoFailed
 from tickrig.host.links.link import LinkClosed, StampedLink
 from tickrig.wire.canopen.eds.eds_device import EdsDevice
 from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID
-
-# Judges one check: may it be done, what came of it, and once more if it failed.
-_LSS_ANSWER: Final = "7E4#"
-"""Begins what LSS slaves say: it does not tell which one."""
-_HISTORY: Final = (0x1003, 0)
-_PDO_PARAMETERS: Final = (*range(0x1400, 0x1600), *range(0x1800, 0x1A00))
-_EMPTIED: Final = "empty the error history 1003h, which cannot be written back"
-_START: Final = "000#01"
-_UPLOADS: Final = ("UE", "US", "BU", "OD")
-"""Groups whose checks fail where an upload goes wrong; others only look at values by it."""
-_UNSEEN: Final = "could not be read back, see the checks of group US"
-_UNPREPARED: Final = "could not be prepared"
-_MAY_BE_CONSTANT: Final = frozenset(
-    (0x1003, 0x1005, 0x1014, 0x1015, 0x1016, 0x1017, *_PDO_PARAMETERS)
-)
-"""Objects that are "rw; const, if not changeable" (CiA 301 v4.2.0, 7.5.2)."""
-_READ_ONLY: Final = frozenset((0x0601_0000, 0x0601_0001, 0x0601_0002))
-_NOT_SUPPORTED: Final = frozenset((0x0609_0030, 0x0609_0031, 0x0609_0032, 0x0609_0036))
-
-
-def _is_misread(error: StepFailed) -> bool:
-    """Return whether a segment came with another toggle bit, n or c than was wanted."""
-    came, *wanted = (frame.partition("#")[2][:2] for frame in (error.got, *error.wanted))
-    return _is_segment(came) and came not in wanted and any(map(_is_segment, wanted))
-
-
-def _is_segment(command: str) -> bool:
-    """Return whether a command byte is that of an answer in a segmented upload."""
-    return command[:1] in {"0", "1"}
-
-
-def _enables(action: Action) -> bool:
-    """Return whether a step gives a PDO its COB-ID: every device takes its own."""
-    index, sub = action.address if isinstance(action, Write) else (0, 0)
-    return isinstance(action, Macro) or (index in _PDO_PARAMETERS and sub == 1)
-
-
-def _is_constant(action: Action, error: StepFailed) -> bool:
-    """Return whether the node keeps an object constant that CiA 301 lets be so."""
-    written = isinstance(action, Write) and action.address[0] in _MAY_BE_CONSTANT
-    return written and abort_of(error.got) in _READ_ONLY
-
-
-def _starts(step: Step) -> bool:
-    """Return whether a step starts the node."""
-    return isinstance(step.action, Send) and step.action.frame.startswith(_START)
-
-
-class Judge:
-    """Plays checks on a node that is in the state in which each begins.
-
-    Args:
-        plan: of the run.
-        exchange: the bus.
-        player: plays steps on it.
-        care: brings the node back after a check.
-        permission: says what may be written.
-    """
-
-    def __init__(
-        self,
-        plan: ConformancePlan,
-        exchange: BusExchange,
-        player: StepPlayer,
-        care: NodeCare,
-        permission: Permission,
-    ) -> None:
-        self._plan, self._exchange, self._player = plan, exchange, player
-        self._care, self._permission = care, permission
-
-    def result(self, check: Check, subject: Subject) -> Result:
-        """Judge a check; one that failed is done again, and both are told."""
-        bound = self._bind(check, subject)
-        if isinstance(bound, str):
-            return Result(check, CheckOutcome(CheckVerdict.NOT_APPLICABLE, bound))
-        steps = tuple(map(self._as_found, bound.steps))
-        bound = bound if steps == bound.steps else replace(bound, steps=steps)
-        if unread := self._unread(bound, subject):
-            return Result(check, CheckOutcome(CheckVerdict.INCONCLUSIVE, unread))
-        first = self._go(bound)
-        if first.verdict is not CheckVerdict.FAIL or self._care.lost:
-            return Result(check, first)
-        again = self._go(bound)
-        if again.reason.startswith(_UNPREPARED) and not self._exchange.disturbances:
-            return Result(check, first)  # the first go has left the node in another state
-        if again.verdict is CheckVerdict.PASS:
-            reason = f"passed when it was done again; before: {first.reason}"
-            again = replace(again, verdict=CheckVerdict.INCONCLUSIVE, reason=reason)
-        return Result(check, again, first)
-
-    def _bind(self, check: Check, subject: Subject) -> BoundCheck | str:
-        """Return the check with the numbers of the node, or why it cannot be done."""
-        for word in sorted(check.needs - subject.features.words):
-            if word != STIMULUS:
-                return subject.features.reasons.get(word, f"the node has no {word}")
-            if self._plan.stimulus is None:
-                return "needs somebody at the inputs of the device: --stimulus"
-        try:
-            bound = bind_check(check, subject.names)
-            if lacking := subject.missing(bound) or subject.fixed(bound.steps):
-                return lacking
-            for index, _ in sorted(bound.changed):
-                self._permission.check_write(index)
-            for index, _ in sorted(bound.written - bound.changed):
-                self._permission.check_write(index, refused=True)
-            if _HISTORY in bound.changed and any(self._care.held(_HISTORY)):
-                self._permission.check_confirmed(_EMPTIED)
-            for question in sorted(bound.questions):
-                self._permission.check_confirmed(question)
-        except Unbound as error:
-            return error.reason
-        except NotAllowed as error:
-            return str(error)
-        return bound
-
-    def _as_found(self, step: Step) -> Step:
-        """Leave out a value that an object held before the run: the tester has written another."""
-        action = step.action
-        if not isinstance(action, Hold) or action.value is None:
-            return step
-        at = action.address
-        if not self._care.is_quieted(at) or self._care.held(at).hex().upper() != action.value:
-            return step
-        return step._replace(action=replace(action, value=None))
-
-    def _unread(self, bound: BoundCheck, subject: Subject) -> str:
-        """Say what a check would write that could not be written back; empty if all can be."""
-        written = bound.changed & subject.has | bound.written & subject.values
-        if self._plan.level is Level.READ_ONLY or not (unread := self._care.unread(written)):
-            return ""
-        places = ", ".join(f"{index:04X}h:{sub:02X}" for index, sub in unread)
-        return f"{places} cannot be read, so that what it holds could not be written back"
-
-    def _go(self, bound: BoundCheck) -> CheckOutcome:
-        """Do a check once, and bring the node back."""
-        self._care.begin(bound)
-        if self._care.lost:
-            return CheckOutcome(CheckVerdict.BLOCKED, "the node does not answer any more")
-        boots = self._exchange.boots
-        self._exchange.begin(bound.within_us, bound.can_ids)
-        start_us, begun_us = self._exchange.now_us, self._exchange.start_us
-        self._wanted: tuple[str, ...] = ()
-        verdict, reason = self._play(bound)
-        self._end(bound)
-        crashed = bool(self._exchange.crashes)
-        if crashed and verdict is not CheckVerdict.FAIL:
-            verdict, reason = CheckVerdict.FAIL, self._crash()
-        lines, end_us = self._lines(), self._exchange.now_us
-        unwell = verdict in {CheckVerdict.FAIL, CheckVerdict.INCONCLUSIVE} and not crashed
-        if not self._care.tidy(bound, boots) and unwell:
-            verdict, reason = CheckVerdict.BLOCKED, f"{reason}; the node did not come back"
-        times = start_us - begun_us, end_us - begun_us
-        return CheckOutcome(verdict, reason, lines, *times, self._wanted)
-
-    def _play(self, bound: BoundCheck) -> tuple[CheckVerdict, str]:
-        number = 0
-        try:
-            for step in bound.steps:
-                number += 1
-                if not step.at_end:
-                    self._player.play(step)
-                if self._exchange.crashes:
-                    raise StepFailed(self._crash())
-        except NotAllowed as error:
-            return CheckVerdict.NOT_APPLICABLE, str(error)
-        except Disturbed as error:
-            return CheckVerdict.INCONCLUSIVE, str(error)
-        except StepFailed as error:
-            self._wanted = error.wanted
-            where = ", ".join(filter(None, [f"step {number}", step_head(step)]))
-            if self._exchange.crashes:
-                return CheckVerdict.FAIL, f"{where}: {self._crash()}"
-            if step.given or _is_constant(step.action, error):
-                return self._unprepared(step.action, error, f"{where}: {error}")
-            reads = isinstance(step.action, Read | ReadOther)
-            misread = reads and bound.check.group not in _UPLOADS and _is_misread(error)
-            return self._failed(bound, f"{where}: {error}", misread=misread)
-        return CheckVerdict.PASS, ""
-
-    def _unprepared(
-        self, action: Action, error: StepFailed, reason: str
-    ) -> tuple[CheckVerdict, str]:
-        """Return the verdict of a check that the node did not let come to its question.
-
-        The clause of the check says nothing of what only prepares it.
-        CiA 301 lets many objects be constant, and values be refused that a device does not
-        support.
-        """
-        if self._exchange.disturbances:
-            reason = f"{reason}; {', '.join(self._exchange.disturbances)}"
-            return CheckVerdict.INCONCLUSIVE, f"{_UNPREPARED}: {reason}"
-        code = abort_of(error.got)
-        if code in _READ_ONLY or (code in _NOT_SUPPORTED and not _enables(action)):
-            return CheckVerdict.NOT_APPLICABLE, f"the node need not take this: {reason}"
-        return CheckVerdict.INCONCLUSIVE, f"{_UNPREPARED}: {reason}"
-
-    def _end(self, bound: BoundCheck) -> None:
-        """Do what is done at the end, however the check went."""
-        for step in bound.steps:
-            if step.at_end:
-                with suppress(StepFailed, Disturbed, NotAllowed):
-                    self._player.play(step)
-
-    def _crash(self) -> str:
-        """Return what the program of the node has raised first."""
-        return next(iter(self._exchange.crashes))
-
-    def _lines(self) -> tuple[FrameLine, ...]:
-        return self._exchange.evidence.lines()
-
-    def _failed(
-        self, bound: BoundCheck, reason: str, *, misread: bool = False
-    ) -> tuple[CheckVerdict, str]:
-        if misread:
-            return CheckVerdict.INCONCLUSIVE, f"{_UNSEEN}: {reason}"
-        if self._exchange.disturbances:
-            return CheckVerdict.INCONCLUSIVE, f"{reason}; {', '.join(self._exchange.disturbances)}"
-        others = self._permission.others
-        if others and any(line.text.startswith(_LSS_ANSWER) for line in self._lines()):
-            known = ", ".join(map(str, sorted(others)))
-            return CheckVerdict.INCONCLUSIVE, f"{reason}; other nodes may have answered: {known}"
-        errors = self._care.errors
-        if errors and any(map(_starts, bound.steps)):
-            why = f"1001h was {errors:02X}h before: with an error a node may leave Operational"
-            return CheckVerdict.INCONCLUSIVE, f"{reason}; {why}"
-        if bound.check.choice:
-            return CheckVerdict.IMPLEMENTATION_DEFINED, f"{bound.check.choice}; {reason}"
-        return CheckVerdict.FAIL, reason
-
 
 # What a report says of how the run judged: for people, by name.
 

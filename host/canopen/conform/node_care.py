@@ -8,7 +8,7 @@ from functools import partial
 from types import MappingProxyType
 from typing import Final, TypeVar
 
-from tickrig.host.canopen.conform.binding.pdo_binding import PATIENCE
+from tickrig.host.canopen.conform.binding.object_reader import PATIENCE
 from tickrig.host.canopen.conform.bus.exchange import MS_US, BusExchange, NotAllowed, StepFailed
 from tickrig.host.canopen.conform.bus.sdo import SdoClient, number_of
 from tickrig.host.canopen.conform.check import Address, Level

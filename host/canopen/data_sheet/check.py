@@ -13,7 +13,9 @@ from tickrig.host.canopen.data_sheet.rules import (
     list_rules,
     object_rules,
     pdo_rules,
+    profile_rules,
     text_rules,
+    truncation,
     value_rules,
 )
 from tickrig.host.text.values import counted
@@ -26,7 +28,7 @@ _CHECKS: Final[tuple[Callable[[Document], Iterator[RuleFinding]], ...]] = (
     *(head_rules.sections, head_rules.file_info, head_rules.device_info, head_rules.counts),
     *(head_rules.features, head_rules.dummy_usage, head_rules.comment_lines),
     head_rules.commissioning,
-    head_rules.truncated,
+    truncation.truncated,
     list_rules.lists,
     *(object_rules.names, object_rules.kinds, object_rules.sub_numbers, object_rules.sub_zeros),
     *(value_rules.numbers, value_rules.list_numbers, value_rules.limits),
@@ -37,7 +39,7 @@ _CHECKS: Final[tuple[Callable[[Document], Iterator[RuleFinding]], ...]] = (
         pdo_rules.reserved,
         pdo_rules.mappings,
     ),
-    *(object_rules.mandatory, object_rules.communication, object_rules.profile),
+    *(profile_rules.mandatory, profile_rules.communication, profile_rules.profile),
 )
 _UNREADABLE: Final = frozenset({"xml", "no-objects"})
 """Where one of these is found, what else is missing goes without saying."""

@@ -8,15 +8,15 @@ from collections.abc import Iterable, Iterator
 from tickrig.host.canopen.dialogue import SdoRequest, Step
 from tickrig.host.canopen.errors import SdoAborted
 from tickrig.host.rtc.canopen import definition
-from tickrig.host.rtc.canopen.data_flow import are_there, check_lengths, find_layout
-from tickrig.host.rtc.canopen.operations import boot
+from tickrig.host.rtc.canopen.boot import boot
+from tickrig.host.rtc.canopen.connections import are_there, check_lengths, find_layout
 from tickrig.host.rtc.canopen.pdo_layout import PdoLayout
 from tickrig.host.rtc.canopen.proxy import ProxyRtc, lay_out_sdo_ports
 from tickrig.host.rtc.canopen.server import RtcCanopenServer
 from tickrig.host.rtc.component import RtComponent
 from tickrig.host.rtc.ports.data_port import InPort
 from tickrig.host.rtc.states import RtcRefused
-from tickrig.host.rtc.system.system import Box, Edge, write_dot
+from tickrig.host.rtc.system.dot import Box, Edge, write_dot
 from tickrig.wire.canopen import sdo
 from tickrig.wire.canopen.nmt import CAN_ID_MASK
 from tickrig.wire.canopen.sdo_frame import AbortCode

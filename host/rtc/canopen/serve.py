@@ -12,7 +12,7 @@ from tickrig.host.rtc.canopen.definition import (
     SystemDefinition,
     read_device_file,
 )
-from tickrig.host.rtc.canopen.definition_file import read_definition
+from tickrig.host.rtc.canopen.definition_reader import read_definition
 from tickrig.host.rtc.canopen.server import RtcCanopenServer
 from tickrig.host.rtc.system.schedule import LATE_US, PAUSE_US
 from tickrig.wire.instant import NEVER

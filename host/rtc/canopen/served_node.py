@@ -8,9 +8,10 @@ from typing import Final, Protocol
 
 from tickrig.host.canopen.dialogue import Dialogue, Failure, QueuedScript
 from tickrig.host.canopen.errors import SdoTimeout
+from tickrig.host.rtc.canopen.boot import boot, probe
 from tickrig.host.rtc.canopen.definition import DeviceFile, NodeEntry, SdoEntry
 from tickrig.host.rtc.canopen.events import ServerEventType
-from tickrig.host.rtc.canopen.operations import NodeOperations, boot, kind_of, probe
+from tickrig.host.rtc.canopen.operations import NodeOperations, kind_of
 from tickrig.host.rtc.canopen.pdo_layout import PdoLayout
 from tickrig.host.rtc.canopen.proxy import ProxyRtc
 from tickrig.host.rtc.states import LifeCycleState

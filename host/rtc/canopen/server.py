@@ -44,7 +44,8 @@ from typing import Final
 
 from tickrig.host.canopen.periodic_timer import PeriodicTimer
 from tickrig.host.links.link import StampedFrames
-from tickrig.host.rtc.canopen.data_flow import PdoDataFlow, PdoLinks, PortConnections, SdoDataFlow
+from tickrig.host.rtc.canopen.connections import PdoLinks, PortConnections
+from tickrig.host.rtc.canopen.data_flow import PdoDataFlow, SdoDataFlow
 from tickrig.host.rtc.canopen.definition import DeviceFile, NodeEntry, SystemDefinition
 from tickrig.host.rtc.canopen.events import EventLog, ServerEventType
 from tickrig.host.rtc.canopen.proxy import ProxyRtc, lay_out_sdo_ports

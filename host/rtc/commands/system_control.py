@@ -16,8 +16,9 @@ from tickrig.host.rtc.ports.literal import literal, read_literal
 from tickrig.host.rtc.ports.port import AnyPort, ConnectorBase
 from tickrig.host.rtc.states import LifeCycleState, RtcRefused
 from tickrig.host.rtc.system.manager import DEFAULT_RATE_HZ, Manager
+from tickrig.host.rtc.system.rts_profile import write_rts_profile
 from tickrig.host.rtc.system.system import describe
-from tickrig.host.rtc.system.system_file import write_rts_profile, write_toml
+from tickrig.host.rtc.system.system_file import write_toml
 from tickrig.host.text.user_file import explain_error
 from tickrig.wire.instant import NEVER
 from tickrig.wire.rtc_types.idl import Struct

@@ -440,7 +440,7 @@ def dot(at: Path) -> None:
     \b
     tickrig rtc dot | dot -Tsvg -o system.svg
     """  # noqa: D301 - click wants the backspace
-    click.echo(load("tickrig.host.rtc.system.system:system_graph")(components(at)))
+    click.echo(load("tickrig.host.rtc.system.dot:system_graph")(components(at)))
 
 
 SYSTEM_VERBS: Final = (save, status, stop, check, dot)

@@ -17,7 +17,8 @@ from tickrig.host.rtc.ports.data_port import DataPort, InPort, OutPort
 from tickrig.host.rtc.ports.port import ConnectorProfile
 from tickrig.host.rtc.ports.ring_buffer import BufferOptions, FullPolicy, RingBuffer
 from tickrig.host.rtc.states import PortStatus, RtcRefused
-from tickrig.host.rtc.system.call_queue import CallQueue, PeerCaller
+from tickrig.host.rtc.system.call_queue import CallQueue
+from tickrig.host.rtc.system.peer_thread import PeerCaller
 from tickrig.host.text.log import log_of
 from tickrig.wire.rtc_types.cdr import Endian, decode, encode
 from tickrig.wire.rtc_types.idl import Struct

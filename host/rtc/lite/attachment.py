@@ -11,16 +11,9 @@ from tickrig.host.cli.messages import Refused, refused_at, say
 from tickrig.host.links.link import Link, LinkClosed, ReopeningLink
 from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.rtc.component import ExecutionContext
+from tickrig.host.rtc.lite.events import ProxyEvent, ProxyEventType, ProxyListener, notify
 from tickrig.host.rtc.lite.proxy import RtcLiteProxy
-from tickrig.host.rtc.lite.request_channel import (
-    POLL_US,
-    ProxyEvent,
-    ProxyEventType,
-    ProxyListener,
-    ProxySettings,
-    RequestChannel,
-    notify,
-)
+from tickrig.host.rtc.lite.request_channel import POLL_US, ProxySettings, RequestChannel
 from tickrig.host.rtc.states import RtcRefused
 from tickrig.host.rtc.system.manager import Manager
 from tickrig.host.text.log import log_of

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Final
 
 from tickrig.host.links.link import DeviceRefused, Link, LinkError, LinkTimeout
 from tickrig.host.rtc.component import ComponentProfile, ExecutionContext, ModuleSpec, RtComponent
-from tickrig.host.rtc.lite import request_channel
+from tickrig.host.rtc.lite import events
 from tickrig.host.rtc.lite.request_channel import RETRIES, ProxySettings, RequestChannel
 from tickrig.host.rtc.ports.data_port import InPort, OutPort
 from tickrig.host.rtc.ports.port import AnyPort
@@ -296,7 +296,7 @@ class RtcLiteProxy(RtComponent):
         instance_name: str,
         link: Link[bytes],
         settings: ProxySettings | None = None,
-        listener: request_channel.ProxyListener | None = None,
+        listener: events.ProxyListener | None = None,
     ) -> None:
         super().__init__(instance_name)
         self._settings, self._listener = settings or ProxySettings(), listener
@@ -328,7 +328,7 @@ class RtcLiteProxy(RtComponent):
         return replace(super().profile, properties=properties)
 
     @property
-    def pings(self) -> request_channel.PingStatistics:
+    def pings(self) -> events.PingStatistics:
         """How the PINGs went since `on_initialize`."""
         return self._channel.ping_monitor.statistics
 
@@ -340,7 +340,7 @@ class RtcLiteProxy(RtComponent):
             before = f"{self._channel.trouble}, and " if self._channel.trouble else ""
             pings = f"none of {self._settings.pings} PINGs was answered"
             self._why = before + pings, self._channel.frames
-            self._notify(request_channel.ProxyEventType.FATAL_ERROR)
+            self._notify(events.ProxyEventType.FATAL_ERROR)
             for context in self.contexts:
                 context.abort_component(self)
 
@@ -487,12 +487,12 @@ class RtcLiteProxy(RtComponent):
         """Tell of an error once it is known that the device is there."""
         if self._unreported and not self._channel.ping_monitor.doubted:
             self._unreported = False
-            self._notify(request_channel.ProxyEventType.PASSIVE_ERROR)
+            self._notify(events.ProxyEventType.PASSIVE_ERROR)
 
-    def _notify(self, kind: request_channel.ProxyEventType) -> None:
-        request_channel.notify(
+    def _notify(self, kind: events.ProxyEventType) -> None:
+        events.notify(
             self._listener,
-            request_channel.ProxyEvent(self._channel.now_us, kind, self.instance_name, *self._why),
+            events.ProxyEvent(self._channel.now_us, kind, self.instance_name, *self._why),
         )
 
 

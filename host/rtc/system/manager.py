@@ -10,45 +10,49 @@ from typing import Final, TypeVar
 
 from tickrig.host.cli.extensions import ExtensionError, ExtensionGroup
 from tickrig.host.rtc.component import ExecutionContext, ModuleSpec, RtComponent
+from tickrig.host.rtc.listeners import call_listeners
 from tickrig.host.rtc.ports.connect import Properties, connect
 from tickrig.host.rtc.ports.connector import Connector
-from tickrig.host.rtc.ports.port import AnyPort, ConnectorProfile, call_listeners
+from tickrig.host.rtc.ports.port import AnyPort, ConnectorProfile
 from tickrig.host.rtc.states import LifeCycleState, ReturnCode, RtcRefused
 from tickrig.host.rtc.system.schedule import Schedule
 
 # Component types that a manager finds by name: ours, and those of installed packages.
 
-_TYPES: Final[dict[str, tuple[str, ...]]] = {
-    "components": ("ConsoleIn", "ConsoleOut", "SeqIn", "SeqOut", "ConfigSample"),
-    "ucode.lookup": ("InfraredRaysReader", "UcodeSettlement", "ContentsInterpretation"),
-    "canopen.robots": ("Joystick", "Beego", "FourX"),
-    "motion.components.ref_hard": ("RefHardRh3",),
-    "motion.components.odometry": ("Odometry",),
-    "motion.components.position_input": ("PositionInput",),
-    "motion.components.omni_to_2wd": ("OmniTo2WD",),
-    "motion.components.navigation": ("Navigation",),
-    "motion.components.path_follower": ("PathFollower",),
-    "motion.options.game_pad": ("GamePad",),
-    "motion.options.switch_input": ("SwitchInputRTC:SwitchInput",),
-    "motion.options.lrf_capture_urg": ("LRFCapture_URG:LrfCaptureUrg",),
-    "motion.options.obstacles": (
-        *("Urg_to_Obstacles:UrgToObstacles", "ObstacleMonitor"),
-        *("CollisionDetection", "ObstaclesAvoidance"),
-    ),
-    "motion.options.follower": ("Follower",),
-    "motion.iis_interfaces": (
-        *("GoalInterface", "RunningInformation", "PathInterface", "Velocity1To2"),
-        *("Velocity2To1", "Velocity2To3", "Velocity3To2", "Position2To3", "Position3To2"),
-        *("PositiveHeading", "WrappedHeading"),
-    ),
+_HERE: Final = "tickrig.host.rtc.components"
+_UCODE: Final = {
+    "infrared_rays_reader": "InfraredRaysReader",
+    "ucode_settlement": "UcodeSettlement",
+    "contents_interpretation": "ContentsInterpretation",
 }
-"""By module of `tickrig.host.rtc`: names of types, with the class if that has another name."""
-
-
-def _paths() -> dict[str, str]:
-    """Return where each type is, by its name."""
-    words = [(module, *name.partition(":")) for module, names in _TYPES.items() for name in names]
-    return {name: f"tickrig.host.rtc.{module}:{kind or name}" for module, name, _, kind in words}
+_MOTION: Final[dict[str, str]] = {
+    "RefHardRh3": "components.ref_hard:RefHardRh3",
+    "Odometry": "components.odometry:Odometry",
+    "PositionInput": "components.position_input:PositionInput",
+    "OmniTo2WD": "components.omni_to_2wd:OmniTo2WD",
+    "Navigation": "components.navigation:Navigation",
+    "PathFollower": "components.path_follower:PathFollower",
+    "GamePad": "options.game_pad:GamePad",
+    "SwitchInputRTC": "options.switch_input:SwitchInput",
+    "LRFCapture_URG": "options.lrf_capture_urg:LrfCaptureUrg",
+    "Urg_to_Obstacles": "options.obstacles:UrgToObstacles",
+    "ObstacleMonitor": "options.obstacles:ObstacleMonitor",
+    "CollisionDetection": "options.obstacles:CollisionDetection",
+    "ObstaclesAvoidance": "options.obstacles:ObstaclesAvoidance",
+    "Follower": "options.follower:Follower",
+    "GoalInterface": "iis_interfaces:GoalInterface",
+    "RunningInformation": "iis_interfaces:RunningInformation",
+    "PathInterface": "iis_interfaces:PathInterface",
+    "Velocity1To2": "iis_interfaces:Velocity1To2",
+    "Velocity2To1": "iis_interfaces:Velocity2To1",
+    "Velocity2To3": "iis_interfaces:Velocity2To3",
+    "Velocity3To2": "iis_interfaces:Velocity3To2",
+    "Position2To3": "iis_interfaces:Position2To3",
+    "Position3To2": "iis_interfaces:Position3To2",
+    "PositiveHeading": "iis_interfaces:PositiveHeading",
+    "WrappedHeading": "iis_interfaces:WrappedHeading",
+}
+"""The motion chain of RH3, what is around it, and the interfaces of IIS, in `host.rtc.motion`."""
 
 
 def _is_component_type(found: object) -> bool:
@@ -63,7 +67,13 @@ def _is_component_type(found: object) -> bool:
 COMPONENT_TYPES: Final = ExtensionGroup[type[RtComponent]](
     "tickrig.components",
     "component type",
-    _paths(),
+    {
+        name: f"{_HERE}:{name}"
+        for name in ("ConsoleIn", "ConsoleOut", "SeqIn", "SeqOut", "ConfigSample")
+    }
+    | {name: f"tickrig.host.rtc.ucode.{module}:{name}" for module, name in _UCODE.items()}
+    | {name: f"tickrig.host.rtc.motion.{place}" for name, place in _MOTION.items()}
+    | {name: f"tickrig.host.rtc.canopen.robots:{name}" for name in ("Joystick", "Beego", "FourX")},
     _is_component_type,
     "an RtComponent with a spec",
 )

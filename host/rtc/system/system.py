@@ -1,22 +1,9 @@
-r"""A system as it is saved: its components, their configuration, and what joins them.
-
->>> print(write_dot([Box("A0", "Adder", (), ("out",)), Box("B0", "", ("in",), ())],
-...                 [Edge("A0.out", "B0.in")]))
-digraph system {
-  rankdir=LR;
-  node [shape=record];
-  "A0" [label="A0\nAdder|{<out> out}"];
-  "B0" [label="{<in> in}|B0"];
-  "A0":"out" -> "B0":"in";
-}
-"""
+"""A system as it is saved: its components, their configuration, and what joins them."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Container, Iterable, Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, Final
 
 from tickrig.host.rtc.component import ExecutionContext, RtComponent
 from tickrig.host.rtc.configuration import DEFAULT
@@ -283,89 +270,3 @@ def _properties(ends: str, wanted: ConnectionEntry, found: ConnectionEntry) -> I
     for key, value in wanted.properties.items():
         if (other := found.properties.get(key)) != value:
             yield f"{ends}: {key} is {other or 'not there'}, not {value}"
-
-
-# Components and what joins them as a graph in the language of Graphviz.
-
-_SPECIAL: Final = re.compile(r'([\\{}|<>" ])')
-
-
-@dataclass(frozen=True, slots=True)
-class Box:
-    """A component.
-
-    Attributes:
-        title: what stands below its name.
-        ins: names of the ports at its left.
-        outs: names of the others.
-    """
-
-    name: str
-    title: str
-    ins: tuple[str, ...]
-    outs: tuple[str, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Edge:
-    """What joins two ports, by their full names.
-
-    Attributes:
-        dashed: it does not pass the PC.
-    """
-
-    source: str
-    target: str
-    dashed: bool = False
-
-
-def write_dot(boxes: Iterable[Box], edges: Iterable[Edge]) -> str:
-    """Return the graph."""
-    lines = ["digraph system {", "  rankdir=LR;", "  node [shape=record];"]
-    lines += (f'  "{box.name}" [label="{_label(box)}"];' for box in boxes)
-    lines += (
-        f"  {_end(edge.source)} -> {_end(edge.target)}{' [style=dashed]' * edge.dashed};"
-        for edge in edges
-    )
-    return "\n".join((*lines, "}"))
-
-
-def system_graph(components: Iterable[Any]) -> str:
-    """Return the graph of a system whose components are described as the control socket does."""
-    described = tuple(components)
-    ends = dict.fromkeys(
-        tuple(connector["ports"])
-        for component in described
-        for port in component["ports"]
-        for connector in port["connectors"]
-    )
-    return write_dot(map(_box, described), (Edge(*pair) for pair in ends))
-
-
-def _box(component: Any) -> Box:
-    ins, outs = list[str](), list[str]()
-    for port in component["ports"]:
-        side = ins if port["kind"] == "DataInPort" else outs
-        side.append(port["name"].rpartition(".")[2])
-    state = component["state"].capitalize()
-    return Box(component["name"], f"{component['type']} {state}", tuple(ins), tuple(outs))
-
-
-def _label(box: Box) -> str:
-    name = r"\n".join(_escaped(word) for word in (box.name, box.title) if word)
-    fields = (_ports(box.ins), name, _ports(box.outs))
-    return "|".join(field for field in fields if field)
-
-
-def _ports(names: tuple[str, ...]) -> str:
-    ports = "|".join(f"<{_escaped(name)}> {_escaped(name)}" for name in names)
-    return f"{{{ports}}}" if ports else ""
-
-
-def _end(port: str) -> str:
-    owner, _, name = port.rpartition(".")
-    return f'"{owner}":"{name}"'
-
-
-def _escaped(text: str) -> str:
-    return _SPECIAL.sub(r"\\\1", text)

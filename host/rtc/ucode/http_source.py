@@ -11,7 +11,7 @@ from io import BytesIO
 from typing import Final
 from urllib.parse import SplitResult, urlsplit
 
-from tickrig.host.rtc.system.call_queue import PeerThread
+from tickrig.host.rtc.system.peer_thread import PeerThread
 from tickrig.host.rtc.ucode.cache import Fetched, SourceStatus
 
 _TIMEOUT_S: Final = 1.0

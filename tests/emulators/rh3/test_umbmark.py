@@ -8,8 +8,9 @@ import pytest
 
 from tickrig.device.rh3.parameters import BaseParameters
 from tickrig.emulators.rh3.closed_loop import ClosedLoop
-from tickrig.host.rtc.motion.drive import drive, run_umbmark, square, start
+from tickrig.host.rtc.motion.drive import drive, start
 from tickrig.host.rtc.motion.geometry import Pose, Wheels
+from tickrig.host.rtc.motion.umbmark import run_umbmark, square
 
 SIDE_M = 2.0
 """Half of UMBmark's, for half the time."""

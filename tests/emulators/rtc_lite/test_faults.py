@@ -9,7 +9,7 @@ from tickrig.device.rtc_lite.node import RtcLiteNode
 from tickrig.emulators.rig.faults import FaultArguments, FaultTally, FaultTrigger, FaultyPort
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
-from tickrig.emulators.rtc_lite.device_type import LINE_FAULTS, Radio, RadioSettings
+from tickrig.emulators.rtc_lite.line import LINE_FAULTS, Radio, RadioSettings
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.wire.instant import NEVER
 

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from tests.wire.rtc_lite.vectors import REPLIES, REQUESTS, raw
 from tickrig.device.rtc_lite.server import LiteConfig
-from tickrig.emulators.rtc_lite.device_type import frame_splitter
+from tickrig.emulators.rtc_lite.line import frame_splitter
 from tickrig.host.text.trace import Mark
 from tickrig.wire.rtc_lite.frame import Framing
 

@@ -8,10 +8,10 @@ import pytest
 
 from tests.host.rtc.ucode.bench import DOOR, UcodeBench
 from tickrig.emulators.bench.control import EmulatorControl
+from tickrig.emulators.tkernel.board import Board
 from tickrig.emulators.tkernel.node_manager import (
     CONTENTS,
     SETTLEMENT,
-    Board,
     BoardLines,
     NodeLimits,
     NodeManager,

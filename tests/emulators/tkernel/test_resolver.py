@@ -15,7 +15,7 @@ from tests.host.rtc.ucode.test_http_source import DEADLINE_S, get
 from tickrig.emulators.bench.child import Child, running
 from tickrig.emulators.commands.cli import main as tickrig
 from tickrig.emulators.tkernel.commands.resolver_cli import main as resolver
-from tickrig.emulators.tkernel.resolution import EXAMPLE
+from tickrig.emulators.tkernel.ucode_table import EXAMPLE
 from tickrig.host.rtc.ucode.cache import SourceStatus
 
 MODULE = "tickrig.emulators.tkernel.commands.resolver_cli"

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from tickrig.emulators.tkernel.resolution import EXAMPLE, ResolutionService, UcodeTable, parse_table
+from tickrig.emulators.tkernel.resolution import ResolutionService
+from tickrig.emulators.tkernel.ucode_table import EXAMPLE, UcodeTable, parse_table
 
 DOOR = "00001C00000000000001000000000001"
 BASE = "http://127.0.0.1:8640"

@@ -18,7 +18,7 @@ from tests.host.rtc.ucode.bench import DOOR
 from tickrig.emulators.bench.child import Child, running
 from tickrig.emulators.commands.cli import main as tickrig
 from tickrig.emulators.tkernel.commands.node_cli import main as tkernel_emu
-from tickrig.emulators.tkernel.resolution import EXAMPLE
+from tickrig.emulators.tkernel.ucode_table import EXAMPLE
 
 DEADLINE_S = 60.0
 NODE = "tickrig.emulators.tkernel.commands.node_cli"

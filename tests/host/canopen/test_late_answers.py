@@ -37,7 +37,7 @@ from tickrig.host.canopen.master.assignment import MasterPlan, SlaveAssignment
 from tickrig.host.canopen.master.canopen_master import CanopenMaster
 from tickrig.host.canopen.sdo_transfer import upload
 from tickrig.host.links.link import StampedFrames, StampedLink
-from tickrig.host.rtc.canopen.definition_file import parse_definition
+from tickrig.host.rtc.canopen.definition_reader import parse_definition
 from tickrig.host.rtc.canopen.serve import read_files, serve
 from tickrig.host.rtc.canopen.served_node import NodePhase
 from tickrig.host.rtc.canopen.server import RtcCanopenServer

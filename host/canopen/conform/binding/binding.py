@@ -2,159 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
-from enum import Enum
-from pathlib import Path
 from typing import Final, NamedTuple
 
-from tickrig.host.canopen.conform.binding.pdo_binding import (
-    PDO_NAMES,
-    BoundPdo,
-    ObjectReader,
-    Upload,
-    bind_pdos,
-    probe_device,
+from tickrig.host.canopen.conform.binding.object_reader import ObjectReader, Upload, probe_device
+from tickrig.host.canopen.conform.binding.pdo_binding import PDO_NAMES, BoundPdo, bind_pdos
+from tickrig.host.canopen.conform.binding.wanted import (
+    COMMUNICATION_AREA,
+    GENERIC_IO,
+    HARMLESS,
+    PLAIN_OUTPUTS,
+    PROFILE_AREA,
+    TEXTS,
+    WANTED,
+    EntryFacts,
+    Use,
+    WantedObject,
+    facts_of,
 )
 from tickrig.host.canopen.conform.check import Level
-from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.eds_device import EdsDevice
 from tickrig.wire.canopen.eds.eds_entry import standard_object
-from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
-
-# The names of objects in checks, and which object of a dictionary is of that kind.
-COMMUNICATION_AREA: Final = range(0x1000, 0x2000)
-PROFILE_AREA: Final = range(0x6000, 0xA000)
-"""Where a write may move something."""
-
-GENERIC_IO: Final = 401
-"""The low word of 1000h of a module of CiA 401."""
-PLAIN_OUTPUTS: Final = (0x6200, 0x6300, 0x6320, 0x6410, 0x6411, 0x6412)
-"""Outputs of CiA 401 take any value; all else of a profile means something: a mode, a position."""
-
-HARMLESS: Final = (0x1015, 0x1007, 0x100D, 0x100C, 0x1017, 0x1006)
-"""Communication objects that take any value, and that stand for others of their size."""
-
-TEXTS: Final = (DataType.VISIBLE_STRING, DataType.OCTET_STRING, DataType.UNICODE_STRING)
-_SIZES: Final = (8, 16, 32, 64)
-_ACCESS: Final = {
-    **{"r": Access.READ.value, "w": Access.WRITE.value, "c": Access.CONST.value},
-    **{"t": Access.TPDO.value, "p": Access.RPDO.value},
-}
-"""The letters of `objects.txt`."""
-_MOST_BYTES: Final = 1 << 32
-
-
-class Use(Enum):
-    """What is done with an object."""
-
-    READ = "read, or mapped where it is only read"
-    REFUSED = "written, and the node must refuse it"
-    WRITE = "written, and restored"
-
-
-class EntryFacts(NamedTuple):
-    """What decides for which names an entry can stand, found out once for all names.
-
-    Attributes:
-        entry: the entry.
-        access: the bits of its access.
-        kind: the number of its data type.
-        free: it takes what its description says, without rules of CiA 301.
-    """
-
-    entry: EntryDescription
-    access: int
-    kind: int
-    free: bool
-
-
-def facts_of(entry: EntryDescription) -> EntryFacts:
-    """Find out the facts about an entry."""
-    free = entry.index not in COMMUNICATION_AREA or entry.index in HARMLESS
-    return EntryFacts(entry, entry.access.value, int(entry.data_type), free)
-
-
-class WantedObject(NamedTuple):
-    """A name and what it stands for.
-
-    Attributes:
-        name: in checks, after `$`.
-        what: for people.
-        use: what is done with it.
-        access: the bits of the access that are asked for: those that count, and their values.
-        kinds: numbers of the data types; None for any.
-        limited: there must be values of its type on both sides of its limits.
-        at: the only place where it can be, and then nothing else counts.
-        lengths: how many bytes its value may have.
-    """
-
-    name: str
-    what: str
-    use: Use
-    access: tuple[int, int] = (0, 0)
-    kinds: Collection[int] | None = None
-    limited: bool = False
-    at: tuple[int, int] | None = None
-    lengths: range = range(1, _MOST_BYTES)
-
-    def fitting(self, facts: Iterable[EntryFacts]) -> list[EntryDescription]:
-        """Return the entries that are of this kind, in their order.
-
-        What is written takes what its description says, without rules of CiA 301.
-
-        One loop without calls: a tenth of a run of one check was here.
-        """
-        (mask, wanted), kinds, anyway = self.access, self.kinds, self.use is not Use.WRITE
-        found = [
-            entry
-            for entry, access, kind, free in facts
-            if access & mask == wanted and (kinds is None or kind in kinds) and (free or anyway)
-        ]
-        return list(filter(_is_limited, found)) if self.limited else found
-
-
-def _is_limited(entry: EntryDescription) -> bool:
-    """Return whether there are values of its type on both sides of its limits."""
-    if entry.low is None or entry.high is None:
-        return False
-    lowest, highest = entry.data_type.limits
-    return lowest < entry.low and entry.high < highest
-
-
-_INTEGERS: Final = frozenset(kind for kind in DataType if kind.is_integer)
-_KINDS: Final[Mapping[str, Collection[int] | None]] = {
-    "any": None,
-    "integers": frozenset(map(int, _INTEGERS)),
-    "texts": frozenset(map(int, TEXTS)),
-    **{kind.name: (int(kind),) for kind in (DataType.BOOLEAN, DataType.REAL32, DataType.DOMAIN)},
-    **{f"{bits} bits": frozenset(int(k) for k in _INTEGERS if k.bits == bits) for bits in _SIZES},
-}
-
-
-def _read_wanted(text: str) -> Iterator[WantedObject]:
-    """Read `objects.txt`, whose head says what stands in a line."""
-    for line in text.splitlines():
-        if line.startswith("#"):
-            continue
-        name, what, use, place, *rest = line.split(" | ")
-        if not rest:
-            index, sub = (int(word, 16) for word in place.split(":"))
-            what = f"{index:04X}h:{sub:02X}, {what}"
-            yield WantedObject(name, what, Use[use.upper()], at=(index, sub))
-            continue
-        has, lacks = (sum(_ACCESS[letter] for letter in part) for part in place.partition("-")[::2])
-        kinds, length, *limited = rest
-        least, _, most = length.partition(" to ")
-        yield WantedObject(
-            *(name, what, Use[use.upper()], (has | lacks, has), _KINDS[kinds]),
-            limited=bool(limited),
-            lengths=range(int(least), int(most or _MOST_BYTES) + 1),
-        )
-
-
-WANTED: Final = tuple(_read_wanted(Path(__file__).with_name("objects.txt").read_text("utf-8")))
-
+from tickrig.wire.canopen.eds.object_table import EntryDescription
 
 # Places in the dictionary of a node at which there is nothing.
 

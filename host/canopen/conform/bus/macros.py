@@ -6,7 +6,8 @@ from binascii import crc_hqx
 from collections.abc import Callable, Iterator, Sized
 from typing import Final
 
-from tickrig.host.canopen.conform.bus.exchange import Disturbed, NotAllowed, StepFailed, matches
+from tickrig.host.canopen.conform.bus.exchange import Disturbed, NotAllowed, StepFailed
+from tickrig.host.canopen.conform.bus.frame_pattern import matches
 from tickrig.host.canopen.conform.bus.sdo import ABORTED, SdoFrames, multiplexer
 from tickrig.host.canopen.conform.check import ANSWER_MS, Address
 from tickrig.host.canopen.conform.notation import TO_MAPPING

@@ -13,8 +13,8 @@ from tickrig.host.canopen.conform.bus.exchange import (
     Disturbed,
     NotAllowed,
     StepFailed,
-    codes_text,
 )
+from tickrig.host.canopen.conform.bus.frame_pattern import codes_text
 from tickrig.host.canopen.conform.bus.macros import MACROS
 from tickrig.host.canopen.conform.bus.sdo import SdoFrames
 from tickrig.host.canopen.errors import SdoAborted, SdoMisnamed, SdoTimeout

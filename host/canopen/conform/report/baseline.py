@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from tickrig.host.canopen.conform import check
+from tickrig.host.canopen.conform import verdict
 from tickrig.host.text.page_text import one_line
 
 _HEAD: Final = "# known failures of a conformance run (canmon conform --baseline)"
@@ -46,56 +46,60 @@ class Baseline:
             raise ValueError(f"{path} is no text: byte {error.start} is no UTF-8") from None
         return cls(frozenset(filter(None, (_id(path, *each) for each in enumerate(lines, 1)))))
 
-    def knows(self, result: check.Result) -> bool:
+    def knows(self, result: verdict.Result) -> bool:
         """Say whether it is a failure that is known."""
-        return result.outcome.verdict is check.CheckVerdict.FAIL and result.check.id in self.known
+        return result.outcome.verdict is verdict.CheckVerdict.FAIL and result.check.id in self.known
 
-    def new(self, report: check.Report) -> list[check.Result]:
+    def new(self, report: verdict.Report) -> list[verdict.Result]:
         """Return the failures that are not known."""
         failed = (
-            result for result in report.results if result.outcome.verdict is check.CheckVerdict.FAIL
+            result
+            for result in report.results
+            if result.outcome.verdict is verdict.CheckVerdict.FAIL
         )
         return [result for result in failed if not self.knows(result)]
 
-    def mended(self, report: check.Report) -> list[str]:
+    def mended(self, report: verdict.Report) -> list[str]:
         """Return the ids that were known to fail and pass now."""
         passed = {
-            one.check.id for one in report.results if one.outcome.verdict is check.CheckVerdict.PASS
+            one.check.id
+            for one in report.results
+            if one.outcome.verdict is verdict.CheckVerdict.PASS
         }
         return sorted(self.known & passed)
 
-    def exit_status(self, report: check.Report) -> int:
+    def exit_status(self, report: verdict.Report) -> int:
         """Return the exit status of a run: that of the report, where known failures are none."""
         if self.new(report):
-            return check.FAILED
+            return verdict.FAILED
         if (
             report.aborted
-            or report.count(check.CheckVerdict.INCONCLUSIVE)
-            or report.count(check.CheckVerdict.BLOCKED)
+            or report.count(verdict.CheckVerdict.INCONCLUSIVE)
+            or report.count(verdict.CheckVerdict.BLOCKED)
         ):
-            return check.UNDECIDED
+            return verdict.UNDECIDED
         return (
             0
-            if report.count(check.CheckVerdict.PASS) or report.count(check.CheckVerdict.FAIL)
-            else check.NOTHING_JUDGED
+            if report.count(verdict.CheckVerdict.PASS) or report.count(verdict.CheckVerdict.FAIL)
+            else verdict.NOTHING_JUDGED
         )
 
-    def ends_with(self, report: check.Report) -> int:
+    def ends_with(self, report: verdict.Report) -> int:
         """Return the exit status of the command: of a run that was ended, why it was."""
         if report.aborted and not report.absent:
-            return check.CTRL_C if report.aborted == check.INTERRUPTED else check.BUS_FAILED
+            return verdict.CTRL_C if report.aborted == verdict.INTERRUPTED else verdict.BUS_FAILED
         return self.exit_status(report)
 
 
 NONE_KNOWN: Final = Baseline()
 
 
-def baseline_text(report: check.Report) -> str:
+def baseline_text(report: verdict.Report) -> str:
     """Write the failures of a report as a baseline, in the order of their ids."""
     failed = {
         result.check.id: f"{result.check.id}  # {one_line(result.check.title)}"
         for result in report.results
-        if result.outcome.verdict is check.CheckVerdict.FAIL
+        if result.outcome.verdict is verdict.CheckVerdict.FAIL
     }
     return "\n".join([_HEAD, *(failed[name] for name in sorted(failed)), ""])
 

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Final
 
-from tickrig.host.canopen.conform.check import FAILED, UNDECIDED, CheckVerdict, Report, Result
 from tickrig.host.canopen.conform.report import overview
 from tickrig.host.canopen.conform.report.baseline import NONE_KNOWN, Baseline
+from tickrig.host.canopen.conform.verdict import FAILED, UNDECIDED, CheckVerdict, Report, Result
 from tickrig.host.text import junit
 
 # A badge for a README: how many checks passed, as SVG.

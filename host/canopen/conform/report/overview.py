@@ -2,7 +2,7 @@
 
 The frames of a check, as `canmon dump` shows them.
 
->>> from tickrig.host.canopen.conform.check import Direction
+>>> from tickrig.host.canopen.conform.verdict import Direction
 >>> lines = FrameLine(1_250, Direction.SENT, "605#40"), FrameLine(2_000, Direction.REMARK, "?")
 >>> plain_frames(lines)
 [' (000.001250)  >  605   [1]  40', ' (000.002000)  #  ?']
@@ -16,7 +16,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Final, NamedTuple
 
-from tickrig.host.canopen.conform.check import (
+from tickrig.host.canopen.conform.verdict import (
     CheckOutcome,
     CheckVerdict,
     Direction,

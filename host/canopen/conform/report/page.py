@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import cache
 from typing import Final
 
-from tickrig.host.canopen.conform.check import CheckOutcome, CheckVerdict, Report
 from tickrig.host.canopen.conform.notation import step_words
 from tickrig.host.canopen.conform.report.baseline import NONE_KNOWN, Baseline
 from tickrig.host.canopen.conform.report.overview import (
@@ -24,6 +23,7 @@ from tickrig.host.canopen.conform.report.overview import (
     verdict_counts,
 )
 from tickrig.host.canopen.conform.suite import group_titles
+from tickrig.host.canopen.conform.verdict import CheckOutcome, CheckVerdict, Report
 from tickrig.host.text.html_page import PageTemplate
 
 _MOST_LINES: Final = 200

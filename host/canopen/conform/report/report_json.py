@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 from typing import Final
 
-from tickrig.host.canopen.conform.check import CheckOutcome, CheckVerdict, Report, Result
 from tickrig.host.canopen.conform.notation import step_words
 from tickrig.host.canopen.conform.report.baseline import NONE_KNOWN, Baseline
 from tickrig.host.canopen.conform.report.overview import by_group, repair_commands
 from tickrig.host.canopen.conform.suite import group_titles
+from tickrig.host.canopen.conform.verdict import CheckOutcome, CheckVerdict, Report, Result
 
 _VERSION: Final = 1
 """It changes when a field changes its meaning or goes."""

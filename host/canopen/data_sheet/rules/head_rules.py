@@ -10,10 +10,9 @@ from typing import Final
 from tickrig.host.canopen.data_sheet.document import Document
 from tickrig.host.canopen.data_sheet.rule import Edit, EditPlace, RuleFinding
 from tickrig.host.canopen.data_sheet.rules import known_keys
-from tickrig.host.canopen.data_sheet.rules.list_rules import LISTS, ObjectList, are_whole, described
+from tickrig.host.canopen.data_sheet.rules.list_rules import are_whole
 from tickrig.wire.canopen.eds import eds_value
 from tickrig.wire.canopen.eds.eds_file import shorten
-from tickrig.wire.canopen.eds.eds_value import object_section
 
 _NEEDED: Final = ("DeviceInfo", "MandatoryObjects")
 _DATE: Final = re.compile(r"[0-9]{2}-[0-9]{2}-[0-9]{4}", re.ASCII)
@@ -204,49 +203,3 @@ def commissioning(document: Document) -> Iterator[RuleFinding]:
 
 _DCF_KEYS: Final = frozenset(key.lower() for key in known_keys.OF_DCF if key != "ParameterValue")
 """Of that one the reader tells."""
-
-
-# The rule that tells a file that was cut off: what it still promises is not there.
-
-_SIGNS: Final = 2
-"""One alone may be a slip: a missing line end, one object that is only listed."""
-
-
-def truncated(document: Document) -> Iterator[RuleFinding]:
-    """Find a file that ends before what it announces."""
-    lines = [line for line in document.file.lines if line.content]
-    if document.file.is_xml or not lines:
-        return
-    last = lines[-1].section
-    lost = _listed_behind(document, last)
-    signs = len(lost) + (document.texts[-1] != "") + _is_short(document, last)
-    if signs >= _SIGNS and (lost or _is_short(document, last)):
-        rest = f"; {lost[0]:04X}h and {len(lost) - 1} more are listed" if lost else ""
-        what = f"the file looks truncated: it ends in [{shorten(last)}]{rest}"
-        yield document.found("truncated", what, "", lines[-1].number)
-
-
-def _listed_behind(document: Document, last: str) -> list[int]:
-    """Return the listed objects without a section, if they are those behind the last section."""
-    place, present = object_section(last), described(document)
-    listed = [index for title in LISTS for index in ObjectList(document, title).indices]
-    for order in (listed, sorted(listed)):
-        lost = [index for index in order if index not in present]
-        begun = order[: len(order) - len(lost)]
-        follows = place is None or not begun or begun[-1] == place[0]
-        if order[len(begun) :] == lost and follows:
-            return lost
-    return []
-
-
-def _is_short(document: Document, last: str) -> int:
-    """Count what the last section lacks: its entries, those of its object, keywords."""
-    if last in LISTS:
-        said = number(document, last, "SupportedObjects") or 0
-        return int(said > len(ObjectList(document, last).entries))
-    place = object_section(last)
-    if place is None:
-        return 0
-    said = number(document, f"{place[0]:04X}", "SubNumber") or 0
-    has_all = document.file.has(last, "AccessType") or place[1] is None
-    return int(said > len(document.subs(place[0]))) + (not has_all)

@@ -11,7 +11,7 @@ from tickrig.host.canopen.bus_file.bus_values import BusMaster, BusPdo, BusSlave
 from tickrig.host.canopen.bus_file.notes import BusFileNotes
 from tickrig.host.canopen.data_sheet.rule import RuleFinding
 from tickrig.host.canopen.master.cia402 import drive_driver
-from tickrig.host.canopen.master.cia402.drive_state import TARGETS, DriveObject
+from tickrig.host.canopen.master.cia402.drive_mode import TARGETS, DriveObject
 from tickrig.host.canopen.master.process_image import EVENT_DRIVEN, Key, keys
 from tickrig.host.text.values import counted
 from tickrig.wire.can import data_frame, frame_bits

@@ -11,7 +11,7 @@ from tickrig.host.canopen.bus_file.bus_values import BusSlave, DriveChannel
 from tickrig.host.canopen.bus_file.known_keys import SETTINGS
 from tickrig.host.canopen.dialogue import QueuedScript, Script
 from tickrig.host.canopen.errors import SdoAborted
-from tickrig.host.canopen.master.cia402 import drive_state
+from tickrig.host.canopen.master.cia402 import drive_mode, drive_state
 from tickrig.host.canopen.master.network_slave import NetworkSlave
 from tickrig.host.canopen.master.process_image import Key, ProcessImage
 from tickrig.host.canopen.master.waiting import DriveFailed, Operation, Until
@@ -98,7 +98,7 @@ _ERROR: Final = drive_state.Statusword.MODE_13
 
 
 async def home(
-    name: str, mode: drive_state.HomingMode, within_us: int, caught_up: Callable[[], Operation]
+    name: str, mode: drive_mode.HomingMode, within_us: int, caught_up: Callable[[], Operation]
 ) -> None:
     """Start homing in a drive that is in this mode, and wait for its end.
 
@@ -118,7 +118,7 @@ async def home(
 
 
 async def _home(
-    name: str, mode: drive_state.HomingMode, within_us: int, caught_up: Callable[[], Operation]
+    name: str, mode: drive_mode.HomingMode, within_us: int, caught_up: Callable[[], Operation]
 ) -> None:
     await _await(name, mode, _ERROR | _REACHED, 0, _START_US, "is not at rest")
     mode.runs = True
@@ -134,7 +134,7 @@ async def _home(
 
 
 async def _await(  # noqa: PLR0913, PLR0917 - a row of what is awaited
-    name: str, mode: drive_state.HomingMode, mask: int, before: int, within_us: int, complaint: str
+    name: str, mode: drive_mode.HomingMode, mask: int, before: int, within_us: int, complaint: str
 ) -> None:
     """Wait until some bits are no longer as before; raise DriveFailed where they say error."""
     await Until(lambda: mode.status & mask != before, within_us, f"{name}: homing {complaint}")
@@ -142,18 +142,18 @@ async def _await(  # noqa: PLR0913, PLR0917 - a row of what is awaited
         raise DriveFailed(f"{name}: homing error (bit 13 of the statusword)")
 
 
-CONTROLWORD: Final = drive_state.DriveObject(0x6040, 2, signed=False)
-_STATUSWORD: Final = drive_state.DriveObject(0x6041, 2, signed=False)
-_MODE: Final = drive_state.DriveObject(0x6060, 1)
-_MODE_DISPLAY: Final = drive_state.DriveObject(0x6061, 1)
-_POSITION: Final = drive_state.DriveObject(0x6064, 4)
-_VELOCITY: Final = drive_state.DriveObject(0x606C, 4)
-_TORQUE: Final = drive_state.DriveObject(0x6077, 2)
+CONTROLWORD: Final = drive_mode.DriveObject(0x6040, 2, signed=False)
+_STATUSWORD: Final = drive_mode.DriveObject(0x6041, 2, signed=False)
+_MODE: Final = drive_mode.DriveObject(0x6060, 1)
+_MODE_DISPLAY: Final = drive_mode.DriveObject(0x6061, 1)
+_POSITION: Final = drive_mode.DriveObject(0x6064, 4)
+_VELOCITY: Final = drive_mode.DriveObject(0x606C, 4)
+_TORQUE: Final = drive_mode.DriveObject(0x6077, 2)
 READ: Final = (_STATUSWORD, _MODE_DISPLAY, _POSITION, _VELOCITY, _TORQUE)
 """In each period."""
 
-_HOMING_METHOD: Final = drive_state.DriveObject(0x6098, 1)
-_SUPPORTED: Final = drive_state.DriveObject(0x6502, 4, signed=False)
+_HOMING_METHOD: Final = drive_mode.DriveObject(0x6098, 1)
+_SUPPORTED: Final = drive_mode.DriveObject(0x6502, 4, signed=False)
 
 AXIS: Final = 0x800
 """From the objects of an axis to those of the next."""
@@ -197,7 +197,7 @@ class DriveDriver:
         self.statusword = self.controlword = self.mode = self.cycles = 0
         self.refusals: list[SdoAborted] = []
         self._missing: set[Key] = set()
-        self._chosen, self._mode = drive_state.ModeNumber.NONE, drive_state.DriveMode()
+        self._chosen, self._mode = drive_mode.ModeNumber.NONE, drive_mode.DriveMode()
         self._reset_fault = self._known = False
 
     @property
@@ -243,9 +243,9 @@ class DriveDriver:
         if self.state is not drive_state.DriveState.OPERATION_ENABLED:
             raise DriveFailed(f"{self.name}: no target in {self._where()}")
         channel = self._channel
-        if self._chosen in drive_state.POSITIONS:
+        if self._chosen in drive_mode.POSITIONS:
             target = target * channel.scale_pos_to_dev + channel.offset_pos_to_dev
-        elif self._chosen in drive_state.SPEEDS:
+        elif self._chosen in drive_mode.SPEEDS:
             target *= channel.scale_vel_to_dev
         self._mode.set_target(target)
 
@@ -287,10 +287,10 @@ class DriveDriver:
         await Until(lambda: self.cycles > 0, _SWITCH_US, f"{self.name}: the node has not booted")
         self.controlword, self._reset_fault = 0, True
         await self.switch_to(drive_state.DriveState.OPERATION_ENABLED)
-        if await self._supports(drive_state.ModeNumber.HOMING):
-            await self.choose(drive_state.ModeNumber.HOMING)
+        if await self._supports(drive_mode.ModeNumber.HOMING):
+            await self.choose(drive_mode.ModeNumber.HOMING)
             await self._home()
-            await self.choose(drive_state.ModeNumber.NONE)
+            await self.choose(drive_mode.ModeNumber.NONE)
 
     async def recover(self) -> None:
         """Reset a fault, and enable the drive again; the target is forgotten."""
@@ -300,7 +300,7 @@ class DriveDriver:
 
     async def shut_down(self) -> None:
         """Choose no mode, and take the voltage away."""
-        await self.choose(drive_state.ModeNumber.NONE)
+        await self.choose(drive_mode.ModeNumber.NONE)
         await self.switch_to(drive_state.DriveState.SWITCH_ON_DISABLED)
 
     def halt(self) -> None:
@@ -348,16 +348,16 @@ class DriveDriver:
             ValueError: there is no such mode.
             DriveFailed: the drive has not this mode, or does not show it in time.
         """
-        number = drive_state.ModeNumber.of(mode)
-        if number is drive_state.ModeNumber.NONE:
-            self._chosen, self._mode = number, drive_state.DriveMode()
+        number = drive_mode.ModeNumber.of(mode)
+        if number is drive_mode.ModeNumber.NONE:
+            self._chosen, self._mode = number, drive_mode.DriveMode()
             await self._exchange(self._write(_MODE, number))
             return
         if not await self._supports(number):
             raise DriveFailed(f"{self.name}: the drive has no mode {number} (6502h)")
-        chosen = drive_state.MODES[number]()
+        chosen = drive_mode.MODES[number]()
         chosen.begin()
-        self._chosen, self._mode = drive_state.ModeNumber.NONE, drive_state.DriveMode()
+        self._chosen, self._mode = drive_mode.ModeNumber.NONE, drive_mode.DriveMode()
         await self.switch_to(self._settings.switching_state)
         await self._exchange(self._write(_MODE, number))
         await Until(
@@ -368,7 +368,7 @@ class DriveDriver:
         self._chosen, self._mode = number, chosen
         await self.switch_to(drive_state.DriveState.OPERATION_ENABLED)
 
-    async def _supports(self, number: drive_state.ModeNumber) -> bool:
+    async def _supports(self, number: drive_mode.ModeNumber) -> bool:
         """Say whether 6502h has a mode."""
         modes = await self._exchange(self._read(_SUPPORTED))
         return bool(modes >> number - 1 & 1)
@@ -376,7 +376,7 @@ class DriveDriver:
     async def _home(self) -> None:
         """Home, unless the method is 0."""
         method = await self._exchange(self._read(_HOMING_METHOD))
-        if method and isinstance(self._mode, drive_state.HomingMode):
+        if method and isinstance(self._mode, drive_mode.HomingMode):
             await home(self.name, self._mode, self._settings.homing_us, self._catch_up)
 
     async def _catch_up(self) -> None:
@@ -412,13 +412,13 @@ class DriveDriver:
             raise DriveFailed(f"{self.name}: {ended[0]}") from ended[0]
         return ended[0]
 
-    def _key(self, item: drive_state.DriveObject) -> Key:
+    def _key(self, item: drive_mode.DriveObject) -> Key:
         return item.index + AXIS * self._settings.axis, item.sub
 
-    def _value(self, item: drive_state.DriveObject) -> int:
+    def _value(self, item: drive_mode.DriveObject) -> int:
         return item.value_of(self._image.read(self._key(item)))
 
-    def _read(self, item: drive_state.DriveObject) -> Script[int]:
+    def _read(self, item: drive_mode.DriveObject) -> Script[int]:
         """Read an object by SDO, unless a TPDO carries it or the drive has it not."""
         key = self._key(item)
         if not self._image.receives(key) and key not in self._missing:
@@ -430,7 +430,7 @@ class DriveDriver:
                 self._image.learn(key, int.from_bytes(data[: item.size], "little"))
         return self._value(item)
 
-    def _write(self, item: drive_state.DriveObject, value: int) -> Script[None]:
+    def _write(self, item: drive_mode.DriveObject, value: int) -> Script[None]:
         """Write an object by RPDO, by SDO where none carries it."""
         key, bits = self._key(item), item.bits_of(value)
         if self._image.sends(key):

@@ -7,19 +7,16 @@ from pathlib import Path
 from typing import Any, Final
 
 from tickrig.host.cli.messages import Refused, refuse_path
+from tickrig.host.rtc.canopen.builder.c_header import write_header
 from tickrig.host.rtc.canopen.builder.profile_file import (
     Project,
     check_identifiers,
     parse_project,
     snake_name,
 )
-from tickrig.host.rtc.canopen.builder.source_files import (
-    SKELETON_SUFFIX,
-    write_header,
-    write_skeleton,
-)
+from tickrig.host.rtc.canopen.builder.skeleton import SKELETON_SUFFIX, write_skeleton
 from tickrig.host.rtc.canopen.definition import NodeEntry, SdoPortEntry, SystemDefinition
-from tickrig.host.rtc.canopen.definition_file import write_definition
+from tickrig.host.rtc.canopen.definition_writer import write_definition
 from tickrig.host.text.whole_file import write_whole
 from tickrig.wire import rtc_canopen
 from tickrig.wire.canopen.eds.eds_value import format_value

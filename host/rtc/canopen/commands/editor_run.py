@@ -11,7 +11,8 @@ from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.messages import BusFailed, Refused
 from tickrig.host.links.link import LinkClosed
 from tickrig.host.rtc.canopen.commands import opening
-from tickrig.host.rtc.canopen.editor.app import EditorSession, SystemEditor
+from tickrig.host.rtc.canopen.editor.app import SystemEditor
+from tickrig.host.rtc.canopen.editor.session import EditorSession
 from tickrig.wire.can import ErrorState
 
 

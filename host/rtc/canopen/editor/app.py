@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import sys
-import threading
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
 from itertools import chain, repeat
 from pathlib import Path
 from textwrap import wrap
@@ -16,137 +14,16 @@ from textual.binding import Binding, BindingType
 from textual.containers import Container
 
 from tickrig.host.canmon.model.decode.decoded import write_entry
-from tickrig.host.links.link import StampedLink
 from tickrig.host.rtc.canopen.definition import ServerRefused
-from tickrig.host.rtc.canopen.definition_file import save_definition
-from tickrig.host.rtc.canopen.editor.panes import (
-    Item,
-    ObjectsPane,
-    SystemPane,
-    connect,
-    link,
-    remove,
-)
+from tickrig.host.rtc.canopen.editor.objects_pane import ObjectsPane
+from tickrig.host.rtc.canopen.editor.session import EditorSession
+from tickrig.host.rtc.canopen.editor.system_pane import Item, SystemPane, connect, link, remove
 from tickrig.host.rtc.canopen.editor.widgets import CursorView, QuestionScreen
-from tickrig.host.rtc.canopen.events import EventListener, ServerEvent, ServerEventType
-from tickrig.host.rtc.canopen.serve import open_server
+from tickrig.host.rtc.canopen.events import ServerEvent, ServerEventType
 from tickrig.host.rtc.canopen.served_node import NodePhase
-from tickrig.host.rtc.canopen.server import RtcCanopenServer
 from tickrig.host.rtc.canopen.view import NodeView, ServerView
 from tickrig.host.rtc.states import RtcRefused
 from tickrig.host.tui import FramedApp, KeyFooter, Line, LineView
-from tickrig.wire.can import ErrorState, Frames
-
-# A server that runs in a thread while somebody looks at it.
-_LONGEST_US: Final = 10_000
-"""So soon is done what was asked for."""
-
-AddComponents = Callable[[RtcCanopenServer], None]
-"""Puts components of others beside the proxies."""
-
-
-class EditorSession:
-    """Runs the server of a System Definition; another definition is another server.
-
-    Whoever looks at it or commands it holds `lock`.
-
-    Args:
-        server: the server.
-        path: its System Definition.
-        link: the bus.
-        add_components: puts more components into each server that is loaded.
-        listeners: called with the events of each server.
-
-    Attributes:
-        lock: of the server.
-        path: where the System Definition was read or saved last.
-        server: the server.
-    """
-
-    def __init__(
-        self,
-        server: RtcCanopenServer,
-        path: Path,
-        link: StampedLink,
-        add_components: AddComponents = lambda server: None,
-        listeners: tuple[EventListener, ...] = (),
-    ) -> None:
-        self.lock, self.path, self._folder = threading.RLock(), path, path.parent
-        self._link, self._add_components, self._listeners = link, add_components, listeners
-        self._leaving: Frames = ()
-        self._stop, self._pool = threading.Event(), ThreadPoolExecutor(1, "server")
-        self._thread: Future[None] | None = None
-        self.server = server
-        server.log.listeners += listeners
-
-    @property
-    def view(self) -> ServerView:
-        """Looks at the server, and commands it."""
-        return ServerView(self.server)
-
-    @property
-    def ended(self) -> bool:
-        """Whether something ended the thread."""
-        return self._thread is not None and self._thread.done()
-
-    @property
-    def eds_paths(self) -> dict[int, Path]:
-        """The EDS of each node, by node-ID."""
-        nodes = self.server.definition.nodes
-        return {node.id: self._folder / node.eds for node in nodes}
-
-    def load(self, path: Path) -> None:
-        """Serve another definition; the nodes of this one are left first.
-
-        Raises:
-            DefinitionError: it or an EDS cannot be used.
-            OSError: it cannot be read.
-        """
-        server = open_server(path)
-        self._add_components(server)
-        server.log.listeners += self._listeners
-        with self.lock:
-            self._leaving += self.server.stop(self.server.now_us)
-            self.server, self.path, self._folder = server, path, path.parent
-
-    def save(self, path: Path) -> None:
-        """Save the definition with connections and links as they are now; OSError if it cannot."""
-        with self.lock:
-            definition = self.view.definition()
-        save_definition(definition, self._folder, path)
-        self.path = path
-
-    def bus_state(self, state: ErrorState, /) -> None:
-        """Tell the server what its CAN controller reports."""
-        self.server.bus_state(state)
-
-    def turn(self, until_us: int) -> None:
-        """Wait for what is heard or due, not beyond a time, and let the server do it."""
-        link = self._link
-        due_us = min(self.server.due_us, until_us)
-        now_us, received = link.receive_stamped(max(0, due_us - link.now_us))
-        with self.lock:
-            sent = (*self._leaving, *self.server.tick(now_us, received))
-            self._leaving = ()
-        if sent:
-            link.send(sent)
-
-    def start(self) -> None:
-        """Begin to work, in a thread."""
-        self._thread = self._pool.submit(self._run)
-
-    def close(self) -> None:
-        """End the thread, and leave the nodes; LinkClosed if the bus is gone."""
-        self._stop.set()
-        self._pool.shutdown()
-        if self._thread is not None:
-            self._thread.result()
-        self._link.send((*self._leaving, *self.server.stop(self._link.now_us)))
-
-    def _run(self) -> None:
-        while not self._stop.is_set():
-            self.turn(self._link.now_us + _LONGEST_US)
-
 
 # The line at the bottom, and lines of events.
 

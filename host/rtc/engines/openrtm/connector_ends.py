@@ -19,7 +19,8 @@ from tickrig.host.rtc.ports.data_port import DataPort, InPort, OutPort
 from tickrig.host.rtc.ports.port import ConnectorBase, InterfaceProfile
 from tickrig.host.rtc.ports.service_port import Consumer, Provider, ServicePort
 from tickrig.host.rtc.states import PortStatus, RtcRefused
-from tickrig.host.rtc.system.call_queue import CallQueue, PeerThread, PeerThreads
+from tickrig.host.rtc.system.call_queue import CallQueue
+from tickrig.host.rtc.system.peer_thread import PeerThread, PeerThreads
 from tickrig.host.text.log import log_of
 from tickrig.wire.rtc_types.cdr import Endian
 

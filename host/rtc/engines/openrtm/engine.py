@@ -6,11 +6,11 @@
 # kinds of threads meet, and one rule keeps them apart: components, ports and the manager belong to
 # the manager's thread alone.
 #
-#   threads of the ORB    run the servants (servants.py,
+#   threads of the ORB    run the servants (manager, rt_object, context, configuration,
 #                         port_service). A servant does its work by `calls.call(...)`: the manager's
 #                         thread carries it out between two ticks. What takes too long is TIMEOUT.
 #   the manager's thread  ticks, and serves those calls while it waits. It never calls a peer.
-#   threads for peers     make all calls into peers (system/call_queue.py): `submit` returns at
+#   threads for peers     make all calls into peers (system/peer_thread.py): `submit` returns at
 #                         once. A peer that hangs holds up itself, for the 1 s of a CORBA call.
 #
 # The exception is connecting: `notify_connect` is a call that goes from port to port and comes back
@@ -39,11 +39,12 @@ from dataclasses import dataclass
 
 from tickrig.host.cli.engine_options import OpenRtmOptions, format_name
 from tickrig.host.rtc.component import ExecutionContext, ModuleSpec, RtComponent
-from tickrig.host.rtc.engines.openrtm import servants
-from tickrig.host.rtc.engines.openrtm.orb import NameServer, Orb
+from tickrig.host.rtc.engines.openrtm import configuration, context, manager, rt_object
+from tickrig.host.rtc.engines.openrtm.context import AttachedContexts, ServantReferences
+from tickrig.host.rtc.engines.openrtm.names import NameServer
+from tickrig.host.rtc.engines.openrtm.orb import Orb
 from tickrig.host.rtc.engines.openrtm.peers import Peers, refuse_wrong_paths
 from tickrig.host.rtc.engines.openrtm.port_service import ComponentPorts, SystemPorts
-from tickrig.host.rtc.engines.openrtm.servants import AttachedContexts, ServantReferences
 from tickrig.host.rtc.engines.openrtm.stubs import stubs
 from tickrig.host.rtc.system.call_queue import CallQueue
 from tickrig.host.rtc.system.manager import Manager
@@ -51,7 +52,7 @@ from tickrig.host.rtc.system.manager import Manager
 
 @dataclass(slots=True)
 class _Served:
-    servant: servants.RtObjectServant
+    servant: rt_object.RtObjectServant
     contexts: list[ExecutionContext]
     path: str
 
@@ -90,10 +91,10 @@ class _OpenRtmEngine:
         self._references = ServantReferences(self._orb, idl, calls, fixed=fixed)
         self._ports = SystemPorts(self._orb, calls, rtcs)
         self._names = NameServer(self._orb, options.name_server)
-        servant = servants.ManagerServant(rtcs, self._references, stop)
-        reference = self._orb.serve_as(servants.NAME, idl.skeleton(servants.MANAGER_IDL), servant)
-        context, _, _ = self._path(servants.NAME, servants.SPEC).rpartition("/")
-        self._names.bind(f"{context}/{servants.NAME}.mgr".lstrip("/"), reference)
+        servant = manager.ManagerServant(rtcs, self._references, stop)
+        reference = self._orb.serve_as(manager.NAME, idl.skeleton(manager.INTERFACE), servant)
+        context, _, _ = self._path(manager.NAME, manager.SPEC).rpartition("/")
+        self._names.bind(f"{context}/{manager.NAME}.mgr".lstrip("/"), reference)
         for component in rtcs.components:
             self._add(component)
         rtcs.on_added.append(self._add)
@@ -112,15 +113,15 @@ class _OpenRtmEngine:
 
     def _add(self, component: RtComponent) -> None:
         references = self._references
-        servant = servants.RtObjectServant(component, self._rtcs, references)
+        servant = rt_object.RtObjectServant(component, self._rtcs, references)
         contexts = AttachedContexts(component, self._rtcs, references)
-        answers = servants.ConfigurationServant(
+        answers = configuration.ConfigurationServant(
             component.configuration, self._calls, references.stubs
         )
         servant.configuration = self._orb.serve(
-            references.stubs.skeleton(servants.CONFIGURATION_IDL), answers
+            references.stubs.skeleton(configuration.INTERFACE), answers
         )
-        reference = references.enter(component, servants.COMPONENT_IDL, servant, contexts)
+        reference = references.enter(component, rt_object.INTERFACE, servant, contexts)
         servant.ports = ComponentPorts(self._ports, component, reference)
         for one in component.contexts:
             self._add_context(one, component)
@@ -132,8 +133,8 @@ class _OpenRtmEngine:
     def _add_context(self, one: ExecutionContext, component: RtComponent) -> None:
         if self._references.of(one) is None:
             owner = component if one in component.own_contexts else None
-            servant = servants.ExecutionContextServant(one, owner, self._references)
-            self._references.enter(one, servants.CONTEXT_IDL, servant)
+            servant = context.ExecutionContextServant(one, owner, self._references)
+            self._references.enter(one, context.INTERFACE, servant)
 
     def _remove(self, component: RtComponent) -> None:
         served = self._served.pop(component)
@@ -155,7 +156,7 @@ class _OpenRtmEngine:
             "V": spec.vendor,
             "c": spec.category,
             "h": socket.gethostname(),
-            "M": servants.NAME,
+            "M": manager.NAME,
             "p": str(os.getpid()),
         }
         return format_name(self._options.names, values)

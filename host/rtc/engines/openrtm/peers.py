@@ -10,14 +10,15 @@ from omniORB import CORBA
 
 from tickrig.host.cli.engine_options import Endpoint, parse_endpoint
 from tickrig.host.rtc.engines.openrtm.connector_ends import CORBA_CDR, DATA_TYPE, INTERFACE
-from tickrig.host.rtc.engines.openrtm.orb import Orb, Reference, carried, explain, name_of, nvlist
+from tickrig.host.rtc.engines.openrtm.names import name_of
+from tickrig.host.rtc.engines.openrtm.orb import Orb, Reference, carried, explain, nvlist
 from tickrig.host.rtc.engines.openrtm.port_service import SystemPorts
 from tickrig.host.rtc.engines.openrtm.stubs import stubs
 from tickrig.host.rtc.ports.data_port import DataPort
 from tickrig.host.rtc.ports.port import AnyPort
 from tickrig.host.rtc.states import RtcRefused
-from tickrig.host.rtc.system.call_queue import PeerThread
 from tickrig.host.rtc.system.manager import Manager, RemoteConnection
+from tickrig.host.rtc.system.peer_thread import PeerThread
 from tickrig.host.text.log import log_of
 
 _LOOK_US: Final = 1_000_000

@@ -20,8 +20,9 @@ from tickrig.host.rtc.ports.data_port import DataPort, InPort, OutPort
 from tickrig.host.rtc.ports.port import AnyPort, ConnectorBase, ConnectorProfile
 from tickrig.host.rtc.ports.service_port import ServicePort
 from tickrig.host.rtc.states import ReturnCode, RtcRefused
-from tickrig.host.rtc.system.call_queue import Arrivals, CallQueue, PeerThreads
+from tickrig.host.rtc.system.call_queue import Arrivals, CallQueue
 from tickrig.host.rtc.system.manager import Manager
+from tickrig.host.rtc.system.peer_thread import PeerThreads
 from tickrig.host.text.log import log_of
 
 # The connectors of a port of ours with ports of peers; all this is in the manager's thread.

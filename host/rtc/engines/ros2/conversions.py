@@ -3,292 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from math import atan2, cos, inf, pi, sin, tau
 from typing import Any, Final
 
+from tickrig.host.rtc.engines.ros2 import robot_messages as robot
 from tickrig.host.rtc.engines.ros2.message_types import Stamps, message_type
+from tickrig.host.rtc.engines.ros2.topic_entry import TopicEntry
 from tickrig.wire.rtc_types import iis, rtc
 from tickrig.wire.rtc_types.idl import Struct
-from tickrig.wire.rtc_types.rtc import ActArrayState, Point2D, Pose2D, RangeData, Time, Velocity2D
-
-# Poses, velocities, joints and ranges as messages of ROS 2, and back.
-# What joins a port with a topic, as a line of the table says.
-_STOP_AFTER_US: Final = 500_000
-"""Silence after which a velocity is taken back, if the table does not say otherwise."""
-
-_VELOCITIES: Final = ("geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped")
-PLACED: Final = ("nav_msgs/msg/Odometry", "tf2_msgs/msg/TFMessage")
-FRAMES: Final = {
-    **dict.fromkeys(PLACED, "odom"),
-    "geometry_msgs/msg/PoseStamped": "odom",
-    "geometry_msgs/msg/TwistStamped": "base_link",
-    "sensor_msgs/msg/JointState": "",
-    "sensor_msgs/msg/LaserScan": "laser",
-}
-"""`frame_id` of messages that have one, where the table names none."""
-
-
-@dataclass(frozen=True, slots=True)
-class TopicEntry:
-    """A port and its topic.
-
-    Attributes:
-        port: full name, such as `Odometry.OdometryPosition`.
-        topic: without the first slash, such as `odom`.
-        type: the message, such as `nav_msgs/msg/Odometry`.
-        frame: `frame_id` of the header.
-        child_frame: whose pose it is.
-        joints: names of the joints, in the order of the values.
-        stop_after_us: so long after the last message the port gets a zero, such as standstill;
-            never with 0.
-        reliable: whether messages are sent again until they arrive.
-        place: file and line, for people; empty for what stands in no file.
-    """
-
-    port: str
-    topic: str
-    type: str
-    frame: str = ""
-    child_frame: str = ""
-    joints: tuple[str, ...] = ()
-    stop_after_us: int = 0
-    reliable: bool = True
-    place: str = ""
-
-    def __str__(self) -> str:
-        """Return how people call it."""
-        return f"{self.place}: {self.port}" if self.place else self.port
-
-
-def usual_entry(port: str, topic: str, kind: str) -> TopicEntry:
-    """Return an entry with the frames and the stop that hold where nobody names others."""
-    stop_after_us = _STOP_AFTER_US * (kind in _VELOCITIES)
-    child_frame = "base_link" if kind in PLACED else ""
-    frame = FRAMES.get(kind, "")
-    return TopicEntry(port, topic, kind, frame, child_frame, stop_after_us=stop_after_us)
-
-
-@dataclass(frozen=True, slots=True)
-class TopicTable:
-    """Which ports have topics.
-
-    Attributes:
-        entries: for each port of each topic one; None has every port that a message fits joined
-            with a topic of its name.
-        diagnostics: topic for the states of the components, empty for none.
-        period_us: how often these are told.
-    """
-
-    entries: tuple[TopicEntry, ...] | None = None
-    diagnostics: str = "diagnostics"
-    period_us: int = 1_000_000
-
-
-_UNKNOWN: Final = [0.0] * 36
-"""A covariance that nobody knows."""
-
-_STRAIGHT: Final = 1e-9
-"""A turn that is none, rad."""
-
-
-def odometry_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
-    """Return what makes an Odometry of poses; the velocity is that since the pose before."""
-    make, speed = _odometry(entry, stamps), _Speed()
-
-    def convert(value: Any) -> Any:
-        forward, turn = speed.since(value.tm, value.data)
-        return make(value.tm, value.data, forward, 0.0, turn)
-
-    return convert
-
-
-def pose_vel_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
-    """Return what makes an Odometry of poses with their velocities."""
-    make = _odometry(entry, stamps)
-
-    def convert(value: Any) -> Any:
-        speeds = value.data.velocities
-        return make(value.tm, value.data.pose, speeds.vx, speeds.vy, speeds.va)
-
-    return convert
-
-
-def transform_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
-    """Return what makes a TFMessage with one transform of poses."""
-    header, vector, turned = _header(entry, stamps), _vector(), _turned()
-    stamped = message_type("geometry_msgs/msg/TransformStamped")
-    transform, message = message_type("geometry_msgs/msg/Transform"), message_type(entry.type)
-
-    def convert(value: Any) -> Any:
-        place = value.data.position
-        moved = transform(vector(place.x, place.y, 0.0), turned(value.data.heading))
-        return message([stamped(header(value.tm), entry.child_frame, moved)])
-
-    return convert
-
-
-def pose_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
-    """Return what makes a PoseStamped of poses."""
-    header, pose, message = _header(entry, stamps), _pose(), message_type(entry.type)
-    return lambda value: message(header(value.tm), pose(value.data))
-
-
-def pose_in(data_type: Any) -> Callable[[TopicEntry, Stamps], Callable[[Any], Any]]:
-    """Return what makes poses of PoseStamped; whatever tilts them is left out."""
-
-    def maker(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
-        def convert(message: Any) -> Any:
-            stamp, pose = message.header.stamp, message.pose
-            place, q = pose.position, pose.orientation
-            heading = atan2(2 * (q.w * q.z + q.x * q.y), 1 - 2 * (q.y * q.y + q.z * q.z))
-            tm = stamps.to_system(stamp.sec, stamp.nanosec)
-            return data_type(tm, data=Pose2D(Point2D(place.x, place.y), heading))
-
-        return convert
-
-    return maker
-
-
-def twist_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
-    """Return what makes a Twist of velocities in the plane."""
-    twist = _twist()
-    return lambda value: twist(value.data.vx, value.data.vy, value.data.va)
-
-
-def twist_stamped_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
-    """Return what makes a TwistStamped of velocities in the plane."""
-    header, twist, message = _header(entry, stamps), _twist(), message_type(entry.type)
-
-    def convert(value: Any) -> Any:
-        speeds = value.data
-        return message(header(value.tm), twist(speeds.vx, speeds.vy, speeds.va))
-
-    return convert
-
-
-def twist_in(data_type: Any) -> Callable[[TopicEntry, Stamps], Callable[[Any], Any]]:
-    """Return what makes velocities in the plane of Twist or TwistStamped."""
-
-    def maker(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
-        stamped = entry.type.endswith("Stamped")
-
-        def convert(message: Any) -> Any:
-            twist = message.twist if stamped else message
-            speeds = Velocity2D(twist.linear.x, twist.linear.y, twist.angular.z)
-            return data_type(stamps.to_system(), data=speeds)
-
-        return convert
-
-    return maker
-
-
-def joints_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
-    """Return what makes a JointState of positions."""
-    header, message = _header(entry, stamps), message_type(entry.type)
-
-    def convert(value: Any) -> Any:
-        data = value.data
-        positions = list(data) if isinstance(data, tuple) else [data]
-        return message(header(value.tm), _named(entry, positions), positions, [], [])
-
-    return convert
-
-
-def actuators_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
-    """Return what makes a JointState of the state of actuators."""
-    header, message = _header(entry, stamps), message_type(entry.type)
-
-    def convert(value: Any) -> Any:
-        positions = [each.position for each in value.actuators]
-        speeds = [each.speed for each in value.actuators]
-        return message(header(value.tm), _named(entry, positions), positions, speeds, [])
-
-    return convert
-
-
-def scan_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:
-    """Return what makes a LaserScan; where there was no distance it is infinite (REP 117)."""
-    header, message = _header(entry, stamps), message_type(entry.type)
-
-    def convert(value: RangeData) -> Any:
-        config, ranges = value.config, [range_m or inf for range_m in value.ranges]
-        turn_s = 1 / config.frequency if config.frequency > 0 else 0.0
-        low, step = config.minAngle, config.angularRes
-        high = low + step * max(0, len(ranges) - 1)
-        times = (turn_s * step / tau, turn_s)
-        limits = (config.minRange, config.maxRange)
-        return message(header(value.tm), low, high, step, *times, *limits, ranges, [])
-
-    return convert
-
-
-class _Speed:
-    """The velocity between poses, on an arc that begins and ends along their headings."""
-
-    def __init__(self) -> None:
-        self._before: tuple[Time, Pose2D] | None = None
-
-    def since(self, tm: Time, pose: Pose2D) -> tuple[float, float]:
-        """Return m/s ahead and rad/s since the pose before; 0 for the first one."""
-        before, self._before = self._before, (tm, pose)
-        if before is None or (past_us := tm.us - before[0].us) <= 0:
-            return 0.0, 0.0
-        start, turn = before[1], (pose.heading - before[1].heading + pi) % tau - pi
-        middle, half = start.heading + turn / 2, turn / 2
-        east, north = pose.position.x - start.position.x, pose.position.y - start.position.y
-        chord = east * cos(middle) + north * sin(middle)
-        way = chord * half / sin(half) if abs(half) > _STRAIGHT else chord
-        return 1e6 * way / past_us, 1e6 * turn / past_us
-
-
-def _named(entry: TopicEntry, positions: list[float]) -> list[str]:
-    """Return the names of joints; ValueError if the table has not as many."""
-    names = list(entry.joints) or [f"joint{n}" for n in range(len(positions))]
-    if len(names) != len(positions):
-        raise ValueError(f"{len(positions)} joints, and {len(names)} names: {', '.join(names)}")
-    return names
-
-
-def _header(entry: TopicEntry, stamps: Stamps) -> Callable[[Time], Any]:
-    header, stamp = message_type("std_msgs/msg/Header"), message_type("builtin_interfaces/msg/Time")
-    return lambda tm: header(stamp(*stamps.to_ros(tm)), entry.frame)
-
-
-def _vector() -> Any:
-    return message_type("geometry_msgs/msg/Vector3")
-
-
-def _turned() -> Callable[[float], Any]:
-    quaternion = message_type("geometry_msgs/msg/Quaternion")
-    return lambda heading: quaternion(0.0, 0.0, sin(heading / 2), cos(heading / 2))
-
-
-def _pose() -> Callable[[Pose2D], Any]:
-    pose, point = message_type("geometry_msgs/msg/Pose"), message_type("geometry_msgs/msg/Point")
-    turned = _turned()
-    return lambda data: pose(point(data.position.x, data.position.y, 0.0), turned(data.heading))
-
-
-def _twist() -> Callable[[float, float, float], Any]:
-    twist, vector = message_type("geometry_msgs/msg/Twist"), _vector()
-    return lambda ahead, left, turn: twist(vector(ahead, left, 0.0), vector(0.0, 0.0, turn))
-
-
-def _odometry(entry: TopicEntry, stamps: Stamps) -> Callable[..., Any]:
-    header, pose, twist = _header(entry, stamps), _pose(), _twist()
-    placed = message_type("geometry_msgs/msg/PoseWithCovariance")
-    moving, message = (
-        message_type("geometry_msgs/msg/TwistWithCovariance"),
-        message_type(entry.type),
-    )
-
-    def make(tm: Time, data: Pose2D, ahead: float, left: float, turn: float) -> Any:
-        speeds = moving(twist(ahead, left, turn), _UNKNOWN)
-        return message(header(tm), entry.child_frame, placed(pose(data), _UNKNOWN), speeds)
-
-    return make
-
+from tickrig.wire.rtc_types.rtc import ActArrayState, RangeData
 
 _Conversion = Callable[[Any], Any]
 _Maker = Callable[[TopicEntry, Stamps], _Conversion]
@@ -362,23 +84,23 @@ def _std() -> tuple[dict[tuple[str, type[Struct]], _Maker], ...]:
 _STD_OUT, _STD_IN = _std()
 
 OUT: Final[Mapping[tuple[str, type[Struct]], _Maker]] = {
-    **{("nav_msgs/msg/Odometry", kind): odometry_out for kind in _POSES},
-    ("nav_msgs/msg/Odometry", rtc.TimedPoseVel2D): pose_vel_out,
-    **{("tf2_msgs/msg/TFMessage", kind): transform_out for kind in _POSES},
-    **{("geometry_msgs/msg/PoseStamped", kind): pose_out for kind in _POSES},
-    **{("geometry_msgs/msg/Twist", kind): twist_out for kind in _SPEEDS},
-    **{("geometry_msgs/msg/TwistStamped", kind): twist_stamped_out for kind in _SPEEDS},
-    **{("sensor_msgs/msg/JointState", kind): joints_out for kind in _ANGLES},
-    ("sensor_msgs/msg/JointState", ActArrayState): actuators_out,
-    ("sensor_msgs/msg/LaserScan", RangeData): scan_out,
+    **{("nav_msgs/msg/Odometry", kind): robot.odometry_out for kind in _POSES},
+    ("nav_msgs/msg/Odometry", rtc.TimedPoseVel2D): robot.pose_vel_out,
+    **{("tf2_msgs/msg/TFMessage", kind): robot.transform_out for kind in _POSES},
+    **{("geometry_msgs/msg/PoseStamped", kind): robot.pose_out for kind in _POSES},
+    **{("geometry_msgs/msg/Twist", kind): robot.twist_out for kind in _SPEEDS},
+    **{("geometry_msgs/msg/TwistStamped", kind): robot.twist_stamped_out for kind in _SPEEDS},
+    **{("sensor_msgs/msg/JointState", kind): robot.joints_out for kind in _ANGLES},
+    ("sensor_msgs/msg/JointState", ActArrayState): robot.actuators_out,
+    ("sensor_msgs/msg/LaserScan", RangeData): robot.scan_out,
     **_STD_OUT,
 }
 """Of an OutPort; the first message that fits a type is the usual one."""
 
 IN: Final[Mapping[tuple[str, type[Struct]], _Maker]] = {
-    **{("geometry_msgs/msg/Twist", kind): twist_in(kind) for kind in _SPEEDS},
-    **{("geometry_msgs/msg/TwistStamped", kind): twist_in(kind) for kind in _SPEEDS},
-    **{("geometry_msgs/msg/PoseStamped", kind): pose_in(kind) for kind in _POSES},
+    **{("geometry_msgs/msg/Twist", kind): robot.twist_in(kind) for kind in _SPEEDS},
+    **{("geometry_msgs/msg/TwistStamped", kind): robot.twist_in(kind) for kind in _SPEEDS},
+    **{("geometry_msgs/msg/PoseStamped", kind): robot.pose_in(kind) for kind in _POSES},
     **_STD_IN,
 }
 """Of an InPort."""

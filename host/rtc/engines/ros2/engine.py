@@ -12,14 +12,16 @@ from tickrig.host.cli.engine_options import Ros2Options
 from tickrig.host.rtc.component import RtComponent
 from tickrig.host.rtc.engines import peer_ports
 from tickrig.host.rtc.engines.ros2 import participant
-from tickrig.host.rtc.engines.ros2.conversions import IN, OUT, TopicEntry, TopicTable, usual_entry
+from tickrig.host.rtc.engines.ros2.conversions import IN, OUT
 from tickrig.host.rtc.engines.ros2.message_types import Stamps, message_type
-from tickrig.host.rtc.engines.ros2.participant import TopicReader, TopicWriter
 from tickrig.host.rtc.engines.ros2.table_reader import parse_table
+from tickrig.host.rtc.engines.ros2.topic_entry import TopicEntry, TopicTable, usual_entry
+from tickrig.host.rtc.engines.ros2.topics import TopicReader, TopicWriter
 from tickrig.host.rtc.ports.data_port import InPort, OutPort
 from tickrig.host.rtc.states import LifeCycleState, RtcRefused
-from tickrig.host.rtc.system.call_queue import CallQueue, PeerThread
+from tickrig.host.rtc.system.call_queue import CallQueue
 from tickrig.host.rtc.system.manager import Manager
+from tickrig.host.rtc.system.peer_thread import PeerThread
 from tickrig.host.text.log import log_of
 from tickrig.wire.rtc_types.rtc import Time
 

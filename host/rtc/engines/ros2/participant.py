@@ -8,9 +8,7 @@ import socket
 import sys
 import threading
 import time
-from collections.abc import Callable, Mapping
-from functools import partial
-from math import isfinite
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final, Protocol
 
@@ -21,16 +19,14 @@ from cyclonedds.builtin import (
 )
 from cyclonedds.core import DDSException, InstanceState, Listener
 from cyclonedds.domain import Domain, DomainParticipant
-from cyclonedds.internal import InvalidSample, load_cyclonedds
+from cyclonedds.internal import load_cyclonedds
 from cyclonedds.pub import DataWriter
 from cyclonedds.qos import Policy, Qos
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 
-from tickrig.host.rtc.engines.ros2.conversions import TopicEntry
 from tickrig.host.rtc.engines.ros2.message_types import dds_name, message_type, ros_name
-from tickrig.host.rtc.states import PortStatus
-from tickrig.host.rtc.system.call_queue import PeerThread
+from tickrig.host.rtc.engines.ros2.topic_entry import TopicEntry
 from tickrig.host.text.log import log_of
 
 # What Cyclone DDS has to say: it would write a line to standard error for each message.
@@ -323,199 +319,3 @@ def _refused_policy(qos: Any, *, reads: bool) -> str:  # noqa: PLR0911 - a table
 
 def _is_reliable(qos: Any) -> bool:
     return any(isinstance(policy, Policy.Reliability.Reliable) for policy in qos)
-
-
-# What reads the messages of one topic for its port, in the thread of the engine.
-
-# What writes the messages of one port to its topic, in the thread of the engine.
-
-_WRITER_LOG: Final = log_of(__name__)
-
-
-class TopicWriter:
-    """Writes to a topic; it is opened with the first message, or by `open`.
-
-    All of it is called in one thread.
-
-    Args:
-        participant: takes part in the domain.
-        entry: port and topic.
-
-    Attributes:
-        entry: as given.
-    """
-
-    def __init__(self, participant: DdsParticipant, entry: TopicEntry) -> None:
-        self._participant, self.entry = participant, entry
-        self._writer: Any = None
-        self._failed = self._closed = False
-
-    def open(self) -> None:
-        """Be there for peers; what cannot be is logged in a line."""
-        try:
-            if not (self._failed or self._closed):
-                self._writer = self._participant.writer(self.entry)
-        except DDSException as error:
-            self._failed = True
-            _WRITER_LOG.warning(
-                "%s: no topic %s: %s", self.entry, self.entry.topic, reason_of(error)
-            )
-
-    def put(self, message: Any) -> PortStatus:
-        """Write a message; nothing waits for those who read it.
-
-        Returns:
-            INVALID_ARGS if a number of it does not fit, BUFFER_TIMEOUT if too much waits for
-            readers already, PORT_ERROR if the topic cannot be.
-        """
-        if self._writer is None:
-            self.open()
-        if self._writer is None:
-            return PortStatus.PORT_ERROR
-        try:
-            self._writer.write(message)
-        except DDSException as error:
-            late = error.code == DDSException.DDS_RETCODE_TIMEOUT
-            return PortStatus.BUFFER_TIMEOUT if late else PortStatus.PORT_ERROR
-        except Exception as error:  # whatever its encoder says of a value
-            if not self._failed:
-                _WRITER_LOG.warning("%s: no %s: %s", self.entry, self.entry.type, error)
-            self._failed = True
-            return PortStatus.INVALID_ARGS
-        return PortStatus.PORT_OK
-
-    def matched(self) -> list[int]:
-        """Return the instance handles of the peers that it is joined with, in any thread."""
-        writer = self._writer
-        return [] if writer is None else list(writer.get_matched_subscriptions())
-
-    def close(self) -> None:
-        """Be gone."""
-        self._writer, self._closed = None, True
-
-
-_SMALLEST: Final = 1.2e-38
-"""Below it a float32 is denormal; nothing on a robot is so small."""
-
-
-class _Arrivals(Listener):
-    """Tells that something came; DDS calls it in a thread of its own, where nothing is done."""
-
-    def __init__(self, notify: Callable[[], None]) -> None:
-        self._notify = notify
-        super().__init__()  # type: ignore[no-untyped-call] # untyped there
-
-    def on_data_available(self, reader: Any) -> None:
-        self._notify()
-
-
-class TopicReader:
-    """Reads a topic, and hands on what comes.
-
-    All but the constructor is called in the thread.
-
-    Args:
-        participant: takes part in the domain.
-        entry: port and topic.
-        thread: reads.
-        put: takes each message, and None where they have stopped for too long.
-
-    Attributes:
-        entry: as given.
-    """
-
-    def __init__(
-        self,
-        participant: DdsParticipant,
-        entry: TopicEntry,
-        thread: PeerThread,
-        put: Callable[[Any], object],
-    ) -> None:
-        self._participant, self.entry, self._thread = participant, entry, thread
-        self._put = put
-        self._reader: Any = None
-        self._closed = self._spoilt = self._odd = self._watched = False
-        self._heard_s, self._stop_s = 0.0, entry.stop_after_us / 1e6
-
-    def open(self) -> None:
-        """Be there for peers; what cannot be is logged in a line."""
-        try:
-            if not self._closed:
-                self._reader = self._participant.reader(
-                    self.entry, _Arrivals(partial(self._thread.submit, self._take))
-                )
-        except DDSException as error:
-            _LOG.warning("%s: no topic %s: %s", self.entry, self.entry.topic, reason_of(error))
-
-    def matched(self) -> list[int]:
-        """Return the instance handles of the peers that it is joined with, in any thread."""
-        reader = self._reader
-        return [] if reader is None else list(reader.get_matched_publications())
-
-    def close(self) -> None:
-        """Be gone."""
-        self._reader, self._closed = None, True
-
-    def _take(self) -> float | None:
-        """Take what has come, one by one: a message that is none costs no other."""
-        for _ in range(HISTORY):
-            if self._reader is None or (found := self._take_one(self._reader)) is None:
-                return None
-            for message in found:
-                if not isinstance(message, InvalidSample):  # nothing but that somebody is gone
-                    self._hand_on(message)
-        return 0
-
-    def _take_one(self, reader: Any) -> list[Any] | None:
-        """Return what came next, nothing for what is no message; None at the end."""
-        try:
-            return reader.take(1) or None
-        except DDSException as error:
-            self._warn_once(reason_of(error))
-            return None
-        except Exception as error:  # whatever its decoder says of bytes
-            self._warn_once(str(error) or type(error).__name__)
-            return []
-
-    def _warn_once(self, reason: str) -> None:
-        if not self._spoilt:
-            text = "%s: what came on %s is no %s: %s"
-            _LOG.warning(text, self.entry, self.entry.topic, self.entry.type, reason)
-        self._spoilt = True
-
-    def _hand_on(self, message: Any) -> None:
-        if not self._odd and (odd := _odd_number(message)):
-            self._odd = True
-            text = "%s: %s on %s: an rclpy that puts an int into a float field sends this, and"
-            text += " ROS_PYTHON_CHECK_FIELDS=1 in its environment finds it"
-            _LOG.warning(text, self.entry, odd, self.entry.topic)
-        self._put(message)
-        self._heard_s = time.monotonic()
-        if self._stop_s and not self._watched:
-            self._watched = True
-            self._thread.submit(self._watch)
-
-    def _watch(self) -> float | None:
-        """Take the latest value back when nothing more has come for too long."""
-        left_s = self._heard_s + self._stop_s - time.monotonic()
-        if left_s > 0 and not self._closed:
-            return left_s
-        self._watched = False
-        if not self._closed:
-            self._put(None)
-        return None
-
-
-def _odd_number(message: object, path: str = "") -> str:
-    """Return which number of a message no sender can mean, with its value; empty if none.
-
-    That is one that is not finite, or so small that it is a whole number in the bits of a float.
-    Sequences are passed over: a range without an echo is infinite (REP 117).
-    """
-    for name, value in vars(message).items():
-        if isinstance(value, float):
-            if not isfinite(value) or 0 < abs(value) < _SMALLEST:
-                return f"{path}{name} is {value:g}"
-        elif hasattr(value, "__dict__") and (odd := _odd_number(value, f"{path}{name}.")):
-            return odd
-    return ""

@@ -19,7 +19,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Final
 
-from tickrig.host.rtc.engines.ros2 import conversions
+from tickrig.host.rtc.engines.ros2 import topic_entry
 from tickrig.host.rtc.engines.ros2.conversions import MESSAGES
 from tickrig.host.text.names import near
 from tickrig.host.text.section import (
@@ -69,8 +69,8 @@ def _joints(value: object) -> tuple[str, ...]:
 
 _USUAL: Final = "that of its type"
 _OF_TYPES: Final = {
-    "frame": tuple(conversions.FRAMES),
-    "child_frame": conversions.PLACED,
+    "frame": tuple(topic_entry.FRAMES),
+    "child_frame": topic_entry.PLACED,
     "joints": ("sensor_msgs/msg/JointState",),
 }
 """Keys that only some messages have."""
@@ -97,7 +97,7 @@ _DIAGNOSTICS: Final[Schema] = {
 }
 
 
-def parse_table(text: str, name: str) -> conversions.TopicTable:
+def parse_table(text: str, name: str) -> topic_entry.TopicTable:
     """Return what a file says.
 
     Args:
@@ -114,12 +114,12 @@ def parse_table(text: str, name: str) -> conversions.TopicTable:
     words = section.read(_DIAGNOSTICS) if (section := top.sub("diagnostics")) else {}
     if mistakes := top.notes.all:
         raise ValueError("\n".join(f"{name}:{line}: {reason}" for line, reason in mistakes))
-    usual = conversions.TopicTable()
+    usual = topic_entry.TopicTable()
     topic = words.get("topic", usual.diagnostics).lstrip("/")
-    return conversions.TopicTable(tuple(made), topic, words.get("period", usual.period_us))
+    return topic_entry.TopicTable(tuple(made), topic, words.get("period", usual.period_us))
 
 
-def _entry(section: Section, file: str) -> conversions.TopicEntry | None:
+def _entry(section: Section, file: str) -> topic_entry.TopicEntry | None:
     """Return what a table says, None if it is wrong."""
     before = len(section.notes.mistakes)
     words = section.read(_ENTRY)
@@ -129,7 +129,7 @@ def _entry(section: Section, file: str) -> conversions.TopicEntry | None:
             section.wrong(f"{kind} has no {key}; it is for {', '.join(kinds)}", key)
     if len(section.notes.mistakes) > before or is_broken(section.values):
         return None
-    usual = conversions.usual_entry(words["port"], words["topic"].lstrip("/"), words["type"])
+    usual = topic_entry.usual_entry(words["port"], words["topic"].lstrip("/"), words["type"])
     given = {_FIELDS.get(key, key): words[key] for key in (*_OF_TYPES, *_FIELDS) if key in words}
     line = section.notes.document.line_of(section.keys)
     return replace(usual, reliable=words.get("reliable", True), place=f"{file}:{line}", **given)
@@ -138,10 +138,10 @@ def _entry(section: Section, file: str) -> conversions.TopicEntry | None:
 _FIELDS: Final = {"stop_after": "stop_after_us"}
 
 
-def _check_once(top: Section, entries: Iterable[conversions.TopicEntry]) -> None:
+def _check_once(top: Section, entries: Iterable[topic_entry.TopicEntry]) -> None:
     """Find a pair of port and topic that stands there twice, a topic with two types."""
-    pairs: dict[tuple[str, str], conversions.TopicEntry] = {}
-    kinds: dict[str, conversions.TopicEntry] = {}
+    pairs: dict[tuple[str, str], topic_entry.TopicEntry] = {}
+    kinds: dict[str, topic_entry.TopicEntry] = {}
     for entry in entries:
         line = int(entry.place.rpartition(":")[2])
         if first := pairs.get((entry.port, entry.topic)):

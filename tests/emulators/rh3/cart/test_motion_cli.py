@@ -16,13 +16,9 @@ from click.testing import CliRunner, Result
 
 from tickrig.device.rh3.parameters import BaseParameters
 from tickrig.emulators.rh3.closed_loop import ClosedLoop
+from tickrig.emulators.rh3.commands.cart_options import MotionOptions, require_arrival
 from tickrig.emulators.rh3.commands.motion_cli import main as rh3
-from tickrig.emulators.rh3.commands.motion_verbs import (
-    MotionOptions,
-    SquarePlan,
-    require_arrival,
-    run_squares,
-)
+from tickrig.emulators.rh3.commands.motion_verbs import SquarePlan, run_squares
 from tickrig.host.rtc.motion.drive import BaseConnection, drive, start
 from tickrig.host.rtc.motion.geometry import Pose
 

@@ -14,7 +14,7 @@ from click.testing import CliRunner
 from tickrig.emulators.commands.cli import main
 from tickrig.emulators.rh3.closed_loop import ClosedLoop
 from tickrig.emulators.rh3.commands.motion_cli import main as rh3
-from tickrig.emulators.rh3.commands.motion_verbs import CartClock, CartControl, ServedCart
+from tickrig.emulators.rh3.commands.served_cart import CartClock, CartControl, ServedCart
 from tickrig.host.control.client import ControlClient
 from tickrig.host.rtc.motion.drive import start
 from tickrig.host.rtc.motion.geometry import Pose

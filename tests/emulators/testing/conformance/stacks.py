@@ -25,7 +25,7 @@ from tickrig.emulators.testing.conformance.conformance import conformance
 from tickrig.emulators.testing.conformance.durand_slave import DurandSlave
 from tickrig.emulators.testing.conformance.local_node import LocalNodeSlave
 from tickrig.host.canopen.conform.bus.exchange import NotAllowed
-from tickrig.host.canopen.conform.check import Report
+from tickrig.host.canopen.conform.verdict import Report
 from tickrig.wire.canopen.eds.eds_file import EdsFile
 from tickrig.wire.canopen.eds.eds_writer import write_eds
 from tickrig.wire.canopen.eds.object_table import Access, EntryDescription

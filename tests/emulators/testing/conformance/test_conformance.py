@@ -20,8 +20,9 @@ from tickrig.emulators.testing.conformance.bench_source import open_rig
 from tickrig.emulators.testing.conformance.conformance import conformance
 from tickrig.emulators.testing.conformance.slave import Slave, SlaveCall
 from tickrig.emulators.testing.rig_file.reader import read_rig_file
-from tickrig.host.canopen.conform.check import CheckVerdict, Level, Report
+from tickrig.host.canopen.conform.check import Level
 from tickrig.host.canopen.conform.report.report_json import report_json
+from tickrig.host.canopen.conform.verdict import CheckVerdict, Report
 from tickrig.wire.can import CanFrame, Frames
 
 NMT = "NMT-0[345]"

@@ -10,8 +10,8 @@ import pytest
 from tests.emulators.testing.conformance.stacks import judge_durand, judge_local_node, judge_ours
 from tests.emulators.testing.conformance.verdict_page import FOREIGN, PAGE
 from tests.emulators.testing.conformance.verdict_table import compare, read_table
-from tickrig.host.canopen.conform.check import CheckVerdict, Report
 from tickrig.host.canopen.conform.suite import suite_checks
+from tickrig.host.canopen.conform.verdict import CheckVerdict, Report
 
 pytestmark = pytest.mark.unmeasured
 

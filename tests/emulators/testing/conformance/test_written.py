@@ -7,7 +7,7 @@ from xml.etree.ElementTree import parse
 import pytest
 
 from tickrig.device import make_epos
-from tickrig.host.canopen.conform.check import Report
+from tickrig.host.canopen.conform.verdict import Report
 from tickrig.testing import conformance, conformance_text, write_conformance
 from tickrig.wire.can import CanFrame, Frames
 

@@ -10,7 +10,7 @@ from tests.emulators.testing.conformance.stacks import judge_durand, judge_local
 from tests.emulators.testing.conformance.verdict_table import compare, read_table
 from tests.environment import ROOT
 from tickrig import Bench
-from tickrig.host.canopen.conform.check import CheckVerdict, Report, Result
+from tickrig.host.canopen.conform.verdict import CheckVerdict, Report, Result
 from tickrig.testing import conformance
 
 PAGE: Final = ROOT / "docs" / "reference/canopen/conformance.md"

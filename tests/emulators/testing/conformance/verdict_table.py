@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Final, NamedTuple
 
 from tests.environment import ROOT
-from tickrig.host.canopen.conform.check import CheckVerdict, Report
+from tickrig.host.canopen.conform.verdict import CheckVerdict, Report
 
 FILE: Final = ROOT / "tests" / "golden" / "canopen" / "foreign_verdicts.txt"
 COLUMNS: Final = ("LocalNode", "durand")

@@ -20,13 +20,13 @@ from tickrig.host.canopen.conform.check import (
     ExpectNone,
     Level,
     Period,
-    Report,
     Wait,
 )
 from tickrig.host.canopen.conform.conform_run import ConformRun
 from tickrig.host.canopen.conform.report.report_json import report_json
 from tickrig.host.canopen.conform.report.text import text_report
 from tickrig.host.canopen.conform.suite import suite_checks
+from tickrig.host.canopen.conform.verdict import Report
 from tickrig.host.links.link import StampedFrames
 from tickrig.wire.can import CanFrame, Frames, data_frame
 from tickrig.wire.canopen.datatypes import DataType

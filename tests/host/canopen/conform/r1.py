@@ -19,8 +19,9 @@ from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.emulators.testing.conformance.conformance import PoweredSlave
 from tickrig.host.canopen.conform.binding.capabilities import EdsClaims
-from tickrig.host.canopen.conform.check import ConformancePlan, Report
+from tickrig.host.canopen.conform.check import ConformancePlan
 from tickrig.host.canopen.conform.conform_run import ConformRun
+from tickrig.host.canopen.conform.verdict import Report
 from tickrig.host.canopen.eds import open_eds
 from tickrig.wire.canopen.eds.eds_device import EdsDevice, read_device
 from tickrig.wire.errors import WireError

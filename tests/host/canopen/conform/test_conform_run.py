@@ -6,7 +6,8 @@ from tests.host.canopen.conform.r1 import R1
 from tests.host.canopen.conform.under_test import Judged
 from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.device.canopen.stack import make_slave
-from tickrig.host.canopen.conform.check import CheckVerdict, ConformancePlan, Level, Report
+from tickrig.host.canopen.conform.check import ConformancePlan, Level
+from tickrig.host.canopen.conform.verdict import CheckVerdict, Report
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.object_table import RO, EntryDescription
 

@@ -18,9 +18,10 @@ from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
-from tickrig.host.canopen.conform.check import CheckVerdict, ConformancePlan, Level, Report
+from tickrig.host.canopen.conform.check import ConformancePlan, Level
 from tickrig.host.canopen.conform.conform_run import ConformRun
 from tickrig.host.canopen.conform.report.text import text_report
+from tickrig.host.canopen.conform.verdict import CheckVerdict, Report
 from tickrig.host.canopen.eds import read_sound
 from tickrig.wire.can import CanFrame, Frames, data_frame
 from tickrig.wire.canopen.datatypes import DataType

@@ -10,7 +10,8 @@ from tests.host.canopen.conform.r1 import yes
 from tests.host.canopen.conform.under_test import Judged, not_harmless
 from tickrig.device.canopen.device_rtc import CanopenEcho, make_device_rtc
 from tickrig.emulators.testing.conformance.bench_source import SlaveStimulus
-from tickrig.host.canopen.conform.check import CheckVerdict, ConformancePlan, Level
+from tickrig.host.canopen.conform.check import ConformancePlan, Level
+from tickrig.host.canopen.conform.verdict import CheckVerdict
 
 EXAMPLES = Path(__file__).parents[4] / "examples"
 FILES = sorted(EXAMPLES.rglob("*.eds"))

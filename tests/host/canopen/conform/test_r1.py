@@ -10,8 +10,9 @@ from tests.device.canopen.profile_objects import DRIVE, GENERIC_IO
 from tests.host.canopen.conform.r1 import R1, Stimulus, yes
 from tickrig.device.canopen.ds401 import Ds401
 from tickrig.device.canopen.ds402 import Ds402
-from tickrig.host.canopen.conform.check import CheckVerdict, ConformancePlan, Level, Report
+from tickrig.host.canopen.conform.check import ConformancePlan, Level
 from tickrig.host.canopen.conform.suite import ORDER, suite_checks
+from tickrig.host.canopen.conform.verdict import CheckVerdict, Report
 
 PROFILE = frozenset(range(0x6000, 0xA000))
 OF_ANY_NODE = tuple(group for group in ORDER if group not in ("IO", "D4"))

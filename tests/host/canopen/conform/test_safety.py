@@ -9,8 +9,9 @@ import pytest
 
 from tests.device.canopen.actions import SlaveActions
 from tests.host.canopen.conform.r1 import R1, Stimulus, yes
-from tickrig.host.canopen.conform.check import CheckVerdict, ConformancePlan, Level, Report, Result
+from tickrig.host.canopen.conform.check import ConformancePlan, Level
 from tickrig.host.canopen.conform.node_care import KnownState
+from tickrig.host.canopen.conform.verdict import CheckVerdict, Report, Result
 from tickrig.host.links.link import StampedFrames
 from tickrig.wire.can import CanFrame, Frames, frame_bits
 from tickrig.wire.canopen.nmt import NmtState

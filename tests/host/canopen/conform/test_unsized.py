@@ -11,8 +11,9 @@ from tests.host.canopen.conform.defects.defect import Defect, says, together
 from tests.host.canopen.conform.defects.test_found import DefectiveR1
 from tests.host.canopen.conform.r1 import yes
 from tests.host.canopen.conform.under_test import not_harmless
-from tickrig.host.canopen.conform.check import CheckVerdict, ConformancePlan, Level, Report
+from tickrig.host.canopen.conform.check import ConformancePlan, Level
 from tickrig.host.canopen.conform.conform_run import ConformRun
+from tickrig.host.canopen.conform.verdict import CheckVerdict, Report
 
 SIZES: Final = {"4F": 1, "4B": 2, "47": 3, "43": 4}
 

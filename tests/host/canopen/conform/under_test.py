@@ -13,8 +13,9 @@ from tickrig.emulators.canopen.eds import EdsCache
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.host.canopen.conform.binding.capabilities import NodeDescription
-from tickrig.host.canopen.conform.check import CheckVerdict, ConformancePlan, Report
+from tickrig.host.canopen.conform.check import ConformancePlan
 from tickrig.host.canopen.conform.conform_run import ConformRun
+from tickrig.host.canopen.conform.verdict import CheckVerdict, Report
 from tickrig.host.canopen.eds import open_eds
 
 HARMLESS = {CheckVerdict.PASS, CheckVerdict.NOT_APPLICABLE, CheckVerdict.IMPLEMENTATION_DEFINED}

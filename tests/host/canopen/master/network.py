@@ -58,7 +58,7 @@ class Network:
         """The letter with which the latest boot-up ended."""
         outcome = self.master.slave(node_id).outcome
         assert outcome is not None, "no boot-up has ended"
-        return str(outcome.status.value)
+        return outcome.status.value
 
     def heard(self) -> list[str]:
         """All frames so far, without their times."""

@@ -14,7 +14,7 @@ from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.host.rtc import LifeCycleState
 from tickrig.host.rtc.canopen.definition import SystemDefinition
-from tickrig.host.rtc.canopen.definition_file import parse_definition
+from tickrig.host.rtc.canopen.definition_reader import parse_definition
 from tickrig.host.rtc.canopen.events import ServerEvent, ServerEventType
 from tickrig.host.rtc.canopen.proxy import ProxyRtc
 from tickrig.host.rtc.canopen.serve import read_files, serve

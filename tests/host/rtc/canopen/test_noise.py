@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from tests.host.rtc.canopen.bench import EDS, PALETTE_AND_MOTOR, Bench
 from tests.soak import examples
-from tickrig.host.rtc.canopen.definition_file import parse_definition
+from tickrig.host.rtc.canopen.definition_reader import parse_definition
 from tickrig.host.rtc.canopen.serve import read_files, serve
 from tickrig.host.rtc.canopen.served_node import NodePhase
 from tickrig.host.rtc.canopen.server import RtcCanopenServer

@@ -10,7 +10,7 @@ from click.testing import CliRunner
 from tests.host.rtc.canopen.bench import EDS, PALETTE_AND_MOTOR, SYSTEMS, Bench
 from tests.host.rtc.canopen.components import add_logger
 from tickrig.host.rtc.canopen.commands.server import main
-from tickrig.host.rtc.canopen.definition_file import parse_definition
+from tickrig.host.rtc.canopen.definition_reader import parse_definition
 from tickrig.host.rtc.canopen.events import ServerEventType
 from tickrig.host.rtc.canopen.offline import boot_offline, check_offline
 from tickrig.host.rtc.canopen.serve import open_server, read_files

@@ -6,7 +6,7 @@ import pytest
 
 from tests.emulators.can.can_bench import frames
 from tests.host.rtc.canopen.bench import PALETTE_AND_MOTOR, Bench
-from tickrig.host.rtc.canopen.definition_file import parse_definition
+from tickrig.host.rtc.canopen.definition_reader import parse_definition
 from tickrig.host.rtc.canopen.server import ServerObjects
 
 DEFINITION = parse_definition(

@@ -20,9 +20,9 @@ from tickrig.emulators.canopen.node import Node
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.host.rtc import LifeCycleState, ReturnCode
-from tickrig.host.rtc.canopen.data_flow import check_lengths
+from tickrig.host.rtc.canopen.connections import check_lengths
 from tickrig.host.rtc.canopen.definition import PdoLink, PdoName, ServerRefused
-from tickrig.host.rtc.canopen.definition_file import parse_definition
+from tickrig.host.rtc.canopen.definition_reader import parse_definition
 from tickrig.host.rtc.canopen.events import ServerEventType
 from tickrig.host.rtc.canopen.offline import check_offline
 from tickrig.host.rtc.canopen.pdo_layout import PdoLayout, lay_out

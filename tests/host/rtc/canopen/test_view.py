@@ -8,7 +8,8 @@ from tests.host.rtc.canopen.bench import PALETTE_AND_MOTOR, Bench
 from tests.host.rtc.canopen.components import add_knob
 from tickrig.host.rtc import LifeCycleState, RtcRefused
 from tickrig.host.rtc.canopen.definition import PdoLink, PdoName, Role, RtConnection, ServerRefused
-from tickrig.host.rtc.canopen.definition_file import parse_definition, write_definition
+from tickrig.host.rtc.canopen.definition_reader import parse_definition
+from tickrig.host.rtc.canopen.definition_writer import write_definition
 from tickrig.host.rtc.canopen.events import ServerEventType
 from tickrig.host.rtc.canopen.served_node import NodePhase
 from tickrig.host.rtc.canopen.view import NOT_HEARD, PdoView, PortView, ServerView

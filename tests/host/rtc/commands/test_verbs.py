@@ -14,8 +14,9 @@ from tests.host.rtc.commands.served import Served
 from tests.host.rtc.spy import ERROR
 from tickrig.emulators.commands.cli import main
 from tickrig.host.rtc import Provider, ServicePort
+from tickrig.host.rtc.system.rts_profile import parse_rts_profile
 from tickrig.host.rtc.system.system import System, describe, differences
-from tickrig.host.rtc.system.system_file import parse_rts_profile, parse_toml
+from tickrig.host.rtc.system.system_file import parse_toml
 
 
 @pytest.fixture

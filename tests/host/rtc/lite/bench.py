@@ -12,7 +12,7 @@ from tickrig.emulators.rig.faults import FaultyPort
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.emulators.rig.station import Station
-from tickrig.emulators.rtc_lite.device_type import LINE_FAULTS
+from tickrig.emulators.rtc_lite.line import LINE_FAULTS
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.host.rtc import ExecutionContext, Manager
 from tickrig.host.rtc.lite import ProxyEvent, ProxySettings, RtcLiteProxy, attach

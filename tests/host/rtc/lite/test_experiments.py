@@ -11,7 +11,7 @@ from tests.host.rtc.lite.bench import PERIOD_US, TICK_US, Bench
 from tests.host.rtc.lite.experiment import ALL, JOINTS, Experiment
 from tests.wire.rtc_lite.vectors import raw
 from tickrig.device.rtc_lite.component import LiteEcho
-from tickrig.emulators.rtc_lite.device_type import RadioSettings, radio
+from tickrig.emulators.rtc_lite.line import RadioSettings, radio
 from tickrig.host.rtc.commands.system_control import describe_component
 from tickrig.host.rtc.commands.verbs import component_lines
 from tickrig.host.rtc.lite import ProxySettings

@@ -10,7 +10,7 @@ from tickrig.device.rtc_lite.component import LiteEcho
 from tickrig.emulators.rig.rig import Rig
 from tickrig.host.links.link import Link
 from tickrig.host.rtc.lite import ProxySettings
-from tickrig.host.rtc.lite.request_channel import ProxyEvent, ProxyEventType
+from tickrig.host.rtc.lite.events import ProxyEvent, ProxyEventType
 
 
 def only_event(bench: Bench) -> ProxyEvent:

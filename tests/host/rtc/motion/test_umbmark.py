@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.host.rtc.motion.drive import Error, Umbmark, square
 from tickrig.host.rtc.motion.geometry import Pose, Wheels, moved
+from tickrig.host.rtc.motion.umbmark import Error, Umbmark, square
 
 SIDE_M = 4.0
 NOMINAL = Wheels(0.1, 0.1, 0.45)

@@ -22,7 +22,8 @@ from tickrig.host.rtc.engines.peer_ports import (
     PeerEnd,
     cdr,
 )
-from tickrig.host.rtc.system.call_queue import CallQueue, PeerThread
+from tickrig.host.rtc.system.call_queue import CallQueue
+from tickrig.host.rtc.system.peer_thread import PeerThread
 from tickrig.wire.rtc_types.cdr import Endian
 
 DEADLINE_S = 30.0

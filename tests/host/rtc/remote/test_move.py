@@ -9,7 +9,7 @@ import pytest
 
 from tests.host.rtc.spy import ERROR, OK, PERIOD_US, Bench, BrokenError
 from tickrig.host.rtc import ExecutionContext, ReturnCode
-from tickrig.host.rtc.engines.openrtm.servants import Request, move
+from tickrig.host.rtc.engines.openrtm.context import Request, move
 from tickrig.host.rtc.system.call_queue import CallQueue
 
 activate = ExecutionContext.activate_component

@@ -8,7 +8,7 @@ from functools import partial
 
 import pytest
 
-from tickrig.host.rtc.system.call_queue import PeerThread, calls_run
+from tickrig.host.rtc.system.peer_thread import PeerThread, calls_run
 
 DEADLINE_S = 30.0
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import pytest
 
 from tests.host.rtc.remote.engine import DEADLINE_S
-from tickrig.host.rtc.system.call_queue import PeerThreads
+from tickrig.host.rtc.system.peer_thread import PeerThreads
 
 
 @pytest.fixture

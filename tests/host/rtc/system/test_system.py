@@ -22,6 +22,7 @@ from tickrig.host.rtc import (
     ServicePort,
 )
 from tickrig.host.rtc.components import ConsoleOut
+from tickrig.host.rtc.system.rts_profile import parse_rts_profile, write_rts_profile
 from tickrig.host.rtc.system.system import (
     ComponentEntry,
     ConnectionEntry,
@@ -30,12 +31,7 @@ from tickrig.host.rtc.system.system import (
     restore,
     with_remotes,
 )
-from tickrig.host.rtc.system.system_file import (
-    parse_rts_profile,
-    parse_toml,
-    write_rts_profile,
-    write_toml,
-)
+from tickrig.host.rtc.system.system_file import parse_toml, write_toml
 
 GOLDEN = Path(__file__).parents[3] / "golden" / "rtc_chain.xml"
 

@@ -9,20 +9,13 @@ from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.byte_faults import BYTE_FAULTS
 from tickrig.emulators.serial.serial_line import SerialLine
-from tickrig.emulators.tkernel.resolution import (
-    EXAMPLE,
-    ResolutionService,
-    SimSource,
-    opener,
-    parse_table,
-)
+from tickrig.emulators.tkernel.resolution import ResolutionService, SimSource, opener
+from tickrig.emulators.tkernel.ucode_table import EXAMPLE, parse_table
 from tickrig.host.rtc import InPort, Manager
 from tickrig.host.rtc.ports.connect import connect
-from tickrig.host.rtc.ucode.lookup import (
-    ContentsInterpretation,
-    InfraredRaysReader,
-    UcodeSettlement,
-)
+from tickrig.host.rtc.ucode.contents_interpretation import ContentsInterpretation
+from tickrig.host.rtc.ucode.infrared_rays_reader import InfraredRaysReader
+from tickrig.host.rtc.ucode.ucode_settlement import UcodeSettlement
 from tickrig.wire.rtc_types.rtc import TimedLongSeq, TimedPoint2D, TimedStringSeq
 from tickrig.wire.ucode import BAUD
 

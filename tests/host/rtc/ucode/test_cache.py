@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from tickrig.emulators.tkernel.resolution import ResolutionService, SimSource, UcodeTable
+from tickrig.emulators.tkernel.resolution import ResolutionService, SimSource
+from tickrig.emulators.tkernel.ucode_table import UcodeTable
 from tickrig.host.rtc.ucode.cache import CacheLimits, LookupCache
 
 SECOND_US = 1_000_000

@@ -10,7 +10,8 @@ from tests.host.rtc.ucode.bench import DOOR, LIFT, NOBODY, SECOND_US, UcodeBench
 from tickrig.device.ucode_reader import Marker
 from tickrig.host.links.link import LinkClosed
 from tickrig.host.rtc import Manager
-from tickrig.host.rtc.ucode.lookup import InfraredRaysReader, UcodeSettlement
+from tickrig.host.rtc.ucode.infrared_rays_reader import InfraredRaysReader
+from tickrig.host.rtc.ucode.ucode_settlement import UcodeSettlement
 from tickrig.wire.rtc_types.rtc import Point2D, TimedStringSeq
 
 

@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.host.rtc.ucode.lookup import Contents, parse_address, parse_contents
+from tickrig.host.rtc.ucode.contents_interpretation import Contents, parse_contents
+from tickrig.host.rtc.ucode.ucode_settlement import parse_address
 
 
 def test_information_is_a_place_and_its_properties() -> None:

@@ -13,7 +13,8 @@ import pytest
 
 from tests.host.rtc.ucode.bench import DOOR, NOBODY
 from tickrig.emulators.tkernel.commands.http_service import HttpService
-from tickrig.emulators.tkernel.resolution import EXAMPLE, ResolutionService, parse_table
+from tickrig.emulators.tkernel.resolution import ResolutionService
+from tickrig.emulators.tkernel.ucode_table import EXAMPLE, parse_table
 from tickrig.host.rtc.ucode.cache import Fetched, SourceStatus
 from tickrig.host.rtc.ucode.http_source import MOST_OCTETS, HttpSource
 

@@ -10,7 +10,7 @@ from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.byte_faults import BYTE_FAULTS
 from tickrig.emulators.serial.serial_line import SerialLine
-from tickrig.host.rtc.ucode.lookup import Round, UcodeReaderClient
+from tickrig.host.rtc.ucode.infrared_rays_reader import Round, UcodeReaderClient
 
 
 class ReaderBench:

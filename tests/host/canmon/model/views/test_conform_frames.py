@@ -4,7 +4,7 @@ from pathlib import Path
 
 from tickrig.host.canmon.conform.conformance import decoded_frames
 from tickrig.host.canopen.conform.bus.exchange import FIRST_LINES, LAST_LINES, Evidence
-from tickrig.host.canopen.conform.check import Direction, FrameLine
+from tickrig.host.canopen.conform.verdict import Direction, FrameLine
 
 EDS = Path("examples/io_module.eds")
 

@@ -7,7 +7,7 @@ import pytest
 from tests.host.canopen.conform.r1 import EDS
 from tickrig.device import make_epos
 from tickrig.host.canopen.conform.binding.binding import BoundPlace, bind
-from tickrig.host.canopen.conform.check import CheckVerdict
+from tickrig.host.canopen.conform.verdict import CheckVerdict
 from tickrig.host.canopen.eds import read_sound
 from tickrig.host.canopen.errors import SdoAborted
 from tickrig.testing import conformance

@@ -8,8 +8,9 @@ from typing import Final
 from tests.host.canopen.conform.defects.defect import Defect
 from tests.host.canopen.conform.defects.table import DEFECTS
 from tests.host.canopen.conform.defects.test_found import judge
-from tickrig.host.canopen.conform.check import Check, CheckVerdict
+from tickrig.host.canopen.conform.check import Check
 from tickrig.host.canopen.conform.suite import suite_checks
+from tickrig.host.canopen.conform.verdict import CheckVerdict
 
 SEEN: Final = (CheckVerdict.FAIL, CheckVerdict.IMPLEMENTATION_DEFINED)
 

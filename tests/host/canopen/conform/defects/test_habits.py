@@ -35,8 +35,9 @@ from tickrig.device.canopen.slave import CanopenSlave, ServiceMaker
 from tickrig.device.canopen.stack import make_slave
 from tickrig.device.canopen.sync import Sync
 from tickrig.emulators.can.outside.host import CanHost
-from tickrig.host.canopen.conform.check import CheckVerdict, ConformancePlan, Level, Report
+from tickrig.host.canopen.conform.check import ConformancePlan, Level
 from tickrig.host.canopen.conform.conform_run import ConformRun
+from tickrig.host.canopen.conform.verdict import CheckVerdict, Report
 from tickrig.host.links.link import StampedFrames
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.canopen.datatypes import DataType, Value

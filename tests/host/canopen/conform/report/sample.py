@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from tickrig.host.canopen.conform.check import (
-    Check,
+from tickrig.host.canopen.conform.check import Check, Level
+from tickrig.host.canopen.conform.verdict import (
     CheckOutcome,
     CheckVerdict,
     Direction,
     FrameLine,
-    Level,
     Report,
     Result,
 )

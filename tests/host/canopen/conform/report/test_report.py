@@ -15,20 +15,14 @@ from tests.host.canopen.conform.defects.test_found import DefectiveR1, judge
 from tests.host.canopen.conform.report.sample import EVIDENCE, HOSTILE, SAMPLE, result
 from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.sequence import SequenceRun, TomlSequence
-from tickrig.host.canopen.conform.check import (
-    CheckOutcome,
-    CheckVerdict,
-    RefuseRead,
-    Report,
-    Result,
-    Send,
-    Step,
-)
+from tickrig.host.canopen.conform.check import RefuseRead, Send, Step
 from tickrig.host.canopen.conform.report.baseline import Baseline, baseline_text
 from tickrig.host.canopen.conform.report.ci import badge, report_junit
+from tickrig.host.canopen.conform.report.issue import issue_text
 from tickrig.host.canopen.conform.report.page import html_page
 from tickrig.host.canopen.conform.report.report_json import report_json
-from tickrig.host.canopen.conform.report.text import issue_text, text_report
+from tickrig.host.canopen.conform.report.text import text_report
+from tickrig.host.canopen.conform.verdict import CheckOutcome, CheckVerdict, Report, Result
 
 KNOWN = Baseline(frozenset({"NMT-11", "LS-02", "XX-99"}))
 MANY = replace(SAMPLE, results=tuple(result(f"UE-{n}", CheckVerdict.FAIL, "no") for n in range(30)))

@@ -6,7 +6,7 @@ import pytest
 
 from tickrig.device import make_epos
 from tickrig.emulators.testing.conformance.conformance import conformance
-from tickrig.host.canopen.conform.check import CheckVerdict, Report
+from tickrig.host.canopen.conform.verdict import CheckVerdict, Report
 from tickrig.wire.can import CanFrame, Frames
 
 NMT = ("NMT-03", "HB")

@@ -5,7 +5,8 @@ from __future__ import annotations
 from tests.host.canopen.conform.r1 import yes
 from tests.host.canopen.conform.test_our_slaves import eds_of
 from tests.host.canopen.conform.under_test import Judged, slave_of
-from tickrig.host.canopen.conform.check import CheckVerdict, ConformancePlan, Level
+from tickrig.host.canopen.conform.check import ConformancePlan, Level
+from tickrig.host.canopen.conform.verdict import CheckVerdict
 from tickrig.wire.can import CanFrame
 
 

@@ -20,7 +20,7 @@ from tickrig.host.rtc.canopen.builder.profile_file import (
     parse_project,
 )
 from tickrig.host.rtc.canopen.commands.builder import main
-from tickrig.host.rtc.canopen.definition_file import parse_definition
+from tickrig.host.rtc.canopen.definition_reader import parse_definition
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.eds.eds_writer import write_eds
 from tickrig.wire.rtc_canopen import object_table

@@ -12,7 +12,7 @@ from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.host.rtc.canopen.builder.build import build
 from tickrig.host.rtc.canopen.builder.profile_file import EXAMPLE, parse_project
-from tickrig.host.rtc.canopen.definition_file import parse_definition
+from tickrig.host.rtc.canopen.definition_reader import parse_definition
 from tickrig.host.rtc.canopen.serve import read_files, serve
 from tickrig.host.rtc.canopen.server import RtcCanopenServer
 

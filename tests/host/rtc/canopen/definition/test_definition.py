@@ -24,7 +24,8 @@ from tickrig.host.rtc.canopen.definition import (
     StartEntry,
     SystemDefinition,
 )
-from tickrig.host.rtc.canopen.definition_file import parse_definition, write_definition
+from tickrig.host.rtc.canopen.definition_reader import parse_definition
+from tickrig.host.rtc.canopen.definition_writer import write_definition
 from tickrig.wire.canopen.pdo import MappedObject
 from tickrig.wire.rtc_canopen import PORT_TYPES, PortDirection
 

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from tests.host.rtc.canopen.bench import SYSTEMS
-from tickrig.host.rtc.canopen.definition_file import read_definition, save_definition
+from tickrig.host.rtc.canopen.definition_reader import read_definition
+from tickrig.host.rtc.canopen.definition_writer import save_definition
 
 FIG_120 = SYSTEMS / "fig120.yaml"
 

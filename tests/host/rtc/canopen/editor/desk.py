@@ -17,7 +17,8 @@ from tickrig.emulators.canopen.node import Node
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.host.rtc.canopen.editor import app as editor_app
-from tickrig.host.rtc.canopen.editor.app import AddComponents, EditorSession, SystemEditor
+from tickrig.host.rtc.canopen.editor.app import SystemEditor
+from tickrig.host.rtc.canopen.editor.session import AddComponents, EditorSession
 from tickrig.host.rtc.canopen.editor.widgets import CursorView
 from tickrig.host.rtc.canopen.events import ServerEvent
 from tickrig.host.rtc.canopen.serve import open_server

@@ -13,7 +13,7 @@ from tests.host.rtc.canopen.bench import EDS
 from tests.host.rtc.canopen.components import Knob
 from tests.host.rtc.canopen.editor.desk import Desk, at_desk
 from tickrig.host.rtc.canopen.definition import PdoLink, PdoName, RtConnection
-from tickrig.host.rtc.canopen.definition_file import parse_definition
+from tickrig.host.rtc.canopen.definition_reader import parse_definition
 from tickrig.host.rtc.canopen.editor.app import SystemEditor
 from tickrig.host.rtc.canopen.editor.widgets import QuestionScreen
 from tickrig.host.rtc.canopen.server import RtcCanopenServer

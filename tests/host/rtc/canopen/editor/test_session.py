@@ -12,7 +12,7 @@ import pytest
 from tests.host.rtc.canopen.bench import SYSTEMS
 from tickrig.host.links.can_link import CanLink
 from tickrig.host.links.link import LinkClosed, StampedFrames, StampedLink
-from tickrig.host.rtc.canopen.editor.app import EditorSession
+from tickrig.host.rtc.canopen.editor.session import EditorSession
 from tickrig.host.rtc.canopen.events import ServerEvent, ServerEventType
 from tickrig.host.rtc.canopen.serve import open_server
 from tickrig.wire.can import ErrorState, Frames

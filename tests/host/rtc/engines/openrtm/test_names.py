@@ -11,7 +11,8 @@ from omniORB import URI
 
 from tests.host.rtc.engines.openrtm.name_server import OmniNames, eventually
 from tickrig.host.cli.engine_options import parse_endpoint
-from tickrig.host.rtc.engines.openrtm.orb import NameServer, Orb, Reference
+from tickrig.host.rtc.engines.openrtm.names import NameServer
+from tickrig.host.rtc.engines.openrtm.orb import Orb, Reference
 
 pytestmark = pytest.mark.realtime
 

@@ -11,8 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.host.rtc.engines.ros2.extra import CYCLONE
-from tickrig.host.rtc.engines.ros2.conversions import IN, OUT, usual_entry
+from tickrig.host.rtc.engines.ros2.conversions import IN, OUT
 from tickrig.host.rtc.engines.ros2.message_types import Stamps
+from tickrig.host.rtc.engines.ros2.topic_entry import usual_entry
 from tickrig.wire.rtc_types import iis, rtc
 from tickrig.wire.rtc_types.idl import Struct
 from tickrig.wire.rtc_types.rtc import (

@@ -11,7 +11,7 @@ import pytest
 from tests.host.rtc.engines.openrtm.name_server import OmniNames
 from tests.host.rtc.engines.openrtm.ports.foreign import Peer, Served
 from tickrig.host.cli.engine_options import parse_endpoint
-from tickrig.host.rtc.engines.openrtm.orb import NameServer
+from tickrig.host.rtc.engines.openrtm.names import NameServer
 from tickrig.host.rtc.engines.openrtm.peers import Peers, parse_path
 from tickrig.host.rtc.engines.openrtm.stubs import stubs
 from tickrig.host.rtc.states import RtcRefused

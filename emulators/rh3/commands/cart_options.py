@@ -1,0 +1,196 @@
+"""What the verbs of `rh3` share: a cart as the options say, and how a run of it ends."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from shutil import get_terminal_size
+from typing import Final
+
+import click
+
+from tickrig.device.rh3.parameters import BaseParameters
+from tickrig.device.urg.world import room
+from tickrig.emulators.rh3.closed_loop import ClosedLoop, MountedUrg
+from tickrig.emulators.rig.sim_link import SimLink
+from tickrig.host.cli.control import stopped_by_signals
+from tickrig.host.cli.messages import Refused, refuse_path
+from tickrig.host.cli.start import INTERRUPTED, paint
+from tickrig.host.control.clock import RealClock
+from tickrig.host.links.serial_link import SerialLink
+from tickrig.host.rtc import Manager
+from tickrig.host.rtc.motion.chain import RATE_HZ, MotionChain
+from tickrig.host.rtc.motion.drive import BaseConnection, start
+from tickrig.host.rtc.motion.geometry import Pose, Wheels
+from tickrig.host.rtc.motion.motion_run import WIDTH, LiveMap, MotionRun, TrackMap, TrackSample
+from tickrig.host.rtc.motion.options.lrf_capture_urg import LrfCaptureUrg
+from tickrig.host.rtc.states import RtcRefused
+from tickrig.host.rtc.system.schedule import RealTime
+
+_SCANNER: Final = "LRFCapture_URG0"
+"""The component of a range finder, if the cart has one."""
+
+
+class RunStopped(Exception):  # noqa: N818 - no error
+    """Somebody ended the run."""
+
+
+@dataclass(frozen=True, slots=True)
+class MotionOptions:
+    """The options that all verbs have.
+
+    Attributes:
+        set_id: configuration set.
+        device: a serial port, None for an emulated base in virtual time.
+        baud: its bit rate.
+        any_device: whether to drive it without asking who it is.
+        pace: how many times as fast as the machine's virtual time passes, None as it goes.
+        conf: Odometry.conf.
+        show_map: draw the track while it runs.
+        base: what the emulated base is like.
+        plot: file for a picture.
+        clock: what the cart waits by, in real time and with a pace.
+        room_m: width and depth of a room around the origin; with one, an emulated base carries a
+            range finder.
+    """
+
+    set_id: str
+    device: str | None
+    baud: int
+    pace: float | None
+    conf: Path | None
+    show_map: bool
+    base: BaseParameters
+    plot: Path | None = None
+    clock: RealClock = field(default_factory=RealClock)
+    room_m: tuple[float, float] | None = None
+    any_device: bool = False
+
+    def begin(self, wheels: Wheels | None = None) -> BaseConnection:
+        """Return a cart at the origin with its components active."""
+        connection = self._connection()
+        try:
+            if self.conf is not None:
+                connection.chain.odometry.load(self.conf)
+            if wheels is not None:
+                connection.chain.odometry.calibrate(wheels)
+        except RtcRefused as error:
+            raise Refused(str(error)) from None
+        except OSError as error:
+            refuse_path("odometry-conf", error)
+        start(connection, self.set_id)
+        if connection.chain.in_error:
+            raise Refused(connection.chain.ref_hard.error_reason)
+        return connection
+
+    def _connection(self) -> BaseConnection:
+        if self.device is not None:
+            connection = _SerialBaseConnection(self.device, self.baud, self.clock)
+            connection.chain.ref_hard.configuration.set("AnyDevice", str(int(self.any_device)))
+            return connection
+        world = room(*self.room_m) if self.room_m else None
+        loop = ClosedLoop(self.base, world=world, pace=self.pace, clock=self.clock)
+        for eye in loop.range_finders:
+            _add_scanner(loop, eye)
+        return loop
+
+
+def _add_scanner(loop: ClosedLoop, eye: MountedUrg) -> None:
+    """Have the scans of a range finder written to a port."""
+    scanner = LrfCaptureUrg(_SCANNER, lambda name: SimLink(loop.rig, eye.line.b))
+    loop.manager.add(scanner, RATE_HZ)
+    loop.manager.activate(_SCANNER)
+
+
+class _SerialBaseConnection:
+    """A `BaseConnection` in real time, over a serial port: a base, or `rh3-emu`.
+
+    Args:
+        url: what DeviceFileName is set to; a path or a pyserial URL.
+        baud: bit rate in bit/s.
+        clock: what it waits by.
+
+    Attributes:
+        chain: its components.
+    """
+
+    def __init__(self, url: str, baud: int, clock: RealClock | None = None) -> None:
+        self._manager = Manager()
+        self.chain = MotionChain(self._manager, partial(SerialLink, baud=baud))
+        self.chain.ref_hard.configuration.set("DeviceFileName", url)
+        self._runner = RealTime(self._manager, clock or RealClock())
+
+    @property
+    def now_us(self) -> int:
+        """Time since the start."""
+        return self._manager.now_us
+
+    @property
+    def pose(self) -> Pose:
+        """Where odometry takes it to be: nobody else knows."""
+        return self.chain.odometry.pose
+
+    def run_to(self, t_us: int) -> None:
+        """Wait until it is so late, and run what is due meanwhile."""
+        while self.now_us < t_us:
+            self._runner.step()
+
+
+class RunWatcher:
+    """Draws samples if they are to be drawn, and raises `RunStopped` when a signal has come."""
+
+    def __init__(self, options: MotionOptions, points: Sequence[Pose]) -> None:
+        self._ended = self._asking = False
+        width = min(WIDTH, get_terminal_size().columns - 1)
+        drawn = partial(paint, sys.stdout)
+        self._map = LiveMap(TrackMap(points, width), drawn) if options.show_map else None
+
+    def end(self) -> None:
+        """Let the next sample be the last; a question is left at once."""
+        self._ended = True
+        if self._asking:
+            raise KeyboardInterrupt
+
+    @contextmanager
+    def asking(self) -> Iterator[None]:
+        """Ask somebody something: no samples come; `RunStopped` if that was the answer."""
+        self._asking = True
+        try:
+            yield
+        except (click.Abort, KeyboardInterrupt):
+            raise RunStopped from None
+        finally:
+            self._asking = False
+        if self._ended:  # click.pause passes Ctrl-C over
+            raise RunStopped
+
+    def watch(self, sample: TrackSample) -> None:
+        """Take a sample."""
+        if self._map is not None:
+            self._map.watch(sample)
+        if self._ended:
+            raise RunStopped
+
+
+@contextmanager
+def watched(options: MotionOptions, points: Sequence[Pose]) -> Iterator[RunWatcher]:
+    """Watch a run; Ctrl-C ends it with exit status 130."""
+    watcher = RunWatcher(options, points)
+    with stopped_by_signals(watcher.end):
+        try:
+            yield watcher
+        except RunStopped:
+            click.echo("stopped", err=True)
+            raise SystemExit(INTERRUPTED) from None
+
+
+def require_arrival(connection: BaseConnection, run: MotionRun) -> None:
+    """End with a line and exit status 1 if the goal was not reached."""
+    if connection.chain.in_error:
+        raise click.ClickException(connection.chain.ref_hard.error_reason)
+    if run.reached_s is None:
+        raise click.ClickException(f"not there after {run.duration_s:.1f} s")

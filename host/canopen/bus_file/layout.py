@@ -1,0 +1,123 @@
+"""The two layouts of a bus.yml: that of dcfgen, and that of cogen with `defaults` and `nodes`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, Final, NamedTuple, cast
+
+from tickrig.host.canopen.bus_file.notes import BusFileNotes, BusFileSection
+from tickrig.host.text.document import FilePlace, Item, Key
+from tickrig.wire.canopen.eds.eds_file import shorten
+
+OPTIONS: Final = "options"
+MASTER: Final = "master"
+_DEFAULTS: Final = "defaults"
+_NODES: Final = "nodes"
+_COGEN: Final = (OPTIONS, MASTER, _DEFAULTS, _NODES)
+
+
+class Layout(NamedTuple):
+    """The sections of a file as dcfgen gets them.
+
+    Attributes:
+        options: None where there are none.
+        master: None where there is none.
+        slaves: by name, in the order of dcfgen.
+        hidden: where something begins with a dot, by its name, if dcfgen reads the file as it is.
+        defaults: what cogen gives to all nodes; None where there is nothing.
+    """
+
+    options: BusFileSection | None
+    master: BusFileSection | None
+    slaves: dict[str, BusFileSection]
+    hidden: dict[str, FilePlace]
+    defaults: BusFileSection | None = None
+
+
+def read_layout(tree: Item, notes: BusFileNotes) -> Layout:
+    """Find the sections of a file.
+
+    What begins with a dot is no node: anchors stand there. As cogen does it, `defaults` count more
+    than what a node says, and all keys are sorted.
+    """
+    top = BusFileSection(notes, "", tree, tree.place)
+    ends = _optional(top, OPTIONS), _optional(top, MASTER)
+    if _NODES in top or _DEFAULTS in top:
+        return Layout(*ends, _cogen_nodes(top), {}, _optional(top, _DEFAULTS))
+    names = list(_named(top))
+    hidden = {key: top.place_of(key) for key in names if key.startswith(".")}
+    nodes = (key for key in names if key not in {OPTIONS, MASTER, *hidden})
+    slaves = {
+        key: BusFileSection(notes, shorten(key), top.fields[key], top.place_of(key))
+        for key in nodes
+    }
+    return Layout(*ends, slaves, hidden)
+
+
+def _optional(top: BusFileSection, key: str) -> BusFileSection | None:
+    item = top.fields.get(key)
+    return None if item is None else BusFileSection(top.notes, key, item, top.place_of(key))
+
+
+def _cogen_nodes(top: BusFileSection) -> dict[str, BusFileSection]:
+    for key in top.fields:
+        if key not in _COGEN and not str(key).startswith("."):
+            text = f"{shorten(str(key))!r} stands beside nodes: it is dropped"
+            top.note("section-lost", key, text)
+    if _NODES not in top:
+        top.note("no-nodes", _DEFAULTS, "defaults, but no nodes: that they are for")
+        return {}
+    nodes = BusFileSection(top.notes, _NODES, top.fields[_NODES], top.place_of(_NODES))
+    defaults = _optional(top, _DEFAULTS)
+    found = {}
+    for name in sorted(_named(nodes)):
+        item = _sorted(_with_defaults(top.notes, name, nodes.fields[name], defaults), {})
+        found[name] = BusFileSection(top.notes, shorten(name), item, nodes.place_of(name))
+    return found
+
+
+def _named(section: BusFileSection) -> Iterator[str]:
+    """Give the names of nodes; one that is no text is noted."""
+    for key in section.fields:
+        if isinstance(key, str):
+            yield key
+        else:
+            section.note("kind", key, f"{shorten(str(key))}: the name of a node is a text")
+
+
+def _with_defaults(
+    notes: BusFileNotes, name: str, item: Item, defaults: BusFileSection | None
+) -> Item:
+    """Return a node with all that defaults say."""
+    if defaults is None or not item.is_mapping:
+        return item
+    for key, own in item.fields.items():
+        usual = defaults.fields.get(key, own)
+        if usual is not own:
+            text = f"{shorten(str(key))} is that of defaults: {usual.place}"
+            notes.note("defaults-win", item.keys[key], shorten(name), text)
+    keys: dict[Key, FilePlace] = {
+        **item.keys,
+        **{key: defaults.place_of(key) for key in defaults.fields},
+    }
+    return Item({**item.fields, **defaults.fields}, item.place, keys=keys)
+
+
+def _sorted(item: Item, done: dict[int, Item]) -> Item:
+    """Return a mapping with sorted keys, also in its mappings, as PyYAML writes it.
+
+    Args:
+        item: that, or something else.
+        done: those that are sorted by the identity of what they were: an anchor is sorted once.
+    """
+    if not item.is_mapping:
+        return item
+    if (made := done.get(id(item))) is not None:
+        return made
+    try:
+        keys: list[Any] = sorted(cast(Any, item.fields))  # keys of two kinds raise
+    except TypeError:
+        keys = list(item.fields)
+    fields = {key: _sorted(item.fields[key], done) for key in keys}
+    made = done[id(item)] = Item(fields, item.place, item.text, item.keys)
+    return made

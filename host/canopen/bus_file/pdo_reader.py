@@ -1,0 +1,266 @@
+"""The PDO sections of a node: what is written, and what both sides have then."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Final
+
+from tickrig.host.canopen.bus_file.bus_values import BusPdo
+from tickrig.host.canopen.bus_file.known_keys import MAPPED, PDO, check_keys
+from tickrig.host.canopen.bus_file.notes import UNSIGNED8, UNSIGNED16, BusFileSection
+from tickrig.host.canopen.bus_file.sheet import Sheet, Writes
+from tickrig.wire.canopen.eds.eds_file import shorten
+from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
+from tickrig.wire.canopen.nmt import INVALID
+from tickrig.wire.canopen.pdo import MAX_PDO_BITS, MappedObject
+
+RPDO: Final = 0x1400
+TPDO: Final = 0x1800
+_MAPPING: Final = 0x200
+_PREDEFINED: Final = 4
+_AUTO: Final = "auto"
+_OTHER_WAY: Final = {
+    True: ("event_deadline",),
+    False: ("event_timer", "inhibit_time", "sync_start"),
+}
+"""Keys that dcfgen reads of PDOs of the other direction alone, by whether it is a TPDO."""
+_FIRST_FREE: Final = 0x680
+_END_OF_FREE: Final = 0x6E0
+
+
+class CobIds:
+    """The COB-IDs that `auto` gives to PDOs beyond the fourth, one after the other."""
+
+    def __init__(self) -> None:
+        self._next = _FIRST_FREE
+
+    def take(self) -> int | None:
+        """Return the next one, None if all are taken."""
+        if self._next >= _END_OF_FREE:
+            return None
+        self._next += 1
+        return self._next - 1
+
+
+class PdoReader:
+    """Reads the sections `rpdo` and `tpdo` of one node.
+
+    Args:
+        node: its section.
+        sheet: its EDS.
+        writes: take what is to be written.
+        cob_ids: of the whole bus.
+    """
+
+    def __init__(self, node: BusFileSection, sheet: Sheet, writes: Writes, cob_ids: CobIds) -> None:
+        self._node, self._sheet, self._writes, self._cob_ids = node, sheet, writes, cob_ids
+
+    def read(self, key: str, first: int) -> tuple[BusPdo, ...]:
+        """Read one of the two sections.
+
+        Args:
+            key: `rpdo` or `tpdo`.
+            first: index of the first communication parameter.
+
+        Returns:
+            The PDOs that the master's dictionary is given.
+        """
+        pdos = {
+            index - first + 1: _of_sheet(self._sheet, index) for index in self._sheet.pdos(first)
+        }
+        if key in self._node:
+            section = self._node.section(key)
+            for number in section.fields:
+                pdo = pdos.get(number) if isinstance(number, int) else None
+                if pdo is None:
+                    what = f"{key} {shorten(str(number))} is not in {self._sheet.path.name}"
+                    text = f"{what}, which has {_said(pdos)}"
+                    section.note("pdo-missing", number, text)
+                else:
+                    one = section.section(number)
+                    pdos[pdo.number] = self._configured(pdo, first + pdo.number - 1, one)
+        return tuple(pdo for pdo in pdos.values() if pdo.enabled and pdo.mapping)
+
+    def _configured(self, pdo: BusPdo, index: int, section: BusFileSection) -> BusPdo:
+        """Write what differs from the EDS, in the order of dcfgen: off, parameters, mapping, on."""
+        check_keys(section, PDO)
+        for key in _OTHER_WAY[pdo.transmit]:
+            if key in section:
+                kind = "a TPDO" if pdo.transmit else "an RPDO"
+                section.note("pdo-key", key, f"{key} of {kind}: dcfgen writes nothing of it")
+        place = section.place
+        was, pdo = pdo.cob_id, replace(pdo, cob_id=self._cob_id(pdo, section))
+        if was != pdo.cob_id | INVALID:
+            self._writes.add(index, 1, pdo.cob_id | INVALID, section.place_of("cob_id"))
+        if not pdo.enabled:
+            if section.flag("enabled", "mapping" in section and "cob_id" not in section):
+                where = self._sheet.place(index, 1)
+                text = f"cob_id is 0x{pdo.cob_id:08X}, with bit 31: it stays off: {where}"
+                section.note("not-enabled", "enabled", text)
+            return pdo
+        pdo = self._with_parameters(pdo, index, section)
+        if "mapping" in section:
+            pdo = self._with_mapping(pdo, index + _MAPPING, section)
+        if section.flag("enabled", default=True):
+            self._writes.add(index, 1, pdo.cob_id, place)
+        elif pdo.mapping and pdo.transmit:
+            text = "it is off, but not for the master: its EDS maps something into it"
+            section.note("not-disabled", "enabled", text)
+        return pdo
+
+    def _cob_id(self, pdo: BusPdo, section: BusFileSection) -> int:
+        item = section.fields.get("cob_id")
+        if item is None:
+            return pdo.cob_id
+        if item.value != _AUTO:
+            return section.whole("cob_id", pdo.cob_id)
+        if pdo.number <= _PREDEFINED:
+            base = 0x80 if pdo.transmit else 0x100
+            return pdo.number * 0x100 + base + self._sheet.node_id
+        taken = self._cob_ids.take()
+        if taken is None:
+            text = f"auto: none is left, 0x{_FIRST_FREE:X}..0x{_END_OF_FREE - 1:X} are taken"
+            section.note("cob-id-none", "cob_id", text)
+            return pdo.cob_id
+        return taken
+
+    def _with_parameters(self, pdo: BusPdo, index: int, section: BusFileSection) -> BusPdo:
+        """Take the parameters that the file gives; those of the other direction are not written."""
+        kind = section.whole("transmission", pdo.transmission, 0, UNSIGNED8)
+        inhibit = section.whole("inhibit_time", pdo.inhibit_time_100us, 0, UNSIGNED16)
+        timer = section.whole("event_timer", pdo.event_timer_ms, 0, UNSIGNED16)
+        sync = section.whole("sync_start", pdo.sync_start, 0, UNSIGNED8)
+        if kind != pdo.transmission:
+            self._writes.add(index, 2, kind, section.place_of("transmission"))
+        if not pdo.transmit:
+            deadline = section.whole("event_deadline", pdo.event_timer_ms, 0, UNSIGNED16)
+            if deadline != pdo.event_timer_ms:
+                text = "event_deadline of an RPDO: dcfgen fails at it"
+                section.note("event-deadline", "event_deadline", text)
+            return replace(pdo, transmission=kind)
+        if inhibit != pdo.inhibit_time_100us:
+            self._writes.add(index, 3, inhibit, section.place_of("inhibit_time"))
+        if timer != pdo.event_timer_ms:
+            self._writes.add(index, 5, timer, section.place_of("event_timer"))
+        if sync != pdo.sync_start:
+            self._writes.add(index, 6, sync, section.place_of("sync_start"))
+        return replace(
+            *(pdo,),
+            transmission=kind,
+            inhibit_time_100us=inhibit,
+            event_timer_ms=timer,
+            sync_start=sync,
+        )
+
+    def _with_mapping(self, pdo: BusPdo, index: int, section: BusFileSection) -> BusPdo:
+        place = section.place_of("mapping")
+        entries = section.sections("mapping")
+        if entries or self._sheet.value(index, 0):
+            self._writes.add(index, 0, 0, place)
+        mapping: list[MappedObject] = []
+        for entry in entries:
+            check_keys(entry, MAPPED)
+            mapped = self._mapped(entry, pdo)
+            if mapped is not None:
+                mapping.append(mapped)
+                self._writes.add(index, len(mapping), mapped.encode(), entry.place)
+        bits = sum(mapped.bits for mapped in mapping)
+        if bits > MAX_PDO_BITS:
+            section.note("pdo-length", "mapping", f"{bits} bits are mapped; 64 at most")
+        if mapping:
+            self._writes.add(index, 0, len(mapping), place)
+        return replace(pdo, mapping=tuple(mapping))
+
+    def _mapped(self, entry: BusFileSection, pdo: BusPdo) -> MappedObject | None:
+        """Return what an entry maps, None if it is not there."""
+        if "index" not in entry:
+            entry.note("kind", "index", "an entry of mapping has an index")
+            return None
+        if (index := entry.whole("index", -1, 0, UNSIGNED16)) < 0:
+            return None
+        sub = entry.whole("sub_index", 0, 0, UNSIGNED8)
+        row = self._sheet.row(index, sub)
+        what = f"{index:04X}h:{sub:02X}"
+        if row is None:
+            text = f"{what} is not there: {self._sheet.beside(index)}"
+            entry.note("object-missing", "index", text)
+            return None
+        self._check_mappable(entry, row, what, pdo)
+        if (bits := entry.whole("bits", row.data_type.bits)) != row.data_type.bits:
+            where = self._sheet.place(index, sub)
+            entry.note(
+                "mapped-length",
+                "bits",
+                f"bits: {bits}, but {what} has {row.data_type.bits}: {where}",
+            )
+        if not row.data_type.bits:
+            text = f"{what} is a {row.data_type.name}, which no PDO carries"
+            entry.note("value-type", "index", text)
+            return None
+        return MappedObject(index, sub, row.data_type.bits)
+
+    def _check_mappable(
+        self, entry: BusFileSection, row: EntryDescription, what: str, pdo: BusPdo
+    ) -> None:
+        place = self._sheet.place(row.index, row.sub)
+        if not row.access & (Access.TPDO | Access.RPDO):
+            entry.note("not-mappable", "index", f"{what} cannot be mapped: {place}")
+        elif not row.access & (Access.TPDO if pdo.transmit else Access.RPDO):
+            kind = "TPDO" if pdo.transmit else "RPDO"
+            entry.note("direction", "index", f"{what} cannot be mapped into a {kind}: {place}")
+
+
+def _said(pdos: dict[int, BusPdo]) -> str:
+    """Say which numbers there are."""
+    return ", ".join(map(str, list(pdos)[:12])) + (", ..." if len(pdos) > 12 else "") or "none"
+
+
+def _of_sheet(sheet: Sheet, index: int) -> BusPdo:
+    """Return a PDO as it is at power-on."""
+    transmit = index >= TPDO
+    pdo = BusPdo(index - (TPDO if transmit else RPDO) + 1, transmit, INVALID)
+    count, value = sheet.value(index, 0), sheet.value
+    return replace(
+        pdo,
+        cob_id=value(index, 1, INVALID) if count >= 1 else INVALID,
+        transmission=value(index, 2) if count >= 2 else 0,
+        inhibit_time_100us=value(index, 3) if count >= 3 and transmit else 0,
+        event_timer_ms=value(index, 5) if count >= 5 else 0,
+        sync_start=value(index, 6) if count >= 6 and transmit else 0,
+        mapping=tuple(_mapping(sheet, index + _MAPPING)),
+    )
+
+
+def _mapping(sheet: Sheet, index: int) -> Iterator[MappedObject]:
+    count = sheet.value(index, 0)
+    for sub in sheet.subs(index):
+        if 1 <= sub <= count and (value := sheet.value(index, sub)):
+            yield MappedObject.parse(value)
+
+
+def pdos_after(sheet: Sheet, writes: Writes) -> tuple[BusPdo, ...]:
+    """Return all PDOs of a slave as they are after the writes, RPDOs first."""
+    written = writes.values()
+
+    def value(index: int, sub: int, default: int = 0) -> int:
+        data = written.get(index << 8 | sub)
+        return sheet.value(index, sub, default) if data is None else int.from_bytes(data, "little")
+
+    def pdo(index: int, number: int, transmit: bool) -> BusPdo:
+        count = value(index + _MAPPING, 0)
+        subs = (sub for sub in sheet.subs(index + _MAPPING) if 1 <= sub <= count)
+        mapping = (MappedObject.parse(value(index + _MAPPING, sub)) for sub in subs)
+        return BusPdo(
+            *(number, transmit, value(index, 1, INVALID), value(index, 2)),
+            inhibit_time_100us=value(index, 3) if transmit else 0,
+            event_timer_ms=value(index, 5),
+            sync_start=value(index, 6) if transmit else 0,
+            mapping=tuple(mapping),
+        )
+
+    return tuple(
+        pdo(index, index - first + 1, first == TPDO)
+        for first in (RPDO, TPDO)
+        for index in sheet.pdos(first)
+    )

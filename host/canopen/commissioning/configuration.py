@@ -1,0 +1,112 @@
+"""The configuration that a DCF says: what it holds, what differs in a node, how it gets there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import Final
+
+from tickrig.host.canopen.conform.write_order import PDOS, Write, in_order, is_too_long
+from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.eds.eds_device import EdsDevice
+from tickrig.wire.canopen.eds.eds_file import EdsFile
+from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
+from tickrig.wire.canopen.nmt import INVALID
+
+_Address = tuple[int, int]
+Values = dict[_Address, bytes]
+
+_COMMANDS: Final = (0x1003, 0x1010, 0x1011, *range(0x1F50, 0x1F58))
+"""Error history, store, restore, programs: to write them commands something."""
+_CONFIGURED: Final = 0x1020
+"""Verify configuration: date and time are written when all else is."""
+_COB_ID: Final = 1
+"""Sub-index of the communication parameter of a PDO."""
+_TEXTS: Final = (DataType.VISIBLE_STRING, DataType.UNICODE_STRING)
+
+
+def dcf_values(file: EdsFile, device: EdsDevice, node_id: int) -> Values:
+    """Return what a DCF configures: its ParameterValues of objects that can be written.
+
+    Args:
+        file: the DCF.
+        device: what it says.
+        node_id: is added where a value is relative to it.
+    """
+    sections = {(index, sub or 0): section for section, index, sub in file.objects()}
+    return {
+        (row.index, row.sub): row.power_on_data(node_id)
+        for row in device.entries
+        if row.writable and row.index not in _COMMANDS and _has_value(file, sections, row)
+    }
+
+
+def _has_value(file: EdsFile, sections: Mapping[_Address, str], row: EntryDescription) -> bool:
+    section = sections.get((row.index, row.sub), f"{row.index:04X}")
+    beside = file.value(f"{row.index:04X}Value", str(row.sub))
+    return bool(file.value(section, "ParameterValue") or beside)
+
+
+def default_values(device: EdsDevice, node_id: int) -> Values:
+    """Return the defaults of all parameters that an EDS describes."""
+    return {
+        (row.index, row.sub): row.power_on_data(node_id)
+        for row in device.entries
+        if row.has_default and is_parameter(row)
+    }
+
+
+def is_parameter(row: EntryDescription) -> bool:
+    """Say whether an entry is set once, and not a value that comes and goes with a process."""
+    mapped = Access.RPDO in row.access or Access.TPDO in row.access
+    kept = row.readable and row.writable and not mapped
+    return kept and row.index not in _COMMANDS and row.data_type is not DataType.DOMAIN
+
+
+def same(row: EntryDescription | None, wanted: bytes, found: bytes) -> bool:
+    """Say whether two values mean the same: texts without the zeros at their end."""
+    if row is not None and row.data_type in _TEXTS:
+        return wanted.rstrip(b"\0") == found.rstrip(b"\0")
+    return wanted == found
+
+
+def disabled(done: Sequence[Write], left: Sequence[Write]) -> str:
+    """Say which PDO is disabled between two writes, and would be enabled by one that is left."""
+    was = {at: data for at, data in done if at[1] == _COB_ID and _is_pdo(at[0])}
+    will = {at: data for at, data in left if at[1] == _COB_ID and _is_pdo(at[0])}
+    open_pdos = [at for at in was.keys() & will if _is_off(was[at]) and not _is_off(will[at])]
+    return "".join(f"the PDO of {index:04X}h stays disabled" for index, _ in open_pdos)
+
+
+def _is_pdo(index: int) -> bool:
+    return any(index in area for area in PDOS)
+
+
+def _is_off(data: bytes) -> bool:
+    return bool(int.from_bytes(data, "little") & INVALID)
+
+
+def writes(
+    values: Mapping[_Address, bytes],
+    number: Callable[[_Address], int],
+    writable: Collection[_Address],
+) -> list[Write]:
+    """Return what to write, one after the other; the date of the configuration comes last.
+
+    Args:
+        values: what the node shall hold.
+        number: reads an object of the node, as an unsigned number.
+        writable: objects that can be written; a step between is left out for others.
+
+    Raises:
+        ValueError: a COB-ID, or a number of mapped objects, that is none.
+    """
+    last = {at: data for at, data in values.items() if at[0] == _CONFIGURED}
+    first = {at: values[at] for at in sorted(values) if at not in last}
+    try:
+        if any(is_too_long(at, data) for at, data in first.items()):
+            raise OverflowError
+        found = [(at, data) for at, data in in_order(first, number) if at in writable]
+    except (OverflowError, ValueError):
+        reason = "a COB-ID of more than 32 bits, or more than 255 mapped objects"
+        raise ValueError(reason) from None
+    return [*found, *last.items()]

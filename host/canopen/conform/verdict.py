@@ -1,0 +1,142 @@
+"""What came of a check, and of a run of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Final, NamedTuple
+
+from tickrig.host.canopen.conform.check import Check, Level
+
+
+class CheckVerdict(StrEnum):
+    """What a check gave."""
+
+    PASS = "pass"
+    FAIL = "fail"
+    NOT_APPLICABLE = "not applicable"
+    IMPLEMENTATION_DEFINED = "implementation-defined"
+    INCONCLUSIVE = "inconclusive"
+    """The bus or this host was too slow, lost frames, or another node disturbed it."""
+    BLOCKED = "blocked"
+    """The node did not come back."""
+
+
+class Direction(StrEnum):
+    """Which way a line of the evidence went."""
+
+    SENT = ">"
+    RECEIVED = "<"
+    REMARK = "#"
+
+
+class FrameLine(NamedTuple):
+    """A line of the evidence.
+
+    Attributes:
+        at_us: bus time since the start of the run.
+        direction: to the node, from the bus, or a remark of the tester.
+        text: the frame in candump's notation, or the remark.
+    """
+
+    at_us: int
+    direction: Direction
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class CheckOutcome:
+    """One go at a check.
+
+    Attributes:
+        verdict: what it gave.
+        reason: why, in one line: what came and what was allowed; empty where it passed.
+        evidence: what was on the bus.
+        start_us: bus time since the start of the run.
+        end_us: the same, of its end.
+        wanted: patterns of the frame that should have come, one of them, where it failed by that.
+    """
+
+    verdict: CheckVerdict
+    reason: str = ""
+    evidence: tuple[FrameLine, ...] = ()
+    start_us: int = 0
+    end_us: int = 0
+    wanted: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """A check with what came of it.
+
+    Attributes:
+        check: the check.
+        outcome: what counts.
+        first: the go before it, where a failure was tried again.
+    """
+
+    check: Check
+    outcome: CheckOutcome
+    first: CheckOutcome | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """A whole run.
+
+    Attributes:
+        source: the bus, as the user named it.
+        node_id: of the node, 1..127.
+        level: what was allowed.
+        results: in the order in which they were judged.
+        node: what it says of itself (1000h, 1008h to 100Ah, 1018h), by name, for people.
+        settings: adapter, bit rate, tolerances, seed, versions and such, by name, for people.
+        findings: of the EDS, and contradictions between it and the node, one a line.
+        unrestored: what could not be written back, one a line.
+        repairs: what restores it, written in this order: words of `canmon net SOURCE write NODE`.
+        duration_us: of the run, in bus time.
+        aborted: why it ended before its end; empty if it did not.
+        doubt: why all of it may say nothing of the node; empty if it does.
+        absent: nothing was judged, as nobody, or more than one node, answers to the node-ID.
+    """
+
+    source: str
+    node_id: int
+    level: Level
+    results: tuple[Result, ...] = field(repr=False)
+    node: Mapping[str, str] = field(default_factory=dict)
+    settings: Mapping[str, str] = field(default_factory=dict, repr=False)
+    findings: tuple[str, ...] = ()
+    unrestored: tuple[str, ...] = ()
+    repairs: tuple[str, ...] = ()
+    duration_us: int = 0
+    aborted: str = ""
+    doubt: str = ""
+    absent: bool = False
+
+    def count(self, verdict: CheckVerdict) -> int:
+        """Return how many checks gave this verdict."""
+        return sum(result.outcome.verdict is verdict for result in self.results)
+
+    @property
+    def exit_status(self) -> int:
+        """0 all pass, 1 a failure, 4 inconclusive or blocked, 5 nothing judged (conform.md 5)."""
+        if self.count(CheckVerdict.FAIL):
+            return FAILED
+        if (
+            self.count(CheckVerdict.INCONCLUSIVE)
+            or self.count(CheckVerdict.BLOCKED)
+            or self.aborted
+        ):
+            return UNDECIDED
+        return 0 if self.count(CheckVerdict.PASS) else NOTHING_JUDGED
+
+
+FAILED: Final = 1
+UNDECIDED: Final = 4
+NOTHING_JUDGED: Final = 5
+BUS_FAILED: Final = 3
+CTRL_C: Final = 130
+INTERRUPTED: Final = "interrupted"
+"""Why a run has ended before its end, if somebody ended it."""

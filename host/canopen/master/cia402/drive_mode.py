@@ -1,0 +1,243 @@
+"""Modes of operation, each with its set-point and its handshake (CiA 402-2)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Final
+
+from tickrig.host.canopen.dialogue import Script
+from tickrig.host.canopen.master.cia402.drive_state import Controlword, Statusword
+from tickrig.host.text.names import near
+
+_START: Final = Controlword.MODE_4
+"""New set-point, start homing, interpolate."""
+
+_AT_ONCE: Final = Controlword.MODE_5
+
+
+class ModeNumber(IntEnum):
+    """Modes of operation, 6060h."""
+
+    NONE = 0
+    PROFILE_POSITION = 1
+    VELOCITY = 2
+    PROFILE_VELOCITY = 3
+    PROFILE_TORQUE = 4
+    HOMING = 6
+    INTERPOLATED_POSITION = 7
+    CYCLIC_POSITION = 8
+    CYCLIC_VELOCITY = 9
+    CYCLIC_TORQUE = 10
+
+    @classmethod
+    def of(cls, mode: int | str) -> ModeNumber:
+        """Return a mode by its usual abbreviation, as `pp`; ValueError if there is none."""
+        if isinstance(mode, int) and mode in list(cls):
+            return cls(mode)
+        mode = str(mode)
+        if mode not in _SHORT:
+            raise ValueError(f"no mode {mode!r}; {near(mode, _SHORT)}")
+        return _SHORT[mode]
+
+
+_SHORT: Final[Mapping[str, ModeNumber]] = {
+    "none": ModeNumber.NONE,
+    "pp": ModeNumber.PROFILE_POSITION,
+    "vl": ModeNumber.VELOCITY,
+    "pv": ModeNumber.PROFILE_VELOCITY,
+    "tq": ModeNumber.PROFILE_TORQUE,
+    "hm": ModeNumber.HOMING,
+    "ip": ModeNumber.INTERPOLATED_POSITION,
+    "csp": ModeNumber.CYCLIC_POSITION,
+    "csv": ModeNumber.CYCLIC_VELOCITY,
+    "cst": ModeNumber.CYCLIC_TORQUE,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class DriveObject:
+    """An object of a drive.
+
+    Attributes:
+        index: of its first axis.
+        size: bytes.
+        sub: of the object.
+        signed: whether it is an INTEGER.
+    """
+
+    index: int
+    size: int
+    sub: int = 0
+    signed: bool = True
+
+    @property
+    def lowest(self) -> int:
+        """The least value."""
+        return -(1 << 8 * self.size - 1) if self.signed else 0
+
+    @property
+    def highest(self) -> int:
+        """The greatest value."""
+        return (1 << 8 * self.size - self.signed) - 1
+
+    def value_of(self, bits: int) -> int:
+        """Return the value that so many bits are."""
+        return bits - (1 << 8 * self.size) if bits > self.highest else bits
+
+    def bits_of(self, value: int) -> int:
+        """Return the bits of a value."""
+        return value & (1 << 8 * self.size) - 1
+
+
+_Write = Callable[[DriveObject, int], Script[None]]
+
+
+class DriveMode:
+    """What a mode does in each period; it is chosen while the drive has it.
+
+    Attributes:
+        controlword: its bits of 6040h.
+    """
+
+    def __init__(self) -> None:
+        self.controlword = 0
+
+    def begin(self) -> None:
+        """Have no set-point, as when the mode is chosen."""
+
+    def set_target(self, value: float) -> None:
+        """Take a set-point in units of the device; ValueError where a mode has none."""
+        raise ValueError("this mode has no target")
+
+    def read(self, statusword: int) -> None:
+        """Take the statusword of this period."""
+
+    def write(self, write: _Write) -> Script[bool]:
+        """Write the set-point; return whether there is one: without, the drive is halted."""
+        yield from ()
+        return False
+
+
+class TargetMode(DriveMode):
+    """Writes its target in each period.
+
+    Args:
+        target: the object.
+        bits: of the controlword, set while there is a target.
+    """
+
+    def __init__(self, target: DriveObject, bits: int = 0) -> None:
+        super().__init__()
+        self._object, self._bits = target, bits
+        self._target: int | None = None
+
+    def begin(self) -> None:
+        """Have no target."""
+        self._target = None
+
+    def set_target(self, value: float) -> None:
+        """Take a target; what is too large for the object is cut.
+
+        Raises:
+            ValueError: it is no number.
+        """
+        if not math.isfinite(value):
+            raise ValueError(f"{value} is no target")
+        self._target = max(self._object.lowest, min(int(value), self._object.highest))
+
+    def write(self, write: _Write) -> Script[bool]:
+        """Write the target, if there is one."""
+        if self._target is None:
+            self.controlword &= ~self._bits
+            return False
+        self.controlword |= self._bits
+        yield from write(self._object, self._target)
+        return True
+
+
+class _ProfilePositionMode(TargetMode):
+    """Writes each new target once, and has it taken by the handshake of bits 4 and 12."""
+
+    def begin(self) -> None:
+        """Have no target, and none that was given."""
+        super().begin()
+        self._given: int | None = None
+        self._acknowledged = False
+
+    def read(self, statusword: int) -> None:
+        """Look for the acknowledge."""
+        self._acknowledged = bool(statusword & Statusword.MODE_12)
+
+    def write(self, write: _Write) -> Script[bool]:
+        """Raise bit 4 for a new target, let it fall when it is acknowledged."""
+        self.controlword |= _AT_ONCE
+        if self._target is None:
+            return False
+        if self._acknowledged:
+            self.controlword &= ~_START
+        elif self._target != self._given:
+            if self.controlword & _START:
+                self.controlword &= ~_START
+            else:
+                yield from write(self._object, self._target)
+                self.controlword |= _START
+                self._given = self._target
+        return True
+
+
+class HomingMode(DriveMode):
+    """Starts homing by bit 4; bits 10, 12 and 13 of the statusword say how it goes.
+
+    Attributes:
+        runs: homing is to run.
+        status: these bits.
+    """
+
+    MASK: Final = Statusword.TARGET_REACHED | Statusword.MODE_12 | Statusword.MODE_13
+
+    def begin(self) -> None:
+        """Do not home."""
+        self.runs, self.status = False, 0
+
+    def read(self, statusword: int) -> None:
+        """Take its bits."""
+        self.status = statusword & self.MASK
+
+    def write(self, write: _Write) -> Script[bool]:
+        """Set bit 4 while homing is to run."""
+        self.controlword = int(_START) if self.runs else 0
+        yield from ()
+        return self.runs
+
+
+_POSITION: Final = DriveObject(0x607A, 4)
+_SPEED: Final = DriveObject(0x60FF, 4)
+_TORQUE: Final = DriveObject(0x6071, 2)
+_FREQUENCY: Final = DriveObject(0x6042, 2)
+_INTERPOLATED: Final = DriveObject(0x60C1, 4, sub=1)
+
+TARGETS: Final = (_POSITION, _SPEED, _TORQUE, _FREQUENCY, _INTERPOLATED)
+"""The set-points of all modes."""
+
+MODES: Final[Mapping[ModeNumber, Callable[[], DriveMode]]] = {
+    ModeNumber.PROFILE_POSITION: lambda: _ProfilePositionMode(_POSITION),
+    ModeNumber.VELOCITY: lambda: TargetMode(_FREQUENCY, 0x70),
+    ModeNumber.PROFILE_VELOCITY: lambda: TargetMode(_SPEED),
+    ModeNumber.PROFILE_TORQUE: lambda: TargetMode(_TORQUE),
+    ModeNumber.HOMING: HomingMode,
+    ModeNumber.INTERPOLATED_POSITION: lambda: TargetMode(_INTERPOLATED, _START),
+    ModeNumber.CYCLIC_POSITION: lambda: TargetMode(_POSITION),
+    ModeNumber.CYCLIC_VELOCITY: lambda: TargetMode(_SPEED),
+    ModeNumber.CYCLIC_TORQUE: lambda: TargetMode(_TORQUE),
+}
+
+POSITIONS: Final = (
+    ModeNumber.PROFILE_POSITION,
+    ModeNumber.INTERPOLATED_POSITION,
+    ModeNumber.CYCLIC_POSITION,
+)
+SPEEDS: Final = (ModeNumber.VELOCITY, ModeNumber.PROFILE_VELOCITY, ModeNumber.CYCLIC_VELOCITY)
+"""Modes whose targets are scaled; torques go to the device as they are."""

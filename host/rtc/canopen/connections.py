@@ -1,0 +1,207 @@
+"""What joins nodes: connectors of ports through the PC, and PDO links without it (Fig. 120)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from tickrig.host.canopen.dialogue import Failure, QueuedScript
+from tickrig.host.rtc.canopen import definition
+from tickrig.host.rtc.canopen.boot import set_pdo
+from tickrig.host.rtc.canopen.events import Notify, ServerEventType
+from tickrig.host.rtc.canopen.pdo_layout import PdoLayout
+from tickrig.host.rtc.canopen.served_node import NodePhase, ServedNode
+from tickrig.host.rtc.component import RtComponent
+from tickrig.host.rtc.ports.port import ConnectorProfile
+from tickrig.host.rtc.states import RtcRefused
+from tickrig.host.rtc.system.manager import Manager
+
+
+class PortConnections:
+    """Makes connectors as soon as both ports are there; keeps those of a component that goes.
+
+    Args:
+        manager: has the ports.
+        wanted: connectors to be made.
+        notify: called with what became of each.
+
+    Attributes:
+        wanted: those that have not been made.
+    """
+
+    def __init__(
+        self, manager: Manager, wanted: tuple[definition.RtConnection, ...], notify: Notify
+    ) -> None:
+        self._manager, self._notify = manager, notify
+        self.wanted = list(wanted)
+        self._refused = set[str]()
+
+    @property
+    def all(self) -> tuple[definition.RtConnection, ...]:
+        """Those that are made, then those that are wanted."""
+        made = (_entry(profile) for profile in self._manager.connectors)
+        return (*made, *self.wanted)
+
+    def make(self) -> None:
+        """Make those whose ports are there; one that cannot be is wanted no more."""
+        for entry in tuple(self.wanted):
+            try:
+                if not are_there(self._manager, entry):
+                    continue
+            except RtcRefused as error:
+                self._refuse(str(error))
+                continue
+            self.wanted.remove(entry)
+            self._connect(entry)
+
+    def keep(self, component: RtComponent) -> None:
+        """Want those of a component again that is about to go."""
+        profiles = (
+            connector.profile
+            for port in component.ports.values()
+            for connector in port.connectors
+            if connector.joins_components
+        )
+        self.wanted += (_entry(profile) for profile in profiles)
+
+    def forget(self, first: str, second: str) -> bool:
+        """Want a connection no more; False if it is none that waits."""
+        ends = {first, second}
+        waiting = [entry for entry in self.wanted if {entry.source, entry.target} == ends]
+        self.wanted = [entry for entry in self.wanted if entry not in waiting]
+        return bool(waiting)
+
+    def _refuse(self, text: str) -> None:
+        """Tell once of a port that is not there; another boot of its device may bring it."""
+        if text not in self._refused:
+            self._refused.add(text)
+            self._notify(ServerEventType.CONNECTION_REFUSED, 0, text)
+
+    def _connect(self, entry: definition.RtConnection) -> None:
+        ends = f"{entry.source} to {entry.target}"
+        try:
+            self._manager.connect(entry.source, entry.target, entry.properties)
+        except RtcRefused as error:
+            self._notify(ServerEventType.CONNECTION_REFUSED, 0, str(error))
+        else:
+            self._notify(ServerEventType.CONNECTED, 0, ends)
+
+
+def are_there(manager: Manager, entry: definition.RtConnection) -> bool:
+    """Say whether both components are there; RtcRefused if one that is has no such port."""
+    names = {component.instance_name for component in manager.components}
+    ends = [end for end in (entry.source, entry.target) if end.rpartition(".")[0] in names]
+    for end in ends:
+        manager.port(end)
+    return len(ends) == 2
+
+
+def _entry(profile: ConnectorProfile) -> definition.RtConnection:
+    source, target = profile.ports
+    return definition.RtConnection(source, target, dict(profile.properties))
+
+
+class PdoLinks:
+    """Makes PDO links when both nodes are ready: an RPDO receives the TPDO of another node.
+
+    Args:
+        nodes: by node-ID.
+        links: those of the System Definition.
+        notify: called with what became of each.
+
+    Attributes:
+        links: all that are wanted.
+    """
+
+    def __init__(
+        self, nodes: Mapping[int, ServedNode], links: tuple[definition.PdoLink, ...], notify: Notify
+    ) -> None:
+        self._nodes, self._notify = nodes, notify
+        self.links = list(links)
+        self._made: dict[definition.PdoLink, int] = {}  # by which CAN-ID
+
+    def add(self, now_us: int, link: definition.PdoLink) -> None:
+        """Want a link, and make it; ServerRefused if it cannot be now."""
+        for other in self.links:
+            if other.target == link.target:
+                raise definition.ServerRefused(f"{other.source} and {other.target} are linked")
+        self._check(link)
+        self.links.append(link)
+        self._make(now_us, link)
+
+    def remove(self, now_us: int, link: definition.PdoLink) -> None:
+        """Give the RPDO its own COB-ID again; ServerRefused if there is no such link."""
+        if link not in self.links:
+            raise definition.ServerRefused(f"{link.source} and {link.target} are not linked")
+        own = self.layout(link.target).cob_id
+        self.links.remove(link)
+        self._made.pop(link, None)
+        self._write(now_us, link, own, linked=False)
+
+    def make(self, now_us: int, node_id: int) -> None:
+        """Make those of a node that has become ready; a target that stayed still has its own."""
+        for link in self.links:
+            if link.target.node == node_id:
+                self._made.pop(link, None)
+            ends = (link.source.node, link.target.node)
+            if node_id in ends and all(self._ready(end) for end in ends):
+                try:
+                    self._check(link)
+                except definition.ServerRefused as error:
+                    self._notify(ServerEventType.LINK_REFUSED, link.target.node, str(error))
+                else:
+                    self._make(now_us, link)
+
+    def layout(self, name: definition.PdoName) -> PdoLayout:
+        """Return a PDO of a node that is ready; ServerRefused if it has none."""
+        if name.node not in self._nodes or not self._ready(name.node):
+            raise definition.ServerRefused(f"node {name.node} is not ready")
+        return find_layout(name, self._nodes[name.node].layouts)
+
+    def _ready(self, node_id: int) -> bool:
+        return self._nodes[node_id].phase is NodePhase.READY
+
+    def _check(self, link: definition.PdoLink) -> None:
+        check_lengths(link, self.layout(link.source), self.layout(link.target))
+
+    def _make(self, now_us: int, link: definition.PdoLink) -> None:
+        """Give the RPDO the COB-ID of the TPDO."""
+        cob_id = self.layout(link.source).cob_id
+        if self._made.get(link) != cob_id:
+            self._write(now_us, link, cob_id, linked=True)
+
+    def _write(self, now_us: int, link: definition.PdoLink, cob_id: int, *, linked: bool) -> None:
+        node, text = self._nodes[link.target.node], f"{link.source} to {link.target}"
+
+        def done(_: None) -> None:
+            for sink in node.proxy.sinks if node.proxy else ():
+                if sink.layout.index == link.target.index:
+                    sink.linked = linked
+            if linked:
+                self._made[link] = cob_id
+            kind = ServerEventType.PDO_LINKED if linked else ServerEventType.PDO_UNLINKED
+            self._notify(kind, node.entry.id, f"{text}: {cob_id:03X}h")
+
+        def failed(failure: Failure) -> None:
+            self._notify(ServerEventType.LINK_REFUSED, node.entry.id, f"{text}: {failure}")
+
+        script = set_pdo(link.target.index, definition.PdoEntry(cob_id=cob_id))
+        node.run(now_us, QueuedScript("link", script, done, failed, moves=False))
+
+
+def find_layout(name: definition.PdoName, layouts: Iterable[PdoLayout]) -> PdoLayout:
+    """Return that of a PDO; ServerRefused if it is off."""
+    for layout in layouts:
+        if layout.index == name.index:
+            return layout
+    raise definition.ServerRefused(f"{name} is off, or not there")
+
+
+def check_lengths(link: definition.PdoLink, source: PdoLayout, target: PdoLayout) -> None:
+    """Raise ServerRefused if the frame of one is not as long as that of the other.
+
+    Dummy bits fill up an RPDO, and nothing the TPDO of the same Booleans.
+    """
+    if source.size != target.size:
+        raise definition.ServerRefused(
+            f"{link.source} has {source.bits} bits, {link.target} has {target.bits}"
+        )

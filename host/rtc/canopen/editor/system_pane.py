@@ -1,0 +1,248 @@
+"""The tree of nodes, components and what joins them."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from functools import lru_cache
+from typing import ClassVar, Final
+
+from textual.binding import Binding, BindingType
+
+from tickrig.host.rtc.canopen.definition import PdoLink, PdoName, RtConnection, ServerRefused
+from tickrig.host.rtc.canopen.editor.widgets import CursorRow, CursorView
+from tickrig.host.rtc.canopen.served_node import NodePhase
+from tickrig.host.rtc.canopen.view import (
+    NOT_HEARD,
+    ComponentView,
+    NodeView,
+    PdoView,
+    PortView,
+    ServerView,
+    SystemView,
+)
+from tickrig.host.tui import Line
+
+Item = NodeView | ComponentView | PdoView | PortView | PdoLink | RtConnection
+_SystemRow = CursorRow[Item]
+
+_STATES: Final = {"ACTIVE": "bold green", "INACTIVE": "cyan", "ERROR": "bold white on red"}
+_DIM: Final = "bright_black"
+_ALARM: Final = "bold red"
+_MARK: Final = "bold yellow"
+
+_KEPT_ROWS: Final = 4_096
+"""More than 127 nodes have; a row that is the same is not written again."""
+
+_FOLDED: Final = "▸ "
+_OPEN: Final = "▾ "
+
+
+def _system_rows(
+    system: SystemView, folded: Collection[str] = (), marked: str = ""
+) -> list[_SystemRow]:
+    """Return the rows.
+
+    Args:
+        system: what there is.
+        folded: keys of nodes and components that are shown without what they have.
+        marked: key of the port or PDO that is to be connected.
+    """
+    sources = {link.target: link.source for link in system.links}
+    rows: list[_SystemRow] = []
+    for node in system.nodes:
+        rows.append(_node(node, folded))
+        if rows[-1].key not in folded:
+            rows += (_pdo(pdo, sources.get(pdo.name), marked) for pdo in node.pdos)
+            rows += (_port(port, marked) for port in node.ports)
+    for component in system.components:
+        rows.append(_component(component, folded))
+        if rows[-1].key not in folded:
+            rows += (_port(port, marked) for port in component.ports)
+    return [*rows, *_joints(system)]
+
+
+def _node(node: NodeView, folded: Collection[str]) -> _SystemRow:
+    key = f"node {node.node_id}"
+    age = "" if node.heartbeat_age_us == NOT_HEARD else f"{node.heartbeat_age_us // 1_000} ms"
+    nmt = node.nmt_state.replace("_", "-").capitalize()
+    line = (
+        (_fold(key, folded), ""),
+        (f"{node.node_id:>3} {node.name:<12} ", "bold"),
+        _state(node.proxy_state),
+        (f" {nmt:<15} ", ""),
+        (f"{age:>8}", _ALARM if node.late else ""),
+        _phase(node),
+    )
+    return CursorRow(key, line, node)
+
+
+def _phase(node: NodeView) -> tuple[str, str]:
+    if node.phase is NodePhase.READY:
+        return "", ""
+    problem = f": {node.problem}" if node.problem else ""
+    return f"  {node.phase.value}{problem}", _ALARM if problem else _DIM
+
+
+def _component(component: ComponentView, folded: Collection[str]) -> _SystemRow:
+    key = f"component {component.name}"
+    line = (
+        (_fold(key, folded), ""),
+        (f"    {component.name:<12} ", "bold"),
+        _state(component.state),
+        (f" {component.type_name}", _DIM),
+    )
+    return CursorRow(key, line, component)
+
+
+def _fold(key: str, folded: Collection[str]) -> str:
+    return _FOLDED if key in folded else _OPEN
+
+
+def _state(state: str) -> tuple[str, str]:
+    return f"{state.capitalize():<8}", _STATES.get(state, _DIM)
+
+
+@lru_cache(_KEPT_ROWS)
+def _pdo(pdo: PdoView, source: PdoName | None, marked: str) -> _SystemRow:
+    key = f"pdo {pdo.name}"
+    linked = f" ← {source}" if source else ""
+    text = f"{pdo.cob_id:03X}h {pdo.bits:>2} bits  {pdo.index:04X}h ↔ {pdo.proxy_index:04X}h"
+    line: Line = (
+        (f"      {pdo.name!s:<12} ", _style(key, marked)),
+        (text, _DIM),
+        (linked, "green"),
+    )
+    return CursorRow(key, line, pdo)
+
+
+@lru_cache(_KEPT_ROWS)
+def _port(port: PortView, marked: str) -> _SystemRow:
+    key = f"port {port.name}"
+    way = "out" if port.out else "in "
+    peers = f" {'→' if port.out else '←'} {', '.join(port.peers)}" if port.peers else ""
+    line: Line = (
+        (f"      {way} {port.name:<20} ", _style(key, marked)),
+        (port.data_type, _DIM),
+        (peers, "green"),
+    )
+    return CursorRow(key, line, port)
+
+
+def _style(key: str, marked: str) -> str:
+    return _MARK if key == marked else ""
+
+
+def _joints(system: SystemView) -> Iterator[_SystemRow]:
+    for link in system.links:
+        text = f"{link.source} → {link.target}"
+        yield CursorRow(f"link {text}", (("  PDO link   ", _DIM), (text, "green")), link)
+    for entry in system.connections:
+        text = f"{entry.source} → {entry.target}"
+        waits = (("  waits for its ports", _DIM),) if entry in system.waiting else ()
+        yield CursorRow(
+            f"connection {text}", (("  through PC ", _DIM), (text, "green"), *waits), entry
+        )
+
+
+def connect(view: ServerView, first: Item, second: Item) -> None:
+    """Join two ports through the PC; ServerRefused or RtcRefused if they do not fit."""
+    if not (isinstance(first, PortView) and isinstance(second, PortView)):
+        raise ServerRefused("through the PC go ports: mark one, go to another")
+    out, in_ = (first, second) if first.out else (second, first)
+    view.connect(out.name, in_.name)
+
+
+def link(view: ServerView, first: Item, second: Item) -> None:
+    """Link a TPDO with an RPDO, without the PC; ServerRefused if they do not fit."""
+    if not (isinstance(first, PdoView) and isinstance(second, PdoView)):
+        raise ServerRefused("linked are PDOs: mark one, go to another")
+    source, target = sorted((first.name, second.name), key=lambda name: name.pdo[0] != "t")
+    if (source.pdo[0], target.pdo[0]) != ("t", "r"):
+        raise ServerRefused(f"{source} and {target}: a TPDO is linked with an RPDO")
+    view.link(source, target)
+
+
+def remove(view: ServerView, item: Item) -> None:
+    """End a link or connection; ServerRefused if it is none."""
+    match item:
+        case PdoLink(source, target):
+            view.unlink(source, target)
+        case RtConnection(first, second):
+            view.disconnect(first, second)
+        case _:
+            raise ServerRefused("links and connections are removed: they are at the end")
+
+
+_Owner = NodeView | ComponentView
+
+
+class SystemPane(CursorView[Item]):
+    """Shows a system; the cursor chooses what commands are about.
+
+    Attributes:
+        folded: keys of rows that are shown without what they have.
+        marked: the port or PDO that is to be connected.
+        node_id: the node in whose rows the cursor was last; 0 for none.
+    """
+
+    HELP = """
+    # System
+
+    Nodes with the state of the proxy, that of NMT, and how long ago the heartbeat was; their
+    PDOs and ports; other components; at the end what joins them.
+
+    To join two: mark a port or PDO, go to another, then connect them through the PC (ports) or
+    link them without it (PDOs). To end it: go to it at the end, and remove it.
+
+    A click moves the cursor; a double click, or one at the margin, opens and folds.
+    """
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("left", "fold(True)", "fold", show=False),
+        Binding("right", "fold(False)", "open", show=False),
+    ]
+
+    def __init__(self) -> None:
+        super().__init__("system")
+        self.forget()
+
+    def forget(self) -> None:
+        """Begin anew, with another system."""
+        self.folded: set[str] = set()
+        self.marked: _SystemRow | None = None
+        self.node_id, self.cursor = 0, 0
+
+    @property
+    def owner(self) -> _Owner | None:
+        """The node or component in whose rows the cursor is; None among what joins them."""
+        if self.row is None or isinstance(self.row.item, PdoLink | RtConnection):
+            return None
+        above = (row.item for row in reversed(self.rows_shown[: self.cursor + 1]))
+        return next(item for item in above if isinstance(item, _Owner))
+
+    def look(self, system: SystemView) -> None:
+        """Show how things are now."""
+        self.offer(_system_rows(system, self.folded, self.marked.key if self.marked else ""))
+        match self.owner:
+            case NodeView() as node:
+                self.node_id = node.node_id
+            case ComponentView():
+                self.node_id = 0
+
+    def mark(self) -> bool:
+        """Mark the port or PDO under the cursor, or let it go; False if it is none."""
+        row = self.row
+        if row is None or not isinstance(row.item, PdoView | PortView):
+            return False
+        self.marked = None if self.marked and self.marked.key == row.key else row
+        return True
+
+    def action_enter(self) -> None:
+        """Fold or open what is under the cursor."""
+        if self.row is not None:
+            self.action_fold(self.row.key not in self.folded)
+
+    def action_fold(self, folded: bool) -> None:
+        """Show the node or component under the cursor without what it has, or with it."""
+        if self.row is not None and isinstance(self.row.item, _Owner):
+            (self.folded.add if folded else self.folded.discard)(self.row.key)
+            self.post_message(self.Entered(self))

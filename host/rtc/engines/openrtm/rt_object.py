@@ -1,0 +1,146 @@
+"""A component as peers see it (OMG RTC 1.0, RTObject; SDO 1.0, SDO)."""
+
+from __future__ import annotations
+
+from typing import Any, Final, Protocol
+
+from tickrig.host.rtc.component import RtComponent
+from tickrig.host.rtc.engines.openrtm.context import ServantReferences
+from tickrig.host.rtc.engines.openrtm.orb import Reference, nvlist
+from tickrig.host.rtc.states import ReturnCode
+from tickrig.host.rtc.system.manager import Manager
+
+INTERFACE: Final = "OpenRTM.DataFlowComponent"
+
+
+class _Ports(Protocol):
+    """The ports of a component as an ORB serves them."""
+
+    def services(self) -> list[Reference]:
+        """Return a PortService for each."""
+        ...
+
+    def close(self) -> None:
+        """Let nobody call them any more."""
+        ...
+
+
+class RtObjectServant:
+    """Answers for a component; its methods are the operations of the IDL.
+
+    Not emulated: organizations and composite components (lists of them are empty), and
+    services that peers bring along.
+
+    Args:
+        component: the component.
+        manager: has it.
+        references: of components.
+
+    Attributes:
+        ports: its ports, once they are served.
+        configuration: reference of its configuration.
+    """
+
+    def __init__(
+        self, component: RtComponent, manager: Manager, references: ServantReferences
+    ) -> None:
+        self._component, self._manager, self._references = component, manager, references
+        self._calls, self._stubs = references.calls, references.stubs
+        self.ports: _Ports | None = None
+        self.configuration: Reference = None
+
+    def get_component_profile(self) -> Any:
+        """Return what there is to know."""
+        spec, name = self._component.spec, self._component.instance_name
+        profiles = [port.get_port_profile() for port in self.get_ports()]
+        return self._stubs.rtc.ComponentProfile(
+            instance_name=name,
+            type_name=spec.type_name,
+            description=spec.description,
+            version=spec.version,
+            vendor=spec.vendor,
+            category=spec.category,
+            port_profiles=profiles,
+            parent=None,
+            properties=nvlist(_properties_of(self._component)),
+        )
+
+    def get_ports(self) -> list[Reference]:
+        """Return its ports."""
+        return [] if self.ports is None else self.ports.services()
+
+    def initialize(self) -> Any:
+        """Refuse: it was initialized when its manager got it."""
+        return self._code(self._component.initialize)
+
+    def finalize(self) -> Any:
+        """Refuse: a component of a manager takes part in some context; `exit` ends it."""
+        return self._code(self._component.finalize)
+
+    def exit(self) -> Any:
+        """End the component."""
+        return self._code(self._exit)
+
+    on_initialize, on_finalize = initialize, finalize
+
+    def get_sdo_id(self) -> str:
+        """Return its instance name."""
+        return self._component.instance_name
+
+    def get_sdo_type(self) -> str:
+        """Return its description."""
+        return self._component.spec.description
+
+    def get_device_profile(self) -> Any:
+        """Return who made what."""
+        spec = self._component.spec
+        return self._stubs.sdo.DeviceProfile(
+            spec.category, spec.vendor, spec.type_name, spec.version, []
+        )
+
+    def get_configuration(self) -> Reference:
+        """Return its configuration."""
+        return self.configuration
+
+    def get_organizations(self) -> list[Any]:
+        """Return none, as those that follow."""
+        return []
+
+    get_owned_organizations = get_service_profiles = get_status_list = get_organizations
+
+    def get_service_profile(self, name: str) -> Any:
+        """Refuse, as those that follow: it has none."""
+        raise self._stubs.sdo.InvalidParameter(f"it has no {name!r}")
+
+    get_sdo_service = get_status = get_service_profile
+
+    def get_monitoring(self) -> Any:
+        """Refuse: there is none."""
+        raise self._stubs.sdo.InterfaceNotImplemented("no Monitoring")
+
+    def _exit(self) -> ReturnCode:
+        if self._references.fixed:
+            return ReturnCode.UNSUPPORTED
+        self._manager.delete(self._component.instance_name)
+        return ReturnCode.RTC_OK
+
+    def _code(self, call: Any) -> Any:
+        return self._references.code(self._calls.call(call))
+
+
+def _properties_of(component: RtComponent) -> dict[str, str]:
+    """Return what OpenRTM has in the properties of a component's profile."""
+    spec = component.spec
+    return {
+        "implementation_id": spec.type_name,
+        "type_name": spec.type_name,
+        "instance_name": component.instance_name,
+        "description": spec.description,
+        "version": spec.version,
+        "vendor": spec.vendor,
+        "category": spec.category,
+        "language": "Python",
+        "lang_type": "SCRIPT",
+        "naming.type": "corba",
+        **component.profile.properties,
+    }

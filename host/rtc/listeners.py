@@ -1,0 +1,30 @@
+"""Lists of functions that are called when something happens; none of them can stop the rest."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Final, ParamSpec
+
+from tickrig.host.text.log import log_of
+
+P = ParamSpec("P")
+
+_LOG: Final = log_of(__name__)
+
+
+def call_listeners(
+    who: str, listeners: Iterable[Callable[P, object]], *args: P.args, **kwargs: P.kwargs
+) -> None:
+    """Call each listener; what one raises is logged, and nothing else comes of it.
+
+    Args:
+        who: has the listeners; for people.
+        listeners: called in their order; one may add or remove some meanwhile.
+        args: of each call.
+        kwargs: of each call.
+    """
+    for listener in tuple(listeners):
+        try:
+            listener(*args, **kwargs)
+        except Exception:  # as callbacks of a component: one must not end the others
+            _LOG.exception("%s: a listener raised", who)

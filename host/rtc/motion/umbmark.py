@@ -1,0 +1,101 @@
+"""UMBmark: systematic errors of an odometry, measured by squares both ways, and corrected.
+
+Source: Borenstein and Feng, Measurement and Correction of Systematic Odometry Errors in
+Mobile Robots, IEEE Transactions on Robotics and Automation 12 (6), 1996.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import fsum, hypot, pi, sin
+from typing import Final
+
+from tickrig.host.rtc.motion.drive import BaseConnection, OnSample, drive
+from tickrig.host.rtc.motion.geometry import Pose, Wheels
+
+SIDE_M: Final = 4.0
+
+Error = tuple[float, float]
+"""How far a cart truly is from where it thinks it is: x, y, m."""
+
+
+@dataclass(frozen=True, slots=True)
+class Umbmark:
+    """The errors at the end of squares.
+
+    Attributes:
+        clockwise: one for each run.
+        counter_clockwise: one for each run.
+        returns_m: how far from its start the cart stood at the end of each run.
+    """
+
+    clockwise: tuple[Error, ...]
+    counter_clockwise: tuple[Error, ...]
+    returns_m: tuple[float, ...] = ()
+
+    @property
+    def most_m(self) -> float:
+        """E_max,syst: the larger distance of the two centres of gravity."""
+        return max(hypot(*_centre(self.clockwise)), hypot(*_centre(self.counter_clockwise)))
+
+    def corrected(self, wheels: Wheels, side_m: float = SIDE_M) -> Wheels:
+        """Return the geometry that makes up for the errors; the mean radius stays."""
+        (x_cw, _), (x_ccw, _) = _centre(self.clockwise), _centre(self.counter_clockwise)
+        alpha = (x_cw + x_ccw) / (-4 * side_m)
+        beta = (x_cw - x_ccw) / (-4 * side_m)
+        axle = wheels.axle * (pi / 2) / (pi / 2 - alpha)
+        share = 1.0
+        if beta:
+            radius = side_m / 2 / sin(beta / 2)
+            share = (radius + axle / 2) / (radius - axle / 2)
+        mean = (wheels.left + wheels.right) / 2
+        ratio = wheels.right / wheels.left * share
+        return Wheels(2 * mean / (ratio + 1), 2 * mean * ratio / (ratio + 1), axle)
+
+
+def _centre(errors: Sequence[Error]) -> Error:
+    """Return the centre of gravity.
+
+    >>> _centre([(0.0, 1.0), (2.0, 3.0)])
+    (1.0, 2.0)
+    """
+    return fsum(x for x, _ in errors) / len(errors), fsum(y for _, y in errors) / len(errors)
+
+
+def square(*, clockwise: bool, side_m: float = SIDE_M) -> list[Pose]:
+    """Return the corners of a square from the origin back to it."""
+    y = -side_m if clockwise else side_m
+    return [Pose(side_m), Pose(side_m, y), Pose(0.0, y), Pose()]
+
+
+def run_umbmark(
+    begin: Callable[[int], BaseConnection],
+    true_pose: Callable[[BaseConnection], Pose] = lambda connection: connection.pose,
+    runs: int = 5,
+    side_m: float = SIDE_M,
+    watch: OnSample = lambda sample: None,
+) -> Umbmark:
+    """Drive squares both ways, each from the origin.
+
+    Args:
+        begin: starts run number n, from 0 on: a cart at the origin, components active.
+        true_pose: measures where the cart is at the end of a run.
+        runs: how many each way.
+        side_m: of the squares; UMBmark has 4 m.
+        watch: called with each sample.
+
+    Raises:
+        TimeoutError: a square that did not end.
+    """
+    errors: dict[bool, list[Error]] = {True: [], False: []}
+    returns = []
+    for number in range(2 * runs):
+        clockwise = number % 2 == 0
+        connection = begin(number)
+        if drive(connection, square(clockwise=clockwise, side_m=side_m), watch).reached_s is None:
+            raise TimeoutError(f"square {number + 1} did not end")
+        truth, thought = true_pose(connection), connection.chain.odometry.pose
+        errors[clockwise].append((truth.x - thought.x, truth.y - thought.y))
+        returns.append(truth.distance(Pose()))
+    return Umbmark(tuple(errors[True]), tuple(errors[False]), tuple(returns))

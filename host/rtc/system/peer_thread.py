@@ -1,0 +1,230 @@
+"""Threads for the calls of many connectors into peers: one does, until somebody hangs."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from heapq import heappop, heappush
+from itertools import count
+from queue import Empty
+from typing import Final, Protocol
+
+from tickrig.host.links.ready import WaitingQueue
+from tickrig.host.text.log import log_of
+
+# A thread for the calls into one peer: whoever hangs there delays nobody else.
+
+_PeerCall = Callable[[], float | None]
+"""Returns after how many seconds it wants to be made again, None if it does not."""
+
+_RETRY_US: Final = 1_000_000
+
+_LOG: Final = log_of(__name__)
+
+
+class _CallingThread(threading.Thread):
+    """The thread of a `PeerThread`; it does not keep the process alive.
+
+    Attributes:
+        ending: it was told to end, and does after its present call.
+    """
+
+    ending = False
+
+
+def calls_run() -> bool:
+    """Return whether a thread that was told to end still makes a call.
+
+    A process that ends in the middle of one may abort, or never end: the call is in code of C++.
+    """
+    threads = threading.enumerate()
+    return any(isinstance(thread, _CallingThread) and thread.ending for thread in threads)
+
+
+class PeerThread:
+    """Makes calls into a peer, one after the other, in a thread of its own.
+
+    A call that hangs holds up those that follow it here; its time-out is the engine's (1 s for
+    a CORBA call). The thread does not keep the process alive.
+
+    Args:
+        name: of the peer, for people.
+        retry_us: so long after a call that had no answer connectors call again.
+
+    Attributes:
+        retry_s: the same, in seconds.
+    """
+
+    def __init__(self, name: str, retry_us: int = _RETRY_US) -> None:
+        self.retry_s, self._order = retry_us / 1e6, count()
+        self._calls: WaitingQueue[_PeerCall | None] = WaitingQueue()
+        self._repeated: list[tuple[float, int, _PeerCall]] = []
+        self._thread = _CallingThread(target=self._run, name=name, daemon=True)
+        self._thread.start()
+
+    def submit(self, call: _PeerCall) -> None:
+        """Have a call made after those that wait; nothing waits for it here."""
+        self._calls.put(call)
+
+    def close(self, wait_us: int = 0) -> None:
+        """End after the present call; wait for that, but not longer than `wait_us`."""
+        self._thread.ending = True
+        self._calls.put(None)
+        self._thread.join(wait_us / 1e6)
+
+    def _run(self) -> None:
+        while (call := self._next()) is not None:
+            try:
+                again_s = call()
+            except Exception:
+                _LOG.exception("%s: a call raised", self._thread.name)
+            else:
+                self._plan(call, again_s)
+
+    def _plan(self, call: _PeerCall, again_s: float | None) -> None:
+        if again_s == 0:
+            self._calls.put(call)
+        elif again_s is not None:
+            heappush(self._repeated, (time.monotonic() + again_s, next(self._order), call))
+
+    def _next(self) -> _PeerCall | None:
+        """Wait for the next call; those that are repeated come at their time."""
+        wait_s = None
+        if self._repeated:
+            wait_s = self._repeated[0][0] - time.monotonic()
+            if wait_s <= 0:
+                return heappop(self._repeated)[2]
+        try:
+            return self._calls.get(wait_s)
+        except Empty:
+            return heappop(self._repeated)[2]
+
+
+_PATIENCE_S: Final = 0.005
+"""Nobody waits longer for another one's call; then there is one thread more."""
+
+_LANES: Final = 2
+"""So many threads make calls that are answered: two hide that each answer wakes somebody up, and
+more than that wait for each other."""
+
+_IDLE_S: Final = 5.0
+"""So long a thread waits for something to do; who hangs is called again each second."""
+
+_MOST: Final = 256
+
+_CONNECTORS_LOG: Final = log_of(__name__)
+
+
+class PeerCaller(Protocol):
+    """Makes calls into peers, in threads of its own: `PeerThread`, `PeerThreads`."""
+
+    retry_s: float
+
+    def submit(self, call: _PeerCall) -> None:
+        """Have a call made; nothing waits for it here."""
+        ...
+
+
+class PeerThreads:
+    """Makes the calls of many connectors, each of which has one at a time.
+
+    As long as peers answer at once there is one thread, which takes a third of the processor time
+    that a thread for each connector would. Where calls wait there is a second one, and another
+    one for each call that hangs.
+
+    Args:
+        name: for people.
+        retry_us: so long after a call that had no answer connectors call again.
+
+    Attributes:
+        retry_s: the same, in seconds.
+        running: how many threads there are.
+    """
+
+    def __init__(self, name: str, retry_us: int = _RETRY_US) -> None:
+        self.retry_s, self._name, self._order = retry_us / 1e6, name, count()
+        self._changed = threading.Condition()
+        self._calls: deque[tuple[float, _PeerCall]] = deque()
+        self._repeated: list[tuple[float, int, _PeerCall]] = []
+        self.running, self._idle, self._helped_s, self._closed = 0, 0, 0.0, False
+        self._made: dict[int, float] = {}  # since when a thread is in its call
+
+    def submit(self, call: _PeerCall) -> None:
+        """Have a call made; nothing waits for it here."""
+        with self._changed:
+            self._append(call, wake=not self._calls)
+
+    def close(self) -> None:
+        """End the threads after their present calls."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify_all()
+
+    def _append(self, call: _PeerCall, *, wake: bool) -> None:
+        """Enter a call; where calls wait too long, have one thread more make them."""
+        now_s = time.monotonic()
+        self._calls.append((now_s, call))
+        if late := self._is_late(now_s):
+            self._helped_s = now_s
+        if self._idle:
+            if late or wake:  # who is awake takes those that follow
+                self._changed.notify()
+        elif late and self.running < _MOST and not self._closed:
+            self.running += 1
+            threading.Thread(target=self._run, name=self._name, daemon=True).start()
+
+    def _is_late(self, now_s: float) -> bool:
+        """Return whether a call waits too long, and would not with one thread more."""
+        if not self.running:
+            return True
+        if now_s - max(self._calls[0][0], self._helped_s) <= _PATIENCE_S:
+            return False
+        hanging = sum(now_s - since_s > _PATIENCE_S for since_s in self._made.values())
+        return self.running - self._idle - hanging < _LANES
+
+    def _run(self) -> None:
+        while (call := self._next()) is not None:
+            try:
+                again_s = call()
+            except Exception:
+                _CONNECTORS_LOG.exception("%s: a call raised", self._name)
+            else:
+                self._plan(call, again_s)
+
+    def _plan(self, call: _PeerCall, again_s: float | None) -> None:
+        if again_s is None:
+            return
+        with self._changed:
+            if again_s == 0:
+                self._append(call, wake=False)  # this thread is awake
+            else:
+                due_s = time.monotonic() + again_s
+                heappush(self._repeated, (due_s, next(self._order), call))
+
+    def _next(self) -> _PeerCall | None:
+        """Wait for the next call; None ends the thread."""
+        me = threading.get_ident()
+        with self._changed:
+            self._made.pop(me, None)
+            end_s = time.monotonic() + _IDLE_S
+            while not self._closed:
+                now_s = time.monotonic()
+                if self._calls or (self._repeated and self._repeated[0][0] <= now_s):
+                    self._made[me] = now_s
+                    return self._take(now_s)
+                if now_s >= end_s and not (self._repeated and not self._idle):
+                    break
+                due_s = self._repeated[0][0] if self._repeated else end_s
+                self._idle += 1
+                self._changed.wait(max(0.0, due_s - now_s))
+                self._idle -= 1
+            self.running -= 1
+        return None
+
+    def _take(self, now_s: float) -> _PeerCall:
+        """Take what is due to be made again, else the oldest."""
+        if self._repeated and self._repeated[0][0] <= now_s:
+            return heappop(self._repeated)[2]
+        return self._calls.popleft()[1]
