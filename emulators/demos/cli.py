@@ -12,14 +12,14 @@ from tickrig.host.cli.options import PATH, works_in
 
 
 @click.command()
-@works_in("tickrig.emulators.demos.rrc:show")
+@works_in("tickrig.emulators.demos.terminal_cli:show_rrc")
 def rrc() -> None:
     """Drive an RRC on a pty through power-on, all samples, output mode and a watchdog trip."""
 
 
 @click.command("rtc-lite")
 @click.option("--virtual", is_flag=True, help="In virtual time: the same lines each time, at once.")
-@works_in("tickrig.emulators.demos.rtc_lite:show")
+@works_in("tickrig.emulators.demos.terminal_cli:show_rtc_lite")
 def rtc_lite(virtual: bool) -> None:
     """Send numbers through two emulated PICs, cut the power of one, and see it come back.
 
@@ -30,7 +30,7 @@ def rtc_lite(virtual: bool) -> None:
 
 @click.command()
 @click.option("--no-caches", is_flag=True, help="Entries of the caches do not outlive the outage.")
-@works_in("tickrig.emulators.demos.tkernel:show")
+@works_in("tickrig.emulators.demos.terminal_cli:show_tkernel")
 def tkernel(no_caches: bool) -> None:
     """Let a robot keep its position by ucodes while the service that resolves them is gone.
 
@@ -44,7 +44,7 @@ def tkernel(no_caches: bool) -> None:
 @click.command(cls=BusCommand)
 @click.option("--plot", type=PATH, help="Draw the curves into FILE.png, .svg or .html.")
 @bus_options
-@works_in("tickrig.emulators.demos.fig120:show")
+@works_in("tickrig.emulators.demos.terminal_cli:show_fig120")
 def fig120(plot: Path | None, **options: Any) -> None:
     """Let a potentiometer at one CANopen node turn the motor of another, without a PC in between.
 

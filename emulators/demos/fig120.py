@@ -9,11 +9,10 @@ from dataclasses import dataclass
 from functools import partial
 from math import cos, pi
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import can
 import canopen
-import click
 
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.bench.child import running
@@ -21,12 +20,10 @@ from tickrig.emulators.can.outside.sim_network import SimNetwork
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.models import MODELS, EmulatedModel
 from tickrig.emulators.canopen.node import Node, Nodes
-from tickrig.emulators.commands.picture import check_plot, new_figure, write_figure
+from tickrig.emulators.commands.picture import new_figure, write_figure
 from tickrig.emulators.rig.emulated import read_signal
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
-from tickrig.host.cli.can_options import BusOptions, open_raw
-from tickrig.host.cli.messages import Refused, failing, refuse_path, warnings_shown
 from tickrig.host.control.client import ControlClient
 from tickrig.host.text.values import Setting
 
@@ -298,8 +295,6 @@ def _node(node_id: int, model: EmulatedModel, wire: CanWire) -> Node:
 # `tickrig demo fig120`: set up, leave the bus, turn the potentiometer, watch the motor.
 
 _Echo = Callable[[str], None]
-_WITHIN_A_PROCESS: Final = ("virtual", "tickrig")
-
 _STEPS_V: Final = (0.0, 1.25, 2.5, 3.75, 5.0)
 _STEP_US: Final = 600_000
 _TURN_US: Final = 2_000_000
@@ -347,32 +342,6 @@ def _held(volts: float, done: float) -> float:
 
 def _turned_back(done: float) -> float:
     return round(_STEPS_V[-1] / 2 * (1 + cos(pi * done)), 3)
-
-
-def show(plot: Path | None, **options: Any) -> None:
-    """Run the demonstration on the terminal, and draw its curves into a file."""
-    if plot is not None:
-        check_plot(plot)
-    samples = _play(BusOptions(**options))
-    if plot is not None:
-        try:
-            write_plot(samples, plot)
-        except OSError as error:
-            refuse_path("plot", error)
-        click.echo(f"\nThe curves are in {plot}.")
-
-
-def _play(bus: BusOptions) -> list[CurveSample]:
-    with failing(RuntimeError, OSError, canopen.SdoCommunicationError):
-        if not bus:
-            return run_demo(VirtualStage(), click.echo)
-        with warnings_shown():
-            if bus.interface in _WITHIN_A_PROCESS:
-                raise Refused(
-                    f"{bus.interface} is inside one process, and the nodes run in another"
-                )
-            with bus_stage(bus.arguments(), lambda: open_raw(bus)[0]) as stage:
-                return run_demo(stage, click.echo)
 
 
 def run_demo(stage: Fig120Stage, echo: _Echo) -> list[CurveSample]:

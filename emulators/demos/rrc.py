@@ -5,13 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import Final, NamedTuple
 
-import click
-
 from tickrig.emulators.bench.child import running
-from tickrig.host.cli.messages import failing
 from tickrig.host.control.client import ControlClient
 from tickrig.host.control.requests import Object
-from tickrig.host.links.link import DeviceRefused, Link, LinkError
+from tickrig.host.links.link import Link
 from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.rrc import RrcClient, RrcRefused
 from tickrig.wire.lines import LineSplitter
@@ -100,12 +97,6 @@ class _DemoTranscript:
         time_s = (self._link.now_us - self._start_us) / 1e6
         meaning = _MEANING.get(line, "") if mark == "<" else ""
         self._echo(f"  {time_s:7.3f} {mark} {line or '(LF)':<28} {meaning}".rstrip())
-
-
-def show() -> None:
-    """Run the demonstration on the terminal."""
-    with failing(RuntimeError, OSError, LinkError, DeviceRefused):
-        run_demo(click.echo)
 
 
 def run_demo(echo: _Echo) -> None:

@@ -6,8 +6,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, closing, contextmanager, suppress
 from typing import Final
 
-import click
-
 from tickrig.device.rtc_lite.node import RtcLiteNode
 from tickrig.device.rtc_lite.server import LiteConfig
 from tickrig.emulators.bench.child import running
@@ -17,10 +15,9 @@ from tickrig.emulators.rig.station import Station
 from tickrig.emulators.rtc_lite.device_type import COMPONENTS
 from tickrig.emulators.rtc_lite.line import MonitoredLink
 from tickrig.emulators.serial.serial_line import SerialLine
-from tickrig.host.cli.messages import failing, warnings_shown
 from tickrig.host.control.client import ControlClient
 from tickrig.host.control.clock import RealClock
-from tickrig.host.links.link import Link, LinkError
+from tickrig.host.links.link import Link
 from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.rtc.component import ExecutionContext
 from tickrig.host.rtc.components import ConsoleIn, ConsoleOut
@@ -133,16 +130,6 @@ _CONNECTIONS: Final = (
 )
 _CHAIN: Final = ("ConsoleIn0", "LiteA0", "LiteB0", "ConsoleOut0")
 _SETTINGS: Final = ProxySettings(rediscover=True)
-
-
-def show(*, virtual: bool) -> None:
-    """Run the demonstration on the terminal, in virtual time or in real time."""
-    with failing(RuntimeError, OSError, LinkError, RtcRefused):
-        if virtual:
-            run_demo(VirtualSetup(), click.echo)
-            return
-        with warnings_shown(), pty_setup() as setup:
-            run_demo(setup, click.echo)
 
 
 def run_demo(setup: DemoSetup, echo: _Echo) -> None:

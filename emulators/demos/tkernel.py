@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from math import hypot, pi
 from typing import Any, Final
 
-import click
-
 from tickrig.device.rh3.base import Rh3Base
 from tickrig.device.rh3.parameters import BaseParameters
 from tickrig.device.ucode_reader import Marker, UcodeReader
@@ -249,11 +247,6 @@ class Moment:
     outage: bool
     error_m: float
     odometry_error_m: float
-
-
-def show(*, no_caches: bool) -> None:
-    """Run the demonstration on the terminal."""
-    run_demo(CorridorStage(caches=not no_caches), click.echo)
 
 
 def run_demo(stage: CorridorStage, echo: _Echo) -> list[Moment]:
