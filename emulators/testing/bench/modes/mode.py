@@ -83,7 +83,7 @@ class BenchMode(ABC):
     def __init__(self, rig: BenchRig, tolerance: Tolerances) -> None:
         self._rig, self.tolerance = rig, tolerance
 
-    def _ask(self, question: Callable[[BenchRig], T]) -> T:
+    def _query(self, question: Callable[[BenchRig], T]) -> T:
         """Return what the rig says; nothing is done to it."""
         return question(self._rig)
 
@@ -127,11 +127,11 @@ class BenchMode(ABC):
 
     def check_fault(self, owner: str, name: str) -> None:
         """Raise ValueError unless a device, a wire or (empty) any has a fault of this name."""
-        self._ask(lambda rig: rig.state.full_fault_name(owner, name))
+        self._query(lambda rig: rig.state.full_fault_name(owner, name))
 
     def describe(self, owner: str) -> BenchDescription:
         """Return what there is at a device, at all of them if it is empty."""
-        return self._ask(lambda rig: rig.describe(owner))
+        return self._query(lambda rig: rig.describe(owner))
 
     @abstractmethod
     def clear(self, owner: str, fault: str) -> None:
@@ -143,7 +143,7 @@ class BenchMode(ABC):
 
     def hear(self, listener: Callable[[WireLine], None]) -> None:
         """Tell of each line and frame from now on."""
-        self._ask(lambda rig: rig.journal.listeners.append(listener))
+        self._query(lambda rig: rig.journal.listeners.append(listener))
 
     def observe(self, owner: str, text: str, seen: Condition, within_us: int) -> bool:
         """Say whether something is seen at a device, or by a human who is asked the text."""
@@ -170,15 +170,15 @@ class BenchMode(ABC):
 
     def journal(self) -> tuple[WireLine, ...]:
         """Return the latest lines and frames, and what was done."""
-        return self._ask(lambda rig: rig.journal.lines())
+        return self._query(lambda rig: rig.journal.lines())
 
     def mappings(self) -> tuple[WireLine, ...]:
         """Return the frames before the journal's which say what PDOs carry."""
-        return self._ask(lambda rig: rig.journal.mappings())
+        return self._query(lambda rig: rig.journal.mappings())
 
     def unfinished(self) -> tuple[WireLine, ...]:
         """Return what has begun on serial lines and did not end."""
-        return self._ask(lambda rig: rig.journal.unfinished())
+        return self._query(lambda rig: rig.journal.unfinished())
 
     @abstractmethod
     def too_slow(self) -> str:
@@ -207,7 +207,7 @@ class EmulatedMode(BenchMode):
         """What answers requests."""
         return EmulatorControl(self._rig)
 
-    def _ask(self, question: Callable[[BenchRig], T]) -> T:
+    def _query(self, question: Callable[[BenchRig], T]) -> T:
         return self.act(question)
 
     def request(self, do: str, **fields: object) -> Object:
