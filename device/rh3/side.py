@@ -21,7 +21,7 @@ _BRAKE: Final = 500.0
 """Per mille of torque with which the shorted motor brakes; a choice."""
 
 
-class Wheel(Part):
+class _Wheel(Part):
     """Turns by torque against friction and load, a millisecond a step.
 
     Not emulated: inductance and back-EMF of the motor, play and stiffness of the gear,
@@ -158,7 +158,7 @@ class _SpeedLoop(Part):
         """Whether a step towards standstill, with nothing counted, would change nothing."""
         return not (self.reference or self._error or self._change or self.counted)
 
-    def drive(self, wheel: Wheel, target: float, steps: int) -> list[float]:
+    def drive(self, wheel: _Wheel, target: float, steps: int) -> list[float]:
         """Turn a wheel for some milliseconds; return its speed in each, counts/ms.
 
         Args:
@@ -233,7 +233,7 @@ class Side(Part):
     def __init__(
         self, name: str, backward_bit: int, parameters: BaseParameters, registers: Registers
     ) -> None:
-        self.name, self.wheel = name, Wheel(parameters)
+        self.name, self.wheel = name, _Wheel(parameters)
         self._registers, self._backward_bit = registers, backward_bit
         self._speed_loop = _SpeedLoop(registers)
         self._position_loop = _PositionLoop(registers)

@@ -9,13 +9,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Final
 
-TOP_MM_S: Final = (333.0, 667.0, 1_000.0, 1_333.0, 1_667.0)
+_TOP_MM_S: Final = (333.0, 667.0, 1_000.0, 1_333.0, 1_667.0)
 """Forward speed at an output of 100 %, by speed mode."""
 
-BACKING: Final = 0.5
+_BACKING: Final = 0.5
 """Part of it that is left when it backs."""
 
-TURN_MRAD_S: Final = (300.0, 600.0, 900.0, 1_200.0, 1_500.0)
+_TURN_MRAD_S: Final = (300.0, 600.0, 900.0, 1_200.0, 1_500.0)
 """Turning speed at an output of 100 %, by speed mode."""
 
 _SPEEDING_MM_S2: Final = 800.0
@@ -85,13 +85,13 @@ class Vehicle:
             running: whether VR2 is on; the brakes are on otherwise.
         """
         v_pct, w_pct = out_pct if self.charge > 0.0 else (0, 0)
-        top_mm_s = TOP_MM_S[speed_mode - 1] * (BACKING if v_pct < 0 else 1.0)
+        top_mm_s = _TOP_MM_S[speed_mode - 1] * (_BACKING if v_pct < 0 else 1.0)
         before_mm_s, before_mrad_s = self.speed_mm_s, self.turn_mrad_s
         slowing = _SLOWING_MM_S2 if running else _BRAKING_MM_S2
         self.speed_mm_s = _toward(before_mm_s, top_mm_s * v_pct / 100, _SPEEDING_MM_S2, slowing)
         self.turn_mrad_s = _toward(
             before_mrad_s,
-            TURN_MRAD_S[speed_mode - 1] * w_pct / 100,
+            _TURN_MRAD_S[speed_mode - 1] * w_pct / 100,
             _SPEEDING_MM_S2 * _TURN_PER_SPEED,
             slowing * _TURN_PER_SPEED,
         )
@@ -105,7 +105,7 @@ class Vehicle:
         speed_m_s = abs(self.speed_mm_s) / 1_000
         pushing_n = max(0.0, speed_m_s - before_m_s) / _STEP_S * _MASS_KG
         wheels_w = (_ROLLING_N + pushing_n) * speed_m_s
-        turning_w = _TURNING_W * abs(self.turn_mrad_s) / TURN_MRAD_S[-1]
+        turning_w = _TURNING_W * abs(self.turn_mrad_s) / _TURN_MRAD_S[-1]
         used_j = (_IDLE_W + wheels_w / _EFFICIENCY + turning_w) * _STEP_S
         self.charge = max(0.0, self.charge - used_j / (self.battery_wh * _J_PER_WH))
 

@@ -22,7 +22,7 @@ _MAX_SINCE: Final = 2**63 - 1
 """As long as a command line can say."""
 
 
-class Controlled(Protocol):
+class _Controlled(Protocol):
     """What requests are answered about: a `RunningEmulator`, or a thing without a wire.
 
     Attributes:
@@ -66,7 +66,7 @@ class EmulatorControl(RequestDispatcher):
             `RunningEmulator` has no lines to show.
     """
 
-    def __init__(self, emulator: Controlled) -> None:
+    def __init__(self, emulator: _Controlled) -> None:
         self._emulator = emulator
         self._running = emulator if isinstance(emulator, RunningEmulator) else None
         shows_lines = {"lines": (self._lines, ("since",))} if self._running else {}

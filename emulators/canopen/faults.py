@@ -12,7 +12,7 @@
 #                  |  tx: SDO answers, heartbeats, boot-up, PDOs are changed, late, doubled, lost
 #
 # `NodeFaults` is what an operator arms. Only while a fault is armed, or a late frame waits, a
-# `FaultyNode` stands between the station and its device (`Station.device`): without faults nothing
+# `_FaultyNode` stands between the station and its device (`Station.device`): without faults nothing
 # costs time. A trace records the device itself, so a replay needs no faults.
 #
 # Three kinds act otherwise: those that act `by_itself` send frames, or restart the node, at their
@@ -608,8 +608,8 @@ class NodeFaults(Copyable):
             self.wire.force_off(self.node.port)
         if fault_type.boots and self.node.is_on:
             self._hold(0, data_frame(self._error_control_id, bytes([NmtState.INITIALISING])))
-        if self.station is not None and not isinstance(self.station.device, FaultyNode):
-            self.station.device = FaultyNode(self.station.device, self)
+        if self.station is not None and not isinstance(self.station.device, _FaultyNode):
+            self.station.device = _FaultyNode(self.station.device, self)
 
     def clear(self, name: str) -> None:
         """Let a fault end; clearing one that is not armed is no error. What is late comes now."""
@@ -768,7 +768,7 @@ class NodeFaults(Copyable):
         return NodeFrames.OTHER if can_id in others else NodeFrames.PDO
 
 
-class FaultyNode(Copyable):
+class _FaultyNode(Copyable):
     """A node whose frames suffer faults; a `Device[Frames]` that stands before it.
 
     Args:

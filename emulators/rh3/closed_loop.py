@@ -83,7 +83,7 @@ class MountedUrg(Mounted):
         self.urg.world = self.world.with_posts(*posts) if posts else self.world
 
 
-class Aboard(Coupling, Protocol):
+class _Aboard(Coupling, Protocol):
     """Something that a cart carries; it moves along as a coupling of the rig."""
 
     @property
@@ -140,7 +140,7 @@ class ClosedLoop:
         seed: int = 0,
         dense: bool = False,
         world: World | None = None,
-        aboard: Callable[[Rh3Base], Aboard] | None = None,
+        aboard: Callable[[Rh3Base], _Aboard] | None = None,
         pace: float | None = None,
         clock: RealClock | None = None,
     ) -> None:

@@ -32,7 +32,7 @@ class _BoardState(IntEnum):
     RUNNING = 2
 
 
-class SolderedLines(Protocol):
+class _SolderedLines(Protocol):
     """What is soldered to a board and is let go without a word when its supply goes."""
 
     def cut(self) -> None:
@@ -60,7 +60,7 @@ class Board:
         boots: how often it was up.
     """
 
-    def __init__(self, limits: NodeLimits, start: _StartSystem, lines: SolderedLines) -> None:
+    def __init__(self, limits: NodeLimits, start: _StartSystem, lines: _SolderedLines) -> None:
         self.limits, self._start, self._lines = limits, start, lines
         self.inputs = InputBank(INPUTS, on_change=self._input_set)
         self.manager: NodeManager | None = None

@@ -349,7 +349,7 @@ _FRAME: Final = (_BUS, _NODES)
 """Sections that are no panel's."""
 
 
-class Kept(Protocol):
+class _Kept(Protocol):
     """What has settings in a workspace, as a panel."""
 
     @property
@@ -372,7 +372,7 @@ class PanelSettings:
         panels: whose settings they are.
     """
 
-    def __init__(self, workspace: Workspace, setup: MonitorSetup, panels: Sequence[Kept]) -> None:
+    def __init__(self, workspace: Workspace, setup: MonitorSetup, panels: Sequence[_Kept]) -> None:
         self.workspace, self._setup, self._panels = workspace, setup, tuple(panels)
         self._conflict = ""
 

@@ -41,7 +41,7 @@ from tickrig.wire.errors import FieldError
 # Why a gateway does not do what it is asked (CiA 309-3, internal error codes).
 
 
-class GatewayErrorCode(IntEnum):
+class _GatewayErrorCode(IntEnum):
     """Internal error code."""
 
     NOT_SUPPORTED = 100
@@ -60,19 +60,19 @@ class GatewayErrorCode(IntEnum):
 
 
 _TEXTS: Final = {
-    GatewayErrorCode.NOT_SUPPORTED: "request not supported",
-    GatewayErrorCode.SYNTAX: "syntax error",
-    GatewayErrorCode.INTERNAL_STATE: "not possible now",
-    GatewayErrorCode.TIME_OUT: "no answer in time",
-    GatewayErrorCode.NO_DEFAULT_NET: "no default net is set",
-    GatewayErrorCode.NO_DEFAULT_NODE: "no default node is set",
-    GatewayErrorCode.UNSUPPORTED_NET: "there is no such net",
-    GatewayErrorCode.UNSUPPORTED_NODE: "there can be no such node",
-    GatewayErrorCode.LOST_CONNECTION: "the bus is gone",
-    GatewayErrorCode.LSS_MANUFACTURER: "LSS: an error of the maker of the slave",
-    GatewayErrorCode.LSS_NODE_ID: "LSS: the slave does not take this node-ID",
-    GatewayErrorCode.LSS_BIT_RATE: "LSS: the slave does not take this bit rate",
-    GatewayErrorCode.LSS_STORE: "LSS: the slave cannot store",
+    _GatewayErrorCode.NOT_SUPPORTED: "request not supported",
+    _GatewayErrorCode.SYNTAX: "syntax error",
+    _GatewayErrorCode.INTERNAL_STATE: "not possible now",
+    _GatewayErrorCode.TIME_OUT: "no answer in time",
+    _GatewayErrorCode.NO_DEFAULT_NET: "no default net is set",
+    _GatewayErrorCode.NO_DEFAULT_NODE: "no default node is set",
+    _GatewayErrorCode.UNSUPPORTED_NET: "there is no such net",
+    _GatewayErrorCode.UNSUPPORTED_NODE: "there can be no such node",
+    _GatewayErrorCode.LOST_CONNECTION: "the bus is gone",
+    _GatewayErrorCode.LSS_MANUFACTURER: "LSS: an error of the maker of the slave",
+    _GatewayErrorCode.LSS_NODE_ID: "LSS: the slave does not take this node-ID",
+    _GatewayErrorCode.LSS_BIT_RATE: "LSS: the slave does not take this bit rate",
+    _GatewayErrorCode.LSS_STORE: "LSS: the slave cannot store",
 }
 
 
@@ -84,7 +84,7 @@ class GatewayError(Exception):
         text: the same for people; that of the code if empty.
     """
 
-    def __init__(self, code: GatewayErrorCode, text: str = "") -> None:
+    def __init__(self, code: _GatewayErrorCode, text: str = "") -> None:
         super().__init__(text or _TEXTS[code])
         self.code = code
 
@@ -127,16 +127,16 @@ def parse_request(line: str) -> GatewayRequest | None:
         return None
     head = _SEQUENCE.match(line)
     if head is None or int(head[1]) > _MAX_NUMBER:
-        raise GatewayError(GatewayErrorCode.SYNTAX, "a command begins with its number, as [1]")
+        raise GatewayError(_GatewayErrorCode.SYNTAX, "a command begins with its number, as [1]")
     words, numbers = _words(line[head.end() :]), list[int]()
     while words and words[0][:1].isdecimal():
         if len(numbers) == _MOST_NUMBERS:
             raise GatewayError(
-                GatewayErrorCode.SYNTAX, "before a command stand net and node, no more"
+                _GatewayErrorCode.SYNTAX, "before a command stand net and node, no more"
             )
         numbers.append(number(words.pop(0), _MAX_NUMBER, "number"))
     if not words:
-        raise GatewayError(GatewayErrorCode.SYNTAX, "there is no command")
+        raise GatewayError(_GatewayErrorCode.SYNTAX, "there is no command")
     return GatewayRequest(int(head[1]), tuple(numbers), words[0].lower(), tuple(words[1:]))
 
 
@@ -147,14 +147,14 @@ def number(word: str, most: int, what: str, least: int = 0) -> int:
     except ValueError:
         value = -1
     if not (least <= value <= most and word.isascii() and word.isalnum()):
-        raise GatewayError(GatewayErrorCode.SYNTAX, f"{what} {word!r} is not {least}..{most}")
+        raise GatewayError(_GatewayErrorCode.SYNTAX, f"{what} {word!r} is not {least}..{most}")
     return value
 
 
 def _one_of(word: str, words: Collection[str], what: str) -> str:
     """Return a word of those that are known, in lower case."""
     if (lower := word.lower()) not in words:
-        raise GatewayError(GatewayErrorCode.SYNTAX, f"{what} {word!r}; known: {known(words)}")
+        raise GatewayError(_GatewayErrorCode.SYNTAX, f"{what} {word!r}; known: {known(words)}")
     return lower
 
 
@@ -163,7 +163,7 @@ def _check_count(request: GatewayRequest, least: int, most: int | None) -> None:
     count = len(request.words)
     if count < least or (most is not None and count > most):
         raise GatewayError(
-            GatewayErrorCode.SYNTAX, f"{request.verb} with {count} words behind it; see help"
+            _GatewayErrorCode.SYNTAX, f"{request.verb} with {count} words behind it; see help"
         )
 
 
@@ -173,7 +173,7 @@ def _words(text: str) -> list[str]:
     while at < len(text):
         found = _WORD.match(text, at)
         if found is None:
-            raise GatewayError(GatewayErrorCode.SYNTAX, "a quote is not closed")
+            raise GatewayError(_GatewayErrorCode.SYNTAX, "a quote is not closed")
         if found[2]:
             break
         words.append(found[3] if found[1] is None else found[1].replace('""', '"'))
@@ -243,7 +243,7 @@ def encode(name: str, words: Sequence[str]) -> bytes:
         return NUMBERS[name].encode(float(word) if name in REALS else _integer(word))
     except (ValueError, FieldError, Error):
         raise GatewayError(
-            GatewayErrorCode.SYNTAX, f"{text!r} is no value of type {name}"
+            _GatewayErrorCode.SYNTAX, f"{text!r} is no value of type {name}"
         ) from None
 
 
@@ -284,9 +284,9 @@ _MOST_NODE_ID: Final = 127
 _MOST_DELAY_MS: Final = 0xFFFF
 _MOST: Final = 0xFFFF_FFFF
 _FAILED: Final = {
-    LssCommand.CONFIGURE_NODE_ID: GatewayErrorCode.LSS_NODE_ID,
-    LssCommand.CONFIGURE_BIT_TIMING: GatewayErrorCode.LSS_BIT_RATE,
-    LssCommand.STORE: GatewayErrorCode.LSS_STORE,
+    LssCommand.CONFIGURE_NODE_ID: _GatewayErrorCode.LSS_NODE_ID,
+    LssCommand.CONFIGURE_BIT_TIMING: _GatewayErrorCode.LSS_BIT_RATE,
+    LssCommand.STORE: _GatewayErrorCode.LSS_STORE,
 }
 _SPECIFIC: Final = 0xFF
 _SCANS: Final = ("_lss_fastscan", "lss_allnodes")
@@ -316,11 +316,11 @@ def carry_out(bus: NodeBus, request: GatewayRequest) -> str:
     try:
         return _CARRIED_OUT[request.verb](LssMaster(bus, scan_us=scan_us), request)
     except LssFailed as error:
-        code = GatewayErrorCode.TIME_OUT
+        code = _GatewayErrorCode.TIME_OUT
         if error.code and error.command is not None:
-            code = _FAILED.get(error.command, GatewayErrorCode.LSS_MANUFACTURER)
+            code = _FAILED.get(error.command, _GatewayErrorCode.LSS_MANUFACTURER)
         if error.code == _SPECIFIC:
-            code = GatewayErrorCode.LSS_MANUFACTURER
+            code = _GatewayErrorCode.LSS_MANUFACTURER
         raise GatewayError(code, str(error)) from None
 
 
@@ -332,7 +332,7 @@ def _switch_all(lss: LssMaster, request: GatewayRequest) -> str:
 
 def _select(lss: LssMaster, request: GatewayRequest) -> str:
     if not lss.select(LssAddress(*_numbers(request, 4))):
-        raise GatewayError(GatewayErrorCode.TIME_OUT, "no slave has this address")
+        raise GatewayError(_GatewayErrorCode.TIME_OUT, "no slave has this address")
     return _LSS_OK
 
 
@@ -347,7 +347,7 @@ def _set_node(lss: LssMaster, request: GatewayRequest) -> str:
 def _configure_bit_rate(lss: LssMaster, request: GatewayRequest) -> str:
     table, index = _numbers(request, 2)
     if table != STANDARD_TABLE or index not in BIT_RATES:
-        raise GatewayError(GatewayErrorCode.LSS_BIT_RATE, f"table {table} has no bit rate {index}")
+        raise GatewayError(_GatewayErrorCode.LSS_BIT_RATE, f"table {table} has no bit rate {index}")
     lss.configure_bit_rate(BIT_RATES[index])
     return _LSS_OK
 
@@ -378,7 +378,7 @@ def _node(lss: LssMaster, request: GatewayRequest) -> str:
 def _scan(lss: LssMaster, request: GatewayRequest) -> str:
     _numbers(request, 0, 1)
     if (address := lss.fastscan()) is None:
-        raise GatewayError(GatewayErrorCode.TIME_OUT, "no slave is without a node-ID")
+        raise GatewayError(_GatewayErrorCode.TIME_OUT, "no slave is without a node-ID")
     return _text(address)
 
 
@@ -387,7 +387,7 @@ def _all_nodes(lss: LssMaster, request: GatewayRequest) -> str:
     words = _numbers(request, 0, 3)
     if len(words) == 2:
         raise GatewayError(
-            GatewayErrorCode.SYNTAX, "with the first node stands 0 or 1: store or not"
+            _GatewayErrorCode.SYNTAX, "with the first node stands 0 or 1: store or not"
         )
     (node_id, store), said = words[1:] or (2, 1), list[str]()
     with lss.at_work():
@@ -423,7 +423,7 @@ def _numbers(request: GatewayRequest, least: int, most: int | None = None) -> tu
 
 def _within(value: int, least: int, most: int) -> int:
     if not least <= value <= most:
-        raise GatewayError(GatewayErrorCode.SYNTAX, f"{value} is not {least}..{most}")
+        raise GatewayError(_GatewayErrorCode.SYNTAX, f"{value} is not {least}..{most}")
     return value
 
 
@@ -500,13 +500,15 @@ class Gateway:
         except SdoTimeout:
             reason = f"0x{AbortCode.TIMEOUT:08X} #no answer within {self._timeout_us // 1_000} ms"
         except LinkClosed as error:
-            reason = f"{GatewayErrorCode.LOST_CONNECTION} #{error}"
+            reason = f"{_GatewayErrorCode.LOST_CONNECTION} #{error}"
         return f"[{_sequence_of(line)}] ERROR:{' '.join(reason.split())}"
 
     def _carry_out(self, request: GatewayRequest) -> str:
         verb = self._verbs.get(request.verb)
         if verb is None:
-            raise GatewayError(GatewayErrorCode.NOT_SUPPORTED, f"{request.verb!r} is not supported")
+            raise GatewayError(
+                _GatewayErrorCode.NOT_SUPPORTED, f"{request.verb!r} is not supported"
+            )
         return verb(request)
 
     def _node_of(self, request: GatewayRequest, least: int) -> int:
@@ -515,17 +517,17 @@ class Gateway:
         self._check_net(net)
         if node == -1:
             if self._node is None:
-                raise GatewayError(GatewayErrorCode.NO_DEFAULT_NODE)
+                raise GatewayError(_GatewayErrorCode.NO_DEFAULT_NODE)
             return self._node
         if not least <= node <= _NODES:
             text = f"node {node} is not {least}..{_NODES}"
-            raise GatewayError(GatewayErrorCode.UNSUPPORTED_NODE, text)
+            raise GatewayError(_GatewayErrorCode.UNSUPPORTED_NODE, text)
         return node
 
     def _check_net(self, net: list[int]) -> None:
         if net and net[0] != self._net:
             text = f"there is no net {net[0]}, this one is {self._net}"
-            raise GatewayError(GatewayErrorCode.UNSUPPORTED_NET, text)
+            raise GatewayError(_GatewayErrorCode.UNSUPPORTED_NET, text)
 
     def _read(self, request: GatewayRequest) -> str:
         node = self._node_of(request, 1)
@@ -561,7 +563,7 @@ class Gateway:
         self._check_net(list(request.numbers))
         _check_count(request, 1, None)
         if (name := request.words[0].lower()) not in _SETTINGS:
-            raise GatewayError(GatewayErrorCode.NOT_SUPPORTED, f"set {name!r} is not supported")
+            raise GatewayError(_GatewayErrorCode.NOT_SUPPORTED, f"set {name!r} is not supported")
         _check_count(request, 2, 2)
         value = request.words[1]
         match name:

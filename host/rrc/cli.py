@@ -18,7 +18,7 @@ _WATCHDOG_US: Final = 500_000
 _MOST_WATCHDOG_US: Final = 2_550_000
 _UNIT_US: Final = 10_000
 
-SPEED: Final = click.IntRange(1, 5)
+_SPEED: Final = click.IntRange(1, 5)
 _PERCENT: Final = click.IntRange(0, 100)
 _SIGNED: Final = click.IntRange(-100, 100)
 _BYTE: Final = click.IntRange(0, 255)
@@ -163,7 +163,7 @@ def _watchdog(time_us: int | None, *, off: bool) -> int:
 _for_option: Final = time_option("--for", "for_us", help="End after so long.")
 _json_option: Final = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 _speed_option: Final = click.option(
-    "--speed", type=SPEED, default=1, show_default=True, help="Speed mode, 1 is the slowest."
+    "--speed", type=_SPEED, default=1, show_default=True, help="Speed mode, 1 is the slowest."
 )
 
 _Decorator = Callable[[Callable[..., Any]], click.Command]
@@ -298,7 +298,7 @@ def _stick(**options: Any) -> None:
 
 
 @main.command("speed")
-@click.argument("mode", metavar="MODE", type=SPEED)
+@click.argument("mode", metavar="MODE", type=_SPEED)
 @click.option("--lock", is_flag=True, help="Lock the speed buttons of the controller.")
 @works_in(f"{_VERBS}:speed")
 def _speed(**options: Any) -> None:

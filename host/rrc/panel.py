@@ -174,8 +174,8 @@ class ChairPanel(FramedApp):
         have, least = (f"{columns} x {lines}" for columns, lines in (self.size, _LEAST))
         for name, text in (
             ("aim", gauges.stick_pad(*view.aim_pct)),
-            ("state", state_pane(view)),
-            ("lines", lines_pane(view, self.query_one("#lines").content_size.height)),
+            ("state", _state_pane(view)),
+            ("lines", _lines_pane(view, self.query_one("#lines").content_size.height)),
             ("status", Text(f" {self._url}   {view.now_us / 1e6:.1f} s")),
             ("tiny", Text(f"terminal too small: {have}, at least {least}")),
         ):
@@ -190,7 +190,7 @@ def _pane(name: str, title: str) -> Static:
     return pane
 
 
-def state_pane(view: PilotView) -> Text:
+def _state_pane(view: PilotView) -> Text:
     """Show who drives, what comes of it, and what the RRC reports."""
     sa, (aim_v, aim_w) = view.status, view.aim_pct
     key = (" DRIVES ", "bold black on green") if view.held else (" released ", "reverse dim")
@@ -220,7 +220,7 @@ def state_pane(view: PilotView) -> Text:
     return Text("\n").join(rows)
 
 
-def lines_pane(view: PilotView, height: int) -> Text:
+def _lines_pane(view: PilotView, height: int) -> Text:
     """Show the latest events, the newest at the bottom."""
     shown = view.lines[max(0, len(view.lines) - height) :]
     rows = [

@@ -30,7 +30,7 @@ class Drives(StrEnum):
         return "stopped" if self is Drives.STOPPED else f"{self} drives"
 
 
-class PadStick(Protocol):
+class _PadStick(Protocol):
     """A stick with a dead-man button."""
 
     def poll(self, now_us: int, /) -> tuple[int, int]:
@@ -76,7 +76,7 @@ class Pilot:
         view: what is known now.
     """
 
-    def __init__(self, chair: Chair, pad: PadStick | None = None) -> None:
+    def __init__(self, chair: Chair, pad: _PadStick | None = None) -> None:
         self._chair, self._pad = chair, pad
         self._client = chair.client
         self._dead_man = DeadMan()

@@ -31,7 +31,7 @@ from tickrig.wire.rrc.replies import RrcEvent, StatusA
 STEPS: Final = 21
 """Of both rounds together."""
 
-PATIENCE_US: Final = 60_000_000
+_PATIENCE_US: Final = 60_000_000
 _DRIVE_US: Final = 1_000_000
 _SECOND_US: Final = 1_000_000
 _PUSHED_PCT: Final = 60
@@ -252,7 +252,7 @@ class Procedure:
         self.chair.client.run_for(300_000)  # takes the gear out
 
     def _await(
-        self, holds: Callable[[StatusA], bool], what: str, within_us: int = PATIENCE_US
+        self, holds: Callable[[StatusA], bool], what: str, within_us: int = _PATIENCE_US
     ) -> StatusA:
         """Wait until a status line holds, and return one that shows what the RRC made of it."""
         client = self.chair.client
@@ -267,7 +267,7 @@ class Procedure:
             self.operator.waits()
         raise _Failed(f"waited {within_us // 1_000_000} s for {what}")
 
-    def _await_event(self, kind: RrcEvent, within_us: int = PATIENCE_US) -> None:
+    def _await_event(self, kind: RrcEvent, within_us: int = _PATIENCE_US) -> None:
         until_us = self.chair.client.now_us + within_us
         while self.chair.client.now_us < until_us:
             try:

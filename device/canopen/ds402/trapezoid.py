@@ -55,7 +55,7 @@ class PathLimits(Immutable):
     shape: RampShape = RampShape.LINEAR
 
 
-class Leg(NamedTuple):
+class _Leg(NamedTuple):
     """A part of a path: to a velocity in a time."""
 
     velocity: float
@@ -105,7 +105,7 @@ class Path(Part):
         self,
         now_us: int,
         start: Motion,
-        legs: Iterable[Leg],
+        legs: Iterable[_Leg],
         shape: RampShape = RampShape.LINEAR,
         target: float | None = None,
     ) -> None:
@@ -181,15 +181,15 @@ def _effective(limits: PathLimits) -> PathLimits:
     return PathLimits(limits.velocity, limits.acceleration * mean, limits.deceleration * mean)
 
 
-def _ramps(velocity: float, wanted: float, limits: PathLimits) -> list[Leg]:
+def _ramps(velocity: float, wanted: float, limits: PathLimits) -> list[_Leg]:
     if velocity * wanted < 0.0:
         return [*_ramps(velocity, 0.0, limits), *_ramps(0.0, wanted, limits)]
     speeds_up = abs(wanted) > abs(velocity)
     slope = limits.acceleration if speeds_up else limits.deceleration
-    return [Leg(wanted, abs(wanted - velocity) / slope)]
+    return [_Leg(wanted, abs(wanted - velocity) / slope)]
 
 
-def _legs(velocity: float, distance: float, limits: PathLimits, end: float) -> list[Leg]:
+def _legs(velocity: float, distance: float, limits: PathLimits, end: float) -> list[_Leg]:
     """Return the legs of a way to a position; in which direction it is makes no difference."""
     direction = copysign(1.0, distance or velocity)
     velocity, distance = velocity * direction, distance * direction
@@ -199,20 +199,20 @@ def _legs(velocity: float, distance: float, limits: PathLimits, end: float) -> l
         legs = [*_ramps(velocity, 0.0, limits), *rest]
     else:
         legs = _forward(velocity, distance, limits, end)
-    return [Leg(leg.velocity * direction, leg.duration_s) for leg in legs]
+    return [_Leg(leg.velocity * direction, leg.duration_s) for leg in legs]
 
 
-def _forward(velocity: float, distance: float, limits: PathLimits, end: float) -> list[Leg]:
+def _forward(velocity: float, distance: float, limits: PathLimits, end: float) -> list[_Leg]:
     """Return the legs of a way straight ahead: to the top velocity, along, to the end velocity."""
     up, down = limits.acceleration, limits.deceleration
     slowest = sqrt(max(0.0, velocity**2 - 2 * down * distance)) if end > 0.0 else 0.0
     end = max(slowest, min(end, sqrt(velocity**2 + 2 * up * distance)))
     peak = sqrt((2 * up * down * distance + down * velocity**2 + up * end**2) / (up + down))
     top = max(end, min(limits.velocity, peak))
-    legs = [*_ramps(velocity, top, limits), Leg(top, 0.0), *_ramps(top, end, limits)]
+    legs = [*_ramps(velocity, top, limits), _Leg(top, 0.0), *_ramps(top, end, limits)]
     if top > 0.0:
         ways = (velocity + top) / 2 * legs[0].duration_s + (top + end) / 2 * legs[2].duration_s
-        legs[1] = Leg(top, max(0.0, (distance - ways) / top))
+        legs[1] = _Leg(top, max(0.0, (distance - ways) / top))
     return legs
 
 

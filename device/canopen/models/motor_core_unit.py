@@ -28,7 +28,7 @@ from tickrig.wire.instant import NEVER
 
 
 @dataclass(frozen=True, slots=True)
-class Measurements(Immutable):
+class _Measurements(Immutable):
     """What the unit measures of itself.
 
     Attributes:
@@ -78,8 +78,8 @@ class _Fault(Immutable):
     name: str
     code: int
     register: ErrorRegister
-    seen: Callable[[Measurements], bool]
-    gone: Callable[[Measurements], bool]
+    seen: Callable[[_Measurements], bool]
+    gone: Callable[[_Measurements], bool]
     after_us: int = 0
 
     def __reduce__(self) -> tuple[Callable[[str], _Fault], tuple[str]]:
@@ -113,7 +113,7 @@ _DIP_US: Final = 5_000
 _DRIVE: Final = ErrorRegister.DEVICE_PROFILE
 
 
-def _unless_tripped(measured: Measurements) -> bool:
+def _unless_tripped(measured: _Measurements) -> bool:
     """Take a cause for gone that is not seen without power or motion: it would come back."""
     return not measured.tripped
 
@@ -193,7 +193,7 @@ class _Supervision(Part):
         self.faults.clear()
         self._since_us.clear()
 
-    def look(self, now_us: int, measured: Measurements) -> bool:
+    def look(self, now_us: int, measured: _Measurements) -> bool:
         """Look for causes. Returns: whether there is a new fault."""
         known = len(self.faults)
         for fault in _FAULTS:
@@ -205,7 +205,7 @@ class _Supervision(Part):
                 self._raise(fault)
         return len(self.faults) > known
 
-    def clear(self, measured: Measurements) -> bool:
+    def clear(self, measured: _Measurements) -> bool:
         """Let go of the faults whose cause is gone. Returns: whether there were any."""
         gone = [fault for fault in self.faults if fault.gone(measured)]
         for fault in gone:
@@ -390,9 +390,9 @@ class MotorCoreUnit(Application):
             return action
         return motor_core_motion.Action.BRAKE
 
-    def _measurements(self, now_us: int) -> Measurements:
+    def _measurements(self, now_us: int) -> _Measurements:
         servo, on = self.servo, self._motion.on
-        return Measurements(
+        return _Measurements(
             on=on,
             loops=self._motion.loops,
             tripped=on and bool(self.inputs["short_circuit"]),

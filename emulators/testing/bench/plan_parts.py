@@ -145,11 +145,13 @@ def _bus(
 ) -> BusMount:
     mount = BusMount(wire.name, wire.bit_rate or BIT_RATE, seed)
     for device in devices:
-        mount.add(device.name, *slave_of(device, stores))
+        mount.add(device.name, *_slave_of(device, stores))
     return mount
 
 
-def slave_of(device: DevicePlan, stores: dict[Path, StoreFile]) -> tuple[CanopenSlave, DeviceEntry]:
+def _slave_of(
+    device: DevicePlan, stores: dict[Path, StoreFile]
+) -> tuple[CanopenSlave, DeviceEntry]:
     """Return a slave, and what a trace says of it; the files of `stores` are entered there.
 
     Raises:
@@ -300,7 +302,7 @@ def named_device(text: str, folder: Path, name: str = "") -> DevicePlan:
 def _slave(mount: BusMount, plan: DevicePlan) -> tuple[CanopenSlave, DeviceEntry]:
     """Return a slave that is named, and what a trace says of it."""
     try:
-        slave, entry = slave_of(plan, {})
+        slave, entry = _slave_of(plan, {})
     except NoNodeIdError:
         raise ValueError(
             f"{plan.name}: {plan.type} gives no node-ID: write '5={plan.type}'"

@@ -82,10 +82,10 @@ def run_bench(
     control = None if virtual else control or plan.real.control
     options = BenchOptions(virtual=virtual, control=control, **others)
     with mistakes_in(each.type for each in plan.devices.values()):
-        return BenchRun(plan, options).run()
+        return _BenchRun(plan, options).run()
 
 
-class BenchRun(EmulatorRun[BenchOptions]):
+class _BenchRun(EmulatorRun[BenchOptions]):
     """One run.
 
     Args:

@@ -82,7 +82,7 @@ _MOST: Final = 500
 """Runs of a batch."""
 
 
-class Workers(Protocol):
+class _Workers(Protocol):
     """Who does runs: on this machine, or on a cluster."""
 
     @property
@@ -108,7 +108,7 @@ class Campaign:
         workers: who does them.
     """
 
-    def __init__(self, plan: CampaignPlan, journal: CampaignJournal, workers: Workers) -> None:
+    def __init__(self, plan: CampaignPlan, journal: CampaignJournal, workers: _Workers) -> None:
         self._plan, self._journal, self._workers = plan, journal, workers
         done = journal.verdicts
         self._left = (number for number in plan.numbers() if number not in done)
@@ -288,7 +288,7 @@ class _CampaignRun:
             self._journal.remove()
         return table
 
-    def _workers(self, crew: Crew, plan: CampaignPlan) -> Workers:
+    def _workers(self, crew: Crew, plan: CampaignPlan) -> _Workers:
         if not self._options.scheduler:
             return LocalWorkers(crew, plan.collected.digest, self._options.workers or cores())
         try:
@@ -298,7 +298,7 @@ class _CampaignRun:
                 "--scheduler needs Dask: pip install 'tickrig[campaign]'"
             ) from None
 
-    def _do(self, plan: CampaignPlan, workers: Workers) -> None:
+    def _do(self, plan: CampaignPlan, workers: _Workers) -> None:
         """Do all runs, with a bar on a terminal."""
         kept = self._journal.verdicts
         if kept:

@@ -52,7 +52,7 @@ _NO_NODE: Final = (
 )
 
 
-class BusYml(NamedTuple):
+class _BusYml(NamedTuple):
     """A bus.yml that the nodes are those of.
 
     Attributes:
@@ -120,7 +120,7 @@ class _CanopenOptions(RunOptions):
 
     specs: tuple[NodeSpec, ...] = ()
     rig: RigNodes = field(default_factory=RigNodes)
-    bus_yml: BusYml = field(default_factory=BusYml)
+    bus_yml: _BusYml = field(default_factory=_BusYml)
     profile: str = AUTO
     bus: BusOptions = field(default_factory=BusOptions)
     store: Path | None = None
@@ -298,7 +298,7 @@ def emulate(
     sdo = _sdo_limits(options.pop("sdo_timeout"), options.pop("sdo_memory"))
     run = _CanopenRun(
         _CanopenOptions(
-            specs=specs, rig=file, bus_yml=BusYml(*bus_yml), bus=bus, sdo=sdo, **options
+            specs=specs, rig=file, bus_yml=_BusYml(*bus_yml), bus=bus, sdo=sdo, **options
         )
     )
     files = [node.description.file for node in file.nodes]

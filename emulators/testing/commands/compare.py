@@ -45,7 +45,7 @@ _PHASES: Final = 8
 
 
 @dataclass(frozen=True, slots=True)
-class ComparedRun:
+class _ComparedRun:
     """Two runs of a device, in the time of the recording.
 
     Attributes:
@@ -59,7 +59,7 @@ class ComparedRun:
 
 def _compare_ticks(
     recording: replay.BenchRecording, name: str, configured: ConfiguredDevice
-) -> ComparedRun:
+) -> _ComparedRun:
     """Feed the emulator tick by tick, as the recorded device was.
 
     Args:
@@ -70,7 +70,7 @@ def _compare_ticks(
     split = configured.type.line.splitter or line_splitter
     said = replay.traffic_of(recording.of(name), Mark.FROM_DEVICE)
     played = ((at, data, 0) for at, data in replay.play_device(recording, name, configured.device))
-    return ComparedRun(
+    return _ComparedRun(
         list(cut(split(Mark.FROM_DEVICE), said)), list(cut(split(Mark.FROM_DEVICE), played))
     )
 
@@ -81,7 +81,7 @@ def _compare_port(
     make: Callable[[], ConfiguredDevice],
     tolerance: Tolerance,
     settle_us: int,
-) -> ComparedRun:
+) -> _ComparedRun:
     """Let the recorded host talk to the emulator over a line, at its times.
 
     Args:
@@ -99,9 +99,9 @@ def _compare_port(
     split = make().type.line.splitter or line_splitter
     recorded = list(cut(split(Mark.FROM_DEVICE), replay.traffic_of(records, Mark.FROM_DEVICE)))
 
-    def run(begin_us: int) -> ComparedRun:
+    def run(begin_us: int) -> _ComparedRun:
         emulated = _play(make(), records, begin_us, begin_us + until_us)
-        return ComparedRun(recorded, [x for x in emulated if x.at_us >= -tolerance.time_us])
+        return _ComparedRun(recorded, [x for x in emulated if x.at_us >= -tolerance.time_us])
 
     phases = _PHASES if _has_short_change(records, device.tick_us) else 1
     begins = [settle_us + device.tick_us * phase // phases for phase in range(phases)]
@@ -133,10 +133,10 @@ def _begin_with(first: Said, alone: Iterable[Said], tolerance: Tolerance) -> lis
     return [at_us - first.at_us for at_us in islice(found, 1)]
 
 
-def _closest(runs: Iterable[ComparedRun], until_us: int, tolerance: Tolerance) -> ComparedRun:
+def _closest(runs: Iterable[_ComparedRun], until_us: int, tolerance: Tolerance) -> _ComparedRun:
     """Return the run with the fewest differences, the first of them."""
 
-    def differences(run: ComparedRun) -> int:
+    def differences(run: _ComparedRun) -> int:
         pairs = compare(run.recorded, run.emulated, until_us, tolerance)
         return sum(bool(pair.difference) for pair in pairs)
 
@@ -193,7 +193,7 @@ _UNUSED: Final = 1 << 31
 _CAN_ID: Final = 0x1FFF_FFFF
 
 
-def _compare_node_ticks(recording: replay.BenchRecording, name: str, node: Node) -> ComparedRun:
+def _compare_node_ticks(recording: replay.BenchRecording, name: str, node: Node) -> _ComparedRun:
     """Feed a node tick by tick, as the recorded one was.
 
     Args:
@@ -211,7 +211,7 @@ def _compare_node_ticks(recording: replay.BenchRecording, name: str, node: Node)
         for at_us, frames in replay.play_device(recording, name, node)
         for frame in frames
     ]
-    return ComparedRun(recorded, emulated)
+    return _ComparedRun(recorded, emulated)
 
 
 def _compare_bus(
@@ -220,7 +220,7 @@ def _compare_bus(
     tolerance: Tolerance,
     settle_us: int,
     bit_rate: int,
-) -> ComparedRun:
+) -> _ComparedRun:
     """Put the recorded frames of all others on a bus with emulated nodes, at their times.
 
     What a node sends is known by its CAN-IDs, as its dictionary has them at that time.
@@ -237,10 +237,10 @@ def _compare_bus(
     records = [x for x in recording.records if isinstance(x.traffic, CanFrame) or x.text]
     until_us = recording.until_us + tolerance.allowed_us(recording.until_us)
 
-    def run(begin_us: int) -> ComparedRun:
+    def run(begin_us: int) -> _ComparedRun:
         bus = _Bus(make, bit_rate, begin_us)
         emulated = bus.play(records, begin_us + until_us)
-        return ComparedRun(bus.recorded, [x for x in emulated if x.at_us >= -tolerance.time_us])
+        return _ComparedRun(bus.recorded, [x for x in emulated if x.at_us >= -tolerance.time_us])
 
     settled = run(settle_us)
     begins = []
@@ -449,7 +449,7 @@ def _read_tolerance(options: Mapping[str, Any]) -> Tolerance:
 
 def _runs(
     file: Path, recording: replay.BenchRecording, tolerance: Tolerance, options: Mapping[str, Any]
-) -> Iterator[tuple[str, ComparedRun]]:
+) -> Iterator[tuple[str, _ComparedRun]]:
     """Give the two runs of each device, of a recorded bus those of all nodes together."""
     for name in recording.header.devices:
         if not recording.at_port:
@@ -462,7 +462,7 @@ def _runs(
 
 def _ticked(
     file: Path, recording: replay.BenchRecording, name: str, options: Mapping[str, Any]
-) -> ComparedRun:
+) -> _ComparedRun:
     """Compare tick by tick."""
     header = recording.header
     entry, on_can = header.devices[name], header.on_can(name)
@@ -477,7 +477,7 @@ def _ticked(
 
 def _on_line(
     recording: replay.BenchRecording, name: str, tolerance: Tolerance, options: Mapping[str, Any]
-) -> ComparedRun:
+) -> _ComparedRun:
     """Compare what passed a serial port."""
     recorded = recording.header.devices[name].type
     if not (recorded or options["type_name"]):
@@ -491,7 +491,7 @@ def _on_line(
 
 def _on_bus(
     recording: replay.BenchRecording, name: str, tolerance: Tolerance, options: Mapping[str, Any]
-) -> ComparedRun:
+) -> _ComparedRun:
     """Compare what passed a bus."""
     try:
         specs = [spec for text in options["nodes"] for spec in parse_node(text)]

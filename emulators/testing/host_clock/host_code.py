@@ -155,7 +155,7 @@ KEEPABLE: Final = {
 """The functions, by their identity: not all that a module has can be hashed."""
 
 
-class Alias(NamedTuple):
+class _Alias(NamedTuple):
     """Where a function is kept.
 
     Attributes:
@@ -179,9 +179,9 @@ class _HostModules:
         self._modules: tuple[object, ...] = ()
         self._hosts: dict[int, dict[str, Any]] = {}
         self._counts: list[int] = []
-        self._places: dict[int, tuple[Alias, ...]] = {}
+        self._places: dict[int, tuple[_Alias, ...]] = {}
 
-    def places(self) -> Iterator[Alias]:
+    def places(self) -> Iterator[_Alias]:
         """Yield all places where functions were kept; something else may be there by now."""
         modules = tuple(sys.modules.values())
         # By identity and in order: comparing by equality would call `__eq__` of strange
@@ -226,7 +226,7 @@ def _names_of_host(module: object) -> dict[str, Any] | None:
     return names if isinstance(file, str) and is_host(str(names.get("__name__")), file) else None
 
 
-def _places(names: dict[str, Any]) -> Iterator[Alias]:
+def _places(names: dict[str, Any]) -> Iterator[_Alias]:
     module = names.get("__name__")
     for key, value in tuple(names.items()):
         if isinstance(value, FunctionType):
@@ -236,31 +236,31 @@ def _places(names: dict[str, Any]) -> Iterator[Alias]:
             if value.__module__ == module:
                 yield from _attributes(value)
         elif (function := _original(value)) is not None:
-            yield Alias(partial(names.get, key), partial(names.__setitem__, key), function)
+            yield _Alias(partial(names.get, key), partial(names.__setitem__, key), function)
 
 
-def _attributes(owner: type) -> Iterator[Alias]:
+def _attributes(owner: type) -> Iterator[_Alias]:
     for key, value in tuple(vars(owner).items()):
         if isinstance(value, FunctionType):
             yield from _defaults(value)
         elif isinstance(value, staticmethod):
             if (function := _original(value.__func__)) is not None:
                 kept = partial(_static, owner, key)
-                yield Alias(kept, partial(_set_static, owner, key), function)
+                yield _Alias(kept, partial(_set_static, owner, key), function)
         elif (function := _original(value)) is not None:
-            yield Alias(partial(vars(owner).get, key), partial(setattr, owner, key), function)
+            yield _Alias(partial(vars(owner).get, key), partial(setattr, owner, key), function)
 
 
-def _defaults(function: FunctionType) -> Iterator[Alias]:
+def _defaults(function: FunctionType) -> Iterator[_Alias]:
     """Yield the defaults of its arguments."""
     for at, value in enumerate(function.__defaults__ or ()):
         if (found := _original(value)) is not None:
             kept = partial(_default, function, at)
-            yield Alias(kept, partial(_set_default, function, at), found)
+            yield _Alias(kept, partial(_set_default, function, at), found)
     defaults = function.__kwdefaults__ or {}
     for key, value in defaults.items():
         if (found := _original(value)) is not None:
-            yield Alias(partial(defaults.get, key), partial(defaults.__setitem__, key), found)
+            yield _Alias(partial(defaults.get, key), partial(defaults.__setitem__, key), found)
 
 
 def _default(function: FunctionType, at: int) -> Any:
@@ -330,7 +330,7 @@ class Patches:
         self._undo.close()
 
 
-def _put_back(place: Alias, switch: Patch, before: Any) -> None:
+def _put_back(place: _Alias, switch: Patch, before: Any) -> None:
     """Put back what was there, unless somebody has put something else there meanwhile."""
     if place.kept() is switch:
         place.put(before)

@@ -36,7 +36,7 @@ _LINE_BYTES: Final = 48
 """What a line of a journal has around its text."""
 
 
-class PagePart(Enum):
+class _PagePart(Enum):
     """A part of a test, in the order in which parts are given room."""
 
     TEXT = auto()
@@ -61,29 +61,29 @@ class _PageRoom:
     tests: Sequence[TestRecord]
     timelines: Sequence[Timeline | None]
     room_bytes: int = _PAGE_BYTES
-    admitted: set[tuple[int, PagePart]] = field(init=False, default_factory=set)
+    admitted: set[tuple[int, _PagePart]] = field(init=False, default_factory=set)
 
     def __post_init__(self) -> None:
         """Share the room."""
         order = list(Outcome)
         first = sorted(range(len(self.tests)), key=lambda n: order.index(self.tests[n].outcome))
-        for part in PagePart:
+        for part in _PagePart:
             for number in first:
                 size = self._size(number, part)
                 if size <= self.room_bytes:
                     self.admitted.add((number, part))
                     self.room_bytes -= size
 
-    def _size(self, number: int, part: PagePart) -> int:
+    def _size(self, number: int, part: _PagePart) -> int:
         test, timeline = self.tests[number], self.timelines[number]
         match part:
-            case PagePart.TEXT:
+            case _PagePart.TEXT:
                 return _size_of(test.longrepr[:_TEXT_BYTES])
-            case PagePart.TIMELINE:
+            case _PagePart.TIMELINE:
                 return timeline.size if timeline else 0
-            case PagePart.JOURNAL:
+            case _PagePart.JOURNAL:
                 return _size_of("".join(_journal_texts(test)))
-            case PagePart.TRACE:
+            case _PagePart.TRACE:
                 return _size_of(cut(test.trace, _TRACE_BYTES)[0])
 
 
@@ -168,40 +168,40 @@ def _on_page(places: Sequence[overview.ReportedTest], room_bytes: int) -> Iterat
     admitted = _PageRoom(tests, timelines, room_bytes).admitted
     unwell = sum(test.outcome in overview.UNWELL for test in tests)
     for number, place in enumerate(places):
-        parts = {part for part in PagePart if (number, part) in admitted}
+        parts = {part for part in _PagePart if (number, part) in admitted}
         opened = place.record.outcome in overview.UNWELL and unwell <= _MOST_OPEN
         yield _test_on_page(place, timelines[number], parts, opened)
 
 
 def _test_on_page(
-    place: overview.ReportedTest, timeline: Timeline | None, parts: set[PagePart], opened: bool
+    place: overview.ReportedTest, timeline: Timeline | None, parts: set[_PagePart], opened: bool
 ) -> _TestOnPage:
     test = place.record
     lines = test.journal[-_JOURNAL_LINES:]
     return _TestOnPage(
         place,
-        timeline if PagePart.TIMELINE in parts else None,
-        cut(test.longrepr, _TEXT_BYTES)[0] if PagePart.TEXT in parts else "",
-        lines if PagePart.JOURNAL in parts else (),
+        timeline if _PagePart.TIMELINE in parts else None,
+        cut(test.longrepr, _TEXT_BYTES)[0] if _PagePart.TEXT in parts else "",
+        lines if _PagePart.JOURNAL in parts else (),
         test.journal_left_out + len(test.journal) - len(lines),
-        cut(test.trace, _TRACE_BYTES)[0] if PagePart.TRACE in parts else "",
+        cut(test.trace, _TRACE_BYTES)[0] if _PagePart.TRACE in parts else "",
         tuple(_left_out(test, timeline, parts)),
         opened,
     )
 
 
-def _left_out(test: TestRecord, timeline: Timeline | None, parts: set[PagePart]) -> Iterator[str]:
+def _left_out(test: TestRecord, timeline: Timeline | None, parts: set[_PagePart]) -> Iterator[str]:
     """Yield what of a test is not on the page, for people."""
     texts = (
-        (PagePart.TEXT, "the text", test.longrepr, _TEXT_BYTES),
-        (PagePart.TRACE, "the trace", test.trace, _TRACE_BYTES),
+        (_PagePart.TEXT, "the text", test.longrepr, _TEXT_BYTES),
+        (_PagePart.TRACE, "the trace", test.trace, _TRACE_BYTES),
     )
     for part, name, text, most in texts:
         if text and part not in parts:
             yield f"{name}, {page_text.size(len(text))}"
         elif missing := cut(text, most)[1]:
             yield f"the last {page_text.size(missing)} of {name}"
-    if timeline and PagePart.TIMELINE not in parts:
+    if timeline and _PagePart.TIMELINE not in parts:
         yield "the plots"
-    if test.journal and PagePart.JOURNAL not in parts:
+    if test.journal and _PagePart.JOURNAL not in parts:
         yield counted(len(test.journal), "journal line")

@@ -78,10 +78,10 @@ _SCENARIO: Final = re.compile(
 )
 
 
-def no_rig_file(text: str) -> str:
+def _no_rig_file(text: str) -> str:
     r"""Say what a text is that no bench can be made of; empty if nothing is known of it.
 
-    >>> no_rig_file("# drive\n0.1s press power_button\n")
+    >>> _no_rig_file("# drive\n0.1s press power_button\n")
     'it is a scenario: --scenario FILE plays it'
     """
     if text.startswith(BEGIN):
@@ -94,7 +94,7 @@ def no_rig_file(text: str) -> str:
     return SCENARIO if _SCENARIO.match(text) else ""
 
 
-def refuse_old_tables(top: Section) -> Section:
+def _refuse_old_tables(top: Section) -> Section:
     """Return a rig file as it is; note what replaces the tables of files of before.
 
     Args:
@@ -135,7 +135,7 @@ _TABLE: Final = re.compile(rb"^[ \t]*+\[[\w.-]+\]", re.MULTILINE)
 """The head of a table, which no bus.yml has."""
 
 
-def is_bus_yml(path: Path, data: bytes) -> bool:
+def _is_bus_yml(path: Path, data: bytes) -> bool:
     """Return whether a file is a bus.yml, a good or a bad one; not what only its name says."""
     if _TABLE.search(data):
         return False
@@ -146,7 +146,7 @@ def _is_named(path: Path) -> bool:
     return path.suffix.lower() in (".yml", ".yaml")
 
 
-def bus_as_rig(path: Path) -> Section:
+def _bus_as_rig(path: Path) -> Section:
     """Return a bus.yml as if it were a rig file with its nodes alone.
 
     Raises:
@@ -155,10 +155,10 @@ def bus_as_rig(path: Path) -> Section:
     document = TomlDocument({_BUS: path.name}, {(_BUS,): 1})
     if not _is_named(path):
         return Section(Notes(document, [Mistake(1, _MISNAMED)]), (), {"device": {}})
-    return with_nodes(Section(Notes(document), (), document.values), path.parent, alone=True)
+    return _with_nodes(Section(Notes(document), (), document.values), path.parent, alone=True)
 
 
-def with_nodes(top: Section, folder: Path, *, alone: bool = False) -> Section:
+def _with_nodes(top: Section, folder: Path, *, alone: bool = False) -> Section:
     """Return a rig file in which each node of the bus.yml that it names is a device.
 
     What the file says of a device of the same name is kept.
@@ -385,11 +385,11 @@ def _is_device(text: str) -> bool:
 
 def decode_rig_file(data: bytes, path: Path) -> RigPlan:
     """Read the bytes of a rig file; see `read_rig_file`."""
-    if is_bus_yml(path, data):
-        return _plan(bus_as_rig(path), path)
+    if _is_bus_yml(path, data):
+        return _plan(_bus_as_rig(path), path)
     if len(data) > _MAX_MB << 20:
         head = data[:1_000].decode("utf-8", "replace")
-        reason = no_rig_file(head) or f"more than {_MAX_MB} MB: this is no rig file"
+        reason = _no_rig_file(head) or f"more than {_MAX_MB} MB: this is no rig file"
         raise RigFileError(str(path), (Mistake(1, reason),))
     try:
         text = data.decode("utf-8")
@@ -407,11 +407,11 @@ def parse_rig_file(text: str, path: Path) -> RigPlan:
         text: the whole.
         path: of the file, which need not be there.
     """
-    if reason := no_rig_file(text):
+    if reason := _no_rig_file(text):
         raise RigFileError(str(path), (Mistake(1, reason),))
     document = read_toml(text)
-    top = refuse_old_tables(Section(Notes(document), (), document.values))
-    return _plan(with_nodes(top, path.parent), path)
+    top = _refuse_old_tables(Section(Notes(document), (), document.values))
+    return _plan(_with_nodes(top, path.parent), path)
 
 
 def _plan(top: Section, path: Path) -> RigPlan:

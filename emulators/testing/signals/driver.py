@@ -56,7 +56,7 @@ class DeviceSignal:
         return nan if isinstance(value, str) else float(value)
 
 
-class SignalScope:
+class _SignalScope:
     """The signals of a bench and its devices.
 
     Args:
@@ -138,7 +138,7 @@ def check_signals(
     Returns:
         All mistakes; the first key of each is the name of its signal.
     """
-    scope = SignalScope(signals, devices)
+    scope = _SignalScope(signals, devices)
     mistakes = [mistake for key in signals for mistake in _check(scope, key)]
     if not mistakes:
         try:
@@ -148,7 +148,7 @@ def check_signals(
     return mistakes
 
 
-def _check(scope: SignalScope, key: str) -> Iterator[SignalMistake]:
+def _check(scope: _SignalScope, key: str) -> Iterator[SignalMistake]:
     if SLASH in key:
         yield from _check_target(scope, key)
     if key in _TAKEN:
@@ -166,7 +166,7 @@ def _check(scope: SignalScope, key: str) -> Iterator[SignalMistake]:
                 )
 
 
-def _near(scope: SignalScope, key: str, wanted: str) -> str:
+def _near(scope: _SignalScope, key: str, wanted: str) -> str:
     """Say what a formula could mean, or list what it could name, its own device first."""
     own = key.partition(SLASH)[0]
     names = [name for name in scope.signals if SLASH not in name]
@@ -176,7 +176,7 @@ def _near(scope: SignalScope, key: str, wanted: str) -> str:
     return near(wanted, names)
 
 
-def _check_target(scope: SignalScope, key: str) -> Iterator[SignalMistake]:
+def _check_target(scope: _SignalScope, key: str) -> Iterator[SignalMistake]:
     """Yield what is wrong with an input that is driven."""
     device_name, _, name = key.partition(SLASH)
     device = scope.devices.get(device_name)
@@ -243,7 +243,7 @@ def _check_target(scope: SignalScope, key: str) -> Iterator[SignalMistake]:
 # alone, and is told once.
 
 
-class RunningSignal(Copyable):
+class _RunningSignal(Copyable):
     """A signal that runs.
 
     Args:
@@ -260,7 +260,7 @@ class RunningSignal(Copyable):
     def __init__(self, spec: SignalSpec) -> None:
         self.spec, self.due_us = spec, 0
         self.setting: Setting = nan
-        self.terms: Mapping[str, RunningSignal | DeviceSignal] = {}
+        self.terms: Mapping[str, _RunningSignal | DeviceSignal] = {}
 
     @property
     def number(self) -> float:
@@ -277,7 +277,7 @@ class RunningSignal(Copyable):
         return formula.value({**values, TIME: now_us / 1e6})
 
 
-class _TimeNode(RunningSignal):
+class _TimeNode(_RunningSignal):
     """A signal that depends on time alone."""
 
     __slots__ = ("source",)
@@ -301,7 +301,7 @@ class _TimeNode(RunningSignal):
         self.due_us = min(NEVER, next_us + spec.from_us)
 
 
-class _FormulaNode(RunningSignal):
+class _FormulaNode(_RunningSignal):
     """A signal that is computed of others."""
 
     __slots__ = ("formula",)
@@ -322,7 +322,7 @@ class _FormulaNode(RunningSignal):
         self.setting = self.spec.shaped(self.evaluate(self.formula, now_us))
 
 
-class _FilterNode(RunningSignal):
+class _FilterNode(_RunningSignal):
     """A signal with a memory: it moves each `every_us`, as what moves it was before."""
 
     __slots__ = ("_gain", "_input", "_moves", "_state", "filter")
@@ -365,7 +365,7 @@ class _FilterNode(RunningSignal):
         return min(max(value, self.spec.low), self.spec.high)
 
 
-def _node_of(name: str, spec: SignalSpec, seed: int) -> RunningSignal:
+def _node_of(name: str, spec: SignalSpec, seed: int) -> _RunningSignal:
     """Return a signal that runs.
 
     Args:
@@ -421,7 +421,7 @@ class SignalDriver(Copyable):
             raise ValueError("; ".join(map(str, mistakes)))
         self.tick_us = gcd(*(device.tick_us for device in devices.values())) or _NO_DEVICE_US
         self.problems: dict[str, str] = {}
-        scope = SignalScope(signals, devices)
+        scope = _SignalScope(signals, devices)
         self._nodes = {key: _node_of(key, signals[key], seed) for key in scope.ordered()}
         self._link(scope)
         self._filters = [node for node in self._nodes.values() if isinstance(node, _FilterNode)]
@@ -438,7 +438,7 @@ class SignalDriver(Copyable):
             self.problems.clear()
             self.act(0)
 
-    def _link(self, scope: SignalScope) -> None:
+    def _link(self, scope: _SignalScope) -> None:
         """Let each node find what its formula names."""
         for key, node in self._nodes.items():
             source = node.spec.source

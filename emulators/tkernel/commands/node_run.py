@@ -38,7 +38,7 @@ _NAMES: Final = f"{node_manager.HOST}.host_cxt/%n.rtc"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class NodeOptions:
+class _NodeOptions:
     """The command line of `tkernel-emu`."""
 
     system: Path | None = None
@@ -62,7 +62,7 @@ def run_node(connectors: int, message_octets: int, tick: str, boot: str, **optio
         )
     except ValueError as error:
         raise Refused(str(error)) from None
-    NodeRun(NodeOptions(limits=limits, engines=engines, **options)).run()
+    _NodeRun(_NodeOptions(limits=limits, engines=engines, **options)).run()
 
 
 class _Door:
@@ -101,14 +101,14 @@ class _Boot:
         self._runner.stop()
 
 
-class NodeRun:
+class _NodeRun:
     """One run of the command; a board in it may boot many times.
 
     Args:
         options: the command line.
     """
 
-    def __init__(self, options: NodeOptions) -> None:
+    def __init__(self, options: _NodeOptions) -> None:
         self._options = options
         self._system = System() if options.system is None else read_system(options.system)
         self._operator_door, self._system_door = _Door(), _Door()

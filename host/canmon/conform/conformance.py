@@ -72,7 +72,7 @@ def check_files(files: Mapping[str, Path]) -> None:
         raise Refused("two reports cannot go into one file")
 
 
-def keep_inputs(files: Mapping[str, Path], inputs: Iterable[Path]) -> None:
+def _keep_inputs(files: Mapping[str, Path], inputs: Iterable[Path]) -> None:
     """See that no report goes into what the run reads; Refused if one would.
 
     Args:
@@ -85,7 +85,7 @@ def keep_inputs(files: Mapping[str, Path], inputs: Iterable[Path]) -> None:
             check_not_read(path, option, read)
 
 
-def write_files(
+def _write_files(
     report: Report, files: Mapping[str, Path], baseline: Baseline, show: ShowFrames
 ) -> bool:
     """Write the files; say which could not be, and return whether all could.
@@ -191,7 +191,7 @@ class Conformance:
             f"--{name.replace('_', '-')}": options[name] for name in _FILES if options[name]
         }
         check_files(self._files)
-        keep_inputs(self._files, self._inputs())
+        _keep_inputs(self._files, self._inputs())
         self._only = patterns(options["only"])
         self._baseline = _read_baseline(options["baseline"])
         self._allow = _indices("--allow", options["allow"])
@@ -226,7 +226,7 @@ class Conformance:
             held.callback(source.close)
             if node_id is None:
                 return list_nodes(source)
-            keep_inputs(self._files, map(Path, source.eds.values()))
+            _keep_inputs(self._files, map(Path, source.eds.values()))
             report = self._judge(source, node_id)
         return INTERRUPTED if report is None else self._show(report)
 
@@ -303,7 +303,7 @@ class Conformance:
                 show = decoded_frames(eds)
                 text = text_report(report, self._baseline, show, self._again(report))
                 click.echo(text, nl=False)
-        written = write_files(report, self._files, self._baseline, decoded_frames(eds))
+        written = _write_files(report, self._files, self._baseline, decoded_frames(eds))
         if report.absent:
             say(f"Error: {report.aborted}")
             return report.exit_status if written else BUS_FAILED

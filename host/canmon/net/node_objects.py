@@ -233,7 +233,7 @@ def _number(session: NetSession, node_id: int, at: Entry) -> str | None:
         return None
 
 
-TYPES: Final = {
+_TYPES: Final = {
     "bool": DataType.BOOLEAN,
     **{f"i{bits}": DataType[f"INTEGER{bits}"] for bits in (8, 16, 24, 32, 40, 48, 56, 64)},
     **{f"u{bits}": DataType[f"UNSIGNED{bits}"] for bits in (8, 16, 24, 32, 40, 48, 56, 64)},
@@ -279,12 +279,12 @@ def encoded(objects: NamedObjects, entry: Entry, words: str) -> bytes:
     """
     text = objects.text(entry)
     kind, colon, rest = words.partition(":")
-    if colon and kind in TYPES:
-        text, words = node_memory.ObjectText(text.name, TYPES[kind]), rest
+    if colon and kind in _TYPES:
+        text, words = node_memory.ObjectText(text.name, _TYPES[kind]), rest
     if text.kind is None:
         raise Refused(
             f"the type of {objects.title(entry)} is not known: give its EDS (--eds FILE), or the"
-            f" type before the value, as u16:100; types: {', '.join(TYPES)}"
+            f" type before the value, as u16:100; types: {', '.join(_TYPES)}"
         )
     try:
         data = encode_value(text, words)

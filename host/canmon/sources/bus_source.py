@@ -76,7 +76,7 @@ class SocketReader:
         self._socket: Any = bus.socket  # on Windows a socket has no recvmsg, and no such bus
         self.lost, self.tally = 0, LogTally()
         self._socket.setsockopt(socket.SOL_SOCKET, _SO_RXQ_OVFL, 1)
-        let_fd(bus)
+        _let_fd(bus)
         with suppress(OSError):  # older kernels have no such frames
             self._socket.setsockopt(_SOL_CAN_RAW, _CAN_RAW_XL_FRAMES, 1)
         self._socket.setblocking(False)
@@ -118,7 +118,7 @@ class SocketReader:
         return (Record(at_us, self.name, _fd_frame(*_FD_FRAME.unpack(data)), sent),)
 
 
-def let_fd(bus: Any) -> None:
+def _let_fd(bus: Any) -> None:
     """Have a bus of SocketCAN send and hear CAN FD frames, where the kernel has them."""
     with suppress(OSError):
         bus.socket.setsockopt(_SOL_CAN_RAW, _CAN_RAW_FD_FRAMES, 1)
@@ -167,7 +167,7 @@ def open_bus(options: BusOptions) -> tuple[can.BusABC, str, str]:
     except BusUnavailable as error:
         raise SourceFailed(error.message) from None
     if interface == _DEFAULT:
-        let_fd(bus)
+        _let_fd(bus)
     return bus, interface, channel_name(interface if channel is None else channel)
 
 
@@ -230,7 +230,7 @@ BusSource = LiveSource[Record]
 """One or more buses: all that comes are frames."""
 
 
-def reader_of(bus: can.BusABC, interface: str, name: str) -> Reader[Record]:
+def _reader_of(bus: can.BusABC, interface: str, name: str) -> Reader[Record]:
     """Return what reads an open bus."""
     return SocketReader(bus, name) if interface == "socketcan" else BusReader(bus, interface, name)
 
@@ -258,7 +258,7 @@ class OpenBus:
     @property
     def reader(self) -> Reader[Record]:
         """What reads it."""
-        return reader_of(self.bus, self._interface, self.name)
+        return _reader_of(self.bus, self._interface, self.name)
 
     def open_again(self) -> Reader[Record]:
         """Open it once more; whoever used it has closed it."""
@@ -335,7 +335,7 @@ class Transmitter:
         self._source: BusSource | None = None
         self._reads: BusReceiver | None = None
         if receives:
-            reader = reader_of(self._bus, interface, self.name)
+            reader = _reader_of(self._bus, interface, self.name)
             self._source = BusSource([reader], [bus_word.chosen])
             self._reads = reader.reads if isinstance(reader, BusReader) else None
 

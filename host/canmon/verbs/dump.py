@@ -226,7 +226,7 @@ def dump(  # noqa: PLR0913 - options
         with until_interrupted() as signals, until_unread():
             # a block of a log is written whole; who prints may wait for its reader for ever
             whole = take if recording is None else signals.behind(take)
-            pass_on(frames, meaning, whole, count, quiet_ms)
+            _pass_on(frames, meaning, whole, count, quiet_ms)
     report(frames, strict, meaning.messages())
 
 
@@ -261,7 +261,7 @@ def _is_line(word: str) -> bool:
     return isinstance(parse_source(word), LineSpec)
 
 
-def pass_on(
+def _pass_on(
     source: AnySource[AnyRecord],
     meaning: printer.FilteredDecoder,
     take: _Take,
@@ -328,7 +328,7 @@ def conv(  # noqa: PLR0913 - options
             until_interrupted() as signals,
         ):
             if pieces is None:
-                pass_on(frames, meaning, signals.behind(out.take))
+                _pass_on(frames, meaning, signals.behind(out.take))
             else:
                 _convert_pieces(pieces, signals.behind(out.take), signals.behind(out.take_block))
         if signals.came and place != log:

@@ -32,7 +32,7 @@ _JOIN_ENGINES: Final = "tickrig.host.rtc.engines.engines_joined:engines_joined"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SystemOptions:
+class _SystemOptions:
     """The command line of `tickrig rtc run`."""
 
     system: Path | None = None
@@ -53,7 +53,7 @@ def run_system(lite_boot: str, **given: Any) -> None:
         Refused: the command line asks for something that cannot be done.
     """
     engines, boot_us = take_engines(given), time_us("--lite-boot", lite_boot)
-    options = SystemOptions(lite_boot_us=boot_us, engines=engines, **given)
+    options = _SystemOptions(lite_boot_us=boot_us, engines=engines, **given)
     system = System() if options.system is None else read_system(options.system)
     if options.save is not None:
         check_system(options.save)
@@ -79,7 +79,7 @@ def _find_rt_component(spec: str) -> type[RtComponent]:
     return kind
 
 
-def _restore(manager: Manager, system: System, options: SystemOptions) -> None:
+def _restore(manager: Manager, system: System, options: _SystemOptions) -> None:
     """Make the system; proxies are there already."""
     if (rate_hz := options.rate_hz) is not None:
         entries = tuple(replace(entry, rate_hz=rate_hz) for entry in system.components)
@@ -99,7 +99,7 @@ def _restore(manager: Manager, system: System, options: SystemOptions) -> None:
         raise Refused(f"system {options.system}: {explain_error(error)}") from None
 
 
-def _serve(stack: ExitStack, manager: Manager, options: SystemOptions) -> None:
+def _serve(stack: ExitStack, manager: Manager, options: _SystemOptions) -> None:
     """Run until somebody stops it, then save."""
     clock = ServingClock()
     runner = RealTime(manager, clock)
@@ -121,7 +121,7 @@ def _serve(stack: ExitStack, manager: Manager, options: SystemOptions) -> None:
         write_system(control.saved(file_format(options.save)), options.save)
 
 
-def _run(manager: Manager, runner: RealTime, options: SystemOptions) -> None:
+def _run(manager: Manager, runner: RealTime, options: _SystemOptions) -> None:
     console = Console(manager, click.echo, say)
     if options.console:
         runner.after_tick.append(lambda now_us: console.read(sys.stdin.fileno()))

@@ -130,7 +130,7 @@ class Probes:
         return watch
 
 
-class Runner(Protocol):
+class _Runner(Protocol):
     """What runs a system: `RealTime`, or the loop of a server that has one.
 
     Attributes:
@@ -161,7 +161,7 @@ class SystemControl(RequestDispatcher):
         runner: who runs it.
     """
 
-    def __init__(self, manager: Manager, runner: Runner) -> None:
+    def __init__(self, manager: Manager, runner: _Runner) -> None:
         self._manager, self._runner, self._probes = manager, runner, Probes(manager)
         runner.after_tick.append(self._probes.tick)
         super().__init__(

@@ -243,7 +243,7 @@ class SendBuffer(RingBuffer[P]):
 P_co = TypeVar("P_co", covariant=True)
 
 
-class OutPortConsumer(Protocol[P_co]):
+class _OutPortConsumer(Protocol[P_co]):
     """An OutPort of a peer, as an engine reaches it (OpenRTM-aist 1.x, OutPortConsumer)."""
 
     def get(self) -> P_co | None:
@@ -382,7 +382,7 @@ class InPortPullConnector(_InPortConnector[T, P]):
         port: InPort[T],
         end: PeerEnd,
         codec: Codec[T, P],
-        consumer: OutPortConsumer[P],
+        consumer: _OutPortConsumer[P],
         thread: PeerCaller,
         calls: CallQueue,
     ) -> None:
@@ -429,7 +429,7 @@ class InPortPullConnector(_InPortConnector[T, P]):
 P_contra = TypeVar("P_contra", contravariant=True)
 
 
-class InPortConsumer(Protocol[P_contra]):
+class _InPortConsumer(Protocol[P_contra]):
     """An InPort of a peer, as an engine reaches it (OpenRTM-aist 1.x, InPortConsumer)."""
 
     def put(self, payload: P_contra, /) -> PortStatus:
@@ -470,7 +470,7 @@ class OutPortPushConnector(connector.Connector[Any], Generic[T, P]):
         port: OutPort[T],
         end: PeerEnd,
         codec: Codec[T, P],
-        consumer: InPortConsumer[P],
+        consumer: _InPortConsumer[P],
         thread: PeerCaller,
     ) -> None:
         options = replace(end.options, dataflow=connector.DataflowType.PUSH)

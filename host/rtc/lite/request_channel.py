@@ -83,7 +83,7 @@ _KEPT: Final = 8
 _FRAMES_LOG: Final = log_of(__name__)
 
 
-class ReplyDecoder(Protocol):
+class _ReplyDecoder(Protocol):
     """`Decoder` or `RtnoReplies`."""
 
     @property
@@ -99,7 +99,7 @@ class ReplyDecoder(Protocol):
         ...
 
 
-class FrameLink:
+class _FrameLink:
     """A `Link[LiteFrame]`, one way requests, the other way replies.
 
     A line that is gone is as silent as a device without power. What is no
@@ -116,7 +116,7 @@ class FrameLink:
     """
 
     def __init__(
-        self, link: Link[bytes], encode: Callable[[LiteFrame], bytes], decoder: ReplyDecoder
+        self, link: Link[bytes], encode: Callable[[LiteFrame], bytes], decoder: _ReplyDecoder
     ) -> None:
         self._link, self._encode, self._decoder = link, encode, decoder
         self._byte_us = link.now_us
@@ -158,7 +158,7 @@ class FrameLink:
         self.latest.append(f"{self.now_us / 1e6:.3f} {arrow} {str(frame.body)[2:-1]}")
 
 
-class _RtnoLink(FrameLink):
+class _RtnoLink(_FrameLink):
     """Says what RTno has a letter for, and makes up for the rest.
 
     | asked for | said instead |
@@ -422,11 +422,11 @@ class RequestChannel:
             self._reply = reply
 
 
-def _frames_over(link: Link[bytes], settings: ProxySettings) -> FrameLink:
+def _frames_over(link: Link[bytes], settings: ProxySettings) -> _FrameLink:
     if settings.framing is Framing.RTNO:
         return _RtnoLink(link)
     checksum = settings.checksum
-    return FrameLink(link, lambda frame: frame.encode(checksum), LiteDecoder(REPLIES, checksum))
+    return _FrameLink(link, lambda frame: frame.encode(checksum), LiteDecoder(REPLIES, checksum))
 
 
 def _state(code: int) -> codes.LiteState | None:

@@ -77,7 +77,7 @@ def _frames_of(message: can.Message) -> Frames:
     return (frame,) if frame else ()
 
 
-def open_bus(plan: BusPlan, options: dict[str, Any]) -> can.BusABC:
+def _open_bus(plan: BusPlan, options: dict[str, Any]) -> can.BusABC:
     """Open a bus.
 
     Args:
@@ -91,18 +91,18 @@ def open_bus(plan: BusPlan, options: dict[str, Any]) -> can.BusABC:
     try:
         bus = can.Bus(plan.channel, plan.interface, **{**rate, **dict(plan.options), **options})
     except (can.CanError, OSError, ValueError, ImportError, AttributeError) as error:
-        raise BusGone(f"cannot open {name_of(plan)}: {can_link.bus_reason(error)}") from None
+        raise BusGone(f"cannot open {_name_of(plan)}: {can_link.bus_reason(error)}") from None
     can_link.prepare_bus(bus, plan.interface)
     return bus
 
 
 def open_watched_bus(plan: BusPlan, watch: DoorWatch, options: dict[str, Any]) -> can.BusABC:
-    """Open a bus with a watch at it; see `open_bus`."""
-    bus = open_bus(plan, options)
+    """Open a bus with a watch at it; see `_open_bus`."""
+    bus = _open_bus(plan, options)
     kind = type(bus)
     reads = can_link.BusReceiver(
         bus,
-        name_of(plan),
+        _name_of(plan),
         gone=BusGone,
         raises=(can.CanError, OSError),
         read=partial(kind.recv, bus),
@@ -111,7 +111,7 @@ def open_watched_bus(plan: BusPlan, watch: DoorWatch, options: dict[str, Any]) -
     return bus
 
 
-def name_of(plan: BusPlan) -> str:
+def _name_of(plan: BusPlan) -> str:
     """Return what people call a bus, as `socketcan can0`."""
     return plan.interface if plan.channel is None else f"{plan.interface} {plan.channel}"
 
@@ -122,7 +122,7 @@ def frame_link(plan: BusPlan, watch: DoorWatch) -> StampedLink:
     Raises:
         BusGone: it cannot be opened.
     """
-    link = can_link.CanLink(open_bus(plan, {}), name_of(plan))
+    link = can_link.CanLink(_open_bus(plan, {}), _name_of(plan))
     link.on_error_frame = lambda frame: watch.passed(Mark.FROM_DEVICE, (frame,))
     return free_of_echo(link, plan.interface)
 
@@ -138,6 +138,6 @@ def join_bus(end: CanEnd, plan: BusPlan, stack: ExitStack) -> CanBridge:
     Raises:
         BusGone: it cannot be opened.
     """
-    bus = open_bus(plan, {})
+    bus = _open_bus(plan, {})
     stack.callback(can_link.close_bus, bus)
-    return CanBridge(end, port_on(bus, plan.interface, name_of(plan), LinkGone))
+    return CanBridge(end, port_on(bus, plan.interface, _name_of(plan), LinkGone))

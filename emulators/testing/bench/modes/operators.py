@@ -41,7 +41,7 @@ _SWITCH_S: Final = 30.0
 """A command that takes longer is ended."""
 
 
-class PowerSwitch:
+class _PowerSwitch:
     """Switches a device by the commands of a rig file.
 
     Args:
@@ -153,7 +153,7 @@ _HOLD_US: Final = 1_000_000
 """Who holds a button for so long is told how long."""
 
 
-class HumanOperator:
+class _HumanOperator:
     """`DeviceOperator` of a human, who is asked in the words of the device's type.
 
     What was set is remembered: nobody is asked for it again.
@@ -172,7 +172,7 @@ class HumanOperator:
         device: str,
         physical: HasSignals,
         terminal: Terminal,
-        power: PowerSwitch | None = None,
+        power: _PowerSwitch | None = None,
     ) -> None:
         self._device, self._physical, self._terminal = device, physical, terminal
         self._power, self.said_no = power, False
@@ -286,7 +286,7 @@ _OBJECT: Final = "0x"
 """So objects of a dictionary begin; they are new whenever the power comes."""
 
 
-class EmulatorOperator:
+class _EmulatorOperator:
     """`DeviceOperator` that ask the control socket of an emulator.
 
     Args:
@@ -681,10 +681,10 @@ class Operators:
 
     def _operator_of(self, device: str) -> _DeviceOperator:
         if path := self._where.control.get(device):
-            return EmulatorOperator(path, self._plan.devices[device])
+            return _EmulatorOperator(path, self._plan.devices[device])
         power = self._where.power.get(device)
-        switch = PowerSwitch(device, power) if power else None
-        return HumanOperator(
+        switch = _PowerSwitch(device, power) if power else None
+        return _HumanOperator(
             device, self._like.state.assembly.parts[device], self._terminal, switch
         )
 

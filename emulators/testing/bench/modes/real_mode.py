@@ -39,7 +39,7 @@ _JOIN_S: Final = 10.0
 """A step that has not ended by then never will."""
 
 
-class RigThread:
+class _RigThread:
     """Runs an emulator; between two of its ticks it does what other threads ask for.
 
     Before `start` and after its end time stands still, and callers do it themselves. What a
@@ -241,7 +241,7 @@ class HostInCondition(BaseException):
 class _Watch(HostPace):
     """Knows how late the host is, and keeps it out of the rig's thread."""
 
-    def __init__(self, thread: RigThread) -> None:
+    def __init__(self, thread: _RigThread) -> None:
         super().__init__()
         self._thread = thread
 
@@ -267,7 +267,7 @@ class RealMode(EmulatedMode):
         super().__init__(rig, _IN_REAL_TIME)
         self._clock, self._stack = outside.clock, ExitStack()
         self._begun = self._judging = False
-        self._thread = RigThread(rig, outside.clock)
+        self._thread = _RigThread(rig, outside.clock)
         self._pace, self._waits = _Watch(self._thread), CpuWaits(spares_looker=True)
         self.doors = Doors(outside.places, lambda wire: self._pace, self._begin)
         rig.rig.watchers.append(self._waits.look)

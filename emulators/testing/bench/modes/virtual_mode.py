@@ -40,7 +40,7 @@ else:  # python-can and canopen are slow
 
 # The time of a rig, for hosts that look at a clock.
 
-LONGEST_US: Final = 3_600_000_000
+_LONGEST_US: Final = 3_600_000_000
 """Who waits without a timeout waits an hour at most."""
 
 
@@ -69,7 +69,7 @@ class RigPassing:
         Raises:
             HostTimeError: it is the rig that has called, in the middle of a step.
         """
-        timeout_us = LONGEST_US if timeout_s is None else max(0, round(timeout_s * 1e6))
+        timeout_us = _LONGEST_US if timeout_s is None else max(0, round(timeout_s * 1e6))
         if not self._rig.in_step:
             return self._rig.run_until(done, timeout_us)
         if timeout_us > LOOK_US:
@@ -101,7 +101,7 @@ class _Offers:
         return partial(self.close, len(self._open))
 
 
-class VirtualDoors:
+class _VirtualDoors:
     """The `HostDoors` of a bench in virtual time.
 
     Args:
@@ -203,7 +203,7 @@ class VirtualMode(EmulatedMode):
 
     def __init__(self, rig: BenchRig) -> None:
         super().__init__(rig, _EXACT)
-        self.doors, self._closed = VirtualDoors(rig), False
+        self.doors, self._closed = _VirtualDoors(rig), False
 
     @property
     def now_us(self) -> int:
@@ -231,7 +231,7 @@ class VirtualMode(EmulatedMode):
         rig = self._rig.rig
         for_ever = rig.now_us + within_us >= NEVER
         until_us = rig.now_us + (DAY_US if for_ever else within_us)
-        look_us = max(_LOOK_US, (LONGEST_US if for_ever else within_us) // _LOOKS)
+        look_us = max(_LOOK_US, (_LONGEST_US if for_ever else within_us) // _LOOKS)
         found = done()
         while not found:
             if rig.now_us >= until_us or (for_ever and rig.next_us == NEVER):

@@ -238,10 +238,10 @@ class MaxLoad:
         return f"{channel}: load {percent:.1f} %, at most {self._percent:g} % is right"
 
 
-BOOT_UP: Final = bytes([nmt.NmtState.INITIALISING])
-ERROR_CONTROL_IDS: Final = range(nmt.ERROR_CONTROL_COB_ID + 1, nmt.ERROR_CONTROL_COB_ID + 0x80)
-ANSWER_IDS: Final = range(sdo_frame.RESPONSE_COB_ID + 1, sdo_frame.RESPONSE_COB_ID + 0x80)
-REQUEST_IDS: Final = range(sdo_frame.REQUEST_COB_ID + 1, sdo_frame.REQUEST_COB_ID + 0x80)
+_BOOT_UP: Final = bytes([nmt.NmtState.INITIALISING])
+_ERROR_CONTROL_IDS: Final = range(nmt.ERROR_CONTROL_COB_ID + 1, nmt.ERROR_CONTROL_COB_ID + 0x80)
+_ANSWER_IDS: Final = range(sdo_frame.RESPONSE_COB_ID + 1, sdo_frame.RESPONSE_COB_ID + 0x80)
+_REQUEST_IDS: Final = range(sdo_frame.REQUEST_COB_ID + 1, sdo_frame.REQUEST_COB_ID + 0x80)
 
 
 class HeartbeatTimes(NamedTuple):
@@ -278,13 +278,13 @@ class Heartbeat(Rule):
     def selection(self, ident: int, /) -> FrameSelection:
         """Suspect what comes too soon or too late, and boot-ups."""
         _, low_us, high_us = self._times
-        return FrameSelection(low_us, high_us, frozenset(BOOT_UP), firsts=True)
+        return FrameSelection(low_us, high_us, frozenset(_BOOT_UP), firsts=True)
 
     def judge(self, record: Record, gap_us: int | None, /) -> str | None:
         """Compare the gap, unless the frame or the one before it is a boot-up."""
         booted_us = self._booted_us.get(record.channel)
         behind_boot = gap_us is not None and record.at_us - gap_us == booted_us
-        if record.frame.data[:1] == BOOT_UP:
+        if record.frame.data[:1] == _BOOT_UP:
             self._booted_us[record.channel] = record.at_us
             self._free[record.channel] += 2 - (gap_us is None or behind_boot)
             return None
@@ -371,7 +371,7 @@ class _Watched:
     def hear(self, at_us: int, data: bytes) -> str | None:
         """Take a frame of error control; say that a heartbeat is lost before it."""
         self.has_sent = True
-        if data[:1] == BOOT_UP:
+        if data[:1] == _BOOT_UP:
             self._memory.boot()
             self._heartbeats.boot(at_us)
             self.guarded = self.requested = False
@@ -448,8 +448,8 @@ class NoLostHeartbeat(Rule):
 
     def wants(self, ident: int, /) -> bool:
         """Take the COB-IDs of error control, and those of SDO, which may tell 1017h."""
-        is_sdo = ident in ANSWER_IDS or ident in REQUEST_IDS
-        return is_sdo or ident & ~REMOTE in ERROR_CONTROL_IDS
+        is_sdo = ident in _ANSWER_IDS or ident in _REQUEST_IDS
+        return is_sdo or ident & ~REMOTE in _ERROR_CONTROL_IDS
 
     def begin(self, at_us: int, /) -> None:
         """Note when listening began."""
@@ -460,8 +460,8 @@ class NoLostHeartbeat(Rule):
         frame = record.frame
         assert isinstance(frame, CanFrame)
         node = self._watched(record.channel, frame.can_id & _NODE_MASK)
-        if frame.can_id not in ERROR_CONTROL_IDS:
-            node.take_sdo(record.at_us, frame.data, request=frame.can_id in REQUEST_IDS)
+        if frame.can_id not in _ERROR_CONTROL_IDS:
+            node.take_sdo(record.at_us, frame.data, request=frame.can_id in _REQUEST_IDS)
         elif frame.remote:
             node.requested = True
         else:
@@ -609,7 +609,7 @@ class NoSdoAbort(CanopenRule):
 
     def wants(self, ident: int, /) -> bool:
         """Take the COB-IDs of the default servers."""
-        return ident in ANSWER_IDS or ident in REQUEST_IDS
+        return ident in _ANSWER_IDS or ident in _REQUEST_IDS
 
     def selection(self, ident: int, /) -> FrameSelection:
         """Suspect aborts."""
@@ -624,7 +624,7 @@ class NoSdoAbort(CanopenRule):
             return None
         index, sub = sdo_frame.index_sub(data)
         which = f"{index:04X}h:{sub:02X}" if index or sub else "its transfer"
-        side = "server" if frame.can_id in ANSWER_IDS else "client"
+        side = "server" if frame.can_id in _ANSWER_IDS else "client"
         reason = sdo_frame.describe_abort(int.from_bytes(data[4:], "little"))
         if len(data) < sdo_frame.FRAME_BYTES:
             reason = (
@@ -735,7 +735,7 @@ class NoReboot(CanopenRule):
         """Suspect resets and boot-ups; the first frame of anything else tells of its node."""
         if ident == nmt.NMT_COB_ID:
             return FrameSelection(first_bytes=_RESETS)
-        boot_up = frozenset(BOOT_UP) if ident in ERROR_CONTROL_IDS else frozenset()
+        boot_up = frozenset(_BOOT_UP) if ident in _ERROR_CONTROL_IDS else frozenset()
         return FrameSelection(first_bytes=boot_up, firsts=True)
 
     def judge(self, record: Record, gap_us: int | None, /) -> str | None:
@@ -749,7 +749,7 @@ class NoReboot(CanopenRule):
             return None
         is_new = (record.channel, node) not in self._present
         self._present.add((record.channel, node))
-        if frame.can_id not in ERROR_CONTROL_IDS or frame.data[:1] != BOOT_UP:
+        if frame.can_id not in _ERROR_CONTROL_IDS or frame.data[:1] != _BOOT_UP:
             return None
         expected = is_new or node in self._commanded
         self._commanded.discard(node)

@@ -54,7 +54,7 @@ class RuleScope:
         raise NotImplementedError
 
 
-class After(RuleScope):
+class _After(RuleScope):
     """From the first frame after an event on."""
 
     def __init__(self, event: demands.RuleEvent) -> None:
@@ -68,7 +68,7 @@ class After(RuleScope):
         return came
 
 
-class Before(RuleScope):
+class _Before(RuleScope):
     """Until an event."""
 
     def __init__(self, event: demands.RuleEvent) -> None:
@@ -81,7 +81,7 @@ class Before(RuleScope):
         return not self._came
 
 
-class While(RuleScope):
+class _While(RuleScope):
     """While a condition on signals holds, by the latest frame of the bus that carries one."""
 
     def __init__(self, event: demands.RuleEvent) -> None:
@@ -102,7 +102,7 @@ class While(RuleScope):
 _CAN_ID: Final = re.compile(r"[0-9A-Fa-f]{3}|[0-9A-Fa-f]{8}")
 _TYPE: Final = re.compile(r"[usfb*/+-]\S*")
 
-Slice = tuple[str, FrameSlice]
+_Slice = tuple[str, FrameSlice]
 """Bits of a frame, under the name by which a rule asks for them."""
 
 
@@ -152,7 +152,7 @@ class SliceParser(FilterParser):
         return name
 
 
-def _with_slices(record: Record, decoded: Decoded, slices: Iterable[Slice]) -> Decoded:
+def _with_slices(record: Record, decoded: Decoded, slices: Iterable[_Slice]) -> Decoded:
     """Return what a frame says, with the slices that are of it."""
     frame = record.frame
     if isinstance(frame, ErrorFrame) or frame.remote:
@@ -201,7 +201,7 @@ class ExpressionRule:
         demand: demands.RuleDemand,
         scopes: Sequence[RuleScope],
         missing: filters.MissingSignals,
-        slices: Sequence[Slice],
+        slices: Sequence[_Slice],
         *,
         mapped: bool,
     ) -> None:
@@ -367,7 +367,7 @@ _UNITS: Final = ("s", "ms", "us", "%")
 _COUNT: Final = re.compile(r"[0-9]{1,9}")
 
 
-class QuantityParser(SliceParser):
+class _QuantityParser(SliceParser):
     """Takes quantities from the words of a rule.
 
     Args:
@@ -512,9 +512,9 @@ DEMANDS: Final = (
     *("answered", "dlc", "toggle", "counts", "steps", "changes"),
 )
 _SCOPE: Final[dict[str, Callable[[demands.RuleEvent], RuleScope]]] = {
-    "after": After,
-    "before": Before,
-    "while": While,
+    "after": _After,
+    "before": _Before,
+    "while": _While,
 }
 _PLAIN: Final[dict[str, Callable[[demands.RuleEvent], demands.RuleDemand]]] = {
     "once": lambda event: demands.Count(event, 1, 1),
@@ -543,7 +543,7 @@ _OF: Final = re.compile(r"(?<!\s)\s++of\s")
 _OWN_NODE: Final = re.compile(r"[0-9]{1,3}\.")
 
 
-class _RuleParser(QuantityParser):
+class _RuleParser(_QuantityParser):
     """Recursive descent over the grammar above.
 
     Args:
@@ -552,7 +552,7 @@ class _RuleParser(QuantityParser):
 
     def rule(
         self,
-    ) -> tuple[demands.RuleDemand, list[RuleScope], set[str], list[Slice]]:
+    ) -> tuple[demands.RuleDemand, list[RuleScope], set[str], list[_Slice]]:
         """Return demand, scopes, signals and slices that are named; RuleError if it is no rule."""
         self._named: set[str] = set()
         demand = self._demand(self._subject())

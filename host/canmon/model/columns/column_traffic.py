@@ -134,7 +134,7 @@ _MERGED: Final = 1 << 16
 _LONGEST_US: Final = np.iinfo(np.int64).max
 
 
-class ColumnGaps:
+class _ColumnGaps:
     """Counts the gaps of each identifier of a bus.
 
     Attributes:
@@ -360,7 +360,7 @@ class _ColumnBus:
         self._channel, self._first_us, self._last_us = channel, first_us, first_us
         self._frames = self._went_back = 0
         self._load, self._errors = ColumnLoad(first_us), traffic.ErrorStatistics()
-        self._idents, self._gaps, self._changes = Identifiers(), ColumnGaps(), _ColumnChanges()
+        self._idents, self._gaps, self._changes = Identifiers(), _ColumnGaps(), _ColumnChanges()
         self._bits, self._dlc = np.empty(0, np.int64), np.empty(0, np.uint8)
 
     def take(self, frames: Columns) -> None:

@@ -67,7 +67,7 @@ COMPARISONS: Final[dict[str, _Compare]] = {
     ">": operator.gt,
     ">=": operator.ge,
 }
-EQUALITIES: Final = ("=", "==", "!=")
+_EQUALITIES: Final = ("=", "==", "!=")
 KINDS: Final = (
     *("nmt", "sync", "time", "emcy", "heartbeat", "boot-up", "guard", "sdo", "lss", "dbc"),
     *("unmapped", "raw", "error", "rrc", "rtc-lite"),
@@ -82,30 +82,30 @@ _OUTCOMES: Final = {
     "sdo.unanswered": TransferOutcome.UNANSWERED,
     "sdo.broken": TransferOutcome.BROKEN,
 }
-FIELDS: Final[dict[str, Callable[[AnyRecord, Decoded], int | None]]] = {
+_FIELDS: Final[dict[str, Callable[[AnyRecord, Decoded], int | None]]] = {
     "node": lambda record, decoded: decoded.node,
     "id": lambda record, decoded: _can_id(record),
     "dlc": lambda record, decoded: getattr(record.frame, "dlc", None),
     "bytes": lambda record, decoded: None if record.frame is None else len(record.frame.data),
 }
-WORDS: Final[dict[str, Callable[[AnyRecord, Decoded], str]]] = {
+_WORDS: Final[dict[str, Callable[[AnyRecord, Decoded], str]]] = {
     "channel": lambda record, decoded: record.channel,
     "kind": lambda record, decoded: decoded.kind,
     "dir": lambda record, decoded: "tx" if record.sent else "rx",
     "src": lambda record, decoded: decoded.source,
 }
 
-HIGHEST_NODE: Final = 127
-RANGES: Final = {
-    "node": range(1, HIGHEST_NODE + 1),
+_HIGHEST_NODE: Final = 127
+_RANGES: Final = {
+    "node": range(1, _HIGHEST_NODE + 1),
     "id": range(EXTENDED_MAX + 1),
     "dlc": range(16),
     "bytes": range(MAX_FD_BYTES + 1),
 }
-"""What the numbers of `FIELDS` can be."""
+"""What the numbers of `_FIELDS` can be."""
 KNOWN_WORDS: Final = {"kind": (*KINDS, "fd"), "dir": ("rx", "tx"), "src": (EDS, SEEN, DBC)}
-"""What the words of `WORDS` can be, beside PDOs by their numbers."""
-FREE: Final = ("kind", "src")
+"""What the words of `_WORDS` can be, beside PDOs by their numbers."""
+_FREE: Final = ("kind", "src")
 """Decoders of installed packages may say others."""
 _ERROR_CONTROL: Final = ("boot-up", "heartbeat", "guard")
 NMT_STATES: Final = {state.name.lower().replace("_", "-"): int(state) for state in NmtState}
@@ -117,7 +117,7 @@ _PDO: Final = re.compile(r"([tr]?)pdo([0-9]{0,3})")
 _NODE: Final = re.compile(r"([0-9]{1,3})\.(.+)")
 
 
-def kind_test(word: str) -> Test | None:
+def _kind_test(word: str) -> Test | None:
     """Return the test for a kind of frame, or for how an SDO transfer ended."""
     if word in _FD_KINDS:
         test = _FD_KINDS[word]
@@ -139,12 +139,12 @@ def kind_test(word: str) -> Test | None:
     return lambda record, decoded: decoded.kind.startswith(begins)
 
 
-def state_path(node: int) -> str:
+def _state_path(node: int) -> str:
     """Return the name under which the NMT state of a node is waited for."""
     return f"state of node {node}"
 
 
-def state_test(nodes: range, state: int) -> Test:
+def _state_test(nodes: range, state: int) -> Test:
     """Return the test for nodes that tell an NMT state."""
     return lambda record, decoded: (
         decoded.node in nodes
@@ -153,7 +153,7 @@ def state_test(nodes: range, state: int) -> Test:
     )
 
 
-def object_test(index: int, sub: int | None) -> Test:
+def _object_test(index: int, sub: int | None) -> Test:
     """Return the test for SDO frames about an object."""
 
     def test(record: AnyRecord, decoded: Decoded) -> bool:
@@ -163,7 +163,7 @@ def object_test(index: int, sub: int | None) -> Test:
     return test
 
 
-def range_test(low: int, high: int, *, extended: bool) -> Test:
+def _range_test(low: int, high: int, *, extended: bool) -> Test:
     """Return the test for CAN-IDs, both ends included."""
 
     def test(record: AnyRecord, decoded: Decoded) -> bool:
@@ -175,35 +175,35 @@ def range_test(low: int, high: int, *, extended: bool) -> Test:
     return test
 
 
-def error_test(mask: int) -> Test:
+def _error_test(mask: int) -> Test:
     """Return the test for error frames of some classes."""
     return lambda record, decoded: (
         isinstance(record.frame, ErrorFrame) and bool(record.frame.error_class & mask)
     )
 
 
-def candump_test(chosen: CandumpFilter) -> Test:
+def _candump_test(chosen: CandumpFilter) -> Test:
     """Return the test of candump's rules."""
     return lambda record, decoded: isinstance(record, Record) and chosen.passes(flagged_id(record))
 
 
-def never_holds(name: str, sign: str, value: float) -> bool:
+def _never_holds(name: str, sign: str, value: float) -> bool:
     """Say whether a field can never be compared so: somebody must have meant something else."""
-    numbers, compare = RANGES[name], COMPARISONS[sign]
-    if sign in EQUALITIES:
+    numbers, compare = _RANGES[name], COMPARISONS[sign]
+    if sign in _EQUALITIES:
         return value not in numbers
     return not (compare(numbers[0], value) or compare(numbers[-1], value))
 
 
-def is_word(name: str, value: str) -> bool:
+def _is_word(name: str, value: str) -> bool:
     """Say whether a field may have a word."""
     is_pdo = name == "kind" and _PDO.fullmatch(value) is not None and value[-1:].isdecimal()
     return name not in KNOWN_WORDS or value in KNOWN_WORDS[name] or is_pdo
 
 
-def field_test(name: str, compare: _Compare, value: float) -> Test:
+def _field_test(name: str, compare: _Compare, value: float) -> Test:
     """Return the test for a number that every frame of some kind has."""
-    field = FIELDS[name]
+    field = _FIELDS[name]
 
     def test(record: AnyRecord, decoded: Decoded) -> bool:
         found = field(record, decoded)
@@ -212,9 +212,9 @@ def field_test(name: str, compare: _Compare, value: float) -> Test:
     return test
 
 
-def word_test(name: str, sign: str, value: str) -> Test:
+def _word_test(name: str, sign: str, value: str) -> Test:
     """Return the test for a word."""
-    word, wanted = WORDS[name], sign != "!="
+    word, wanted = _WORDS[name], sign != "!="
     return lambda record, decoded: (word(record, decoded) == value) == wanted
 
 
@@ -308,7 +308,7 @@ def comparison(sign: str, text: str) -> Callable[[Signal], bool]:
     """Return what compares a signal, by its number or its text.
 
     Args:
-        sign: one of `COMPARISONS`; of `EQUALITIES` where the text is no number.
+        sign: one of `COMPARISONS`; of `_EQUALITIES` where the text is no number.
         text: what it is compared with.
     """
     wanted, compare = number(text), COMPARISONS[sign]
@@ -356,7 +356,7 @@ class MissingSignals:
             self._left = {path: find for path, find in left if find(decoded) is None}
         if self._words:
             self._words = [
-                word for word in self._words if WORDS[word[0]](record, decoded) != word[1]
+                word for word in self._words if _WORDS[word[0]](record, decoded) != word[1]
             ]
 
     @property
@@ -534,10 +534,10 @@ class FilterParser:
         """Take node-IDs, as 3 or 3-5."""
         match = _NODES.fullmatch(self._next.text)
         nodes = range(int(match[1]), int(match[2] or match[1]) + 1) if match else range(0)
-        if not nodes or nodes[0] < 1 or nodes[-1] > HIGHEST_NODE:
+        if not nodes or nodes[0] < 1 or nodes[-1] > _HIGHEST_NODE:
             came = repr(self._next.text) if self._next.text else "nothing"
             order = "; the lower one stands first" if match and not nodes else ""
-            raise self._error(f"{came} is no node-ID 1 to {HIGHEST_NODE}, as 3 or 3-5{order}")
+            raise self._error(f"{came} is no node-ID 1 to {_HIGHEST_NODE}, as 3 or 3-5{order}")
         del self._tokens[0]
         self._nodes.add(nodes)
         return nodes
@@ -548,20 +548,20 @@ class FilterParser:
         if word not in NMT_STATES:
             return lambda record, decoded: decoded.node in nodes
         del self._tokens[0]
-        self._signals |= {state_path(node) for node in nodes}
-        return state_test(nodes, NMT_STATES[word])
+        self._signals |= {_state_path(node) for node in nodes}
+        return _state_test(nodes, NMT_STATES[word])
 
     def _plain_term(self) -> Test:
         word = self._next.text
         word = _ALIASES.get(word, word)
         if not word or word in _RESERVED or not re.match(r"[\w#]", word):
             raise self._error("a term is missing, as emcy, node=3, 181-18F or statusword.fault")
-        if word in FIELDS or word in WORDS:
+        if word in _FIELDS or word in _WORDS:
             del self._tokens[0]
             if word == "node" and self._next.text[:1].isdecimal():
                 return self._node()
             return self._field(word)
-        test = self._id_test(word) or kind_test(word)
+        test = self._id_test(word) or _kind_test(word)
         if test is None:
             return self._signal(word)
         del self._tokens[0]
@@ -573,9 +573,9 @@ class FilterParser:
     def _id_test(self, word: str) -> Test | None:
         """Return the test of CAN-IDs; None for other words."""
         if _RULE.fullmatch(word):
-            return candump_test(CandumpFilter.parse(word))
+            return _candump_test(CandumpFilter.parse(word))
         if errors := _ERRORS.fullmatch(word):
-            return error_test(int(errors[1], 16))
+            return _error_test(int(errors[1], 16))
         low, dash, high = word.partition("-")
         if not _CAN_ID.fullmatch(low) or (dash and not _CAN_ID.fullmatch(high)):
             return None
@@ -585,39 +585,39 @@ class FilterParser:
         most = EXTENDED_MAX if extended else STANDARD_MAX
         if len(low) != len(high) or not numbers[0] <= numbers[1] <= most:
             raise self._error(f"{word} is no range of CAN-IDs like 181-18F")
-        return range_test(*numbers, extended=extended)
+        return _range_test(*numbers, extended=extended)
 
     def _object(self) -> Test:
         match = _OBJECT.fullmatch(self._next.text)
         if match is None:
             raise self._error(f"{self._next.text!r} is no object like 6040h or 0x1018:1")
         del self._tokens[0]
-        return object_test(int(match[1], 16), int(match[2], 16) if match[2] else None)
+        return _object_test(int(match[1], 16), int(match[2], 16) if match[2] else None)
 
     def _field(self, name: str) -> Test:
         sign, value = self._comparison(name)
-        if name in WORDS:
-            if sign not in EQUALITIES:
+        if name in _WORDS:
+            if sign not in _EQUALITIES:
                 raise self._error(f"{name} can be compared by = and != alone")
             value = _ALIASES.get(value, value)
-            if not is_word(name, value):
+            if not _is_word(name, value):
                 words = KNOWN_WORDS[name]
                 meant = [f"; did you mean {word!r}?" for word in closest(value, words)]
-                if meant or name not in FREE:
+                if meant or name not in _FREE:
                     said = f"{name} is never {value!r}, but {', '.join(words)}"
                     raise self._error(said + "".join(meant))
                 self._words.add((name, value))
             del self._tokens[0]
-            return word_test(name, sign, value)
+            return _word_test(name, sign, value)
         wanted = _hexadecimal(value) if name == "id" else number(value)
         if wanted is None:
             raise self._error(f"{value!r} is no number")
-        if never_holds(name, sign, wanted):
-            low, high = RANGES[name][0], RANGES[name][-1]
+        if _never_holds(name, sign, wanted):
+            low, high = _RANGES[name][0], _RANGES[name][-1]
             ends = f"{low:X} to {high:X}" if name == "id" else f"{low} to {high}"
             raise self._error(f"{name} is {ends}, never {sign.strip('=!')}{value}")
         del self._tokens[0]
-        return field_test(name, COMPARISONS[sign], wanted)
+        return _field_test(name, COMPARISONS[sign], wanted)
 
     def _comparison(self, name: str) -> tuple[str, str]:
         """Take the sign; return it and the value behind it, which is not taken yet."""
@@ -633,14 +633,14 @@ class FilterParser:
         if not _ADDRESS.fullmatch(word) and not _NAME.fullmatch(word):
             raise self._error(f"{word!r} is neither a kind ({', '.join(KINDS)}) nor a signal")
         node, _, _ = signal_place(word)
-        if node is not None and node not in RANGES["node"]:
-            raise self._error(f"{node} is no node-ID 1 to {HIGHEST_NODE}")
+        if node is not None and node not in _RANGES["node"]:
+            raise self._error(f"{node} is no node-ID 1 to {_HIGHEST_NODE}")
         del self._tokens[0]
         self._signals.add(word)
         if self._next.text not in COMPARISONS:
             return signal_test(word)
         sign, value = self._comparison(word)
-        if number(value) is None and sign not in EQUALITIES:
+        if number(value) is None and sign not in _EQUALITIES:
             raise self._error(f"{value!r} is no number")
         del self._tokens[0]
         return signal_test(word, sign, value)
@@ -678,4 +678,4 @@ def parse_filter(text: str) -> Filter:
         chosen = CandumpFilter.parse(text)
     except ValueError:
         return FilterParser(text).parse()
-    return Filter(text, candump_test(chosen))
+    return Filter(text, _candump_test(chosen))

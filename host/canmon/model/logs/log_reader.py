@@ -14,7 +14,7 @@ Counter({'CAN XL frames': 1})
 
 >>> tally, clock = LogTally(), ScreenClock()
 >>> shown = "(000.000250)  can0  TX - -  705   [1]  7F   '.'"
->>> record = parse_screen_line(shown, tally, clock)
+>>> record = _parse_screen_line(shown, tally, clock)
 >>> record.at_us, record.channel, str(record.frame), record.sent
 (250, 'can0', '705#7F', True)
 """
@@ -148,7 +148,7 @@ class ScreenClock:
         return max(0, count + self.shift_us)
 
 
-def parse_screen_line(line: str, tally: LogTally, clock: ScreenClock) -> Record | str | None:
+def _parse_screen_line(line: str, tally: LogTally, clock: ScreenClock) -> Record | str | None:
     """Return a frame, what was counted or is no fault instead, or None for a bad line."""
     text = _COLOUR.sub("", line).strip() if "\x1b" in line else line.strip()
     match = _FRAME.fullmatch(text)
@@ -302,7 +302,7 @@ def _parsed(line: str, text: str, tally: LogTally, clock: ScreenClock) -> Record
         return parse_json_line(text, tally)
     if match := _LINE.fullmatch(text):
         return _logged(match, tally)
-    return parse_screen_line(line, tally, clock) or parse_csv_line(text, tally, clock)
+    return _parse_screen_line(line, tally, clock) or parse_csv_line(text, tally, clock)
 
 
 def _logged(match: re.Match[str], tally: LogTally) -> Record | str | None:
@@ -478,7 +478,7 @@ def read_log(path: Path) -> LogReader:
     return reader
 
 
-class TextLogReader:
+class _TextLogReader:
     """A reader of a log in text."""
 
     def __init__(self, path: Path, kind: log_file.LogFormat) -> None:

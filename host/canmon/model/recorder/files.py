@@ -41,7 +41,7 @@ _MIN_BYTES: Final = 64 << 10
 """Of a file: smaller ones are no use."""
 
 _MIN_DISK_BYTES: Final = 1 << 20
-RESERVE_BYTES: Final = 256 << 10
+_RESERVE_BYTES: Final = 256 << 10
 """Room that is kept free: for frames that are on their way to a file."""
 
 MAX_PRE_FRAMES: Final = 150_000
@@ -652,9 +652,9 @@ class Files:
         part = self._part
         under_way = 0 if part is None else part.bytes
         while disk_bytes is not None:
-            # The part under way counts; `RESERVE_BYTES` is for frames that are not written
+            # The part under way counts; `_RESERVE_BYTES` is for frames that are not written
             # yet.
-            if index.bytes + under_way + RESERVE_BYTES <= disk_bytes:
+            if index.bytes + under_way + _RESERVE_BYTES <= disk_bytes:
                 break
             if self._plan.at_limit is AtLimit.END or not self._remove_oldest(index):
                 self.ended = f"{disk_bytes} bytes of disk space are used up"
@@ -664,12 +664,12 @@ class Files:
         self._looked_frames = self.frames
         # The disk of others may fill up, too: own old parts go if the plan allows that,
         # else the end is clean.
-        while shutil.disk_usage(self._plan.path.parent).free < RESERVE_BYTES:
+        while shutil.disk_usage(self._plan.path.parent).free < _RESERVE_BYTES:
             may_remove = disk_bytes is not None and self._plan.at_limit is AtLimit.OLDEST
             if not (may_remove and self._remove_oldest(index)):
                 path = str(self.path)
                 self.end_part()  # there is room for that
-                left = f"{RESERVE_BYTES >> 10} KiB are left on the disk"
+                left = f"{_RESERVE_BYTES >> 10} KiB are left on the disk"
                 raise OSError(errno.ENOSPC, left, path)
 
     def _remove_oldest(self, index: _Index) -> bool:

@@ -64,7 +64,7 @@ def sequence_name(text: str, number: int) -> str:
     return (match[1] or match[2]) if match else f"sequence {number}"
 
 
-def read_texts(settings: Mapping[str, Any]) -> list[str]:
+def _read_texts(settings: Mapping[str, Any]) -> list[str]:
     """Return the texts of `[[item]]`; SettingError if one is none."""
     texts = []
     for number, item in enumerate(tables(settings, "item")):
@@ -230,7 +230,7 @@ class SequencePanel(SendingPanel):
     def load(self, settings: Mapping[str, Any]) -> None:
         """Take the bus and the sequences."""
         super().load(settings)
-        self.texts = read_texts(settings) or [NEW]
+        self.texts = _read_texts(settings) or [NEW]
 
     def save(self) -> dict[str, Any]:
         """Return them."""

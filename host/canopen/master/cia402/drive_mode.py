@@ -121,7 +121,7 @@ class DriveMode:
         return False
 
 
-class TargetMode(DriveMode):
+class _TargetMode(DriveMode):
     """Writes its target in each period.
 
     Args:
@@ -158,7 +158,7 @@ class TargetMode(DriveMode):
         return True
 
 
-class _ProfilePositionMode(TargetMode):
+class _ProfilePositionMode(_TargetMode):
     """Writes each new target once, and has it taken by the handshake of bits 4 and 12."""
 
     def begin(self) -> None:
@@ -224,14 +224,14 @@ TARGETS: Final = (_POSITION, _SPEED, _TORQUE, _FREQUENCY, _INTERPOLATED)
 
 MODES: Final[Mapping[ModeNumber, Callable[[], DriveMode]]] = {
     ModeNumber.PROFILE_POSITION: lambda: _ProfilePositionMode(_POSITION),
-    ModeNumber.VELOCITY: lambda: TargetMode(_FREQUENCY, 0x70),
-    ModeNumber.PROFILE_VELOCITY: lambda: TargetMode(_SPEED),
-    ModeNumber.PROFILE_TORQUE: lambda: TargetMode(_TORQUE),
+    ModeNumber.VELOCITY: lambda: _TargetMode(_FREQUENCY, 0x70),
+    ModeNumber.PROFILE_VELOCITY: lambda: _TargetMode(_SPEED),
+    ModeNumber.PROFILE_TORQUE: lambda: _TargetMode(_TORQUE),
     ModeNumber.HOMING: HomingMode,
-    ModeNumber.INTERPOLATED_POSITION: lambda: TargetMode(_INTERPOLATED, _START),
-    ModeNumber.CYCLIC_POSITION: lambda: TargetMode(_POSITION),
-    ModeNumber.CYCLIC_VELOCITY: lambda: TargetMode(_SPEED),
-    ModeNumber.CYCLIC_TORQUE: lambda: TargetMode(_TORQUE),
+    ModeNumber.INTERPOLATED_POSITION: lambda: _TargetMode(_INTERPOLATED, _START),
+    ModeNumber.CYCLIC_POSITION: lambda: _TargetMode(_POSITION),
+    ModeNumber.CYCLIC_VELOCITY: lambda: _TargetMode(_SPEED),
+    ModeNumber.CYCLIC_TORQUE: lambda: _TargetMode(_TORQUE),
 }
 
 POSITIONS: Final = (

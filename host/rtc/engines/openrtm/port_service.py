@@ -46,7 +46,7 @@ class _PortSystem(Protocol):
     calls: CallQueue
     threads: PeerThreads
     arrivals: Arrivals
-    ending: dict[str, PeerConnection]
+    ending: dict[str, _PeerConnection]
 
     def find(self, reference: Reference) -> AnyPort | None:
         """Return the port of ours that a reference is of; None if it is a peer's."""
@@ -67,7 +67,7 @@ class _PortSystem(Protocol):
         ...
 
 
-class PeerConnection:
+class _PeerConnection:
     """A connector of a port of ours with a port of a peer.
 
     Attributes:
@@ -112,13 +112,13 @@ class _PeerConnections:
 
     def __init__(self, port: AnyPort, system: _PortSystem) -> None:
         self._port, self._system = port, system
-        self._by_id: dict[str, PeerConnection] = {}
+        self._by_id: dict[str, _PeerConnection] = {}
         self._closed = False
         port.on_disconnect.append(self._ended)
 
     def reserve(
         self, profile: _Profile, values: dict[str, str], peer_name: str
-    ) -> PeerConnection | None:
+    ) -> _PeerConnection | None:
         """Begin a connector: check it, and serve what the peer is to call.
 
         Args:
@@ -149,12 +149,12 @@ class _PeerConnections:
             profile.name,
             peer_name,
         )
-        connection = PeerConnection(place, peer, where, _end_at(where, self._port))
+        connection = _PeerConnection(place, peer, where, _end_at(where, self._port))
         connection.additions = connection.end.publish(values)
         self._by_id[connection.connector_id] = connection
         return connection
 
-    def keep(self, connection: PeerConnection, profile: _Profile, values: dict[str, str]) -> None:
+    def keep(self, connection: _PeerConnection, profile: _Profile, values: dict[str, str]) -> None:
         """Join what was begun.
 
         Args:
@@ -172,7 +172,7 @@ class _PeerConnections:
         connection.profile = profile
         self._system.schedule(connector)
 
-    def drop(self, connection: PeerConnection) -> None:
+    def drop(self, connection: _PeerConnection) -> None:
         """Leave nothing of what was begun and cannot be joined."""
         connection.peer_knows = True
         self.end(connection.connector_id)
@@ -184,7 +184,7 @@ class _PeerConnections:
         elif (connection := self._by_id.get(connector_id)) is not None:
             self._end(connection)
 
-    def look(self, connector_id: str) -> tuple[PeerConnection | None, bool]:
+    def look(self, connector_id: str) -> tuple[_PeerConnection | None, bool]:
         """Return the connector with a peer of an ID, and whether there is, or was just now, any.
 
         Its peer need not be told of the end from now on.
@@ -233,7 +233,7 @@ class _PeerConnections:
         if (connection := self._by_id.get(profile.connector_id)) is not None:
             self._end(connection)
 
-    def _end(self, connection: PeerConnection) -> None:
+    def _end(self, connection: _PeerConnection) -> None:
         """Serve the peer no more, and tell it unless it knows."""
         self._by_id.pop(connection.connector_id, None)
         connection.end.close()
@@ -243,7 +243,7 @@ class _PeerConnections:
         if connection.end.thread is not None:
             connection.end.thread.close()
 
-    def _notify(self, connection: PeerConnection) -> None:
+    def _notify(self, connection: _PeerConnection) -> None:
         """Tell a peer, in its thread."""
         connection.notify_peer()
         self._system.ending.pop(connection.connector_id, None)
@@ -366,7 +366,7 @@ class _PortAnswers:
         self._calls.call(partial(self._connections.end, connector_id))
         return _code(_OK)
 
-    def _join(self, connection: PeerConnection, profile: _Profile) -> _Profile:
+    def _join(self, connection: _PeerConnection, profile: _Profile) -> _Profile:
         """Have the peer join, then join our end; if that fails nothing is left of either."""
         asked = False
         try:
@@ -452,7 +452,7 @@ class SystemPorts:
     def __init__(self, orb: Orb, calls: CallQueue, manager: Manager) -> None:
         self.orb, self.calls, self._manager = orb, calls, manager
         self.references: dict[AnyPort, Reference] = {}
-        self.ending: dict[str, PeerConnection] = {}
+        self.ending: dict[str, _PeerConnection] = {}
         self.components: list[ComponentPorts] = []
         self.arrivals, self.threads = Arrivals(), PeerThreads("peers of OpenRTM")
         manager.add_item(self.arrivals)
