@@ -8,7 +8,7 @@ from enum import Enum, auto
 from typing import Final
 
 from tickrig.device.chance import Chance, threshold_of
-from tickrig.device.twin import Listeners, Part
+from tickrig.device.twin import Copyable, Listeners
 from tickrig.emulators.rig.faults import FaultArguments, FaultForm, FaultTally, bind_arguments
 from tickrig.wire.can import CanFrame
 
@@ -59,7 +59,7 @@ NARROWED: Final = ("drop", "corrupt", "duplicate", "delay")
 """Those of a bus that can hit the frames of one node alone."""
 
 
-class _ArmedFault(Part):
+class _ArmedFault(Copyable):
     """A fault of a bus that is armed, for all nodes or for one.
 
     Attributes:
@@ -81,7 +81,7 @@ class _ArmedFault(Part):
         return self.number is None or self.number in senders
 
 
-class CanFaults(Part):
+class CanFaults(Copyable):
     """The faults of one bus; those with a rate have a chance of their own.
 
     Chance is drawn once for each frame on the bus, and once for each time a

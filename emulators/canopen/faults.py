@@ -35,7 +35,7 @@ from typing import Any, Final
 from tickrig.device.canopen.slave import UNCONFIGURED
 from tickrig.device.horizon import Horizon
 from tickrig.device.physical import OutputSignal
-from tickrig.device.twin import Copyable, Listeners, Part
+from tickrig.device.twin import Copyable, Listeners
 from tickrig.emulators.can.bus_device import Accepted
 from tickrig.emulators.can.faults import CAN_FAULTS, NARROWED
 from tickrig.emulators.can.wire import CanWire
@@ -105,7 +105,7 @@ _ANSWERS: Final = {
 }
 
 
-class _SdoBlocks(Part):
+class _SdoBlocks(Copyable):
     """Follows the block transfers of an SDO server, in which any byte may begin a frame."""
 
     __slots__ = ("_last", "_of_client", "_of_server")
@@ -168,7 +168,7 @@ _Sent = tuple[tuple[int, CanFrame], ...]
 """What comes instead of a frame, each with how much later in us."""
 
 
-class ArmedNodeFault(Part):
+class ArmedNodeFault(Copyable):
     """A fault of a node that is armed.
 
     Attributes:

@@ -24,7 +24,7 @@ from typing import Any, ClassVar, Final, Generic
 
 from tickrig.device.chance import Chance, check_rate, threshold_of
 from tickrig.device.core import W
-from tickrig.device.twin import Copyable, Immutable, Listeners, Part
+from tickrig.device.twin import Copyable, Immutable, Listeners
 from tickrig.emulators.rig.port import Port
 from tickrig.host.text.names import near
 from tickrig.host.text.trace import Mark
@@ -226,7 +226,7 @@ def _parse_rate(name: str, text: str) -> float:
     return rate
 
 
-class FaultTally(Part):
+class FaultTally(Copyable):
     """How often a fault has acted, and how often it may.
 
     Args:
@@ -253,7 +253,7 @@ class FaultTally(Part):
         return allowed
 
 
-class FaultTrigger(Part):
+class FaultTrigger(Copyable):
     """Decides by chance, rate and count when a fault acts.
 
     Args:
