@@ -269,7 +269,7 @@ def _date_us(text: str) -> int | None:
     return at_us if at_us >= 0 else None
 
 
-class _AscLogReader(LineLogReader):
+class AscLogReader(LineLogReader):
     """A reader of an ASC log."""
 
     comments = ("//",)

@@ -565,7 +565,7 @@ _END_US: Final = 16_725_225_600_000_000
 _MARKS: Final = "marks of gaps and triggers"
 
 
-class _CanLogWriter:
+class CanLogWriter:
     """A log that python-can writes.
 
     These formats number their buses: `can3` is number 3, others take free numbers,

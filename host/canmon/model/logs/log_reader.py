@@ -478,7 +478,7 @@ def read_log(path: Path) -> LogReader:
     return reader
 
 
-class _TextLogReader:
+class TextLogReader:
     """A reader of a log in text."""
 
     def __init__(self, path: Path, kind: log_file.LogFormat) -> None:

@@ -160,7 +160,7 @@ class TextLogWriter:
         self._lines.clear()
 
 
-class _CsvLogWriter(TextLogWriter):
+class CsvLogWriter(TextLogWriter):
     """Rows below a header; they do not name their bus."""
 
     def __init__(self, path: Path, kind: log_file.LogFormat) -> None:
@@ -214,7 +214,7 @@ class BusNumbers:
         ]
 
 
-class _GvretLogWriter(TextLogWriter):
+class GvretLogWriter(TextLogWriter):
     """Rows as SavvyCAN reads them: data frames of at most 8 bytes, with numbers of buses."""
 
     def __init__(self, path: Path, kind: log_file.LogFormat) -> None:

@@ -412,7 +412,7 @@ _HEAD_BYTES: Final = 24
 _LINK_TYPE_AT: Final = 20
 
 
-class _PcapReader:
+class PcapReader:
     """A reader of the frames in a capture."""
 
     def __init__(self, path: Path, kind: log_file.LogFormat) -> None:
@@ -491,7 +491,7 @@ _LOW: Final = 0xFFFF_FFFF
 _BLOCK_FRAMES: Final = 256
 
 
-class _PcapngWriter:
+class PcapngWriter:
     """A capture. A mark is a comment of the frame behind it, where Wireshark shows it.
 
     Raises:

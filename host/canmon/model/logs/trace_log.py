@@ -27,7 +27,7 @@ _WITHOUT_ERRORS = "a trace holds no error frames"
 _MARKS = {True: Mark.TO_DEVICE, False: Mark.FROM_DEVICE}
 
 
-class _TraceLogWriter:
+class TraceLogWriter:
     """A trace of one bus, as a host sees it: that of the first frame; its times begin with it."""
 
     def __init__(self, path: Path, kind: log_file.LogFormat) -> None:
@@ -90,7 +90,7 @@ def _name(channel: str) -> str:
     return re.sub(r"[^\w./:-]|^\W", "_", channel, flags=re.ASCII)
 
 
-class _TraceLogReader:
+class TraceLogReader:
     """A reader of the frames in a trace.
 
     Of a trace that was recorded at the devices it gives the frames in the order in which they

@@ -254,7 +254,7 @@ def _note_status(status: bytes, tally: log_file.LogTally) -> None:
         tally.errors_told[text] += 1
 
 
-class _TrcLogReader(LineLogReader):
+class TrcLogReader(LineLogReader):
     """A reader of a trace."""
 
     comments = (";",)
