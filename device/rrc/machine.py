@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Final
+from typing import ClassVar, Final
 
 from tickrig.device.physical import InputBank, OutputSignal
 from tickrig.device.rrc.board import OUTPUTS, Buzzer, LoadAccount, PowerSequence, new_inputs
@@ -173,11 +173,13 @@ class Rrc(Copyable):
     sounds like, the USB serial driver.
 
     Attributes:
+        type_name: what its device type is called, for traces.
         config: durations, names and sizes.
         inputs: what the world does to it, see `board.INPUTS`.
         state: where it is in the manual's state diagram.
     """
 
+    type_name: ClassVar[str] = "rrc"
     config: RrcConfig = field(default_factory=RrcConfig)
     inputs: InputBank = field(default_factory=new_inputs)
     state: RrcState = field(default=RrcState.OFF, init=False)
@@ -198,11 +200,6 @@ class Rrc(Copyable):
     def __post_init__(self) -> None:
         """Begin without power."""
         self.reset()
-
-    @property
-    def type_name(self) -> str:
-        """What its device type is called, for traces."""
-        return "rrc"
 
     @property
     def tick_us(self) -> int:
