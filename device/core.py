@@ -49,7 +49,7 @@ class Device(Protocol[W]):
         ...
 
 
-class _UartDevice(Device[bytes], Protocol):
+class UartDevice(Device[bytes], Protocol):
     """A device that changes the setting of its serial line while it runs."""
 
     @property
