@@ -215,6 +215,8 @@ class Supervision(BenchMachine):
 
     @host_rule()
     def supervise(self) -> None:
+        while self.master.receive(0) is not None:
+            pass  # it came before
         self.look()
         self.heard.clear()
         errors, restarts = len(self.master.errors), self.master.restarts

@@ -15,7 +15,7 @@ FAULTS = {
     "toggle_ignored": ("sdo_twice",),
     "late_answer_believed": ("sdo_slow",),
     "emcy_ignored": ("emcy_storm",),
-    "heartbeat_loss_unseen": ("heartbeat_mute", "bus_off"),
+    "heartbeat_loss_unseen": ("bus_off",),
     "boot_up_as_heartbeat": ("boots_again",),
     "restart_race": ("boot_late",),
     "old_cob_id": (),
