@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import select
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager, suppress
@@ -18,6 +17,7 @@ from tickrig.host.cli.messages import BusFailed, Refused, refuse_path, refused_a
 from tickrig.host.cli.start import give_up_terminals, taking_signals
 from tickrig.host.links.game_pad import EvdevPad
 from tickrig.host.links.link import DeviceRefused, LinkClosed, LinkError, first_line
+from tickrig.host.links.ready import ready
 from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.links.terminal import TerminalOutput, take_keys
 from tickrig.host.rrc.chair import STEP_US, Chair, ChairStopped, DeadMan, Guard
@@ -403,7 +403,7 @@ class _TerminalOperator:
     def waits(self) -> None:
         if self._ended.number:
             raise Quit("interrupted")
-        if select.select([0], [], [], 0)[0]:
+        if ready([0], (), 0)[0]:
             data = os.read(0, 1_024)
             if not data:
                 raise Quit("standard input has ended")

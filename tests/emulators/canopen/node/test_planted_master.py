@@ -9,6 +9,8 @@ import pytest
 from tests.emulators.canopen.node.planted import MISTAKES, Supervision
 from tickrig.testing import check_host
 
+pytestmark = pytest.mark.release  # a minute of searches
+
 FAULTS = {
     "no_timeout": ("sdo_mute", "sdo_slow"),
     "abort_as_data": ("sdo_abort", "sdo_busy"),

@@ -136,7 +136,7 @@ def test_a_report_tells_what_differs(pytester: pytest.Pytester, run: Run) -> Non
     run("--bench-report", "run.json", "--bench-compare")
     (test,) = read_run(pytester.path / "run.json").tests
     assert test.outcome is Outcome.FAILED
-    assert test.reason == "the second run differs from the first at line 28"
+    assert test.reason == "the second run differs from the first at line 33"
 
 
 @pytest.mark.parametrize(
