@@ -208,7 +208,7 @@ class NodeFaultType(FaultForm):
         by_itself: what it does each `period` (an argument; each tick without it).
         abort: it answers the request itself, with this function's frame.
         controller: it is done to the CAN controller.
-        silent: the node neither sends nor hears until the frame that it holds has left.
+        silent: the node neither sends nor receives until the frame that it holds has left.
         boots: the node that it pretends to be sends a boot-up first.
     """
 
@@ -428,7 +428,7 @@ NODE_FAULTS: Final[Mapping[str, NodeFaultType]] = {
         frames=NodeFrames.FOR_SDO_START,
         abort=_aborted,
     ),
-    "sdo_mute": NodeFaultType("the SDO server hears no request", frames=NodeFrames.REQUEST),
+    "sdo_mute": NodeFaultType("the SDO server ignores requests", frames=NodeFrames.REQUEST),
     "sdo_slow": NodeFaultType(
         "each SDO answer is late",
         arguments=(_delay("800ms", "how much later it comes"),),
@@ -459,7 +459,7 @@ NODE_FAULTS: Final[Mapping[str, NodeFaultType]] = {
     ),
     "heartbeat_mute": NodeFaultType("heartbeats are missing", frames=NodeFrames.HEARTBEAT),
     "heartbeat_state": NodeFaultType(
-        "heartbeats tell another state",
+        "heartbeats report another state",
         arguments=(FaultArgument("state", "which one", "stopped", choices=_STATES),),
         frames=NodeFrames.HEARTBEAT,
         instead=_other_state,
@@ -471,7 +471,7 @@ NODE_FAULTS: Final[Mapping[str, NodeFaultType]] = {
         instead=_late,
     ),
     "boot_late": NodeFaultType(
-        "the node starts slowly: until its boot-up it neither sends nor hears",
+        "the node starts slowly: until its boot-up it neither sends nor receives",
         arguments=(_delay("3s", "how much later it boots"),),
         frames=NodeFrames.BOOT_UP,
         instead=_late,

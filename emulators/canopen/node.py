@@ -50,7 +50,7 @@ NODE_OUTPUTS: Final = (
 class Node(Copyable):
     """A `Device[Frames]` around a slave, with the physical side of its application.
 
-    Without power it neither sends nor hears, and begins anew when power is back.
+    Without power it neither sends nor receives, and begins anew when power is back.
     What is done to it from the inside, and what its CAN controller reports,
     takes effect at the beginning of its next tick. A controller that is bus-off is
     told to recover at once, as most drivers do.

@@ -39,6 +39,7 @@ def device(name: str, folder: Path, binary: bool) -> None:
     tickrig new device lamp
     pip install -e lamp
     tickrig emu lamp --link /tmp/lamp
+    tickrig new device sensor --binary       answers frames, not lines
     """  # noqa: D301 - click wants the backspace
     module = name.replace("-", "_")
     if not _NAME.fullmatch(name):

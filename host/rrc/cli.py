@@ -111,7 +111,7 @@ def main(context: click.Context, /, url: str, *, panel: bool, **guard: Any) -> N
 
     URL is a port: /dev/ttyACM0, COM3, rfc2217://HOST:PORT, socket://HOST:PORT.
     Nothing moves before an RRC has answered there. Its watchdog and stablemode
-    are on meanwhile. However the command ends, it stops the motors first; if it
+    are on while it runs. However the command ends, it stops the motors first; if it
     is killed, the watchdog stops VR2.
 
     \b
