@@ -2,22 +2,30 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import functools
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import click
 
 from tickrig._lazy import LazyModule
-from tickrig.host.cli.messages import Refused, refuse_path
+from tickrig.host.canopen.errors import SdoFailed
+from tickrig.host.cli.messages import Refused, refuse_path, say
+from tickrig.host.cli.options import PATH
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
+    from tickrig.host.canmon.model.decode import eds_folder
     from tickrig.host.canopen import eds
     from tickrig.host.canopen.bus_file import bus_file
+    from tickrig.host.canopen.commissioning.node_bus import NodeBus
     from tickrig.host.canopen.data_sheet import document as documents
     from tickrig.wire.canopen.eds import eds_file
 
 else:  # slow
     bus_file = LazyModule("tickrig.host.canopen.bus_file.bus_file")
     documents = LazyModule("tickrig.host.canopen.data_sheet.document")
+    eds_folder = LazyModule("tickrig.host.canmon.model.decode.eds_folder")
     eds = LazyModule("tickrig.host.canopen.eds")
     eds_file = LazyModule("tickrig.wire.canopen.eds.eds_file")
 
@@ -64,3 +72,86 @@ def read_device_document(path: Path, what: str = "FILE") -> documents.Document:
     if not document.rows:
         raise Refused(f"{what} " + "\n".join(map(str, document.file.errors)))
     return document
+
+
+_IDENTITY: Final = 0x1018
+
+
+def read_identity(bus: NodeBus, node_id: int) -> eds_folder.EdsIdentity | None:
+    """Read who a node is (1018h); None if it does not tell vendor or product."""
+    return eds_folder.node_identity([_number(bus, node_id, sub) for sub in (1, 2, 3)])
+
+
+def _number(bus: NodeBus, node_id: int, sub: int) -> int | None:
+    try:
+        return int.from_bytes(bus.read(node_id, _IDENTITY, sub, 4), "little")
+    except SdoFailed:
+        return None
+
+
+def chosen_eds(eds: Path | eds_folder.EdsFolder | None, bus: NodeBus, node_id: int) -> Path | None:
+    """Return the EDS of a node: the file that is named, or that of a folder which fits the node.
+
+    Which file of a folder it is, or that none fits, is said.
+
+    Raises:
+        LinkClosed: the bus is gone.
+    """
+    if not isinstance(eds, eds_folder.EdsFolder):
+        return eds
+    identity = read_identity(bus, node_id)
+    if identity is None:
+        say(f"node {node_id}: no EDS is chosen: the node does not tell vendor and product (1018h)")
+        return None
+    choice = eds.choose(node_id, identity)
+    say(choice.said(node_id) if choice else f"node {node_id}: no EDS in {eds} for {identity}")
+    return choice.path if choice else None
+
+
+# The options that name the EDS of a node.
+
+eds_folder_option: Final = click.option(
+    "--eds-dir",
+    "eds_folders",
+    multiple=True,
+    type=PATH,
+    metavar="DIR",
+    help="A folder of EDS files: the one whose vendor, product and revision the node has (1018h).",
+)
+
+
+def node_eds_option(
+    what: str = "EDS, DCF or XDD of the node.",
+) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Return a decorator that adds `--eds FILE` and `--eds-dir`, together as `eds`.
+
+    That is a path, a folder, or None.
+
+    Args:
+        what: the help of `--eds`.
+    """
+
+    def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
+        @functools.wraps(command)
+        def with_eds(
+            *words: object, eds: Path | None, eds_folders: tuple[Path, ...], **options: object
+        ) -> object:
+            if eds is not None and eds_folders:
+                raise Refused("--eds and --eds-dir: which file? give one of them")
+            return command(*words, eds=eds or read_eds_folders(eds_folders), **options)
+
+        return click.option("--eds", type=PATH, metavar="FILE", help=what)(
+            eds_folder_option(with_eds)
+        )
+
+    return decorate
+
+
+def read_eds_folders(folders: Sequence[Path]) -> eds_folder.EdsFolder | None:
+    """Return what `--eds-dir` names; None without one, Refused if it is no folder."""
+    for folder in folders:
+        try:
+            next(folder.iterdir(), None)
+        except (OSError, ValueError) as error:
+            raise Refused(f"--eds-dir {folder}: {getattr(error, 'strerror', error)}") from None
+    return eds_folder.EdsFolder(folders) if folders else None

@@ -212,7 +212,7 @@ _NODES: Final = "nodes"
 _OPTIONS: Final = tuple(field.name for field in fields(BusOptions))
 _WHOLE: Final = ("bitrate", "data_bitrate")
 _SWITCHES: Final = ("fd",)
-_LISTS: Final = ("source", "dbc", "timing", "bus_kwargs")
+_LISTS: Final = ("source", "dbc", "eds_dir", "timing", "bus_kwargs")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -224,12 +224,14 @@ class MonitorSetup:
         options: of the buses.
         eds: files by node-ID.
         dbc: files.
+        eds_dir: folders of EDS files for nodes that have none of their own.
     """
 
     source: tuple[str, ...] = ()
     options: BusOptions = field(default_factory=BusOptions)
     eds: Mapping[int, Path] = field(default_factory=dict)
     dbc: tuple[Path, ...] = ()
+    eds_dir: tuple[Path, ...] = ()
 
     @classmethod
     def read(cls, workspace: Workspace) -> Self:
@@ -256,6 +258,7 @@ class MonitorSetup:
             options=BusOptions(**given),
             eds=eds,
             dbc=tuple(folder / path for path in bus.get("dbc", ())),
+            eds_dir=tuple(folder / path for path in bus.get("eds_dir", ())),
         )
 
     def under(self, other: MonitorSetup) -> MonitorSetup:
@@ -267,6 +270,7 @@ class MonitorSetup:
             options=replace(options, **given),
             eds={**self.eds, **other.eds},
             dbc=other.dbc or self.dbc,
+            eds_dir=other.eds_dir or self.eds_dir,
         )
 
     def write(self, workspace: Workspace) -> None:
@@ -277,8 +281,9 @@ class MonitorSetup:
             if (value := getattr(self.options, name))
         }
         bus["source"] = [_relative(workspace, word) for word in self.source]
-        if self.dbc:
-            bus["dbc"] = [_relative(workspace, str(path), is_path=True) for path in self.dbc]
+        for name, paths in (("dbc", self.dbc), ("eds_dir", self.eds_dir)):
+            if paths:
+                bus[name] = [_relative(workspace, str(path), is_path=True) for path in paths]
         workspace.put(_BUS, bus)
         workspace.put(
             _NODES,

@@ -23,11 +23,12 @@ from tickrig.host.canmon.conform.stimulus import (
     nodes_heard,
     open_stimulus,
 )
-from tickrig.host.canmon.eds_document import read_device_document
+from tickrig.host.canmon.eds_document import chosen_eds, read_device_document
 from tickrig.host.canmon.model.decode.decoder import Decoder
 from tickrig.host.canmon.model.decode.node_memory import EdsObjects, read_eds_objects
 from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.output.listening import until_interrupted
+from tickrig.host.canopen.commissioning.node_bus import NodeBus
 from tickrig.host.canopen.conform.binding.capabilities import NodeDescription
 from tickrig.host.canopen.conform.bus.exchange import LEFT_OUT
 from tickrig.host.canopen.conform.check import ConformancePlan, Level
@@ -200,7 +201,7 @@ class Conformance:
         check_chosen(self._only, self._level)
         moved_by: str | None = options["stimulus"]
         self._stimulus = None if moved_by is None else open_stimulus(moved_by)
-        self._eds: Path | None = options["eds"]
+        self._eds: Path | None = options["eds"] if isinstance(options["eds"], Path) else None
         self._document = read_device_document(self._eds, "--eds") if self._eds else None
 
     def _inputs(self) -> Iterator[Path]:
@@ -208,7 +209,7 @@ class Conformance:
         options = self._options
         if self._word and self._word.lower().endswith(RIG_FILE):
             yield Path(self._word)
-        if options["eds"]:
+        if isinstance(options["eds"], Path):
             yield options["eds"]
         if options["baseline"] and options["baseline"] != options["write_baseline"]:
             yield options["baseline"]
@@ -258,7 +259,10 @@ class Conformance:
         return self._completed(judged[0], source, known) if judged else None
 
     def _describe(self, source: ConformSource, node_id: int) -> NodeDescription | None:
-        """Return what an EDS says about the node: the file of --eds, or that of the source."""
+        """Return what an EDS says about the node: that of --eds or --eds-dir, or of the source."""
+        if self._eds is None and self._options["eds"] is not None:
+            self._eds = chosen_eds(self._options["eds"], NodeBus(source.link), node_id)
+            self._document = read_device_document(self._eds, "--eds-dir") if self._eds else None
         if self._document is not None:
             return NodeDescription.of_file(self._document.file)
         return source.describe(node_id)
@@ -314,7 +318,7 @@ class Conformance:
         """Return the command that judges the node again."""
         words = ["canmon", "conform", *([self._word] if self._word else []), *self._bus.arguments()]
         words += ["--node", str(report.node_id), f"--{report.level.word}"]
-        words += ["--eds", str(self._eds)] if self._options["eds"] else []
+        words += ["--eds", str(self._eds)] if self._eds else []
         words += ["--stimulus", self._options["stimulus"]] if self._options["stimulus"] else []
         for name in ("allow", "never"):
             words += [word for index in self._options[name] for word in (f"--{name}", index)]

@@ -189,7 +189,7 @@ class PdoFrames:
     """
 
     def __init__(self, eds: Mapping[int, EdsObjects]) -> None:
-        self._nodes = {node: NodeMemory(objects) for node, objects in eds.items()}
+        self._eds = eds  # to which files of a folder may be added
 
     def frame(self, text: str) -> CanFrame:
         """Return the frame of `NODE.rpdoN NAME=VALUE ...`.
@@ -202,9 +202,9 @@ class PdoFrames:
         if match is None:
             raise ValueError(f"{pdo!r} is neither a frame as 123#DEADBEEF nor a PDO as 5.rpdo1")
         node, number = int(match[1]), int(match[3])
-        memory = self._nodes.get(node)
-        if memory is None:
+        if node not in self._eds:
             raise ValueError(f"{pdo}: nobody described node {node}; give --eds {node}=FILE")
+        memory = NodeMemory(self._eds[node])
         if not 1 <= number <= PDOS:
             raise ValueError(f"{pdo}: PDOs are numbered 1 to {PDOS}")
         sent = NodePdo(match[2].lower() == "r", node, number)

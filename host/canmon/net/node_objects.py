@@ -8,9 +8,10 @@ from functools import cache, cached_property
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from tickrig.host.canmon.eds_document import read_device_document
+from tickrig.host.canmon.eds_document import chosen_eds, read_device_document
 from tickrig.host.canmon.model.decode import node_memory
 from tickrig.host.canmon.model.decode.decoded import write_entry
+from tickrig.host.canmon.model.decode.eds_folder import EdsFolder
 from tickrig.host.canmon.model.decode.node_memory import NodeMemory, eds_objects
 from tickrig.host.canmon.model.node_dictionary import encode_value
 from tickrig.host.canmon.net.session import NetSession, NodeFailed, failure_text
@@ -174,7 +175,7 @@ DEVICE_TYPE: Final = (0x1000, 0)
 def known_objects(
     session: NetSession,
     node_id: int,
-    eds: Path | None,
+    eds: Path | EdsFolder | None,
     *,
     what: str = "--eds",
     strict: bool = False,
@@ -184,7 +185,7 @@ def known_objects(
     Args:
         session: the bus.
         node_id: the node.
-        eds: its EDS, as somebody names it.
+        eds: its EDS, as somebody names it, or a folder that has it.
         what: names it so.
         strict: an EDS of another device is refused; else it is told.
 
@@ -192,6 +193,7 @@ def known_objects(
         Refused: the EDS cannot be used.
         SdoFailed: the node does not answer.
     """
+    eds = chosen_eds(eds, session.bus, node_id)
     if eds is not None:
         objects = NamedObjects(node_id, read_device_document(eds, what).file)
     else:

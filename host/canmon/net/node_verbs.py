@@ -8,7 +8,8 @@ from typing import Final
 
 import click
 
-from tickrig.host.canmon.eds_document import read_device_document
+from tickrig.host.canmon.eds_document import chosen_eds, node_eds_option, read_device_document
+from tickrig.host.canmon.model.decode.eds_folder import EdsFolder
 from tickrig.host.canmon.model.decode.node_board import profile_text
 from tickrig.host.canmon.net.group import NetCall
 from tickrig.host.canmon.net.node_objects import DEVICE_TYPE, NamedObjects
@@ -306,7 +307,7 @@ _HALF: Final = "the node is as the steps before left it"
 @click.command()
 @click.argument("node", type=NODE_ID)
 @click.option("--bus", "bus_file", type=PATH, metavar="FILE", help="bus.yml that has the node.")
-@click.option("--eds", type=PATH, metavar="FILE", help="EDS or DCF of the node.")
+@node_eds_option("EDS or DCF of the node.")
 @click.option("--explain", is_flag=True, help="Show each step: asked, answered, what follows.")
 @click.option("--keep-alive", "leaves_alone", is_flag=True, help="Leave it if it is Operational.")
 @click.option("--start", is_flag=True, help="Start it when it has booted.")
@@ -316,7 +317,7 @@ def boot(  # noqa: PLR0913, PLR0917 - options
     call: NetCall,
     node: int,
     bus_file: Path | None,
-    eds: Path | None,
+    eds: Path | EdsFolder | None,
     explain: bool,
     leaves_alone: bool,
     start: bool,
@@ -334,9 +335,10 @@ def boot(  # noqa: PLR0913, PLR0917 - options
     """  # noqa: D301 - click wants the backspace
     if bus_file is not None and eds is not None:
         raise Refused("--bus or --eds: which? give one")
-    slave = _expected(node, bus_file, eds)
-    slave = replace(slave, reset_communication=False) if leaves_alone else slave
+    slave = None if isinstance(eds, EdsFolder) else _expected(node, bus_file, eds)
     with net_session(call, node) as session:
+        slave = slave or _expected(node, None, chosen_eds(eds, session.bus, node))
+        slave = replace(slave, reset_communication=False) if leaves_alone else slave
         if doing := _changes(slave):
             what = f"boot-up of node {node}: {', '.join(doing)}"
             session.confirm(what, yes=yes, risk=_risk(slave))

@@ -8,6 +8,8 @@ from typing import Final
 
 import click
 
+from tickrig.host.canmon.eds_document import node_eds_option
+from tickrig.host.canmon.model.decode.eds_folder import EdsFolder
 from tickrig.host.canmon.net import node_objects
 from tickrig.host.canmon.net.group import NetCall
 from tickrig.host.canmon.net.node_objects import (
@@ -49,10 +51,12 @@ _REFUSED: Final = 1
 @click.command()
 @click.argument("node", type=NODE_ID)
 @click.argument("names", nargs=-1, metavar="OBJECT...")
-@click.option("--eds", type=PATH, metavar="FILE", help="EDS, DCF or XDD of the node.")
+@node_eds_option()
 @click.option("--json", "as_json", is_flag=True, help="Objects as JSON, one a line.")
 @click.pass_obj
-def read(call: NetCall, node: int, names: Sequence[str], eds: Path | None, as_json: bool) -> None:
+def read(
+    call: NetCall, node: int, names: Sequence[str], eds: Path | EdsFolder | None, as_json: bool
+) -> None:
     """Read objects of NODE, by name or index; without any all that its EDS names.
 
     A name is that of the EDS in small letters with _ for what is no letter, as
@@ -112,10 +116,12 @@ _PDO_MAPPINGS: Final = (*range(0x1600, 0x1800), *range(0x1A00, 0x1C00))
 @click.command()
 @click.argument("node", type=NODE_ID)
 @click.argument("values", nargs=-1, required=True, metavar="OBJECT=VALUE...")
-@click.option("--eds", type=PATH, metavar="FILE", help="EDS, DCF or XDD of the node.")
+@node_eds_option()
 @click.option("--yes", is_flag=True, help="Ask nothing.")
 @click.pass_obj
-def write(call: NetCall, node: int, values: Sequence[str], eds: Path | None, yes: bool) -> None:
+def write(
+    call: NetCall, node: int, values: Sequence[str], eds: Path | EdsFolder | None, yes: bool
+) -> None:
     """Write objects of NODE, by name or index, in this order.
 
     Values are decimal, hex (0x1F), in the unit of the object where its EDS gives one,
@@ -176,9 +182,9 @@ _DIFFERENT: Final = 1
 @click.command()
 @click.argument("node", type=NODE_ID)
 @click.argument("other", metavar="FILE|NODE")
-@click.option("--eds", type=PATH, metavar="FILE", help="EDS, DCF or XDD of both nodes.")
+@node_eds_option("EDS, DCF or XDD of both nodes.")
 @click.pass_obj
-def compare(call: NetCall, node: int, other: str, eds: Path | None) -> None:
+def compare(call: NetCall, node: int, other: str, eds: Path | EdsFolder | None) -> None:
     """Compare NODE with a DCF, or with another node; exit status 1 if they differ.
 
     Of a DCF its ParameterValues count; of a file without any, as an EDS, the defaults of

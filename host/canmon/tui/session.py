@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Final, Protocol
 from tickrig._lazy import LazyModule
 from tickrig.host.canmon.extensions import make_decoder
 from tickrig.host.canmon.model.decode.decoded import Decoded
+from tickrig.host.canmon.model.decode.eds_folder import EdsFiles
 from tickrig.host.canmon.model.decode.node_board import NodeBoard
 from tickrig.host.canmon.model.decode.node_memory import EdsObjects
 from tickrig.host.canmon.model.frames import AnyRecord, Record
@@ -105,7 +106,7 @@ class Model:
         bit_rate: int | None = None,
         data_bit_rate: int | None = None,
     ) -> None:
-        self.eds = dict(eds or {})
+        self.eds = eds if isinstance(eds, EdsFiles) else EdsFiles(eds)
         self.decoder = make_decoder(self.eds, dbc)
         self.board = NodeBoard(self.decoder, {node: found.name for node, found in self.eds.items()})
         self.top = TopModel(BitRates(bit_rate, data_bit_rate))

@@ -252,7 +252,7 @@ _MOST_AROUND: Final = 1_000
 def command(  # noqa: PLR0913 - options
     *,
     source: Sequence[str],
-    eds: Sequence[str],
+    eds: decode_options.EdsOptions,
     dbc: Sequence[Path],
     span_us: int | None,
     around: int,

@@ -70,7 +70,7 @@ _levels: Final[Decorator] = add_options(
 )
 _choice: Final[Decorator] = add_options(
     click.option("--node", type=click.IntRange(1, 127), metavar="N", help="Node-ID, 1 to 127."),
-    click.option("--eds", type=PATH, metavar="FILE", help="EDS, DCF or XDD of the node."),
+    eds_document.node_eds_option(),
     _levels,
     click.option("--stimulus", metavar="CMD", help="Moves inputs: a command, a socket, or ask."),
     click.option("--allow", multiple=True, metavar="INDEX", help="May be written, as 6200h."),
@@ -150,7 +150,7 @@ def command(context: click.Context, /, source: str | None, **options: Any) -> No
     bus = BusOptions(**{name: options.pop(name) for name in named})
     options["level"] = _level(options)
     if options["lists"]:
-        _list(options["only"], options["eds"])
+        _list(options["only"], options["eds"] if isinstance(options["eds"], Path) else None)
         return
     context.exit(conformance.Conformance(source, bus, options).run())
 

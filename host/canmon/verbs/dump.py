@@ -150,7 +150,7 @@ def dump(  # noqa: PLR0913 - options
     output: str | None,
     file: Path | None,
     wanted: str | None,
-    eds: Sequence[str],
+    eds: decode_options.EdsOptions,
     dbc: Sequence[Path],
     count: int | None,
     quiet_ms: int | None,
@@ -298,7 +298,7 @@ def conv(  # noqa: PLR0913 - options
     source: Sequence[str],
     log: Path,
     wanted: str | None,
-    eds: Sequence[str],
+    eds: decode_options.EdsOptions,
     dbc: Sequence[Path],
     strict: bool,
 ) -> None:

@@ -16,7 +16,12 @@ from tickrig.host.canmon.model.decode.node_memory import EdsObjects
 from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.output.listening import Stopwatch, follow, report, span_option, take_blocks
 from tickrig.host.canmon.sources.source import BlockLog, block_log, open_source
-from tickrig.host.canmon.verbs.decode_options import eds_option, read_eds_files, source_command
+from tickrig.host.canmon.verbs.decode_options import (
+    EdsOptions,
+    eds_option,
+    read_eds_files,
+    source_command,
+)
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.messages import until_unread
 
@@ -38,7 +43,7 @@ _MANY: Final = 1_000
 def command(
     *,
     source: Sequence[str],
-    eds: Sequence[str],
+    eds: EdsOptions,
     span_us: int | None,
     jsonl: bool,
     strict: bool,

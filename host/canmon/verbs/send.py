@@ -3,24 +3,32 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from tickrig._lazy import LazyModule
+from tickrig.host.canmon.eds_document import read_identity
 from tickrig.host.canmon.model import transmit
 from tickrig.host.canmon.output.listening import Pace, until_interrupted
-from tickrig.host.canmon.verbs.decode_options import eds_option, read_eds_files
+from tickrig.host.canmon.verbs.decode_options import EdsOptions, eds_option, read_eds_files
 from tickrig.host.cli.can_options import BusOptions, bus_and_rest, bus_options, fd_options
-from tickrig.host.cli.messages import Refused, refusing, until_unread
+from tickrig.host.cli.messages import Refused, SourceFailed, refusing, until_unread
+from tickrig.host.links.link import LinkClosed
 from tickrig.host.text.values import parse_time_with_unit_us
 from tickrig.wire.can import CanFrame, FdFrame, LogLine, parse_sent
 from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
+    from tickrig.host.canmon.conform import conform_source
+    from tickrig.host.canmon.model.decode.eds_folder import EdsFiles
     from tickrig.host.canmon.sources import bus_source
+    from tickrig.host.canopen.commissioning import node_bus
 else:  # python-can is slow
+    conform_source = LazyModule("tickrig.host.canmon.conform.conform_source")
+    node_bus = LazyModule("tickrig.host.canopen.commissioning.node_bus")
     bus_source = LazyModule("tickrig.host.canmon.sources.bus_source")
 
 
@@ -34,7 +42,7 @@ else:  # python-can is slow
 @click.option("-q", "--quiet", is_flag=True, help="Do not print what is sent.")
 @bus_options
 @fd_options
-def command(words: Sequence[str], eds: Sequence[str], **options: Any) -> None:
+def command(words: Sequence[str], eds: EdsOptions, **options: Any) -> None:
     """Send frames on BUS: by bytes as 123#DEADBEEF, or a PDO by the names of its objects.
 
     Without a BUS they go to that of -c. 123##1AABB is a CAN FD frame; the
@@ -49,6 +57,7 @@ def command(words: Sequence[str], eds: Sequence[str], **options: Any) -> None:
     \b
     canmon send can0 123#DEADBEEF 00000605#40 705#R
     canmon send can0 5.rpdo1 target_velocity=100 --eds 5=drive.eds
+    canmon send can0 5.rpdo1 target_velocity=100 --eds-dir eds
     canmon send can0 080# --every 10ms --count 100
     canmon send can0 100#0000 --every 20ms --counter 0:0..14 --checksum 1:crc8
     """  # noqa: D301 - click wants the backspace
@@ -57,7 +66,7 @@ def command(words: Sequence[str], eds: Sequence[str], **options: Any) -> None:
     bus, frames = bus_and_rest(words, options["channel"], "FRAME...")
     if bus is None and "#" not in frames[0] and "pdo" not in frames[0]:
         raise Refused(f"-c {options['channel']} names the bus: leave out {frames[0]}, or -c")
-    made = _frames(frames, eds)
+    made = _frames(frames, eds, partial(_read_nodes, bus, BusOptions(**options)))
     period_us = _period_us(every, count)
     cyclic = _cyclic(made, period_us, count or (0 if every else 1), fields)
     with (
@@ -71,7 +80,13 @@ def command(words: Sequence[str], eds: Sequence[str], **options: Any) -> None:
         click.echo(f"{missed} periods passed whole and were left out", err=True)
 
 
-def _frames(words: Sequence[str], eds: Sequence[str]) -> list[CanFrame | FdFrame]:
+_ReadNodes = Callable[["EdsFiles", set[int]], None]
+"""Chooses files for nodes, which it asks who they are."""
+
+
+def _frames(
+    words: Sequence[str], eds: EdsOptions, read_nodes: _ReadNodes
+) -> list[CanFrame | FdFrame]:
     """Return the frames; words with `=` belong to the PDO before them."""
     texts: list[str] = []
     for word in words:
@@ -79,9 +94,31 @@ def _frames(words: Sequence[str], eds: Sequence[str]) -> list[CanFrame | FdFrame
             texts[-1] += f" {word}"
         else:
             texts.append(word)
-    named = transmit.PdoFrames(read_eds_files(eds))
+    files = read_eds_files(eds)
+    numbers = (text.partition(".")[0] for text in texts if "#" not in text)
+    nodes = {int(text) for text in numbers if text.isascii() and text.isdecimal()}
+    if files.folder is not None and nodes - files.keys():
+        read_nodes(files, {node for node in nodes - files.keys() if 1 <= node <= 127})
+    named = transmit.PdoFrames(files)
     with refusing():
         return [parse_sent(text) if "#" in text else named.frame(text) for text in texts]
+
+
+def _read_nodes(bus: str | None, options: BusOptions, files: EdsFiles, nodes: set[int]) -> None:
+    """Read who nodes are, so that their files are found."""
+    source = conform_source.open_conform_source(bus, None, options)
+    try:
+        asked = node_bus.NodeBus(source.link)
+        for node in sorted(nodes):
+            identity = read_identity(asked, node)
+            if identity is None:
+                said = f"node {node} does not tell vendor and product (1018h)"
+                raise Refused(f"{said}; give --eds {node}=FILE")
+            files.find(source.name, node, identity)
+    except LinkClosed as error:
+        raise SourceFailed(str(error)) from None
+    finally:
+        source.close()
 
 
 def _fields(counters: Sequence[str], checksums: Sequence[str]) -> transmit.FrameFields:

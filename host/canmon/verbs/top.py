@@ -35,7 +35,7 @@ def command(  # noqa: PLR0913 - options
     source: Sequence[str],
     decode: bool,
     wanted: str | None,
-    eds: Sequence[str],
+    eds: decode_options.EdsOptions,
     dbc: Sequence[Path],
     span_us: int | None,
     reopen: bool,

@@ -39,7 +39,7 @@ def command(  # noqa: PLR0913 - options
     *,
     source: Sequence[str],
     path: Path | None,
-    eds: Sequence[str],
+    eds: decode_options.EdsOptions,
     dbc: Sequence[Path],
     reopen: bool,
     strict: bool,
@@ -66,8 +66,9 @@ def command(  # noqa: PLR0913 - options
     said = MonitorSetup(
         source=tuple(source),
         options=BusOptions(**options),
-        eds=decode_options.eds_paths(eds),
+        eds=decode_options.eds_paths(eds.words),
         dbc=tuple(dbc),
+        eds_dir=eds.folders,
     )
     monitor = _monitor(path, said)
     if not sys.stdout.isatty():
@@ -92,7 +93,7 @@ def _monitor(path: Path | None, said: MonitorSetup) -> app.MonitorApp:
     with refusing("", WorkspaceError):
         workspace = Workspace() if path is None else Workspace.read(path)
         setup = MonitorSetup.read(workspace).under(said)
-        objects = decode_options.read_eds_paths(setup.eds)
+        objects = decode_options.read_eds_paths(setup.eds, setup.eds_dir)
         with decode_options.refusing_dbc():
             model = sessions.Model(objects, setup.dbc, *bit_rates_of(setup.source, setup.options))
         session = sessions.open_session(setup.source, setup.options, model)

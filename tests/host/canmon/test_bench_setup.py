@@ -12,6 +12,7 @@ TEXT = """\
 source = ["can0", "run.log"]
 bitrate = 500000
 dbc = ["car.dbc"]
+eds_dir = ["eds"]
 bus_kwargs = ["port=1"]
 [nodes.3]
 eds = "drive.eds"
@@ -26,6 +27,7 @@ def test_paths_are_taken_from_the_folder_of_the_file(tmp_path: Path) -> None:
         options=BusOptions(bitrate=500_000, bus_kwargs=("port=1",)),
         eds={3: tmp_path / "drive.eds"},
         dbc=(tmp_path / "car.dbc",),
+        eds_dir=(tmp_path / "eds",),
     )
 
 
@@ -55,6 +57,7 @@ def test_the_command_line_goes_before(tmp_path: Path) -> None:
         ("[bus]\n\nbitrate = 'fast'\n", "line 3: bus.bitrate: 'fast' is not a number of bit/s"),
         ('[bus]\nsource = ["a\\u0000"]\n', "line 2: bus.source: is no array of texts"),
         ('[nodes.3]\neds = "a\\u0000"\n', 'nodes.3: is no table with eds = "FILE"'),
+        ("[bus]\neds_dir = 'eds'\n", "line 2: bus.eds_dir: is no array of texts"),
         ("[bus]\ninterface = 3\n", "line 2: bus.interface: 3 is no text"),
         ("[nodes.3]\n[nodes.200]\neds = ''\n", "line 2: nodes.200: is not a node-ID 1..127"),
         ("[nodes]\nx = {}\n", "line 2: nodes.x: is not a node-ID 1..127"),

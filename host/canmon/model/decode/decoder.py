@@ -19,6 +19,7 @@ from tickrig.host.canmon.model.decode.decoded import (
     TransferOutcome,
     write_entry,
 )
+from tickrig.host.canmon.model.decode.eds_folder import EdsFiles, node_identity
 from tickrig.host.canmon.model.decode.node_memory import ObjectText
 from tickrig.host.canmon.model.decode.pdos import (
     PDO_OBJECTS,
@@ -70,7 +71,9 @@ if TYPE_CHECKING:
 #   node is a drive changes the names of its objects, so all its known PDOs are read anew;
 # - a boot-up: the node has its power-on values again, unless it stored others (1010h);
 # - a guarding request (700h + node-ID, RTR): the next frame on this CAN-ID is an answer
-#   with a toggle bit and no heartbeat. Without a request a set bit 7 alone tells it.
+#   with a toggle bit and no heartbeat. Without a request a set bit 7 alone tells it;
+# - vendor, product or revision of 1018h: `EdsFiles` may have a file for the node. Its objects and
+#   PDOs count from then on; what traffic told goes before them, as always.
 #
 # `effect` must stay true to all of this: it says of which frames a block-wise reader may
 # leave some out. A new way to learn from a frame needs its line there, or `canmon nodes` of
@@ -90,6 +93,7 @@ _PDO_IDS: Final = range(0x181, 0x580)
 _NODE_MASK: Final = 0x7F
 COB_ID_SYNC, COB_ID_TIME, COB_ID_EMCY = 0x1005, 0x1012, 0x1014
 _SDO_SERVERS: Final = range(0x1201, 0x1280)
+_IDENTITY: Final = 0x1018
 _LSS_IDS: Final = (LSS_MASTER_COB_ID, LSS_SLAVE_COB_ID)
 _PRE_DEFINED: Final[dict[int, Route]] = {
     NMT_COB_ID: services.decode_nmt,
@@ -117,13 +121,21 @@ class BusDecoder:
 
     Args:
         eds: what files say, by node-ID.
+        files: where files of other nodes are looked for; None if nowhere.
+        channel: what the bus is called there.
 
     Attributes:
         changes: how often what a CAN-ID means may have changed.
     """
 
-    def __init__(self, eds: Mapping[int, node_memory.EdsObjects]) -> None:
+    def __init__(
+        self,
+        eds: Mapping[int, node_memory.EdsObjects],
+        files: EdsFiles | None = None,
+        channel: str = "",
+    ) -> None:
         self._eds, self.changes = eds, 0
+        self._files, self._channel = files, channel
         self._memories: dict[int, node_memory.NodeMemory] = {}
         self._channels: dict[tuple[int, int], SdoChannel] = {}
         self._guarded: set[int] = set()
@@ -270,6 +282,23 @@ class BusDecoder:
         if memory.is_drive != was_drive or entry == node_memory.DEVICE_TYPE:
             self._refresh(self._pdos.known(transfer.node))
         self._learn_cob_ids(transfer.node, entry[0])
+        if entry[0] == _IDENTITY and self._files is not None:
+            self._find_eds(self._files, transfer.node)
+
+    def _find_eds(self, files: EdsFiles, node: int) -> None:
+        """Look for the file of a node by what it has said of 1018h."""
+        memory = self.memory(node)
+        entries = ((_IDENTITY, sub) for sub in (1, 2, 3))
+        identity = node_identity(
+            [memory.number(*one) if memory.was_received(one) else None for one in entries]
+        )
+        found = None if identity is None else files.find(self._channel, node, identity)
+        if found is None:
+            return
+        memory.eds = found
+        self._refresh({*self._pdos.known(node), *pdos_of(node, memory.indices)})
+        for index in (COB_ID_SYNC, COB_ID_TIME, COB_ID_EMCY, *_SDO_SERVERS):
+            self._learn_cob_ids(node, index)
 
     def _refresh(self, pdos: Iterable[NodePdo]) -> None:
         """Read again what is known of some PDOs."""
@@ -366,7 +395,8 @@ class Decoder:
     """Decodes what was heard, in order; each bus has its own nodes.
 
     Args:
-        eds: an EDS or DCF, or what was read of one, by node-ID. It counts on every bus.
+        eds: an EDS or DCF, or what was read of one, by node-ID. It counts on every bus. `EdsFiles`
+            with a folder has those of other nodes, by the identity that is heard.
         dbc: DBC files; the CAN-IDs that they name mean nothing else.
         first: asked before anything else what a frame says.
 
@@ -389,6 +419,7 @@ class Decoder:
             node: node_memory.read_eds_objects(item, node) if isinstance(item, Path) else item
             for node, item in eds.items()
         }
+        self._files = eds if isinstance(eds, EdsFiles) and eds.folder is not None else None
         self.first: tuple[FrameDecoder, ...] = (*first, *map(DbcFile, dbc))
         self._buses: dict[str, BusDecoder] = {}
 
@@ -427,5 +458,5 @@ class Decoder:
         """Return what decodes a bus."""
         bus = self._buses.get(channel)
         if bus is None:
-            bus = self._buses[channel] = BusDecoder(self._eds)
+            bus = self._buses[channel] = BusDecoder(self._eds, self._files, channel)
         return bus

@@ -329,7 +329,7 @@ def _cells(row: NodeStatus, now_us: int, *, with_bus: bool) -> tuple[str, ...]:
     )
     return (
         f"{row.channel} {row.node}" if with_bus else str(row.node),
-        row.name,
+        row.name or row.memory.eds.name,
         row.state_text,
         _heartbeat(row, now_us),
         boots if row.boots else "",
@@ -381,7 +381,7 @@ def _fields(row: NodeStatus, now_us: int) -> dict[str, object]:
         "t": now_us / 1e6,
         "ch": row.channel,
         "node": row.node,
-        "name": row.name,
+        "name": row.name or row.memory.eds.name,
         "state": row.state_text,
         "heartbeat_ms": None if period_us is None else period_us / 1_000,
         "learnt": row.learnt,

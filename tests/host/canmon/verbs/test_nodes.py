@@ -62,14 +62,17 @@ def test_an_eds_puts_its_node_on_the_board() -> None:
     assert result.stdout.splitlines()[2].split() == ["7", "EPOS", "?", "->", "stopped"]
 
 
+NO_WORD = "is not NODE=FILE with a node-ID 1..127, as 3=drive.eds or 1-3=drive.eds"
+
+
 @pytest.mark.parametrize(
     ("words", "text"),
     [
         (
             ("--eds", "200=x"),
-            "--eds '200=x' is not NODE=FILE with a node-ID 1..127, as 3=drive.eds",
+            f"--eds '200=x' {NO_WORD}",
         ),
-        (("--eds", "x"), "--eds 'x' is not NODE=FILE with a node-ID 1..127, as 3=drive.eds"),
+        (("--eds", "x"), f"--eds 'x' {NO_WORD}"),
         (("--eds", "5=none.eds"), "--eds none.eds: No such file or directory"),
         (("--for", "soon"), "--for 'soon' is not a time: write 1.5s, 200ms or 250us"),
     ],
