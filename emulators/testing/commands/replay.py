@@ -62,8 +62,9 @@ def _replay_trace(file: Path, *, verbose: bool, run_code: bool) -> int:
 def _replay_with_host(file: Path, host: str) -> int:
     """Do a scenario again; return 1 if something is wrong."""
     try:
-        steps = host_runs.parse_steps(file.read_text("utf-8"), str(file))
-        runs = host_runs.HostRuns(find_class(host, bench_machine.BenchMachine))
+        machine = find_class(host, bench_machine.BenchMachine)
+        steps = host_runs.parse_steps(file.read_text("utf-8"), str(file), machine.rules())
+        runs = host_runs.HostRuns(machine)
     except OSError as error:
         refuse_path("scenario", error)
     except ValueError as error:
@@ -71,8 +72,11 @@ def _replay_with_host(file: Path, host: str) -> int:
     with runs:
         try:
             runs.run(steps)
-        except Exception as error:  # what a host may raise
-            click.echo(f"{type(error).__name__}: {error}\n{runs.last_lines()}")
+        except BaseException as error:
+            if (failure := runs.failure) is None:
+                raise
+            said = f"{type(error).__name__}: {error}\n{failure.text}\n{failure.passed}"
+            click.echo(said)
             return 1
     click.echo(f"nothing is wrong in {counted(len(steps), 'step')}")
     return 0

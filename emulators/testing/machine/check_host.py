@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 from tickrig._lazy import LazyModule
 from tickrig.emulators.testing.machine.bench_machine import BenchMachine
-from tickrig.emulators.testing.machine.host_runs import HostRuns, HostStep, parse_steps
+from tickrig.emulators.testing.machine.host_runs import HostFailure, HostRuns, HostStep, parse_steps
+from tickrig.host.text.values import counted
 
 if TYPE_CHECKING:
     from tickrig.emulators.testing.machine import strategies
@@ -15,6 +16,10 @@ else:
     strategies = LazyModule("tickrig.emulators.testing.machine.strategies")  # an extra
 
 _HEAD: Final = "# a scenario of {place}, {count}"
+_NOT_AGAIN: Final = (
+    "# it passed when it was repeated: the host keeps something from one run to the next, in a"
+    " global or a class, or depends on a clock or on chance of its own"
+)
 _REPLAY: Final = "put it into a file, and: tickrig replay FILE --host {place}"
 _WANTED: Final = "a search wants Hypothesis: pip install 'tickrig[test]'"
 
@@ -46,9 +51,13 @@ def check_host(
         search = search_of(runs, max_examples=max_examples, max_steps=max_steps, seed=seed)
         try:
             search()
-        except Exception as error:
-            error.add_note(note_of(runs))
-            raise
+        except BaseException:
+            if runs.failure is None:  # Ctrl-C, or what a strategy has raised
+                raise
+            shortest = runs.shorten(runs.failure)
+            failed = shortest or runs.failure
+            failed.error.add_note(note_of(runs, failed, repeats=shortest is not None))
+            raise failed.error from None
 
 
 def search_of(runs: HostRuns, *, max_examples: int, max_steps: int, seed: int | None = None) -> Any:
@@ -95,28 +104,37 @@ def replay_host(machine: type[BenchMachine], scenario: Path | str) -> None:
     text, name = str(scenario), "scenario"
     if "\n" not in text:
         text, name = Path(scenario).read_text("utf-8"), str(scenario)
-    steps = parse_steps(text, name)
+    steps = parse_steps(text, name, machine.rules())
     with HostRuns(machine) as runs:
         try:
             runs.run(steps)
-        except Exception as error:
-            error.add_note(f"what passed last:\n{runs.last_lines()}")
+        except BaseException as error:
+            if runs.failure is not None:
+                error.add_note(f"{runs.failure.text}\nwhat passed last:\n{runs.failure.passed}")
             raise
 
 
-def _scenario_of(runs: HostRuns) -> str:
-    """Write the last run as a scenario."""
-    done = runs.done
-    count = f"{len(done)} step{'' if len(done) == 1 else 's'}"
-    head = _HEAD.format(place=_place(type(runs.machine)), count=count)
-    return "\n".join([head, *map(str, done)])
+def note_of(runs: HostRuns, failure: HostFailure, *, repeats: bool = True) -> str:
+    """Write a failure as a scenario, how it is replayed, and what passed last.
 
-
-def note_of(runs: HostRuns) -> str:
-    """Write the last run as a scenario, how it is replayed, and what passed last."""
-    replay = _REPLAY.format(place=_place(type(runs.machine)))
-    passed = f"what passed last:\n{runs.last_lines()}"
-    return f"{_scenario_of(runs)}\n\n{replay}\n\n{passed}"
+    Args:
+        runs: those of the machine.
+        failure: what was wrong.
+        repeats: it was wrong again when the run was repeated.
+    """
+    place, steps = _place(type(runs.machine)), failure.steps
+    return "\n".join(
+        [
+            _HEAD.format(place=place, count=counted(len(steps), "step")),
+            *map(str, steps),
+            f"# {failure.text}",
+            *([] if repeats else [_NOT_AGAIN]),
+            "",
+            _REPLAY.format(place=place),
+            "",
+            f"what passed last:\n{failure.passed}",
+        ]
+    )
 
 
 def _place(machine: type) -> str:

@@ -68,5 +68,6 @@ class _OneInput:
         try:
             self._fuzz(data)
         except Exception as error:
-            error.add_note(note_of(self._runs))
+            if self._runs.failure is not None:
+                error.add_note(note_of(self._runs, self._runs.failure))
             raise

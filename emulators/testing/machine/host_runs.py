@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import ast
 import inspect
+import random
 import re
-from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager, ExitStack, nullcontext
-from dataclasses import dataclass, field
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
+from copy import deepcopy
+from dataclasses import dataclass, field, replace
+from enum import Enum
 from typing import Any, Final, Self
 
 from tickrig.emulators.testing.bench.bench import PRESS, Bench
@@ -24,9 +28,10 @@ from tickrig.wire.instant import NEVER
 
 _CALL: Final = "call"
 SEED: Final = "seed"
-_VERBS: Final = (_CALL, "set", "press", "fault", "send", "wait", SEED)
+_WAIT: Final = "wait"
+_VERBS: Final = (_CALL, "set", "press", "fault", "send", _WAIT, SEED)
 
-_LONGEST: Final = 10_000
+_LONGEST: Final = 1_000_000
 """Characters of a call."""
 
 _DIGITS: Final = 20
@@ -87,6 +92,10 @@ class HostStep:
             ValueError: the bench has no such input, button, fault or device.
         """
         bench.run_for(self.wait_us)
+        self.act(bench)
+
+    def act(self, bench: Bench) -> None:
+        """Do it to a bench at once; raises ValueError as `do` does."""
         if self.verb == "set":
             name, *words = self.what.split()
             bench.set(name, *map(parse_setting, words))
@@ -104,12 +113,15 @@ class HostStep:
             bench._mode.act(lambda rig: rig.state.draw_by(seed))
 
 
-def parse_steps(text: str, file: str) -> tuple[HostStep, ...]:
+def parse_steps(
+    text: str, file: str, rules: Mapping[str, Mapping[str, object]] | None = None
+) -> tuple[HostStep, ...]:
     """Read the steps of a scenario.
 
     Args:
         text: the whole file.
         file: its name, for messages.
+        rules: those of the machine: an argument may be any value that its rule lists.
 
     Raises:
         ValueError: `FILE:LINE: what came, what is allowed`.
@@ -117,13 +129,13 @@ def parse_steps(text: str, file: str) -> tuple[HostStep, ...]:
     steps = []
     for number, content in content_lines(text):
         try:
-            steps.append(_parse(content))
+            steps.append(_parse(content, rules or {}))
         except ValueError as error:
             raise ValueError(f"{file}:{number}: {error}") from None
     return tuple(steps)
 
 
-def _parse(content: str) -> HostStep:
+def _parse(content: str, rules: Mapping[str, Mapping[str, object]]) -> HostStep:
     match = _LINE.fullmatch(content)
     if match is None:
         raise ValueError(f"{content!r:.60} is not '+TIME ACTION ...', as '+5ms call heat()'")
@@ -131,7 +143,7 @@ def _parse(content: str) -> HostStep:
     if verb not in _VERBS:
         raise ValueError(f"no action {verb!r}; {near(verb, _VERBS)}")
     if verb == _CALL:
-        name, arguments = _parse_call(rest)
+        name, arguments = _parse_call(rest, rules)
         return HostStep(wait_us, verb, name, arguments=arguments)
     if verb == SEED and not (rest.isdecimal() and len(rest) <= _DIGITS):
         raise ValueError(f"a seed is a whole number from 0, not {rest!r:.60}")
@@ -139,7 +151,7 @@ def _parse(content: str) -> HostStep:
     return HostStep(wait_us, verb, what, parse_time_us(time) if lasting else 0)
 
 
-def _parse_call(text: str) -> tuple[str, dict[str, Any]]:
+def _parse_call(text: str, rules: Mapping[str, Mapping[str, object]]) -> tuple[str, dict[str, Any]]:
     """Read `name(argument=literal, ...)`; nothing is evaluated but literals."""
     try:
         call = ast.parse(text, mode="eval").body if len(text) <= _LONGEST else None
@@ -147,16 +159,66 @@ def _parse_call(text: str) -> tuple[str, dict[str, Any]]:
         call = None
     if not isinstance(call, ast.Call) or not isinstance(call.func, ast.Name) or call.args:
         raise ValueError(f"{text!r:.60} is not a call, as 'write(data=b\"a\", to=3)'")
+    listed = rules.get(call.func.id, {})
     try:
-        arguments = {str(each.arg): ast.literal_eval(each.value) for each in call.keywords}
+        arguments = {
+            str(each.arg): _value_of(each.value, listed.get(str(each.arg)))
+            for each in call.keywords
+        }
     except (ValueError, MemoryError, RecursionError):
         raise ValueError(f"{text!r:.60}: an argument is no plain value") from None
     return call.func.id, arguments
 
 
+class _Floats(ast.NodeTransformer):
+    """Makes numbers of `inf` and `nan`, which are names to Python."""
+
+    def visit_Name(self, node: ast.Name) -> ast.expr:
+        """Return the number."""
+        return ast.Constant(float(node.id)) if node.id in ("inf", "nan") else node
+
+
+def _value_of(node: ast.expr, listed: object) -> Any:
+    """Return a plain value, or the one of a list that is written like this."""
+    if isinstance(listed, list | tuple):
+        text = ast.unparse(node)
+        for value in listed:
+            if _same_text(value, text):
+                return value
+    return ast.literal_eval(_Floats().visit(node))
+
+
+def _same_text(value: object, text: str) -> bool:
+    try:
+        return ast.unparse(ast.parse(_literal(value), mode="eval")) == text
+    except (SyntaxError, ValueError):
+        return False
+
+
+def check_written(rule: str, name: str, value: object, listed: object = None) -> None:
+    """Raise TypeError unless a scenario can hold an argument.
+
+    Args:
+        rule: whose argument it is.
+        name: of the argument.
+        value: the argument.
+        listed: the values that the rule lists, if it does.
+    """
+    try:
+        node = ast.parse(_literal(value), mode="eval").body
+        read = _value_of(node, listed)
+        if read == value or _literal(read) == _literal(value):  # nan differs from itself
+            return
+    except (SyntaxError, ValueError, MemoryError, RecursionError):
+        pass
+    hint = "draw plain values, or list the values in host_rule, each with a repr that is Python"
+    raise TypeError(f"{rule}: {name}={value!r:.60} cannot be written in a scenario; {hint}")
+
+
 def _literal(value: object) -> str:
-    """Write a plain value without a `#`, which would begin a comment."""
-    return repr(value).replace("#", "\\x23")
+    """Write a value without a `#`, which would begin a comment."""
+    text = f"{type(value).__name__}.{value.name}" if isinstance(value, Enum) else repr(value)
+    return text.replace("#", "\\x23")
 
 
 def _time(t_us: int) -> str:
@@ -168,9 +230,58 @@ def _time(t_us: int) -> str:
 
 _LAST_LINES: Final = 12
 
+# A host that calls `sys.exit` and an invariant that calls `pytest.fail` raise no Exception, and
+# have failed all the same. These have not; pytest is not imported here.
+_NO_FAILURES: Final = ("KeyboardInterrupt", "Skipped", "Exit")
+
 
 class HostHangsError(AssertionError):
     """A host does not come back: a call, or a whole run, takes longer than the machine says."""
+
+
+@dataclass(frozen=True, slots=True)
+class HostFailure:
+    """What was wrong in a run.
+
+    Attributes:
+        error: what was raised.
+        violated: what raised it: `invariant it_is_slow`, `rule drive`, `connect`, `end`.
+        at_us: when, in the time of the bench.
+        steps: what was done until then.
+        passed: what passed last.
+    """
+
+    error: BaseException
+    violated: str
+    at_us: int
+    steps: tuple[HostStep, ...]
+    passed: str
+
+    def is_like(self, other: HostFailure) -> bool:
+        """Say whether another run failed in the same way."""
+        return type(self.error) is type(other.error) and self.violated == other.violated
+
+    @property
+    def text(self) -> str:
+        """What is wrong, in a line."""
+        said = str(self.error).partition("\n")[0]
+        at = f"at {self.at_us / 1_000_000:.6f} s"
+        return f"{self.violated}, {at}: {type(self.error).__name__}: {said}".rstrip(": ")
+
+
+@contextmanager
+def _seeded() -> Iterator[None]:
+    """Seed the chance of hosts: what a search draws, a replay draws too."""
+    modules = [random, sys.modules.get("numpy.random")]
+    chances: list[Any] = [module for module in modules if module is not None]
+    before = [chance.getstate() if chance is random else chance.get_state() for chance in chances]
+    for chance in chances:
+        chance.seed(0)
+    try:
+        yield
+    finally:
+        for chance, state in zip(chances, before, strict=True):
+            (chance.setstate if chance is random else chance.set_state)(state)
 
 
 class HostRuns:
@@ -178,6 +289,10 @@ class HostRuns:
 
     Args:
         kind: the machine.
+
+    Attributes:
+        machine: the machine.
+        failure: what was wrong in the last run that failed; None if none has failed.
 
     Raises:
         ValueError: a fault or input of it is not on its bench.
@@ -188,8 +303,10 @@ class HostRuns:
         if not isinstance(kind, type):
             raise TypeError(f"give the class {type(kind).__name__}, not an object of it")
         self.machine, self._stack = kind(), ExitStack()
-        self.done: list[HostStep] = []
+        self.failure: HostFailure | None = None
+        self._done: list[HostStep] = []
         self._broken: Exception | None = None
+        self._broken_by = self._doing = ""
         self._end_us = self._back_us = NEVER
         self._invariants = kind.invariants()
 
@@ -235,21 +352,63 @@ class HostRuns:
         # All runs begin at one snapshot: the same objects, so hosts that hold a device need
         # not be told.
         self._snapshot.restore()
-        self.done, self._broken = list(steps), None
+        self._done, self._broken, self._broken_by = [], None, ""
         self._end_us = self.machine.bench.now_us + us_of(self.machine.longest)
         self.machine.bench._mode.act(lambda rig: rig.rig.watchers.append(self._watch))
-        with self._time():
+        with self._time(), _seeded():
             self._run_all(steps)
 
     def _run_all(self, steps: Sequence[HostStep]) -> None:
         try:
+            self._doing = "connect"
             self._judged(self.machine.connect)
             for step in steps:
                 self._do(step)
+            self._doing = "end"
             self._judged(self._settle)
             self._judged(self.machine.end)
+        except BaseException as error:
+            if type(error).__name__ not in _NO_FAILURES:
+                by, now_us = self._broken_by or self._doing, self.machine.bench.now_us
+                passed = self.last_lines()
+                self.failure = HostFailure(error, by, now_us, tuple(self._done), passed)
+            raise
         finally:
             self.machine.disconnect()
+
+    def shorten(self, failure: HostFailure) -> HostFailure | None:
+        """Leave out the steps without which a run fails in the same way.
+
+        Returns:
+            A failure of which no step can be left out; None if the run does not fail again.
+        """
+        failed = self._again(failure, failure.steps)
+        shorter = failed
+        while shorter is not None:
+            failed = shorter
+            shorter = next(
+                (
+                    found
+                    for steps in _shorter(failed.steps)
+                    if (found := self._again(failed, steps)) is not None
+                ),
+                None,
+            )
+        return failed
+
+    def _again(self, failure: HostFailure, steps: Sequence[HostStep]) -> HostFailure | None:
+        """Return the failure of a run that fails in the same way, None if it does not."""
+        before = self.failure
+        try:
+            self.run(steps)
+        except BaseException:
+            found = self.failure
+            if found is None or found is before:
+                raise
+            if found.is_like(failure):
+                return found
+        self.failure = before
+        return None
 
     def _settle(self) -> None:
         """Let the devices act on what was asked last: a run is judged after that."""
@@ -257,9 +416,17 @@ class HostRuns:
         bench.run_for(bench._mode.act(lambda rig: rig.settling_us))
 
     def _do(self, step: HostStep) -> None:
-        self._judged(step.do, self.machine.bench)
+        bench, wait = self.machine.bench, HostStep(step.wait_us, _WAIT)
+        self._done.append(wait)  # until it is more
+        self._doing = f"step {wait}"
+        self._judged(bench.run_for, step.wait_us)
+        self._check()
+        self._done[-1] = step
+        self._doing = f"rule {step.what}" if step.verb == _CALL else f"step {step}"
+        self._judged(step.act, bench)
         if step.verb == _CALL:
-            self._judged(self._rule(step), **step.arguments)
+            # A rule may change what it is given; the step is what it was.
+            self._judged(self._rule(step), **deepcopy(dict(step.arguments)))
         self._check()
 
     def _rule(self, step: HostStep) -> Any:
@@ -314,8 +481,22 @@ class HostRuns:
 
     def _check(self) -> None:
         for name in self._invariants:
-            getattr(self.machine, name)()
+            try:
+                getattr(self.machine, name)()
+            except BaseException:
+                self._broken_by = f"invariant {name}"
+                raise
 
     def last_lines(self) -> str:
         """Return what passed last, and what was done."""
         return "\n".join(self.machine.bench.transcript().splitlines()[-_LAST_LINES:])
+
+
+def _shorter(steps: Sequence[HostStep]) -> Iterator[list[HostStep]]:
+    """Give what a run could be without one of its steps: at first without its time as well."""
+    for at, step in enumerate(steps):
+        before, after = list(steps[:at]), list(steps[at + 1 :])
+        yield before + after
+        if step.wait_us and after:
+            later = replace(after[0], wait_us=step.wait_us + after[0].wait_us)
+            yield [*before, later, *after[1:]]

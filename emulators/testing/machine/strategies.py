@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
+from math import ceil, floor
 from typing import Any, Final
 
 from hypothesis import strategies as st
 
 from tickrig.emulators.testing.bench.bench import Bench
 from tickrig.emulators.testing.machine.bench_machine import BenchMachine, World, WorldInput
-from tickrig.emulators.testing.machine.host_runs import SEED, HostStep
+from tickrig.emulators.testing.machine.host_runs import SEED, HostStep, check_written
 from tickrig.emulators.testing.properties.strategies import (
     Act,
     Session,
@@ -123,11 +125,19 @@ def _calls(rules: Mapping[str, Mapping[str, object]]) -> st.SearchStrategy[HostS
         name: st.fixed_dictionaries({each: _strategy(what) for each, what in given.items()})
         for name, given in rules.items()
     }
+    for name, given in rules.items():  # what is listed is looked at once
+        for each, what in given.items():
+            for value in what if isinstance(what, list | tuple) else ():
+                check_written(name, each, value, what)
 
     @st.composite
     def call(draw: st.DrawFn) -> HostStep:
         wait_us, name = draw(timing()), draw(st.sampled_from(list(drawn)))
-        return HostStep(wait_us, "call", name, arguments=draw(drawn[name]))
+        arguments = draw(drawn[name])
+        for each, value in arguments.items():
+            if isinstance(rules[name][each], st.SearchStrategy):
+                check_written(name, each, value)
+        return HostStep(wait_us, "call", name, arguments=arguments)
 
     return call()
 
@@ -156,15 +166,18 @@ def steps(machine: BenchMachine, most: int) -> st.SearchStrategy[list[HostStep]]
 
     drawn = st.lists(step(), max_size=most)
     return (
-        st.builds(_with_seed, drawn, st.integers(0, _SEEDS))
+        st.builds(partial(_with_seed, world), drawn, st.integers(0, _SEEDS))
         if any(form.rated for form in world.faults.values())
         else drawn
     )
 
 
-def _with_seed(drawn: list[HostStep], seed: int) -> list[HostStep]:
+def _with_seed(world: World, drawn: list[HostStep], seed: int) -> list[HostStep]:
     """Return a run whose faults by chance are others; those of seed 0 are the bench's own."""
-    noisy = any(step.verb == "fault" and "=" in step.what for step in drawn)
+    # Faults without a rate draw too, such as `jitter` and `garbage`.
+    noisy = any(
+        step.verb == "fault" and world.faults[step.what.partition("=")[0]].rated for step in drawn
+    )
     return [HostStep(0, SEED, str(seed)), *drawn] if seed and noisy else drawn
 
 
@@ -176,8 +189,10 @@ def _strategy(what: object) -> st.SearchStrategy[Any]:
     raise TypeError(f"{what!r:.60} says not what an argument may be: a list, a range, a strategy")
 
 
-def _values(item: WorldInput) -> st.SearchStrategy[int]:
-    """Draw whole values of a level: its ends and zero more often."""
-    low, high = int(item.low), int(item.high)
+def _values(item: WorldInput) -> st.SearchStrategy[float]:
+    """Draw whole values of a level, its ends and zero more often; its ends if none is whole."""
+    low, high = ceil(item.low), floor(item.high)
+    if low > high:
+        return st.sampled_from((item.low, item.high))
     ends = [value for value in (0, low, high, 1) if low <= value <= high]
     return st.sampled_from(ends) | st.integers(low, high)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.emulators.canopen.node.planted import MISTAKES, Supervision
-from tickrig.testing import check_host
+from tickrig.testing import check_host, replay_host
 
 pytestmark = pytest.mark.release  # a minute of searches
 
@@ -39,6 +39,10 @@ def test_a_mistake_of_a_master_is_found_in_at_most_four_steps(mistake: str, tmp_
     note = next(each for each in caught.value.__notes__ if "a scenario of" in each)
     steps = [line for line in note.splitlines() if line.lstrip().startswith("+")]
     assert 1 <= len(steps) <= 4, note
+    scenario = note.partition("\n\n")[0]
+    with pytest.raises(type(caught.value)) as again:
+        replay_host(machine(mistake, tmp_path, FAULTS[mistake]), scenario)
+    assert "# " + again.value.__notes__[-1].partition("\n")[0] == scenario.splitlines()[-1]
 
 
 def test_a_master_without_mistakes_passes(tmp_path: Path) -> None:

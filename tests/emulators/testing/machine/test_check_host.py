@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import random
+import re
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
+from enum import Enum
+from math import inf
 from pathlib import Path
 from random import Random
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import pytest
 from click.testing import CliRunner
@@ -16,7 +20,7 @@ from hypothesis import strategies as st
 
 from tickrig import Bench
 from tickrig.emulators.commands.cli import main
-from tickrig.emulators.testing.machine.host_runs import HostStep
+from tickrig.emulators.testing.machine.host_runs import HostRuns, HostStep, parse_steps
 from tickrig.host.links.link import Link
 from tickrig.testing import (
     BenchMachine,
@@ -119,7 +123,7 @@ class Failing(Chair):
 
 def found(machine: type[BenchMachine], max_examples: int = 300) -> tuple[str, str]:
     """Return what a search finds: the exception, and the steps."""
-    with pytest.raises(AssertionError) as caught:
+    with pytest.raises(BaseException) as caught:  # noqa: PT011 - what a host may raise
         check_host(machine, max_examples=max_examples)
     note = caught.value.__notes__[-1]
     scenario, _, rest = note.partition("\n\n")
@@ -143,8 +147,9 @@ def test_a_mistake_is_found_and_is_short(
 ) -> None:
     text, scenario = found(machine)
     assert text.startswith(said)
-    head, *lines = scenario.splitlines()
+    head, *lines, last = scenario.splitlines()
     assert f"test_check_host.py:{machine.__name__}, {len(lines)} step" in head
+    assert re.fullmatch(rf"# invariant \w+, at [\d.]+ s: AssertionError: {said}", last)
     assert len(lines) <= 3
     assert all(step in scenario for step in steps)
 
@@ -158,6 +163,189 @@ def test_what_is_found_can_be_done_again(tmp_path: Path) -> None:
     with pytest.raises(AssertionError, match="a question was not answered"):
         replay_host(Trusting, tmp_path / "found.txt")
     replay_host(Chair, scenario)
+
+
+class Slow(Chair):
+    """Must be ready within 2 s, whatever it does."""
+
+    @invariant()
+    def it_is_in_time(self) -> None:
+        assert self.bench.now_us < 4_000_000, "it takes too long"
+
+
+class Greedy(Chair):
+    """Eats what it is given, and cannot take three at once."""
+
+    faults = inputs = ()
+
+    @host_rule(what=[[1], [1, 2, 3]])
+    def eat(self, what: list[int]) -> None:
+        eaten = 0
+        while what:
+            what.pop()
+            eaten += 1
+        assert eaten < 3, "it cannot eat so much"
+
+
+class Gear(Enum):
+    LOW, HIGH = 1, 2
+
+
+class Geared(Chair):
+    """Takes arguments that Python does not write as they are read."""
+
+    faults = inputs = ()
+
+    @host_rule(gear=list(Gear), limit=[1.0, inf], names=[("#", "\u2028")])
+    def shift(self, gear: Gear, limit: float, names: Sequence[str]) -> None:
+        assert (gear, limit) != (Gear.HIGH, inf), f"it cannot shift to {names}"
+
+
+class Gambler(Chair):
+    """Goes wrong by chance of its own."""
+
+    faults = inputs = ()
+
+    @host_rule()
+    def play(self) -> None:
+        assert random.random() < 0.8, "it has lost"
+
+
+class Quitter(Chair):
+    """Ends the program once it was not answered."""
+
+    @host_rule()
+    def ask(self) -> None:
+        super().ask()
+        if not self.answers[-1]:
+            sys.exit("no answer")
+
+
+class Reporting(Trusting):
+    """Uses what pytest has for failures."""
+
+    @invariant()
+    def each_is_answered(self) -> None:
+        if not all(self.answers):
+            pytest.fail("a question was not answered")
+
+
+@pytest.mark.parametrize(
+    ("machine", "violated"),
+    [
+        (Trusting, "invariant each_is_answered"),
+        (Fast, "invariant it_is_slow"),
+        (Failing, "end"),
+        (Slow, "invariant it_is_in_time"),
+        (Greedy, "rule eat"),
+        (Geared, "rule shift"),
+        (Gambler, "rule play"),
+        (Quitter, "rule ask"),
+        (Reporting, "invariant each_is_answered"),
+    ],
+)
+def test_no_step_of_what_is_found_can_be_left_out(
+    machine: type[BenchMachine], violated: str
+) -> None:
+    _, scenario = found(machine)
+    head, *steps, last = scenario.splitlines()
+    assert last.startswith(f"# {violated}, at ")
+    assert failure_of(machine, scenario) == last
+    assert steps
+    for number in range(len(steps)):
+        left = [head, *steps[:number], *steps[number + 1 :], ""]
+        assert failure_of(machine, "\n".join(left)) != last, steps[number]
+
+
+def failure_of(machine: type[BenchMachine], scenario: str) -> str:
+    """Return what is wrong in a replay, as the scenario says it."""
+    random.seed()  # a replay seeds itself
+    try:
+        replay_host(machine, scenario)
+    except BaseException as error:
+        return "# " + error.__notes__[-1].partition("\n")[0]
+    return ""
+
+
+def test_an_action_that_does_not_come_is_no_step() -> None:
+    _, scenario = found(Slow)
+    assert re.fullmatch(r"\+\S+ wait", scenario.splitlines()[1])
+
+
+def test_what_follows_a_failure_is_no_step() -> None:
+    text = "+1s call drive(speed=30)\n+1s call ask()\n+1s call ask()\n"
+    steps = parse_steps(text, "found.txt")
+    with HostRuns(Fast) as runs:
+        with pytest.raises(AssertionError, match="it is too fast"):
+            runs.run(steps)
+        assert runs.failure is not None
+        assert runs.failure.steps == steps[:1]
+
+
+def test_a_value_that_a_scenario_cannot_hold_is_refused() -> None:
+    class Odd(Chair):
+        @host_rule(what=[object()])
+        def take(self, what: object) -> None:
+            raise NotImplementedError
+
+    class Drawn(Chair):
+        @host_rule(gear=st.sampled_from(Gear))
+        def take(self, gear: Gear) -> None:
+            raise NotImplementedError
+
+    for machine, said in ((Odd, "take: what=<object"), (Drawn, "take: gear=<Gear.LOW: 1>")):
+        with pytest.raises(TypeError, match=f"{said}.* cannot be written in a scenario; draw"):
+            check_host(machine, seed=1)
+
+
+@given(st.floats() | st.binary(max_size=40) | st.sets(st.integers()))
+def test_a_value_that_is_drawn_is_read_again(value: Any) -> None:
+    step = HostStep(0, "call", "take", arguments={"what": value})
+    (read,) = parse_steps(str(step), "found.txt")
+    assert read == step or str(read) == str(step)  # nan differs from itself
+
+
+def test_a_run_that_does_not_fail_again_is_told() -> None:
+    class Forgetful(Chair):
+        faults = inputs = ()
+        asked: ClassVar[list[int]] = []
+
+        @host_rule()
+        def ask(self) -> None:
+            self.asked.append(1)
+            assert len(self.asked) != 5, "the fifth question of all"
+
+    text, scenario = found(Forgetful)
+    assert text.startswith("the fifth question of all")
+    assert "# it passed when it was repeated: the host keeps something" in scenario
+
+
+def test_a_strategy_that_raises_is_not_told_as_a_run() -> None:
+    def broken(number: int) -> int:
+        raise ZeroDivisionError(number)
+
+    class Broken(Chair):
+        @host_rule(what=st.integers().map(broken))
+        def take(self, what: int) -> None:
+            raise NotImplementedError
+
+    with pytest.raises(ZeroDivisionError) as caught:
+        check_host(Broken, seed=1)
+    assert not any("a scenario of" in note for note in getattr(caught.value, "__notes__", ()))
+
+
+def test_noise_without_a_rate_differs_from_run_to_run() -> None:
+    seeds = set()
+
+    class Watched(Noisy):
+        faults = ("garbage",)
+
+        def end(self) -> None:
+            if "garbage" in self.bench.transcript():
+                seeds.add(self.bench.transcript())
+
+    check_host(Watched, max_examples=60, seed=1)
+    assert len(seeds) > 10
 
 
 def test_a_command_does_it_again_without_hypothesis(tmp_path: Path) -> None:
