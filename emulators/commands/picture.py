@@ -21,14 +21,20 @@ _FORMATS: Final = (".png", ".svg", ".html")
 _PLOTTER: Final = "matplotlib"
 
 
-def check_plot(path: Path) -> None:
-    """Refuse before a run what could not be written after it."""
+def check_plot(path: Path, option: str = "--plot", *others: str) -> None:
+    """Refuse before a run what could not be written after it.
+
+    Args:
+        path: of the picture.
+        option: which names it, for the message.
+        others: further suffixes that the option takes, for the message.
+    """
     if path.suffix.lower() not in _FORMATS:
-        raise Refused(f"--plot {path}: the name ends in {', '.join(_FORMATS)}")
+        raise Refused(f"{option} {path}: the name ends in {', '.join((*_FORMATS, *others))}")
     if find_spec(_PLOTTER) is None:
-        raise Refused(f"--plot needs {_PLOTTER}: pip install 'tickrig[plot]'")
+        raise Refused(f"{option} needs {_PLOTTER}: pip install 'tickrig[plot]'")
     try:
-        whole_file.check_file(path, "--plot")
+        whole_file.check_file(path, option)
     except ValueError as error:
         raise Refused(str(error)) from None
 

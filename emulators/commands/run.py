@@ -71,7 +71,7 @@ class EmulatorRun(ABC, Generic[OptionsT]):
             if self._shows_warnings:
                 stack.enter_context(messages.warnings_shown())
             faults, scenario = self._checked()
-            if self._in_real_time:
+            if self._ends_in_order:
                 stack.enter_context(stopped_by_signals(self._stop))
             bench = self._running = self._open(stack)
             stack.callback(bench.close)
@@ -92,6 +92,7 @@ class EmulatorRun(ABC, Generic[OptionsT]):
                 gone = str(error)
             if player:
                 player.finish(bench.rig.now_us)
+            self._show(bench)
         status = self._sum_up(bench, player)
         if gone:
             raise messages.BusFailed(gone)
@@ -101,6 +102,14 @@ class EmulatorRun(ABC, Generic[OptionsT]):
     def _shows_warnings(self) -> bool:
         """Whether warnings go to standard error."""
         return True
+
+    @property
+    def _ends_in_order(self) -> bool:
+        """Whether Ctrl-C ends the run as its own end does."""
+        return self._in_real_time
+
+    def _show(self, bench: RunningEmulator) -> None:
+        """Show the run when it has ended, before all is given back."""
 
     @abstractmethod
     def _make(self) -> tuple[Operator, ScenarioParser]:

@@ -19,7 +19,6 @@ from tickrig.host.text import page_text
 from tickrig.host.text.values import counted, format_time
 
 _FOLDER: Final = "template"
-_PAGE: Final = "page.html"
 _STYLE: Final = "page.css"
 
 
@@ -30,9 +29,12 @@ class PageTemplate:
         package: the package.
         names: filters and globals of the template beside those of all pages.
         script: the file of its script, empty for none.
+        page: the file of the template.
     """
 
-    def __init__(self, package: str, names: Mapping[str, Any], script: str = "") -> None:
+    def __init__(
+        self, package: str, names: Mapping[str, Any], script: str = "", page: str = "page.html"
+    ) -> None:
         folder = files(package).joinpath(_FOLDER)
         self._style = folder.joinpath(_STYLE).read_text("utf-8")
         self._script = folder.joinpath(script).read_text("utf-8") if script else ""
@@ -53,7 +55,7 @@ class PageTemplate:
         }
         environment.filters |= {name: each for name, each in names.items() if name.islower()}
         environment.globals |= names
-        self._template = environment.get_template(_PAGE)
+        self._template = environment.get_template(page)
 
     def render(self, **values: Any) -> str:
         """Return the page of these values; the same values give the same bytes."""

@@ -23,6 +23,7 @@ from tickrig.emulators.testing.bench.errors import PortGone
 from tickrig.emulators.testing.bench.modes.doors import OutsideEnds
 from tickrig.emulators.testing.bench.mounts import BusMount, LineMount, Mount
 from tickrig.emulators.testing.bench.plan_parts import parts_of, rig_of
+from tickrig.emulators.testing.commands import run_output
 from tickrig.emulators.testing.rig_file.plan import RigFileError, RigPlan, bus_text, device_text
 from tickrig.emulators.testing.rig_file.reader import read_rig_file
 from tickrig.host.cli.messages import Refused, refuse_path, say
@@ -32,6 +33,8 @@ from tickrig.host.text.values import Setting, format_time
 _ALONE: Final = "{wire}: no bus outside; [real.{wire}] with interface and channel joins one."
 _NOWHERE: Final = "-"
 _MISTAKES: Final = 2
+_INTERRUPTED: Final = 130
+"""Exit status after Ctrl-C in virtual time, where the run had an end of its own."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,15 +44,28 @@ class BenchOptions(RunOptions):
     Attributes:
         virtual: in virtual time, as fast as it goes.
         for_us: how long; None until somebody ends it.
+        plots: signals to draw, each a diagram.
+        files: where they are drawn; none for the terminal.
+        report: the page of the run.
+        command: what repeats the run.
     """
 
     virtual: bool = False
     for_us: int | None = None
+    plots: tuple[str, ...] = ()
+    files: tuple[Path, ...] = ()
+    report: Path | None = None
+    command: tuple[str, ...] = ()
 
     @property
     def in_real_time(self) -> bool:
         """Unless virtual time is asked for."""
         return not self.virtual
+
+    @property
+    def shows(self) -> bool:
+        """Whether something is shown after the run, also after Ctrl-C."""
+        return bool(self.plots or self.report)
 
 
 def run_bench(
@@ -80,9 +96,35 @@ def run_bench(
         refuse_path("file", error)
     plan = plan if seed is None else replace(plan, seed=seed)
     control = None if virtual else control or plan.real.control
-    options = BenchOptions(virtual=virtual, control=control, **others)
+    command = _command(file, plan.seed, virtual=virtual, **others)
+    options = BenchOptions(virtual=virtual, control=control, command=command, **others)
     with mistakes_in(each.type for each in plan.devices.values()):
         return _BenchRun(plan, options).run()
+
+
+def _command(
+    file: Path,
+    seed: int,
+    *,
+    virtual: bool,
+    for_us: int | None,
+    faults: tuple[str, ...],
+    **others: object,
+) -> tuple[str, ...]:
+    """Return the command line that repeats a run."""
+    words = ["tickrig", "run", str(file), *["--virtual"] * virtual]
+    words += [] if for_us is None else ["--for", _span(for_us)]
+    words += [word for fault in faults for word in ("--fault", fault)]
+    return (*words, "--seed", str(seed))
+
+
+def _span(us: int) -> str:
+    """Write a duration as `--for` takes it.
+
+    >>> _span(3_000_000), _span(1_500)
+    ('3s', '1500us')
+    """
+    return f"{us}us" if us % 1_000_000 else f"{us // 1_000_000}s"
 
 
 class _BenchRun(EmulatorRun[BenchOptions]):
@@ -99,6 +141,13 @@ class _BenchRun(EmulatorRun[BenchOptions]):
         self._outside: OutsideEnds | None = None
         self._mounts: list[Mount] = []
         self._is_over = False
+        inputs = [plan.path] if plan.path else []
+        self._plots = run_output.RunPlots(options.plots, options.files, inputs)
+        self._page = (
+            run_output.RunPage(options.report, plan, options.command, inputs)
+            if options.report
+            else None
+        )
 
     def _make(self) -> tuple[Operator, ScenarioParser]:
         try:
@@ -115,11 +164,20 @@ class _BenchRun(EmulatorRun[BenchOptions]):
             self._outside = self._open_outside(stack)
             self._clock = self._outside.clock
         try:
-            return rig_of(
-                self._parts, self._plan, self._outside, trace=self._options.trace, keeps=False
+            rig = rig_of(
+                self._parts,
+                self._plan,
+                self._outside,
+                trace=self._options.trace,
+                keeps=self._page is not None and self._options.virtual,
             )
         except OSError as error:
             refuse_path("trace", error)
+        if self._options.plots:
+            self._plots.watch(rig)
+        if self._page:
+            self._page.watch(rig)
+        return rig
 
     def _open_outside(self, stack: ExitStack) -> OutsideEnds:
         try:
@@ -153,6 +211,21 @@ class _BenchRun(EmulatorRun[BenchOptions]):
         super()._go_on(bench)
         if self._is_over and self._options.for_us is not None:
             bench.rig.run_to(self._options.for_us)  # with the ticks of that time
+
+    @property
+    def _ends_in_order(self) -> bool:
+        return super()._ends_in_order or self._options.shows
+
+    def _show(self, bench: RunningEmulator) -> None:
+        if self._options.plots:
+            self._plots.finish(bench.rig.now_us, Path(self._plan.path or "").name)
+        if self._page:
+            rows = map(self._row, self._mounts)
+            self._page.finish(virtual=self._options.virtual, rows=rows, paths=self._plots.paths)
+
+    def _sum_up(self, bench: RunningEmulator, player: ScenarioPlayer | None) -> int:
+        status = super()._sum_up(bench, player)
+        return _INTERRUPTED if self._stopped and self._options.virtual else status
 
     def _end(self, bench: RunningEmulator) -> None:
         self._is_over = True

@@ -22,6 +22,20 @@ from tickrig.host.cli.options import PATH, time_option, works_in
     metavar="[OWNER/]NAME[=ARGUMENT][@FROM[-TO]]",
     help="One more fault of a device or a wire; may be repeated.",
 )
+@click.option(
+    *("--plot", "plots"),
+    multiple=True,
+    metavar="SIGNALS",
+    help="Draw signals after the run: x_m,y_m over time, x_m:y_m as a path; may be repeated.",
+)
+@click.option(
+    *("-o", "files"),
+    multiple=True,
+    type=PATH,
+    metavar="FILE",
+    help="Of --plot: .png .svg .html .csv.  [the terminal]",
+)
+@click.option("--report", type=PATH, metavar="FILE.html", help="Write the run as a page.")
 @click.option("--seed", type=click.IntRange(0), help="Seed of all chance.  [that of FILE]")
 @click.option("-v", "--verbose", count=True, help="Show events; -vv shows every line and frame.")
 @works_in("tickrig.emulators.testing.commands.bench_run:run_bench")
@@ -31,11 +45,19 @@ def run(**options: Any) -> None:
     In real time each serial line is at a pseudo-terminal, and at the links, network
     doors and CAN buses of the section [real]; a table says where. Real devices of the section
     [hardware] are not touched. Exit status 2 if the file has mistakes, 3 if the recording
-    is not whole.
+    is not whole, 130 if Ctrl-C ended a run in virtual time.
+
+    A signal is an input or output as `tickrig ctl ... describe` lists it, as
+    left/shaft_deg or left.shaft_deg, shaft_deg if one device alone has it; or a
+    signal of the section [signal]. Ctrl-C ends the run, and the curves and the page show it
+    so far.
 
     \b
     tickrig run rig.toml --control /tmp/rig.ctl
     tickrig ctl /tmp/rig.ctl describe
     tickrig run rig.toml --virtual --for 10s --trace run.trace
     tickrig replay run.trace
+    tickrig run rig.toml --virtual --for 10s --plot left/shaft_deg,right/shaft_deg
+    tickrig run rig.toml --virtual --for 10s --plot x_m:y_m --plot speed_m_s -o run.png
+    tickrig run rig.toml --virtual --for 10s --report run.html
     """  # noqa: D301 - click wants the backspace

@@ -15,9 +15,11 @@ from tickrig.emulators.testing.report.bench_report import (
     BenchReport,
     JournalLine,
     Outcome,
+    RunEnvironment,
     TestRecord,
 )
 from tickrig.emulators.testing.report.timeline import Timeline, timeline_of
+from tickrig.host.canmon.model.graph.plot import widened
 from tickrig.host.text import page_text
 from tickrig.host.text.html_page import PageTemplate
 from tickrig.host.text.values import counted
@@ -157,9 +159,77 @@ def html_page(report: BenchReport, room_bytes: int = _PAGE_BYTES) -> str:
 
 
 @cache
-def _template() -> PageTemplate:
-    """Return the template; it is compiled once."""
-    return PageTemplate(__package__, {"Outcome": Outcome}, script="page.js")
+def _template(page: str = "page.html") -> PageTemplate:
+    """Return a template; it is compiled once."""
+    return PageTemplate(__package__, {"Outcome": Outcome}, script="page.js", page=page)
+
+
+# The page of one run without tests, as of `tickrig run --report`.
+
+_PATH_SIZE: Final = 400
+"""Of the longer side of a path, in units of its picture."""
+_PATH_POINTS: Final = 4_000
+
+
+@dataclass(frozen=True, slots=True)
+class PagePath:
+    """A path: one signal over another.
+
+    Attributes:
+        x: name and unit.
+        y: name and unit.
+        points: values of both.
+    """
+
+    x: tuple[str, str]
+    y: tuple[str, str]
+    points: tuple[tuple[float, float], ...]
+
+    @property
+    def texts(self) -> list[str]:
+        """What is drawn: each name with its least and greatest value and its unit."""
+        return [
+            f"{name} {min(column):.6g} to {max(column):.6g} {unit}".rstrip()
+            for (name, unit), column in zip((self.x, self.y), self._columns, strict=True)
+        ]
+
+    @property
+    def _columns(self) -> list[tuple[float, ...]]:
+        return list(zip(*self.points, strict=True))
+
+    @property
+    def drawn(self) -> tuple[float, float, str]:
+        """Width and height of the picture, and its path; one scale if both have one unit."""
+        (left, right), (low, high) = (widened(min(c), max(c)) for c in self._columns)
+        x_scale, y_scale = _PATH_SIZE / (right - left), _PATH_SIZE / (high - low)
+        if self.x[1] == self.y[1]:
+            x_scale = y_scale = min(x_scale, y_scale)
+        step = -(-len(self.points) // _PATH_POINTS)
+        kept = (*self.points[:-1:step], self.points[-1])
+        places = (f"{(x - left) * x_scale:.4g} {(high - y) * y_scale:.4g}" for x, y in kept)
+        size = (right - left) * x_scale, (high - low) * y_scale
+        return max(size[0], 8), max(size[1], 8), f"M{'L'.join(places)}"
+
+
+def run_page(
+    record: TestRecord,
+    run: RunEnvironment,
+    wires: Sequence[Sequence[str]],
+    paths: Sequence[PagePath] = (),
+) -> str:
+    """Return the page of one run.
+
+    Args:
+        record: what happened; `nodeid` is the title, `reason` how it went.
+        run: where and how it ran.
+        wires: name, place, rate and devices of each wire.
+        paths: signals that are drawn over each other.
+    """
+    (place,) = overview.reported([record])
+    (shown,) = _on_page([place], _PAGE_BYTES)
+    return _template("run.html").render(
+        record=record, test=shown, run=run, wires=wires, paths=[one for one in paths if one.points]
+    )
 
 
 def _on_page(places: Sequence[overview.ReportedTest], room_bytes: int) -> Iterator[_TestOnPage]:

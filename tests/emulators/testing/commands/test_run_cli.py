@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
+from tests.emulators.testing.report.html_tree import parse_page
 from tickrig.emulators.testing.commands.replay_cli import replay_command
 from tickrig.emulators.testing.commands.run_cli import run
 from tickrig.host.control.client import ControlClient
@@ -151,6 +152,127 @@ def test_a_mistake_of_a_user_s_class_is_one_line(folder: Path) -> None:
     assert (status, "Traceback" in err) == (2, False)
 
 
+MOVING = """\
+[device.left]
+type = "epos"
+node_id = 1
+[device.right]
+type = "epos"
+node_id = 2
+[device.left.start]
+load_nm = { ramp = [0, 1], over = "1s" }
+[signal]
+half = { formula = "0.5 * t" }
+[body]
+kind = "differential"
+left = "left"
+right = "right"
+wheel_radius_m = 0.078
+tread_m = 0.33
+mass_kg = 8.0
+"""
+VIRTUAL = ("moving.toml", "--virtual", "--for", "2s")
+
+
+@pytest.fixture
+def moving(folder: Path) -> Path:
+    (folder / "moving.toml").write_text(MOVING)
+    return folder
+
+
+@pytest.mark.usefixtures("moving")
+def test_curves_are_drawn_in_the_terminal() -> None:
+    status, out, err = tickrig_run(*VIRTUAL, "--plot", "left.shaft_deg, half", "--plot", "x_m:y_m")
+    assert (status, err) == (0, "ran 2.000 s; can lost: 0\n")
+    curves, path = out.split("\n\n", 1)
+    assert [line[:16] for line in curves.splitlines()[:2]] == [
+        "━ left/shaft_deg",
+        "━ half 1  (axis ",
+    ]
+    assert curves.splitlines()[-1].rstrip().endswith(" s")
+    assert path.startswith("body/y_m -0")
+    assert any("\u2800" < letter < "\u28ff" for letter in path)
+
+
+def test_curves_are_written_whole_as_the_name_says(moving: Path) -> None:
+    pytest.importorskip("matplotlib")
+    words = (*VIRTUAL, "--plot", "left/shaft_deg,half", "--plot", "x_m:y_m")
+    files = ("a.png", "a.svg", "a.html", "a.csv")
+    assert tickrig_run(*words, *(word for file in files for word in ("-o", file)))[:2] == (0, "")
+    assert (moving / "a.png").read_bytes().startswith(b"\x89PNG")
+    assert "<svg" in (moving / "a.svg").read_text()
+    assert (moving / "a.html").read_text().startswith("<!DOCTYPE html>")
+    head, *rows = (moving / "a.csv").read_text().splitlines()
+    assert head == "t_s,left/shaft_deg [deg],half,body/x_m [m],body/y_m [m]"
+    assert rows[-1].startswith("2.000000,")
+    before = (moving / "a.csv").read_bytes()
+    tickrig_run(*words, "-o", "a.csv")
+    assert (moving / "a.csv").read_bytes() == before
+
+
+def test_an_object_of_a_node_is_a_curve_though_its_name_has_a_colon(moving: Path) -> None:
+    words = ("--plot", "left/0x1003:0", "--plot", "left/0x1003:0:right/0x1003:0", "-o", "a.csv")
+    assert tickrig_run(*VIRTUAL, *words)[0] == 0
+    head = (moving / "a.csv").read_text().splitlines()[0]
+    assert head.split(",")[1:] == ["left/0x1003:0 [UNSIGNED8]", "right/0x1003:0 [UNSIGNED8]"]
+
+
+@pytest.mark.usefixtures("moving")
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        ("--plot left/shaft_dg", "no signal 'left/shaft_dg'; did you mean 'left/shaft_deg'?"),
+        ("--plot x_m:y_n", "no signal 'y_n'; did you mean"),
+        ("--plot x_m,", "no signal ''"),
+        ("--plot shaft_deg", "'shaft_deg' is of several devices: left/shaft_deg, right/shaft_deg"),
+        ("--plot left/state", "left/state is a text, as 'Off'; a curve needs numbers"),
+        ("--plot a.svg", "it takes names of signals; for the file write -o a.svg"),
+        ("-o a.png", "-o needs signals: --plot x_m,y_m"),
+        ("--plot x_m -o a.doc", "-o a.doc: the name ends in .png, .svg, .html, .csv"),
+        ("--plot x_m -o no/a.csv", "-o no/a.csv: no directory no"),
+        ("--plot x_m -o moving.toml", "-o moving.toml: the run reads this file"),
+        ("--report a.json", "--report a.json: the name ends in .html, .htm"),
+        ("--report no/a.html", "report no/a.html: no directory no"),
+    ],
+)
+def test_what_cannot_be_shown_is_told_before_the_run(words: str, complaint: str) -> None:
+    status, out, err = tickrig_run(*VIRTUAL, *words.split())
+    assert (status, out) == (2, "")
+    assert complaint in err
+    assert "ran " not in err
+
+
+def test_the_page_of_a_run_has_devices_faults_curves_and_how_to_repeat_it(moving: Path) -> None:
+    fault = "left/shaft_blocked@500ms-1s"
+    words = (*VIRTUAL, "--fault", fault, "--plot", "x_m:y_m", "-o", "a.csv")
+    assert tickrig_run(*words, "--report", "run.html")[0] == 0
+    page = parse_page((moving / "run.html").read_text())
+    assert [one.text for one in page.all("h1")] == ["moving.toml"]
+    text = page.text
+    for shown in ("left (epos, node-ID 1), right (epos, node-ID 2)", "701#00  boot-up"):
+        assert shown in text
+    assert "left/shaft_blocked from 0.5 s to 1 s" in " ".join(text.split())
+    assert f"tickrig run {' '.join(VIRTUAL)} --fault {fault} --seed 0" in text
+    names = {lane.attributes.get("data-name") for lane in page.by_class("lane")}
+    assert "left/drive_state" in names
+    assert "body/x_m 0 to " in text
+    assert "wheel_radius_m = 0.078" in text
+    (trace,) = page.all("pre", **{"aria-label": "Trace"})
+    (moving / "kept.trace").write_text(trace.text)
+    replayed = CliRunner().invoke(replay_command, ["kept.trace"])
+    assert replayed.stdout.startswith("identical")
+
+
+def test_what_a_rig_file_says_is_no_markup_on_the_page(folder: Path) -> None:
+    (folder / "<b>&.toml").write_text(
+        '# </pre><script>alert(1)</script>\n[device.a]\ntype = "rrc"\n'
+    )
+    assert tickrig_run("<b>&.toml", "--virtual", "--for", "1s", "--report", "run.html")[0] == 0
+    page = parse_page((folder / "run.html").read_text())
+    assert [one.text for one in page.all("h1")] == ["<b>&.toml"]
+    assert len(page.all("script")) == 1
+
+
 @contextmanager
 def live(*words: str, lines: int) -> Iterator[tuple[subprocess.Popen[str], list[str]]]:
     """Run a bench in a process of its own; yield it and the lines that say where it is."""
@@ -196,3 +318,18 @@ def test_in_real_time_it_ends_by_itself_if_it_shall(folder: Path) -> None:
         _, err = process.communicate(timeout=30)
     assert lines[2].startswith("can    -")
     assert (process.returncode, "can: no bus outside" in err) == (0, True)
+
+
+@pytest.mark.realtime
+@pytest.mark.parametrize("mode", [(), ("--virtual", "--for", "999999s")])
+def test_ctrl_c_ends_a_run_and_what_was_seen_is_written(
+    moving: Path, mode: tuple[str, ...]
+) -> None:
+    words = ("moving.toml", *mode, "--plot", "half", "-o", "a.csv", "--report", "run.html", "-vv")
+    with live(*words, lines=3) as (process, _):
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=60)
+    assert (process.returncode, "Traceback" in err) == (130 if mode else 0, False)
+    assert "ran " in err
+    assert (moving / "a.csv").read_text().startswith("t_s,half\n")
+    assert "moving.toml" in (moving / "run.html").read_text()
