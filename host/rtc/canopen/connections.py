@@ -118,6 +118,7 @@ class PdoLinks:
         self._nodes, self._notify = nodes, notify
         self.links = list(links)
         self._made: dict[definition.PdoLink, int] = {}  # by which CAN-ID
+        self._own: dict[definition.PdoName, int] = {}  # CAN-ID of an RPDO without its link
 
     def add(self, now_us: int, link: definition.PdoLink) -> None:
         """Want a link, and make it; ServerRefused if it cannot be now."""
@@ -132,7 +133,7 @@ class PdoLinks:
         """Give the RPDO its own COB-ID again; ServerRefused if there is no such link."""
         if link not in self.links:
             raise definition.ServerRefused(f"{link.source} and {link.target} are not linked")
-        own = self.layout(link.target).cob_id
+        own = self._own.get(link.target, self.layout(link.target).cob_id)
         self.links.remove(link)
         self._made.pop(link, None)
         self._write(now_us, link, own, linked=False)
@@ -165,7 +166,9 @@ class PdoLinks:
 
     def _make(self, now_us: int, link: definition.PdoLink) -> None:
         """Give the RPDO the COB-ID of the TPDO."""
-        cob_id = self.layout(link.source).cob_id
+        cob_id, own = self.layout(link.source).cob_id, self.layout(link.target).cob_id
+        if own != cob_id:  # else the node was set up again while it was linked
+            self._own[link.target] = own
         if self._made.get(link) != cob_id:
             self._write(now_us, link, cob_id, linked=True)
 

@@ -11,7 +11,8 @@ from typing import Final
 from tickrig.host.canopen.eds import read_sound
 from tickrig.wire.canopen.eds.eds_device import EdsDevice
 from tickrig.wire.canopen.eds.eds_file import EdsError, Finding
-from tickrig.wire.canopen.pdo import MappedObject
+from tickrig.wire.canopen.eds.object_table import Access
+from tickrig.wire.canopen.pdo import MAX_PDO_BITS, MappedObject
 from tickrig.wire.rtc_canopen import PortDirection
 
 # What RTC-CANopen raises where a person is to read it.
@@ -40,6 +41,9 @@ class ServerRefused(ValueError):  # noqa: N818 - what the server did
 
 PDO_COUNT: Final = 512
 """PDOs in each direction (CiA 301, object dictionary: 1400h to 15FFh, 1800h to 19FFh)."""
+
+PDO_CAN_IDS: Final = range(0x181, 0x6E0)
+"""What CiA 301 leaves to PDOs; some of it belongs to SDO."""
 
 
 class Role(StrEnum):
@@ -110,7 +114,7 @@ class PdoEntry:
 
     Attributes:
         mapping: the objects in it.
-        cob_id: its COB-ID.
+        cob_id: its COB-ID; with bit 31 the PDO stays off, with bit 30 nobody may request it.
         type: transmission type.
         inhibit_100us: inhibit time in 100 us.
         event_ms: event timer.
@@ -252,6 +256,21 @@ TPDOS: Final = range(0x1800, 0x1A00)
 
 
 @dataclass(frozen=True, slots=True)
+class MappableObject:
+    """An object that PDOs of a device may carry.
+
+    Attributes:
+        mapped: its mapping entry.
+        name: in the EDS.
+        way: Access.TPDO, Access.RPDO or both.
+    """
+
+    mapped: MappedObject
+    name: str
+    way: Access
+
+
+@dataclass(frozen=True, slots=True)
 class DeviceFile:
     """A kind of device.
 
@@ -262,6 +281,7 @@ class DeviceFile:
         pdos: communication parameters that it has.
         relative: those of `defaults` to which a device adds its node-ID.
         findings: what is wrong in the file, whose objects are then not used.
+        mappable: objects that its PDOs may carry.
     """
 
     identity: Mapping[tuple[int, int], int]
@@ -270,6 +290,7 @@ class DeviceFile:
     defaults: Mapping[tuple[int, int], bytes]
     relative: frozenset[tuple[int, int]] = frozenset()
     findings: tuple[Finding, ...] = ()
+    mappable: tuple[MappableObject, ...] = ()
 
 
 def read_device_file(path: Path) -> DeviceFile:
@@ -291,7 +312,18 @@ def read_device_file(path: Path) -> DeviceFile:
         defaults,
         frozenset((row.index, row.sub) for row in device.entries if row.relative),
         findings,
+        tuple(_mappable(device)),
     )
+
+
+def _mappable(device: EdsDevice) -> Iterator[MappableObject]:
+    for row in device.entries:
+        way = row.access & (Access.TPDO | Access.RPDO)
+        if way and 0 < row.data_type.bits <= MAX_PDO_BITS:
+            mapped = MappedObject(row.index, row.sub, row.data_type.bits)
+            info = device.objects[row.index]
+            own = row.name if row.sub == 0 or row.name.startswith(info.name) else ""
+            yield MappableObject(mapped, own or f"{info.name}: {row.name}", way)
 
 
 def _read(path: Path) -> tuple[EdsDevice, tuple[Finding, ...]]:

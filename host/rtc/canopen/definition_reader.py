@@ -18,6 +18,7 @@ from typing import Any, Final, NoReturn
 from tickrig.host.rtc.canopen import definition
 from tickrig.host.text.document import FilePlace, Item
 from tickrig.host.text.yaml_reader import read_yaml
+from tickrig.wire.canopen.nmt import FLAG_30, INVALID
 from tickrig.wire.canopen.pdo import MAX_PDO_BITS, MappedObject
 from tickrig.wire.rtc_canopen import PORT_TYPES, PortDirection
 
@@ -312,12 +313,23 @@ def _ports(node: Item, place: str) -> dict[str, str]:
 def _pdo(node: Item, place: str) -> definition.PdoEntry:
     fields: dict[str, _Reader] = {
         "mapping": _mapping,
-        "cob_id": whole(0x181, 0x6DF),
+        "cob_id": _cob_id,
         "type": _U8,
         "inhibit_100us": _U16,
         "event_ms": _U16,
     }
     return definition.PdoEntry(**_read_table(node, place, fields))
+
+
+def _cob_id(node: Item, place: str) -> int:
+    """Read a CAN-ID of a PDO, with bit 31 if it is off, with bit 30 if nobody may request it."""
+    flags = INVALID | FLAG_30
+    ids = definition.PDO_CAN_IDS
+    number = whole(ids.start, flags | ids.stop - 1)(node, place)
+    if number & ~flags not in ids:
+        allowed = f"0x{ids.start:X}..0x{ids.stop - 1:X}, with bit 31 if the PDO is off"
+        _refuse(node, f"{place}: 0x{number:X} is not {allowed}")
+    return int(number)
 
 
 def _sdo_port(node: Item, place: str) -> definition.SdoPortEntry:

@@ -244,6 +244,10 @@ class NodeOperations:
                 self._notify(ServerEventType.FOREIGN_TRANSITION, self._entry.id, text)
             self._move(proxy, _STATES[state])
 
+    def leave_operational(self) -> Script[None]:
+        """Return the script that brings the device to Pre-operational in the way of its role."""
+        return self._life.deactivate(self._entry)
+
     def say(self, command: NmtCommand) -> None:
         """Send a command after all that is under way."""
         self._run("command", _say(command))

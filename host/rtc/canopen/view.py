@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from pathlib import Path
+from typing import Any, Final, Generic, TypeVar
 
 from tickrig.host.canopen.dialogue import Failure, QueuedScript, Script
 from tickrig.host.canopen.sdo_transfer import download, upload
+from tickrig.host.rtc.canopen import pdo_edit
 from tickrig.host.rtc.canopen.definition import (
+    DeviceFile,
     PdoLink,
     PdoName,
     Role,
@@ -113,21 +116,29 @@ class SystemView:
     waiting: tuple[RtConnection, ...]
 
 
-class PendingTransfer:
-    """An SDO transfer that somebody waits for.
+T = TypeVar("T")
+
+
+class PendingTransfer(Generic[T]):
+    """SDO transfers that somebody waits for.
+
+    Args:
+        empty: the result until there is another.
 
     Attributes:
-        done: it has ended.
-        data: what was read; empty after a write.
-        problem: why it failed, empty if it did not.
+        done: they have ended.
+        data: what was read; `empty` after a write.
+        problem: why they failed, empty if they did not.
     """
 
-    def __init__(self) -> None:
-        self.done, self.data, self.problem = False, b"", ""
+    def __init__(self, empty: T) -> None:
+        self.done, self.data, self.problem = False, empty, ""
 
-    def succeed(self, data: bytes | None) -> None:
+    def succeed(self, data: T | None) -> None:
         """Take the result."""
-        self.done, self.data = True, data or b""
+        self.done = True
+        if data is not None:
+            self.data = data
 
     def fail(self, failure: Failure | str) -> None:
         """Take what went wrong."""
@@ -231,18 +242,66 @@ class ServerView:
         """End such a link; ServerRefused if there is none."""
         self._server.links.remove(self._server.now_us, PdoLink(source, target))
 
-    def read(self, node_id: int, index: int, sub: int) -> PendingTransfer:
+    def read(self, node_id: int, index: int, sub: int) -> PendingTransfer[bytes]:
         """Read an object of a device; ServerRefused if there is no such node."""
-        return self._transfer(node_id, upload(index, sub))
+        return self._transfer(node_id, upload(index, sub), b"")
 
-    def write(self, node_id: int, index: int, sub: int, data: bytes) -> PendingTransfer:
+    def write(self, node_id: int, index: int, sub: int, data: bytes) -> PendingTransfer[bytes]:
         """Write an object of a device; ServerRefused if there is no such node."""
-        return self._transfer(node_id, download(index, sub, data))
+        return self._transfer(node_id, download(index, sub, data), b"")
+
+    def read_pdos(self, node_id: int) -> PendingTransfer[pdo_edit.Pdos]:
+        """Read all PDOs of a device; ServerRefused if it does not answer now."""
+        node = self._node(node_id)
+        pdo_edit.check_answers(node)
+        return self._transfer(node_id, pdo_edit.read_pdos(node.file), {})
+
+    def write_pdos(
+        self, node_id: int, before: pdo_edit.Pdos, wanted: pdo_edit.Pdos
+    ) -> PendingTransfer[None]:
+        """Change PDOs of a device, and set it up again; ServerRefused if that cannot be now.
+
+        Args:
+            node_id: the node.
+            before: what it has.
+            wanted: what it is to have, of some of them.
+        """
+        node, transfer = self._node(node_id), PendingTransfer(None)
+        linked = {link.target.index for link in self.links if link.target.node == node_id}
+        rewrite = pdo_edit.Rewrite(node, before, wanted, linked & wanted.keys())
+
+        def done(_: None) -> None:
+            transfer.succeed(None)
+            rewrite.done()
+
+        def failed(failure: Failure) -> None:
+            transfer.fail(failure)
+            rewrite.failed(failure)
+
+        def dropped() -> None:
+            transfer.drop()
+            transfer.problem += "; its old PDOs are written when it boots"
+
+        job = QueuedScript("PDOs", rewrite.begin(), done, failed, dropped)
+        node.run(self._server.now_us, job)
+        return transfer
+
+    def read_parameters(self, node_id: int, eds: Path) -> PendingTransfer[Mapping[int, bytes]]:
+        """Read what a DCF contains of a device; ServerRefused if it does not answer now."""
+        pdo_edit.check_answers(self._node(node_id))
+        return self._transfer(node_id, pdo_edit.read_parameters(eds), {})
+
+    def device_file(self, node_id: int) -> DeviceFile:
+        """Return what the EDS of a node says; ServerRefused if there is no such node."""
+        return self._node(node_id).file
 
     def definition(self) -> SystemDefinition:
-        """Return the definition with connections and links as they are now."""
+        """Return the definition with PDOs, connections and links as they are now."""
         return replace(
-            self._server.definition, pdo_links=self.links, rt_connections=self.connections
+            self._server.definition,
+            nodes=tuple(node.entry for node in self._server.nodes.values()),
+            pdo_links=self.links,
+            rt_connections=self.connections,
         )
 
     def _node(self, node_id: int) -> ServedNode:
@@ -251,8 +310,10 @@ class ServerView:
             raise ServerRefused(f"node {node_id} is none of: {known}")
         return node
 
-    def _transfer(self, node_id: int, script: Script[bytes] | Script[None]) -> PendingTransfer:
-        transfer = PendingTransfer()
+    def _transfer(
+        self, node_id: int, script: Script[T] | Script[None], empty: T
+    ) -> PendingTransfer[T]:
+        transfer = PendingTransfer(empty)
         callbacks = transfer.succeed, transfer.fail, transfer.drop
         job = QueuedScript("transfer", script, *callbacks, moves=False)
         self._node(node_id).run(self._server.now_us, job)

@@ -16,12 +16,13 @@ from textual.containers import Container
 from tickrig.host.canmon.model.decode.decoded import write_entry
 from tickrig.host.rtc.canopen.definition import ServerRefused
 from tickrig.host.rtc.canopen.editor.objects_pane import ObjectsPane
+from tickrig.host.rtc.canopen.editor.pdo_screen import PdoScreen
 from tickrig.host.rtc.canopen.editor.session import EditorSession
 from tickrig.host.rtc.canopen.editor.system_pane import Item, SystemPane, connect, link, remove
-from tickrig.host.rtc.canopen.editor.widgets import CursorView, QuestionScreen
 from tickrig.host.rtc.canopen.events import ServerEvent, ServerEventType
 from tickrig.host.rtc.canopen.served_node import NodePhase
 from tickrig.host.rtc.canopen.view import NodeView, ServerView
+from tickrig.host.rtc.editor.widgets import CursorView, QuestionScreen
 from tickrig.host.rtc.states import RtcRefused
 from tickrig.host.tui import FramedApp, KeyFooter, Line, LineView
 
@@ -107,6 +108,7 @@ class SystemEditor(FramedApp):
         Binding("c", "join('connect')", "connect"),
         Binding("k", "join('link')", "link"),
         Binding("x", "remove", "remove"),
+        Binding("p", "pdos", "PDOs"),
         Binding("g", "read", "read the object again", show=False),
         Binding("w", "write", "write"),
         Binding("l", "live", "live"),
@@ -167,6 +169,9 @@ class SystemEditor(FramedApp):
         marked = self.system.marked.key if self.system.marked else ""
         file = self.session.path.name
         self.status.show([_status_line(system.nodes, file, self._bus, marked)])
+        for screen in self.screen_stack:
+            if isinstance(screen, PdoScreen):
+                screen.look()
         follows = self.events.at_end
         width = max(1, self.events.scrollable_content_region.width)
         self.events.show([line for event in events for line in _event_lines(event, width)])
@@ -216,6 +221,13 @@ class SystemEditor(FramedApp):
         """End the link or connection under the cursor."""
         if (row := self.system.row) is not None:
             self._command(lambda view: remove(view, row.item))
+
+    def action_pdos(self) -> None:
+        """Show the PDOs of the node in whose rows the cursor is, and change them."""
+        if node_id := self.system.node_id:
+            self.push_screen(PdoScreen(self.session, node_id))
+        else:
+            self._refuse("go to a row of a node: components have no PDOs")
 
     def action_read(self) -> None:
         """Read the object under the cursor again."""

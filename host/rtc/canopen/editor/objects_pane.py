@@ -13,9 +13,9 @@ from tickrig.host.canmon.model.decode.node_memory import (
     ObjectText,
     read_eds_objects,
 )
-from tickrig.host.rtc.canopen.editor.widgets import CursorRow, CursorView
 from tickrig.host.rtc.canopen.served_node import NodePhase
 from tickrig.host.rtc.canopen.view import PendingTransfer, ServerView
+from tickrig.host.rtc.editor.widgets import CursorRow, CursorView
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.eds_file import EdsError
 from tickrig.wire.canopen.eds.eds_value import parse_value
@@ -61,8 +61,8 @@ class _NodeObjects:
         self._reads, self._ages = 0, dict[Entry, int]()
         self._wanted: list[Entry] = []
         self._rows: dict[Entry, tuple[object, _ObjectRow]] = {}
-        self._reading: dict[Entry, PendingTransfer] = {}
-        self._writing: list[tuple[Entry, PendingTransfer]] = []
+        self._reading: dict[Entry, PendingTransfer[bytes]] = {}
+        self._writing: list[tuple[Entry, PendingTransfer[bytes]]] = []
 
     @property
     def rows(self) -> list[_ObjectRow]:
@@ -129,7 +129,7 @@ class _NodeObjects:
         ]
         return sorted(due, key=lambda entry: self._ages.get(entry, 0))
 
-    def _take(self, entry: Entry, transfer: PendingTransfer) -> None:
+    def _take(self, entry: Entry, transfer: PendingTransfer[bytes]) -> None:
         if transfer.problem:
             self._problems[entry] = _reason(entry, transfer)
             return
@@ -168,7 +168,7 @@ class _NodeObjects:
         return CursorRow(write_entry(entry), (*head, *rest), entry)
 
 
-def _reason(entry: Entry, transfer: PendingTransfer) -> str:
+def _reason(entry: Entry, transfer: PendingTransfer[bytes]) -> str:
     """Return why a transfer failed, in the columns that a row of 80 leaves."""
     return transfer.problem.removeprefix(f"{write_entry(entry)} ").removeprefix("aborted: ")
 

@@ -9,7 +9,6 @@ from typing import ClassVar, Final
 from textual.binding import Binding, BindingType
 
 from tickrig.host.rtc.canopen.definition import PdoLink, PdoName, RtConnection, ServerRefused
-from tickrig.host.rtc.canopen.editor.widgets import CursorRow, CursorView
 from tickrig.host.rtc.canopen.served_node import NodePhase
 from tickrig.host.rtc.canopen.view import (
     NOT_HEARD,
@@ -20,6 +19,7 @@ from tickrig.host.rtc.canopen.view import (
     ServerView,
     SystemView,
 )
+from tickrig.host.rtc.editor.widgets import CursorRow, CursorView
 from tickrig.host.tui import Line
 
 Item = NodeView | ComponentView | PdoView | PortView | PdoLink | RtConnection

@@ -19,9 +19,9 @@ from tickrig.emulators.rig.station import Station
 from tickrig.host.rtc.canopen.editor import app as editor_app
 from tickrig.host.rtc.canopen.editor.app import SystemEditor
 from tickrig.host.rtc.canopen.editor.session import AddComponents, EditorSession
-from tickrig.host.rtc.canopen.editor.widgets import CursorView
 from tickrig.host.rtc.canopen.events import ServerEvent
 from tickrig.host.rtc.canopen.serve import open_server
+from tickrig.host.rtc.editor.widgets import CursorView
 from tickrig.host.tui import LineView, line_text
 
 FIG_120 = SYSTEMS / "fig120.yaml"
@@ -69,7 +69,8 @@ class Desk:
 
     async def go_to(self, text: str, pane: str = "system") -> None:
         """Put the cursor on the first row that has a text."""
-        view = self.app.query_one(f"#{pane}", CursorView)
+        view = self._pane(pane)
+        assert isinstance(view, CursorView)
         view.focus()
         places = [n for n, row in enumerate(view.rows_shown) if text in line_text(row.line)]
         assert places, f"{text} is not in {self.shown(pane)}"
@@ -77,8 +78,16 @@ class Desk:
         await self.pilot.pause()
 
     def shown(self, pane: str = "system") -> str:
-        lines = self.app.query_one(f"#{pane}", LineView).lines
+        lines = self._pane(pane).lines
         return "\n".join(line_text(line).rstrip() for line in lines)
+
+    def _pane(self, name: str) -> LineView:
+        """Return a pane of the screen in front, or of one behind it."""
+        found = (
+            one for screen in reversed(self.app.screen_stack) for one in screen.query(LineView)
+        )
+        pane: LineView = next(pane for pane in found if pane.id == name)
+        return pane
 
     def line(self, text: str, pane: str = "system") -> str:
         return next((one for one in self.shown(pane).splitlines() if text in one), "")

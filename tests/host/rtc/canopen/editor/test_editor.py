@@ -15,8 +15,8 @@ from tests.host.rtc.canopen.editor.desk import Desk, at_desk
 from tickrig.host.rtc.canopen.definition import PdoLink, PdoName, RtConnection
 from tickrig.host.rtc.canopen.definition_reader import parse_definition
 from tickrig.host.rtc.canopen.editor.app import SystemEditor
-from tickrig.host.rtc.canopen.editor.widgets import QuestionScreen
 from tickrig.host.rtc.canopen.server import RtcCanopenServer
+from tickrig.host.rtc.editor.widgets import QuestionScreen
 from tickrig.host.tui import FramedApp
 from tickrig.wire.rtc_types.rtc import TimedShortSeq
 

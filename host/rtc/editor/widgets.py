@@ -1,4 +1,4 @@
-"""Widgets of the editor: rows of which one is under the cursor, and a question."""
+"""Widgets of editors: rows of which one is under the cursor, a question, and a choice."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from textual.message import Message
 from textual.screen import ModalScreen
 from textual.widgets import Input, Label
 
-from tickrig.host.tui import Line, LineView, line_width
+from tickrig.host.tui import Line, LineView, line_text, line_width
 
 T = TypeVar("T")
 
@@ -198,6 +198,87 @@ class QuestionScreen(ModalScreen[str | None]):
     def on_input_submitted(self, event: Input.Submitted) -> None:
         """Take the answer."""
         self.dismiss(event.value)
+
+    def action_leave(self) -> None:
+        """Take no answer."""
+        self.dismiss(None)
+
+
+class ChoiceScreen(ModalScreen[T | None]):
+    """Asks for one of several rows; what is typed leaves those that contain it; None is no answer.
+
+    Args:
+        text: the question.
+        rows: what can be chosen.
+    """
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("escape", "leave", "leave"),
+        Binding("up", "move(-1)", show=False, priority=True),
+        Binding("down", "move(1)", show=False, priority=True),
+        Binding("pageup", "page(-1)", show=False, priority=True),
+        Binding("pagedown", "page(1)", show=False, priority=True),
+    ]
+    CSS = """
+    ChoiceScreen { align: center middle; }
+    ChoiceScreen Vertical {
+        width: 90%; max-width: 90; height: 80%;
+        border: round $accent; background: $surface; padding: 0 1;
+    }
+    ChoiceScreen CursorView { height: 1fr; }
+    """
+
+    def __init__(self, text: str, rows: Sequence[CursorRow[T]]) -> None:
+        super().__init__()
+        self._text, self._rows = text, rows
+        self.choices = CursorView[T]("choices")
+
+    def compose(self) -> ComposeResult:
+        """Lay it out."""
+        with Vertical():
+            yield Label(self._text, markup=False)
+            yield Input(placeholder="type to search", compact=True)
+            yield self.choices
+            yield Label("enter: take it    up, down: move    escape: leave it", classes="dim")
+
+    def on_mount(self) -> None:
+        """Show all rows."""
+        self.choices.can_focus = False
+        self.call_after_refresh(self.choices.offer, self._rows)
+
+    def on_input_changed(self, event: Input.Changed) -> None:
+        """Show the rows that contain what is typed."""
+        words = event.value.casefold().split()
+        self.choices.offer(
+            [
+                row
+                for row in self._rows
+                if all(word in line_text(row.line).casefold() for word in words)
+            ]
+        )
+
+    def on_input_submitted(self, event: Input.Submitted) -> None:
+        """Take the row under the cursor."""
+        if self.choices.row is not None:
+            self.dismiss(self.choices.row.item)
+
+    def on_cursor_view_entered(self, event: CursorView.Entered) -> None:
+        """Take the row that was chosen by the mouse."""
+        event.stop()
+        if self.choices.row is not None:
+            self.dismiss(self.choices.row.item)
+
+    def on_cursor_view_moved(self, event: CursorView.Moved) -> None:
+        """Keep it from the screen below."""
+        event.stop()
+
+    def action_move(self, rows: int) -> None:
+        """Move the cursor."""
+        self.choices.action_move(rows)
+
+    def action_page(self, pages: int) -> None:
+        """Move the cursor by as many rows as are in view."""
+        self.choices.action_page(pages)
 
     def action_leave(self) -> None:
         """Take no answer."""

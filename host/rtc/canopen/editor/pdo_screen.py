@@ -1,0 +1,496 @@
+"""The PDOs of one node: what they carry, how they are sent, and their links."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar, Final
+
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.screen import ModalScreen
+
+from tickrig.host.rtc.canopen import pdo_edit
+from tickrig.host.rtc.canopen.definition import TPDOS, DeviceFile, PdoLink, PdoName, ServerRefused
+from tickrig.host.rtc.canopen.editor.session import EditorSession
+from tickrig.host.rtc.canopen.view import PendingTransfer, ServerView
+from tickrig.host.rtc.editor.widgets import ChoiceScreen, CursorRow, CursorView, QuestionScreen
+from tickrig.host.text.values import counted
+from tickrig.host.tui import KeyFooter, Line, LineView, plain
+from tickrig.wire.canopen.pdo import MAX_PDO_BITS, MappedObject, PdoDescription, fields
+
+_DIM: Final = "bright_black"
+_CHANGED: Final = "bold yellow"
+_GOOD: Final = "bold green"
+_ALARM: Final = "bold red"
+_NAME: Final = 40
+"""Columns of the name of an object."""
+
+_BIT_RATE: Final = 1_000_000
+"""In a DCF, if the System Definition gives none."""
+
+
+@dataclass(frozen=True, slots=True)
+class PdoPlace:
+    """A row of the screen.
+
+    Attributes:
+        index: communication parameter of the PDO.
+        entry: place in its mapping, from 0; -1 for the PDO itself.
+    """
+
+    index: int
+    entry: int = -1
+
+
+def pdo_rows(
+    node_id: int,
+    pdos: pdo_edit.Pdos,
+    wanted: pdo_edit.Pdos,
+    names: Mapping[tuple[int, int], str],
+    links: tuple[PdoLink, ...],
+) -> list[CursorRow[PdoPlace]]:
+    """Return the rows of the PDOs of a node.
+
+    Args:
+        node_id: the node.
+        pdos: as the node has them.
+        wanted: those that were changed here.
+        names: of objects, by index and sub-index.
+        links: of the whole system.
+    """
+    rows = []
+    for index, there in pdos.items():
+        pdo = wanted.get(index, there)
+        name = pdo_edit.pdo_name(node_id, index)
+        rows.append(CursorRow(f"{name}", _pdo_line(name, pdo, there, links), PdoPlace(index)))
+        for place, (mapped, shift) in enumerate(fields(pdo.mapping)):
+            at = mapped.index, mapped.sub
+            line: Line = (
+                (f"   {place + 1:>2}  ", _DIM),
+                (f"{mapped.index:04X}h:{mapped.sub:02X}", ""),
+                (f"  bit {shift:>2}  {mapped.bits:>2} bits  ", _DIM),
+                (names.get(at, "dummy" if mapped.index < 0x20 else "not in the EDS")[:_NAME], ""),
+            )
+            rows.append(CursorRow(f"{name} {place}", line, PdoPlace(index, place)))
+    return rows
+
+
+def _pdo_line(
+    name: PdoName, pdo: PdoDescription, there: PdoDescription, links: tuple[PdoLink, ...]
+) -> Line:
+    bits = sum(value & 0xFF for value in pdo.mapping)
+    targets = [f"→ {link.target}" for link in links if link.source == name]
+    targets += [f"← {link.source}" for link in links if link.target == name]
+    return (
+        (f"{name!s:<11}", "bold"),
+        (f" {name.index:04X}h  ", _DIM),
+        ("on  " if pdo.enabled else "off ", _GOOD if pdo.enabled else _DIM),
+        (f"{pdo.can_id:03X}h  type {pdo.transmission_type:>3}  ", ""),
+        (f"{bits:>2} of {MAX_PDO_BITS} bits ", _ALARM if bits > MAX_PDO_BITS else ""),
+        (" changed" if pdo != there else "", _CHANGED),
+        ("".join(f"  {text}" for text in targets), "green"),
+    )
+
+
+class PdoScreen(ModalScreen[None]):
+    """Shows the PDOs of a node and changes them; the node has a change when it is written.
+
+    Args:
+        session: the server.
+        node_id: the node.
+
+    Attributes:
+        pdos: as the node has them; empty before they were read.
+        wanted: those that were changed and are not written yet.
+    """
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("i", "insert", "insert"),
+        Binding("x,delete", "remove", "remove", key_display="x"),
+        Binding("c", "cob_id", "COB-ID"),
+        Binding("t", "type", "type"),
+        Binding("o", "switch", "on/off"),
+        Binding("k", "link", "link/cut"),
+        Binding("w", "write", "write to the node"),
+        Binding("u", "undo", "undo"),
+        Binding("g", "read", "read again"),
+        Binding("ctrl+s", "save", "save DCF", key_display="^s"),
+        Binding("ctrl+o", "load", "load DCF", key_display="^o"),
+        Binding("escape,q", "leave", "leave", key_display="esc"),
+    ]
+    CSS = """
+    PdoScreen { background: $background; }
+    PdoScreen CursorView { height: 1fr; border: round $accent; }
+    PdoScreen #pdo-status { height: 1; background: $boost; }
+    """
+
+    def __init__(self, session: EditorSession, node_id: int) -> None:
+        super().__init__()
+        self._session, self._node_id = session, node_id
+        self.view = CursorView[PdoPlace]("pdos")
+        self.status = LineView("pdo-status")
+        self.pdos: dict[int, PdoDescription] = {}
+        self.wanted: dict[int, PdoDescription] = {}
+        self._file: DeviceFile | None = None
+        self._reading: PendingTransfer[pdo_edit.Pdos] | None = None
+        self._writing: PendingTransfer[None] | None = None
+        self._saving: tuple[PendingTransfer[Mapping[int, bytes]], Path, Path] | None = None
+        self._says: Line = plain("")
+        self._read_once = self._warned = False
+
+    def compose(self) -> ComposeResult:
+        """Lay it out."""
+        yield self.view
+        yield self.status
+        yield KeyFooter()
+
+    def on_mount(self) -> None:
+        """Read the PDOs."""
+        self.status.can_focus = False
+        self.view.focus()
+        self.look()
+
+    # What is shown, and what came of transfers.
+
+    def look(self) -> None:
+        """Show how things are now; called ten times a second, and after each command."""
+        if not self.is_mounted:
+            return
+        with self._session.lock:
+            view = self._session.view
+            try:
+                node = view.node(self._node_id)
+                self._file = view.device_file(self._node_id)
+            except ServerRefused:  # another definition was loaded
+                self.dismiss(None)
+                return
+            links = view.links
+        self._take()
+        if not self._read_once and self._reading is None:
+            self._read(quiet=True)
+        title = f"PDOs of {node.node_id} {node.name}"
+        state = node.proxy_state.capitalize() or node.phase.value
+        self.view.title = f"{title}: {'lost' if node.late else state}"
+        names = {(one.mapped.index, one.mapped.sub): one.name for one in self._file.mappable}
+        self.view.offer(pdo_rows(self._node_id, self.pdos, self.wanted, names, links))
+        self.status.show([self._status()])
+
+    def _status(self) -> Line:
+        if self._writing is not None:
+            return plain(" writing to the node ...", _CHANGED)
+        if self._reading is not None or self._saving is not None:
+            return plain(" reading the node ...", _DIM)
+        if self._says[0][0]:
+            return self._says
+        if not self.pdos:
+            return plain(" waits for the node", _DIM)
+        if self.wanted:
+            return plain(f" {len(self.wanted)} changed, not written: w writes, u undoes", _CHANGED)
+        return plain(" as in the node", _DIM)
+
+    def _take(self) -> None:
+        """Take what has come of transfers."""
+        if (reading := self._reading) is not None and reading.done:
+            self._reading = None
+            if reading.problem:
+                self._note(reading.problem, _ALARM)
+            else:
+                self.pdos = dict(reading.data)
+                self.wanted = {i: p for i, p in self.wanted.items() if p != self.pdos.get(i)}
+                self.wanted = {i: p for i, p in self.wanted.items() if i in self.pdos}
+        if (writing := self._writing) is not None and writing.done:
+            self._writing = None
+            if writing.problem:
+                self._note(writing.problem, _ALARM)
+                self.app.notify(writing.problem, severity="error")
+            else:
+                self._note("written, and read back", _GOOD)
+                self.pdos |= self.wanted
+                self.wanted.clear()
+            self._read_once = False
+        if self._saving is not None and self._saving[0].done:
+            self._save_values(*self._saving)
+            self._saving = None
+
+    def _note(self, text: str, style: str = "") -> None:
+        self._says = plain(f" {text}", style)
+
+    def _read(self, *, quiet: bool = False) -> None:
+        def read(view: ServerView) -> None:
+            self._reading = view.read_pdos(self._node_id)
+            self._read_once = True
+
+        if quiet:
+            with self._session.lock:
+                try:
+                    read(self._session.view)
+                except ServerRefused:
+                    return
+        else:
+            self._command(read)
+
+    # Keys.
+
+    def action_read(self) -> None:
+        """Read the PDOs again; what was changed here stays."""
+        if not self._is_busy():
+            self._says = plain("")
+            self._read()
+
+    def action_insert(self) -> None:
+        """Ask for an object, and put it behind the entry under the cursor, or last in the PDO."""
+        if (at := self._at()) is not None:
+            pdo = self.wanted.get(at.index, self.pdos[at.index])
+            place = len(pdo.mapping) if at.entry < 0 else at.entry + 1
+            self._choose_object(at, place, insert=True)
+
+    def on_cursor_view_entered(self, event: CursorView.Entered) -> None:
+        """Replace the entry under the cursor; of a PDO, ask for its COB-ID."""
+        event.stop()
+        if (at := self._at()) is None:
+            return
+        if at.entry < 0:
+            self.action_cob_id()
+        else:
+            self._choose_object(at, at.entry, insert=False)
+
+    def on_cursor_view_moved(self, event: CursorView.Moved) -> None:
+        """Keep it from the screen below."""
+        event.stop()
+
+    def action_remove(self) -> None:
+        """Remove the entry under the cursor."""
+        if (at := self._at()) is None:
+            return
+        if at.entry < 0:
+            self._refuse("go to an entry of a PDO to remove it; o switches a PDO off")
+        else:
+            self._change(at.index, lambda pdo: pdo_edit.with_entry(pdo, at.entry, None))
+
+    def action_cob_id(self) -> None:
+        """Ask for the COB-ID of the PDO under the cursor."""
+        self._prompt("COB-ID of", lambda pdo: f"0x{pdo.can_id:03X}", pdo_edit.with_cob_id)
+
+    def action_type(self) -> None:
+        """Ask for the transmission type of the PDO under the cursor."""
+        at = self.view.row
+        sends = at is not None and at.item.index in TPDOS
+        self._prompt(
+            "transmission type (0..240 SYNC, 254 and 255 events) of",
+            lambda pdo: str(pdo.transmission_type),
+            lambda pdo, words: pdo_edit.with_type(pdo, words, sends=sends),
+        )
+
+    def action_switch(self) -> None:
+        """Switch the PDO under the cursor on or off."""
+        if (at := self._at()) is not None:
+            self._change(at.index, pdo_edit.switched)
+
+    def action_undo(self) -> None:
+        """Take back all changes that are not written."""
+        if not self._is_busy():
+            self.wanted.clear()
+            self._says = plain("")
+            self.look()
+
+    def action_write(self) -> None:
+        """Write what was changed to the node."""
+        if self._is_busy():
+            return
+        if not self.wanted:
+            self._refuse("nothing was changed")
+            return
+        wanted = dict(self.wanted)
+
+        def write(view: ServerView) -> None:
+            self._writing = view.write_pdos(self._node_id, dict(self.pdos), wanted)
+
+        self._command(write)
+
+    def action_link(self) -> None:
+        """Cut the links of the PDO under the cursor, or ask for one of another node to link it."""
+        if (at := self._at()) is None:
+            return
+        if self.wanted:
+            self._refuse("write or undo the changes first: w writes, u undoes")
+            return
+        name = pdo_edit.pdo_name(self._node_id, at.index)
+        with self._session.lock:
+            view = self._session.view
+            links = [link for link in view.links if name in (link.source, link.target)]
+            nodes = view.nodes
+        if links and (at.index not in TPDOS or len(links) == 1):
+            self._command(lambda view: view.unlink(links[0].source, links[0].target))
+            return
+        rows = [
+            CursorRow(
+                str(pdo.name),
+                ((f"{pdo.name!s:<12} ", ""), (f"{pdo.bits:>2} bits  {node.name}", _DIM)),
+                pdo.name,
+            )
+            for node in nodes
+            for pdo in node.pdos
+            if node.node_id != self._node_id and (pdo.index in TPDOS) != (at.index in TPDOS)
+        ]
+        if not rows:
+            self._refuse("no other node has a PDO of the other direction that is on")
+            return
+
+        def chosen(other: PdoName | None) -> None:
+            if other is not None:
+                ends = (name, other) if at.index in TPDOS else (other, name)
+                self._command(lambda view: view.link(*ends))
+
+        self.app.push_screen(ChoiceScreen(f"link {name} with", rows), chosen)
+
+    def action_save(self) -> None:
+        """Ask for a file, and save what the node has as a DCF."""
+        if self._is_busy():
+            return
+        with self._session.lock:
+            eds = self._session.eds_paths[self._node_id]
+        path = eds.with_name(f"{eds.stem}-{self._node_id}.dcf")
+
+        def answered(text: str | None) -> None:
+            def read(view: ServerView) -> None:
+                self._saving = view.read_parameters(self._node_id, eds), Path(text or ""), eds
+
+            if text:
+                self._command(read)
+
+        self.app.push_screen(QuestionScreen("save the node as DCF", str(path)), answered)
+
+    def action_load(self) -> None:
+        """Ask for a DCF, and take its PDOs as changes."""
+        if self._is_busy() or self._at() is None or (file := self._file) is None:
+            return
+
+        def answered(text: str | None) -> None:
+            if not text:
+                return
+            try:
+                wanted = pdo_edit.pdos_of_dcf(Path(text), self._node_id, file, self.pdos)
+            except OSError as error:
+                self._refuse(f"{text}: {error.strerror}")
+            except ValueError as error:
+                self._refuse(str(error))
+            else:
+                self.wanted = dict(wanted)
+                self._note(f"{text}: {counted(len(wanted), 'changed PDO')}: w writes", _CHANGED)
+                self.look()
+
+        self.app.push_screen(QuestionScreen("load the PDOs of a DCF", ""), answered)
+
+    def action_leave(self) -> None:
+        """Leave; changes that are not written are asked about once."""
+        if self.wanted and not self._warned:
+            self._warned = True
+            self._refuse(f"{len(self.wanted)} changed, not written: w writes, again leaves")
+            return
+        self.dismiss(None)
+
+    # How they do it.
+
+    def _at(self) -> PdoPlace | None:
+        """Return the row under the cursor, None if nothing can be changed now."""
+        if self._is_busy():
+            return None
+        if self.view.row is None:
+            self._refuse("the PDOs of the node are not read yet")
+            return None
+        return self.view.row.item
+
+    def _is_busy(self) -> bool:
+        busy = self._writing is not None or self._saving is not None or self._reading is not None
+        if busy:
+            self._refuse("wait: a transfer is running")
+        return busy
+
+    def _choose_object(self, at: PdoPlace, place: int, *, insert: bool) -> None:
+        if self._file is None:
+            return
+        rows = [
+            CursorRow(
+                f"{one.mapped.encode():08X}",
+                (
+                    (f"{one.mapped.index:04X}h:{one.mapped.sub:02X} ", ""),
+                    (f"{one.mapped.bits:>2} bits  ", _DIM),
+                    (one.name, ""),
+                ),
+                one.mapped,
+            )
+            for one in pdo_edit.mappable(self._file, at.index)
+        ]
+
+        def chosen(mapped: MappedObject | None) -> None:
+            if mapped is not None:
+                self._change(
+                    at.index,
+                    lambda pdo: pdo_edit.with_entry(pdo, place, mapped, insert=insert),
+                )
+
+        name = pdo_edit.pdo_name(self._node_id, at.index)
+        what = f"insert into {name}" if insert else f"entry {place + 1} of {name}"
+        self.app.push_screen(ChoiceScreen(what, rows), chosen)
+
+    def _prompt(
+        self,
+        text: str,
+        shown: Callable[[PdoDescription], str],
+        change: Callable[[PdoDescription, str], PdoDescription],
+    ) -> None:
+        if (at := self._at()) is None:
+            return
+        pdo = self.wanted.get(at.index, self.pdos[at.index])
+
+        def answered(words: str | None) -> None:
+            if words is not None:
+                self._change(at.index, lambda pdo: change(pdo, words))
+
+        name = pdo_edit.pdo_name(self._node_id, at.index)
+        self.app.push_screen(QuestionScreen(f"{text} {name}", shown(pdo)), answered)
+
+    def _change(self, index: int, change: Callable[[PdoDescription], PdoDescription]) -> None:
+        """Change a PDO here; the node has it when it is written."""
+        if index not in self.pdos:  # read anew meanwhile
+            return
+        try:
+            pdo = change(self.wanted.get(index, self.pdos[index]))
+        except ValueError as error:
+            self._refuse(str(error))
+            return
+        self._warned, self._says = False, plain("")
+        self.wanted[index] = pdo
+        if pdo == self.pdos[index]:
+            del self.wanted[index]
+        self.look()
+
+    def _save_values(
+        self, transfer: PendingTransfer[Mapping[int, bytes]], path: Path, eds: Path
+    ) -> None:
+        if transfer.problem:
+            self._refuse(f"{path} is not written: {transfer.problem}")
+            return
+        bit_rate = self._session.server.definition.bus.bitrate or _BIT_RATE
+        try:
+            pdo_edit.save_dcf(path, eds, self._node_id, bit_rate, transfer.data)
+        except OSError as error:
+            self._refuse(f"{path}: {error.strerror}")
+        except ValueError as error:
+            self._refuse(str(error))
+        else:
+            self._note(f"{path}: {counted(len(transfer.data), 'value')} saved", _GOOD)
+
+    def _command(self, command: Callable[[ServerView], object]) -> None:
+        self._says = plain("")
+        try:
+            with self._session.lock:
+                command(self._session.view)
+        except ValueError as error:
+            self._refuse(str(error))
+        self.look()
+
+    def _refuse(self, why: str) -> None:
+        self.app.notify(why, severity="error")

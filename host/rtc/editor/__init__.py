@@ -1,0 +1,1 @@
+"""Screens of running systems of RT components: a picture of components and wires."""
