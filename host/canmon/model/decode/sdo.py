@@ -252,9 +252,21 @@ def _unheard(at_us: int, node: int, answer: _Answer) -> OpenTransfer:
     return opened
 
 
+WRONG_TOGGLE: Final = "wrong toggle bit"
+
+
+def _check_toggle(running: OpenTransfer, toggle: bool) -> None:
+    """Note that a client does not alternate the toggle bit, or does not begin with 0."""
+    began = running.requested_toggle is not None or running.sent is not None
+    first = running.taken is None and not began and not running.partial
+    if toggle == running.taken or (first and toggle):
+        running.add_flaw(WRONG_TOGGLE)
+
+
 def _request_segment(running: OpenTransfer, request: sdo.UploadSegmentRequest) -> str:
     """Take what a client of an upload asks for."""
     running.retries += running.requested_toggle == request.toggle
+    _check_toggle(running, request.toggle)
     running.requested_toggle = request.toggle
     return f"asks for a segment, {running.progress} so far"
 
@@ -262,6 +274,8 @@ def _request_segment(running: OpenTransfer, request: sdo.UploadSegmentRequest) -
 def _take_segment(running: OpenTransfer, segment: sdo.Segment) -> str:
     """Take a segment of an upload, unless it was sent twice or a toggle bit is wrong."""
     if segment.toggle != running.requested_toggle or segment.toggle == running.taken:
+        if segment.toggle != running.requested_toggle is not None:
+            running.add_flaw(WRONG_TOGGLE)
         return "segment with the wrong toggle bit, or sent again"
     running.taken = segment.toggle
     running.data += segment.data
@@ -272,6 +286,8 @@ def _take_segment(running: OpenTransfer, segment: sdo.Segment) -> str:
 def _send_segment(running: OpenTransfer, segment: sdo.Segment) -> str:
     """Take a segment of a download; it counts when the server has confirmed it."""
     again = running.sent is not None and running.sent.toggle == segment.toggle
+    if not again:
+        _check_toggle(running, segment.toggle)
     running.retries += again or segment.toggle == running.taken
     running.sent = segment
     return f"segment of {len(segment.data)} B, {running.progress} so far"
@@ -281,6 +297,8 @@ def _confirm_segment(running: OpenTransfer, response: sdo.DownloadSegmentRespons
     """Take the receipt of a segment."""
     sent = running.sent
     if sent is None or sent.toggle != response.toggle or sent.toggle == running.taken:
+        if sent is not None and sent.toggle != response.toggle:
+            running.add_flaw(WRONG_TOGGLE)
         return "receipt of no segment that was heard, or of one sent again"
     running.taken, running.sent = sent.toggle, None
     running.data += sent.data

@@ -1,0 +1,224 @@
+"""The frames of a log, kept bus by bus as arrays, for what is judged once all of them are there."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Iterable, Iterator, Sequence
+from importlib.util import find_spec
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+from tickrig._lazy import LazyModule
+from tickrig.host.canmon.model.frames import ERROR, EXTENDED, FD, REMOTE, Record, flagged_id
+from tickrig.wire.can import ERROR_CLASS_MASK, EXTENDED_MAX, CanFrame, ErrorFrame, FdFrame
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from tickrig.host.canmon.model.columns import columns as column_frames
+    from tickrig.host.canmon.model.columns.columns import Columns
+else:  # an extra
+    np = LazyModule("numpy")
+    column_frames = LazyModule("tickrig.host.canmon.model.columns.columns")
+
+_MANY: Final = 50_000
+"""From so many frames on numpy is worth its import."""
+
+_DATA_BYTES: Final = 8
+_SPIKE_FRAMES: Final = 3
+
+
+class FramePlace(NamedTuple):
+    """Where a frame is.
+
+    Attributes:
+        number: its place in the log, from 1.
+        at_us: its time.
+    """
+
+    number: int
+    at_us: int
+
+
+class Hit(NamedTuple):
+    """Something wrong, before findings of one rule and node are put together.
+
+    Attributes:
+        rule: name of the rule.
+        node: the node-ID; None if no node is to blame.
+        ident: the CAN-ID with flags; None for the bus as a whole.
+        text: what is wrong.
+        rows: the frames that show it, by their rows on the bus; one at least.
+        amount: how many times it happened there.
+    """
+
+    rule: str
+    node: int | None
+    ident: int | None
+    text: str
+    rows: tuple[int, ...]
+    amount: int = 1
+
+
+class BusFrames:
+    """The frames of one bus in the order of the log.
+
+    Attributes:
+        name: of the bus.
+        at_us: times as the log has them.
+        ident: see `any_ident`; error frames have `ERROR` and their class.
+        dlc: bytes of data, for a remote frame its DLC.
+        payload: the first 8 bytes as a little-endian number.
+        number: places in the log, from 1.
+    """
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.at_us, self.ident, self.dlc = array("q"), array("Q"), array("B")
+        self.payload, self.number = array("Q"), array("q")
+
+    def __len__(self) -> int:
+        """Return how many there are."""
+        return len(self.at_us)
+
+    def add(self, record: Record, number: int) -> None:
+        """Append a frame."""
+        frame = record.frame
+        data = frame.data
+        self.at_us.append(record.at_us)
+        self.ident.append(flagged_id(record) | (FD if isinstance(frame, FdFrame) else 0))
+        self.dlc.append(frame.dlc if isinstance(frame, CanFrame) else len(data))
+        self.payload.append(int.from_bytes(data[:_DATA_BYTES], "little"))
+        self.number.append(number)
+
+    def extend(self, frames: Columns, numbers: Any) -> None:
+        """Append a block of frames; `numbers` is an array of their places."""
+        self.at_us.frombytes(frames.at_us.astype("<i8").tobytes())
+        self.ident.frombytes(frames.ident.astype("<u8").tobytes())
+        self.dlc.frombytes(frames.dlc.tobytes())
+        self.payload.frombytes(frames.payload.astype("<u8").tobytes())
+        self.number.frombytes(numbers.astype("<i8").tobytes())
+
+    def frame(self, row: int) -> CanFrame | ErrorFrame:
+        """Return a classic frame or an error frame."""
+        ident, dlc = self.ident[row], self.dlc[row]
+        data = self.payload[row].to_bytes(_DATA_BYTES, "little")
+        if ident & ERROR:
+            return ErrorFrame(ident & ERROR_CLASS_MASK, data)
+        if ident & REMOTE:
+            return CanFrame(ident & EXTENDED_MAX, b"", True, bool(ident & EXTENDED), dlc)
+        return CanFrame(ident & EXTENDED_MAX, data[:dlc], False, bool(ident & EXTENDED))
+
+    def place(self, row: int) -> FramePlace:
+        """Return where a frame is."""
+        return FramePlace(self.number[row], self.at_us[row])
+
+    def rows_by_ident(self) -> dict[int, Sequence[int]]:
+        """Return the rows of each identifier, in order."""
+        if not self.is_large:
+            rows: dict[int, list[int]] = {}
+            for row, ident in enumerate(self.ident):
+                rows.setdefault(ident, []).append(row)
+            return dict(rows)
+        idents = np.frombuffer(self.ident, np.uint64)
+        found, places = np.unique(idents, return_inverse=True)
+        small = places.astype(np.uint16) if len(found) < 1 << 16 else places
+        order = np.argsort(small, kind="stable")
+        ends = np.cumsum(np.bincount(places)).tolist()
+        begins = [0, *ends[:-1]]
+        parts: Any = zip(found.tolist(), begins, ends, strict=True)
+        runs: Any = order  # an array is a sequence for all that is done with rows
+        return {ident: runs[begin:end] for ident, begin, end in parts}
+
+    @property
+    def is_large(self) -> bool:
+        """Whether rows are arrays of numpy."""
+        return len(self) >= _MANY and find_spec("numpy") is not None
+
+    def picked(self, column: array[int], rows: Sequence[int]) -> Sequence[int]:
+        """Return values of some rows; an array of numpy where the rows are one."""
+        if isinstance(rows, list | tuple | range):
+            return [column[row] for row in rows]
+        kinds = {"q": np.int64, "Q": np.uint64, "B": np.uint8}
+        found: Any = np.frombuffer(column, kinds[column.typecode])[rows]
+        return found  # type: ignore[no-any-return]
+
+    def backward(self) -> list[int]:
+        """Return the rows whose time is before that of the row before them."""
+        if self.is_large:
+            times = np.frombuffer(self.at_us, np.int64)
+            backward: list[int] = (np.flatnonzero(times[1:] < times[:-1]) + 1).tolist()
+            return backward
+        return [row for row, (a, b) in enumerate(pairwise(self.at_us), 1) if b < a]
+
+
+def steady_times(bus: BusFrames, backward: Sequence[int]) -> tuple[array[int], list[int]]:
+    """Return times without single ones that are wrong, and the rows where the clock was set back.
+
+    A frame whose time alone is out of order gets that of its neighbour; behind a clock that was
+    set back the times go on as they are.
+    """
+    times = bus.at_us
+    if not backward:
+        return times, []
+    times, cuts = array("q", times), []
+    for row in backward:
+        if times[row] >= times[row - 1]:
+            continue
+        if row >= 2 and times[row] >= times[row - 2]:  # the one before was too late
+            times[row - 1] = times[row]
+            continue
+        later = next(
+            (
+                at
+                for at in range(row + 1, min(row + 1 + _SPIKE_FRAMES, len(times)))
+                if times[at] >= times[row - 1]
+            ),
+            None,
+        )
+        if later is None and row + _SPIKE_FRAMES < len(times):
+            cuts.append(row)
+            continue
+        for at in range(row, len(times) if later is None else later):
+            times[at] = times[row - 1]
+    return times, cuts
+
+
+class FrameKeeper:
+    """Keeps the frames of a source, bus by bus.
+
+    Attributes:
+        buses: by name.
+        frames: how many came.
+    """
+
+    def __init__(self) -> None:
+        self.buses: dict[str, BusFrames] = {}
+        self.frames = 0
+
+    def take(self, frames: Columns | Iterable[Record]) -> None:
+        """Take frames: a block of columns, or records."""
+        if not isinstance(frames, list | tuple) and isinstance(frames, column_frames.Columns):
+            self._extend(frames)
+            return
+        for record in frames:
+            self._add(record)
+
+    def _add(self, record: Record) -> None:
+        self.frames += 1
+        bus = self.buses.get(record.channel)
+        if bus is None:
+            bus = self.buses[record.channel] = BusFrames(record.channel)
+        bus.add(record, self.frames)
+
+    def _extend(self, columns: Columns) -> None:
+        if not len(columns):
+            return
+        for channel, rows, frames in column_frames.by_channel(columns):
+            bus = self.buses.setdefault(channel, BusFrames(channel))
+            bus.extend(frames, rows + (self.frames + 1))
+        self.frames += len(columns)
+
+    def __iter__(self) -> Iterator[BusFrames]:
+        """Give the buses by name."""
+        return (bus for _, bus in sorted(self.buses.items()))

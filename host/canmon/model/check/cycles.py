@@ -1,0 +1,251 @@
+"""What is wrong with the rhythm of frames that come again and again."""
+
+# Theory of operation
+# ===================
+#
+# Nobody tells the period of an identifier: it is learnt from all of its frames at once, and a
+# source without a rhythm must give no finding. So the gaps are looked at in windows of eight.
+# The middle of a window (its median) tells the period there, the distance of its quartiles how
+# steady it is; neither notices one or two odd gaps. Three kinds of windows follow:
+#
+#     steady   the quartiles are close: the middle is a period
+#     noisy    they are not
+#
+# A run of steady windows with the same middle is a level. Most windows on one level: that is the
+# period, and what differs from it is judged. Few levels that follow each other: the period
+# changed. Neither: frames come with events, and nothing is said.
+#
+# On a level a gap of about two periods is a missing frame, unless the gap beside it makes up for
+# it: then the frame was late. A short gap whose neighbour fills it up to one period has a frame
+# too many between two that are right; a short gap before a whole period is the event of a
+# transmission that begins its event timer anew, and right.
+#
+# Noisy windows that stand together in a log whose other windows are quiet are a jitter that
+# changed; noisy windows all over the log are how the source is.
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+from tickrig._lazy import LazyModule
+
+if TYPE_CHECKING:
+    import numpy as np
+else:  # an extra
+    np = LazyModule("numpy")
+
+_WINDOW: Final = 8
+LEAST_GAPS: Final = 6
+"""So many gaps tell a period."""
+
+_SHORTEST_US: Final = 900
+"""A shorter period is a burst, or below what clocks of loggers can tell."""
+_FLOOR_US: Final = 700
+"""Stamps of loggers are off by so much whatever the source does."""
+_STEADY: Final = 0.15
+_SAME: Final = 0.12
+_ON_LEVEL: Final = 0.6
+_MOST_LEVELS: Final = 5
+_MOST_ODD: Final = 0.12
+"""More odd gaps than this share are how the source is."""
+_NOISY: Final = 0.08
+_TIMES_NOISIER: Final = 6
+_LEAST_NOISY: Final = 2
+_LEAST_QUIET: Final = 0.3
+
+
+class Level(NamedTuple):
+    """Gaps with one period.
+
+    Attributes:
+        begin: the first gap.
+        end: one behind the last.
+        period_us: the period.
+    """
+
+    begin: int
+    end: int
+    period_us: int
+
+
+class Rhythm(NamedTuple):
+    """How frames come.
+
+    Attributes:
+        levels: their periods, in order; more than one where the period changed.
+        missing: gaps in which frames are missing, each with how many.
+        extra: frames that come between two that are right.
+        noisy: gaps from and to which jitter is large, with the usual and the large jitter in us.
+        spread_us: distance of the quartiles of the gaps, where it is usual.
+    """
+
+    levels: tuple[Level, ...]
+    missing: tuple[tuple[int, int], ...] = ()
+    extra: tuple[int, ...] = ()
+    noisy: tuple[tuple[int, int, int, int], ...] = ()
+    spread_us: int = 0
+
+    @property
+    def period_us(self) -> int:
+        """The period that most gaps have."""
+        return max(self.levels, key=lambda one: one.end - one.begin).period_us
+
+
+def rhythm_of(times: Sequence[int]) -> Rhythm | None:
+    """Return the rhythm of frames by their times; None if they have none.
+
+    >>> rhythm_of([0, 10_000, 20_000, 30_000, 50_000, 60_000, 70_000, 80_000]).missing
+    ((3, 1),)
+    """
+    if len(times) <= LEAST_GAPS:
+        return None
+    gaps = gaps_of(times)
+    windows = _windows(gaps)
+    middles = sorted(middle for middle, _ in windows)
+    period_us = middles[len(middles) // 2]
+    if period_us < _SHORTEST_US:
+        return None
+    levels = _levels(windows, len(gaps))
+    if not levels:
+        return None
+    covered = sum(one.end - one.begin for one in levels)
+    main = max(levels, key=lambda one: one.end - one.begin).period_us
+    spreads = sorted(spread for middle, spread in windows if _alike(middle, main))
+    quiet = spreads[len(spreads) // 4] if spreads else 0
+    noisy = _noisy(windows, main, quiet) if len(levels) == 1 else []
+    loud = sum(end - begin for begin, end, _, _ in noisy)
+    if covered + loud < _ON_LEVEL * len(gaps):
+        return None
+    if len(levels) > _MOST_LEVELS:
+        return None
+    missing: list[tuple[int, int]] = []
+    extra: list[int] = []
+    for level in levels:
+        found = _odd(gaps, times, level, quiet)
+        most = max(3, _MOST_ODD * (level.end - level.begin))
+        missing += found[0] if len(found[0]) <= most else []
+        extra += found[1] if len(found[1]) <= most else []
+    return Rhythm(tuple(levels), tuple(missing), tuple(extra), tuple(noisy), quiet)
+
+
+def gaps_of(times: Sequence[int]) -> Sequence[int]:
+    """Return the gaps between times; of an array of numpy an array."""
+    if isinstance(times, list):
+        return [b - a for a, b in pairwise(times)]
+    found: Any = np.diff(np.asarray(times))  # an array is a sequence for all that is done here
+    return found  # type: ignore[no-any-return]
+
+
+def _windows(gaps: Sequence[int]) -> list[tuple[int, int]]:
+    """Return the median and the distance of the quartiles of each eight gaps."""
+    size = min(_WINDOW, len(gaps))
+    low, middle, high = size // 4, size // 2, (3 * size) // 4
+    if isinstance(gaps, list):
+        cut = [sorted(gaps[at : at + size]) for at in range(0, len(gaps) - size + 1, size)]
+        return [(one[middle], one[high] - one[low]) for one in cut]
+    whole = len(gaps) // size
+    table = np.sort(np.asarray(gaps[: whole * size]).reshape(whole, size), axis=1)
+    spreads = (table[:, high] - table[:, low]).tolist()
+    return list(zip(table[:, middle].tolist(), spreads, strict=True))
+
+
+def _alike(one: float, other: float) -> bool:
+    return abs(one - other) <= max(_SAME * max(one, other), min(_FLOOR_US, other / 4))
+
+
+def _is_steady(middle: int, spread: int) -> bool:
+    return spread <= max(_STEADY * middle, min(_FLOOR_US, middle / 3))
+
+
+def _levels(windows: Sequence[tuple[int, int]], gaps: int) -> list[Level]:
+    """Return runs of steady windows with the same middle; noisy ones of that middle join them."""
+    runs: list[list[int]] = []  # first window, one behind the last, its middle
+    for at, (middle, spread) in enumerate(windows):
+        same = bool(runs) and _alike(middle, runs[-1][2])
+        if same and (_is_steady(middle, spread) or at - runs[-1][1] < 1):
+            runs[-1][1] = at + 1
+        elif not same and _is_steady(middle, spread):
+            runs.append([at, at + 1, middle])
+    # A single window between two of the same period is a disturbance, and no level.
+    joined: list[list[int]] = []
+    for run in runs:
+        lone = run[1] - run[0] < 2 and len(windows) > 2
+        if joined and _alike(run[2], joined[-1][2]):
+            joined[-1][1] = run[1]
+        elif not lone:
+            joined.append(run)
+    size = min(_WINDOW, gaps)
+    levels = [Level(begin * size, end * size, middle) for begin, end, middle in joined]
+    if levels and levels[-1].end + size > gaps:
+        levels[-1] = levels[-1]._replace(end=gaps)
+    return levels
+
+
+def _odd(
+    gaps: Sequence[int], times: Sequence[int], level: Level, quiet: int
+) -> tuple[list[tuple[int, int]], list[int]]:
+    """Return the gaps of a level where frames are missing, and the frames that are too many."""
+    period = level.period_us
+    off = max(0.2 * period, 4 * quiet, min(_FLOOR_US, period / 3))
+    missing: list[tuple[int, int]] = []
+    extra: list[int] = []
+    taken = -1
+    for at in _outside(gaps, level.begin, level.end, period - off, period + off):
+        if at <= taken:
+            continue
+        gap = int(gaps[at])
+        before = int(gaps[at - 1]) if at else None
+        behind = int(gaps[at + 1]) if at + 1 < len(gaps) else None
+        if gap > period + off:
+            made_up = any(
+                one < period - off and abs(gap + one - 2 * period) <= off
+                for one in (before, behind)
+                if one is not None
+            )
+            if not made_up and gap > 1.5 * period:
+                missing.append((at, max(1, round(gap / period) - 1)))
+        elif behind is not None and abs(gap + behind - period) <= off:
+            extra.append(at + 1)
+            taken = at + 1
+    return missing, extra
+
+
+def _outside(gaps: Sequence[int], begin: int, end: int, low: float, high: float) -> list[int]:
+    """Return the places of gaps that are shorter or longer."""
+    if isinstance(gaps, list):
+        return [at for at in range(begin, end) if not low <= gaps[at] <= high]
+    part = np.asarray(gaps[begin:end])
+    found: list[int] = (np.flatnonzero((part < low) | (part > high)) + begin).tolist()
+    return found
+
+
+def _noisy(
+    windows: Sequence[tuple[int, int]], period: int, quiet: int
+) -> list[tuple[int, int, int, int]]:
+    """Return the runs of windows with a large jitter, where the others are quiet."""
+    limit = max(_NOISY * period, 500, _TIMES_NOISIER * quiet)
+    loud = [spread > limit for _, spread in windows]
+    still = sum(spread <= max(limit / 3, 2 * quiet) for _, spread in windows)
+    if still < _LEAST_QUIET * len(windows) or not any(loud):
+        return []
+    runs: list[list[int]] = []
+    for at, is_loud in enumerate(loud):
+        if is_loud and runs and at - runs[-1][1] <= 1:
+            runs[-1][1] = at + 1
+        elif is_loud:
+            runs.append([at, at + 1])
+    long = [run for run in runs if run[1] - run[0] >= _LEAST_NOISY]
+    inside = sum(sum(loud[begin:end]) for begin, end in long)
+    if not long or len(long) > 2 or inside < 0.7 * sum(loud):
+        return []
+    return [
+        (
+            begin * _WINDOW,
+            end * _WINDOW,
+            quiet,
+            sorted(spread for _, spread in windows[begin:end])[(end - begin) // 2],
+        )
+        for begin, end in long
+    ]

@@ -1,0 +1,710 @@
+"""What is wrong on a bus, judged by all rules that need no parameter.
+
+>>> from tickrig.host.canmon.model.frames import Record
+>>> from tickrig.wire.can import CanFrame
+>>> frames = [Record(at * 100_000, "can0", CanFrame.parse("705#05")) for at in range(20)]
+>>> [str(fault) for fault in diagnose([frames[:9] + frames[10:]]).faults]
+['no-lost-heartbeat: can0 node 5: no heartbeat for 200.000 ms, one each 100.000 before']
+"""
+
+# Theory of operation
+# ===================
+#
+# The checker (checker.py) holds each frame against rules that somebody gave. Here nobody gave
+# any: what is usual is learnt from the log itself, so all frames are kept (34 bytes each) and
+# judged at the end. A bus is judged in four steps:
+#
+# 1. Times. A single time that is out of order is a finding and gets that of its neighbour; a
+#    clock that was set back cuts the log in two.
+# 2. Is it CANopen (`is_canopen`)? If not, only what holds for every bus is judged: error frames,
+#    times, load. Nobody knows what the identifiers of other protocols mean.
+# 3. Services (node_events.py): NMT, error control, EMCY and SDO frames, one by one, decoded as
+#    everywhere. They also tell the *cuts*: moments after which frames come in another way because
+#    somebody wanted it, as an NMT command or a write to 1800h. No rhythm is judged across one.
+# 4. Rhythms (cycles.py): all frames of an identifier at once, heartbeats, SYNC and PDOs; with
+#    numpy where a log is large. Where all of a bus is silent, that is one finding, and not one for
+#    each identifier.
+#
+# What is found (`Hit`) has rows; hits of one rule, bus and node, or CAN-ID where no node is known,
+# are one `BusFault`.
+
+from __future__ import annotations
+
+from bisect import bisect_left, bisect_right
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import pairwise
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+from tickrig._lazy import LazyModule
+from tickrig.host.canmon.model.check import cycles, node_events
+from tickrig.host.canmon.model.check.bus_frames import (
+    BusFrames,
+    FrameKeeper,
+    FramePlace,
+    Hit,
+    steady_times,
+)
+from tickrig.host.canmon.model.decode import node_memory
+from tickrig.host.canmon.model.decode.decoder import Decoder
+from tickrig.host.canmon.model.decode.pdos import PdoDecoder
+from tickrig.host.canmon.model.frames import ERROR, FD, REMOTE, Record, ident_text, ms_text, node_of
+from tickrig.host.canmon.model.traffic import WINDOW_US, Load
+from tickrig.host.text.values import counted
+from tickrig.wire.can import STANDARD_MAX, CanFrame, frame_bits
+from tickrig.wire.canopen import nmt, sdo_frame
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from tickrig.host.canmon.model.columns.columns import Columns
+else:  # an extra
+    np = LazyModule("numpy")
+
+RULES: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        **node_events.RULES,
+        "no-lost-heartbeat": "a heartbeat that does not come",
+        "length": "a service with a length that it cannot have",
+        "pdo-length": "a PDO whose length changes",
+        "pdo-period": "a PDO whose period changes",
+        "pdo-jitter": "a PDO whose jitter changes",
+        "pdo-missing": "a PDO that does not come",
+        "pdo-doubled": "a PDO that comes twice",
+        "sync-missing": "a SYNC that does not come",
+        "sync-doubled": "a SYNC that comes twice",
+        "sync-period": "a SYNC whose period or jitter changes",
+        "drive-fault": "the fault bit of a CiA 402 statusword",
+        "seen-once": "a CAN-ID that comes once",
+        "silence": "a bus that is silent",
+        "time-back": "a time that goes back",
+        "max-load": "a second with a load above 80 %",
+    }
+)
+"""All rules, and what each finds."""
+
+MOST_LOAD: Final = 80.0
+_ANY_BUS: Final = frozenset(["no-error-frames", "time-back", "max-load"])
+_KEPT_FRAMES: Final = 1_000
+_KEPT_TEXTS: Final = 3
+_LOST_AFTER: Final = 1.5
+"""A heartbeat is lost after so many of its periods, as on the node board."""
+_LONG_US: Final = 1_000_000
+_LEAST_FRAMES: Final = 100
+_SOON_US: Final = 1_500_000
+"""What comes once within so long of a boot-up or NMT command belongs to the start."""
+_NO_NODES: Final[Mapping[int, node_memory.EdsObjects]] = MappingProxyType({})
+
+
+class BusFault(NamedTuple):
+    """Something wrong on a bus: all that one rule finds of one node, or of one CAN-ID.
+
+    Attributes:
+        rule: name of the rule, of `RULES`.
+        channel: the bus.
+        node: the node-ID; None if no node is to blame.
+        ident: the CAN-ID with flags, of the first time; None for the bus as a whole.
+        text: what is wrong, in words.
+        first_us: when it was first seen.
+        last_us: when it was last seen.
+        amount: how many times it was seen.
+        frames: the frames that show it, the first thousand.
+    """
+
+    rule: str
+    channel: str
+    node: int | None
+    ident: int | None
+    text: str
+    first_us: int
+    last_us: int
+    amount: int
+    frames: tuple[FramePlace, ...]
+
+    @property
+    def where(self) -> str:
+        """The bus, and the node or CAN-ID."""
+        if self.node is not None:
+            return f"{self.channel} node {self.node}"
+        return self.channel if self.ident is None else f"{self.channel} {ident_text(self.ident)}"
+
+    def __str__(self) -> str:
+        """Write rule, place and text."""
+        return f"{self.rule}: {self.where}: {self.text}"
+
+
+class Diagnosis(NamedTuple):
+    """What was judged, and what was found.
+
+    Attributes:
+        faults: by time.
+        judged: the rules that had anything to judge.
+        unjudged: why each other rule had not.
+        frames: how many frames there were.
+    """
+
+    faults: tuple[BusFault, ...]
+    judged: tuple[str, ...]
+    unjudged: Mapping[str, str]
+    frames: int
+
+
+class Diagnoser:
+    """Takes the frames of a source, and judges them once all have come.
+
+    Args:
+        bit_rate: bits a second, for the load; None if it is not known.
+        eds: what EDS files say, by node-ID.
+        without_errors: why the source has no error frames whatever happened.
+    """
+
+    def __init__(
+        self,
+        bit_rate: int | None = None,
+        eds: Mapping[int, node_memory.EdsObjects] = _NO_NODES,
+        without_errors: str = "",
+    ) -> None:
+        self._bit_rate, self._eds, self._without_errors = bit_rate, eds, without_errors
+        self.kept = FrameKeeper()
+
+    def take(self, frames: Columns | Iterable[Record]) -> None:
+        """Take frames in the order of the log: a block of columns, or records."""
+        self.kept.take(frames)
+
+    def diagnosis(self) -> Diagnosis:
+        """Judge what has come until now."""
+        faults: list[BusFault] = []
+        judged: set[str] = set()
+        why: dict[str, str] = {}
+        for bus in self.kept:
+            one = _BusJudge(bus, self._bit_rate, self._eds)
+            faults += one.faults()
+            judged |= one.judged
+            why |= one.unjudged
+        if self._without_errors and "no-error-frames" not in {fault.rule for fault in faults}:
+            judged.discard("no-error-frames")
+            why["no-error-frames"] = self._without_errors
+        if not self.kept.frames:
+            why = dict.fromkeys(RULES, "no frame came")
+        faults.sort(key=lambda fault: (fault.first_us, fault.channel, fault.rule))
+        names = tuple(name for name in RULES if name in judged)
+        unjudged = {name: why.get(name, "") for name in RULES if name not in judged}
+        return Diagnosis(tuple(faults), names, unjudged, self.kept.frames)
+
+
+def diagnose(
+    frames: Iterable[Columns | Sequence[Record]],
+    bit_rate: int | None = None,
+    eds: Mapping[int, node_memory.EdsObjects] = _NO_NODES,
+) -> Diagnosis:
+    """Judge the frames of a log by all rules that need no parameter.
+
+    Args:
+        frames: blocks in the order of the log, each columns or records.
+        bit_rate: bits a second, for the load; None if it is not known.
+        eds: what EDS files say, by node-ID.
+    """
+    one = Diagnoser(bit_rate, eds)
+    for block in frames:
+        one.take(block)
+    return one.diagnosis()
+
+
+class _BusJudge:
+    """Judges one bus."""
+
+    def __init__(
+        self,
+        bus: BusFrames,
+        bit_rate: int | None,
+        eds: Mapping[int, node_memory.EdsObjects],
+    ) -> None:
+        self._bus, self._bit_rate, self._eds = bus, bit_rate, eds
+        self.judged = {"no-error-frames", "time-back"}
+        self.unjudged: dict[str, str] = {}
+        self._hits: list[Hit] = []
+        self._rows = bus.rows_by_ident()
+        self._backward = bus.backward()
+        self._times, self._set_back = steady_times(bus, self._backward)
+        self._end_us = max(self._times) if len(bus) else 0
+
+    def faults(self) -> list[BusFault]:
+        """Return what is wrong."""
+        bus, rows = self._bus, self._rows
+        self._time()
+        self._load()
+        decoder = Decoder(self._eds)
+        events = node_events.BusEvents(bus, self._times, decoder, rows)
+        canopen = node_events.is_canopen(bus, rows)
+        for row in _merged(
+            found
+            for ident, found in rows.items()
+            if (node_events.is_event(ident) if canopen else ident & ERROR and ident < FD)
+        ):
+            events.take(row)
+        if not canopen:
+            self.unjudged = (
+                dict.fromkeys(RULES.keys() - _ANY_BUS, "no CANopen was heard") | self.unjudged
+            )
+            return self._grouped(events.hits)
+        self._events = events
+        events.end(self._end_us)
+        self._cuts = sorted(events.cuts)
+        self.judged |= RULES.keys() - _ANY_BUS
+        self._lengths(decoder)
+        self._rhythms()
+        self._drives(decoder)
+        self._once()
+        return self._grouped(events.hits)
+
+    def _hit(
+        self, rule: str, ident: int | None, text: str, rows: Sequence[int], n: int = 1
+    ) -> None:
+        node = None if ident is None else node_of(ident)
+        self._hits.append(Hit(rule, node, ident, text, tuple(map(int, rows)), n))
+
+    # What holds for any bus
+
+    def _time(self) -> None:
+        for row in self._backward:
+            back_us = self._bus.at_us[row - 1] - self._bus.at_us[row]
+            self._hit("time-back", None, f"the time goes back by {ms_text(back_us)} ms", [row])
+        if len(self._bus) > 1 and self._bus.at_us[0] == self._end_us:
+            self.unjudged["time-back"] = "all frames have one time"
+
+    def _load(self) -> None:
+        if self._bit_rate is None:
+            self.unjudged["max-load"] = "no bit rate is known: give -b, as -b 500000"
+            return
+        self.judged.add("max-load")
+        bus, seconds = self._bus, Load(self._times[0])
+        bits = self._bits()
+        windows = []
+        for row, amount in enumerate(bits):
+            if amount and (one := seconds.take(self._times[row], amount)):
+                windows.append((one, row))
+        windows.append((seconds.end(), len(bus) - 1))
+        for window, row in windows:
+            percent = window.bits * 100_000_000 / (self._bit_rate * WINDOW_US)
+            if percent > MOST_LOAD:
+                begin = bisect_left(self._times, window.at_us)
+                text = f"load {percent:.1f} % in a second, at most {MOST_LOAD:g} % is right"
+                self._hit("max-load", None, text, [begin, row])
+
+    def _bits(self) -> Sequence[int]:
+        """Return the bits of each classic frame on the bus, 0 for others."""
+        bus = self._bus
+        if bus.is_large:
+            from tickrig.host.canmon.model.columns.column_traffic import column_bits  # noqa: PLC0415 - numpy
+
+            ident = np.frombuffer(bus.ident, np.uint64)
+            plain = np.flatnonzero((ident >> np.uint64(33) == 0) & (ident & np.uint64(ERROR) == 0))
+            out = np.zeros(len(bus), np.int64)
+            out[plain] = column_bits(
+                ident[plain].astype(np.uint32),
+                np.frombuffer(bus.dlc, np.uint8)[plain],
+                np.frombuffer(bus.payload, np.uint64)[plain],
+            )
+            found: Sequence[int] = out.tolist()
+            return found
+        frames = (bus.frame(row) if bus.ident[row] < FD else None for row in range(len(bus)))
+        return [frame_bits(one) if isinstance(one, CanFrame) else 0 for one in frames]
+
+    # Lengths
+
+    def _lengths(self, decoder: Decoder) -> None:
+        right = {
+            nmt.NMT_COB_ID: (2,),
+            node_events.SYNC_ID: (0, 1),
+            node_events.TIME_ID: (6,),
+        }
+        groups = (
+            (node_events.EMCY_IDS, (8,)),
+            (node_events.RESPONSE_IDS, (sdo_frame.FRAME_BYTES,)),
+            (node_events.REQUEST_IDS, (sdo_frame.FRAME_BYTES,)),
+            (node_events.ERROR_CONTROL_IDS, (1,)),
+        )
+        for ident, rows in self._rows.items():
+            if ident > STANDARD_MAX:
+                continue
+            sizes = Counter(_plain(self._bus.picked(self._bus.dlc, rows)))
+            if ident in node_events.PDO_IDS:
+                self._pdo_length(ident, rows, sizes, decoder)
+                continue
+            fits = right.get(ident) or next((one for ids, one in groups if ident in ids), None)
+            if fits is None:
+                continue
+            for size in sizes.keys() - set(fits):
+                wrong = [row for row in rows if self._bus.dlc[row] == size]
+                wanted = " or ".join(map(str, fits))
+                text = f"{_name(ident)} has {size} B, {wanted} is right"
+                self._hit("length", ident, text, wrong, len(wrong))
+
+    def _pdo_length(
+        self, ident: int, rows: Sequence[int], sizes: Counter[int], decoder: Decoder
+    ) -> None:
+        """Find the frames of a PDO that have another length than most."""
+        usual = sizes.most_common(1)[0][0]
+        layout = getattr(decoder.bus(self._bus.name).lasting(ident), "__self__", None)
+        if isinstance(layout, PdoDecoder) and usual < layout.size:
+            text = f"{_name(ident)} has {usual} B, {layout.size} are right by its mapping"
+            self._hit("pdo-length", ident, text, rows[:_KEPT_FRAMES], sizes[usual])
+        if len(sizes) == 1:
+            return
+        lengths = _plain(self._bus.picked(self._bus.dlc, rows))
+        times = self._bus.picked(self._times, rows)
+        changes = [at for at in range(1, len(lengths)) if lengths[at] != lengths[at - 1]]
+        cuts = self._cuts_of(ident)
+        unknown = [
+            at
+            for at in changes
+            if bisect_right(cuts, times[at]) == bisect_left(cuts, times[at - 1])
+        ]
+        if not unknown:
+            return
+        if len(sizes) > 3 or (len(unknown) > 6 and sizes[usual] < 0.9 * len(rows)):
+            return  # no PDO: its length says something
+        odd = [at for at in range(len(lengths)) if lengths[at] != usual]
+        seen = sorted(sizes.keys() - {usual})
+        text = f"{_name(ident)} has {' or '.join(map(str, seen))} B, {usual} B before and after"
+        if len(odd) > 0.3 * len(rows):
+            odd = unknown
+            text = f"the length of {_name(ident)} changes from {lengths[odd[0] - 1]} to"
+            text += f" {lengths[odd[0]]} B"
+        self._hit("pdo-length", ident, text, [rows[at] for at in odd[:_KEPT_FRAMES]], len(odd))
+
+    # Rhythms
+
+    def _rhythms(self) -> None:
+        self._quiet = self._silences()
+        self._silent: dict[int, list[int]] = {}
+        for ident, rows in sorted(self._rows.items()):
+            node = ident & node_events.NODE_MASK
+            if ident == node_events.SYNC_ID:
+                self._rhythm("sync", ident, rows)
+            elif ident in node_events.ERROR_CONTROL_IDS:
+                one = self._events.nodes.get(node)
+                if one is not None and not one.toggled and one.heartbeats:
+                    self._heartbeats(node, one)
+            elif ident in node_events.PDO_IDS:
+                self._rhythm("pdo", ident, rows)
+        for at, idents in sorted(self._silent.items()):
+            row = bisect_left(self._times, at)
+            gap = self._times[row + 1] - at if row + 1 < len(self._times) else 0
+            row = bisect_right(self._times, at) - 1
+            gap = self._times[row + 1] - at
+            names = counted(len(idents), "CAN-ID")
+            text = f"no frame for {ms_text(gap)} ms, where {names} should come"
+            self._hit("silence", None, text, [row, row + 1])
+
+    def _silences(self) -> list[tuple[int, int]]:
+        """Return the times in which no frame at all came, where they are long."""
+        times = self._times
+        if len(times) < 2:
+            return []
+        if self._bus.is_large:
+            gaps = np.diff(np.frombuffer(times, np.int64))
+            limit = max(20_000, 5 * int(np.median(gaps)))
+            found = np.flatnonzero(gaps > limit).tolist()
+        else:
+            plain = [b - a for a, b in pairwise(times)]
+            limit = max(20_000, 5 * sorted(plain)[len(plain) // 2])
+            found = [at for at, gap in enumerate(plain) if gap > limit]
+        return [(times[at], times[at + 1]) for at in found]
+
+    def _cuts_of(self, ident: int) -> list[int]:
+        node = ident & node_events.NODE_MASK
+        known = node in self._events.nodes or node in self._first_nodes()
+        cuts = [cut.at_us for cut in self._cuts if cut.node in (0, node) or (node and not known)]
+        cuts += [self._times[row] for row in self._set_back]
+        return sorted(cuts)
+
+    def _first_nodes(self) -> set[int]:
+        return {ident & node_events.NODE_MASK for ident in self._rows if ident <= STANDARD_MAX}
+
+    def _pieces(self, ident: int, rows: Sequence[int]) -> list[Sequence[int]]:
+        """Cut the rows of an identifier where somebody changes how its frames come."""
+        times = _plain_times(self._times, rows)
+        places = {bisect_right(times, cut) for cut in self._cuts_of(ident)}
+        ends = sorted({0, len(rows), *places})
+        return [rows[begin:end] for begin, end in pairwise(ends)]
+
+    def _rhythm(
+        self,
+        kind: str,
+        ident: int,
+        rows: Sequence[int],
+    ) -> None:
+        name = _name(ident)
+        pieces = self._pieces(ident, rows)
+        for piece in pieces:
+            times = self._bus.picked(self._times, piece)
+            rhythm = cycles.rhythm_of(times)
+            if rhythm is None:
+                continue
+            period = rhythm.period_us
+            for at, count in rhythm.missing:
+                begin, end = int(times[at]), int(times[at + 1])
+                if not self._is_silent(ident, begin, end, period):
+                    text = f"{name} does not come for {ms_text(end - begin)} ms, its period is"
+                    text += f" {ms_text(period)}"
+                    self._hit(f"{kind}-missing", ident, text, piece[at : at + 2], count)
+            for at in rhythm.extra:
+                text = f"{name} comes {ms_text(int(times[at]) - int(times[at - 1]))} ms after the"
+                text += f" one before, its period is {ms_text(period)}"
+                self._hit(f"{kind}-doubled", ident, text, [piece[at]])
+            for before, behind in pairwise(rhythm.levels):
+                text = f"the period of {name} changes from {ms_text(before.period_us)} to"
+                text += f" {ms_text(behind.period_us)} ms"
+                self._hit(f"{kind}-period", ident, text, [piece[before.end]])
+            for begin, end, usual, large in rhythm.noisy:
+                text = f"the jitter of {name} changes from {ms_text(usual)} to {ms_text(large)} ms,"
+                text += f" its period is {ms_text(period)}"
+                shown = piece[begin : min(end, len(piece) - 1) + 1]
+                rule = "pdo-jitter" if kind == "pdo" else "sync-period"
+                self._hit(rule, ident, text, shown[:_KEPT_FRAMES])
+            last_us = int(times[-1])
+            if piece is pieces[-1] and self._end_us - last_us > 3 * rhythm.levels[-1].period_us:
+                text = f"{name} stops {ms_text(self._end_us - last_us)} ms before the end, its"
+                text += f" period is {ms_text(period)}"
+                self._hit(f"{kind}-missing", ident, text, [piece[-1]])
+
+    def _is_silent(self, ident: int, begin: int, end: int, period: int) -> bool:
+        """Say whether all of the bus is silent in a gap, and note it."""
+        at = bisect_left(self._quiet, (begin, 0))
+        for start, stop in self._quiet[max(0, at - 1) : at + 2]:
+            inside = min(stop, end) - max(start, begin)
+            if inside >= 0.6 * (end - begin - period) and inside > period:
+                self._silent.setdefault(start, []).append(ident)
+                return True
+        return False
+
+    def _heartbeats(self, node: int, one: node_events.NodeEvents) -> None:
+        ident = nmt.ERROR_CONTROL_COB_ID + node
+        rows = [row for row in one.heartbeats if self._bus.dlc[row] > 0]
+        pieces = self._pieces(ident, rows)
+        for piece in pieces:
+            times = [self._times[row] for row in piece]
+            if not times or self._twins(ident, piece, times):
+                continue
+            rhythm = cycles.rhythm_of(times)
+            if rhythm is None:
+                period, missing = self._few_beats(node, times)
+            else:
+                period, missing = rhythm.period_us, rhythm.missing
+                self._odd_beats(ident, piece, rhythm)
+            if period is None:
+                continue
+            says = f"one each {ms_text(period)} before"
+            for at, n in missing:
+                begin, end = times[at], times[at + 1]
+                if not self._is_silent(ident, begin, end, period):
+                    self._lost(ident, end - begin, says, piece[at : at + 2], n)
+            if piece is pieces[-1] and self._end_us - times[-1] > _LOST_AFTER * period:
+                self._lost(ident, self._end_us - times[-1], says, piece[-1:], 1)
+
+    def _few_beats(
+        self, node: int, times: Sequence[int]
+    ) -> tuple[int | None, Sequence[tuple[int, int]]]:
+        """Return the period of heartbeats that are too few to learn it surely, and gaps above."""
+        gaps = sorted(b - a for a, b in pairwise(times))
+        told_ms = self._eds[node].heartbeat_ms if node in self._eds else 0
+        period = told_ms * 1_000 or (gaps[len(gaps) // 2] if len(gaps) >= 2 else 0)
+        if not period or (not told_ms and gaps[0] < period / 2):
+            return None, ()
+        missing = [
+            (at, 1) for at, (a, b) in enumerate(pairwise(times)) if b - a > _LOST_AFTER * period
+        ]
+        return (period, missing) if len(missing) <= max(1, len(times) // 4) else (None, ())
+
+    def _odd_beats(self, ident: int, piece: Sequence[int], rhythm: cycles.Rhythm) -> None:
+        if len(rhythm.extra) > 2:
+            self._double(ident, [piece[at] for at in rhythm.extra])
+        for before, behind in pairwise(rhythm.levels):
+            text = f"the period of its heartbeat changes from {ms_text(before.period_us)}"
+            text += f" to {ms_text(behind.period_us)} ms"
+            self._hit("no-lost-heartbeat", ident, text, [piece[before.end]])
+
+    def _lost(self, ident: int, gap: int, says: str, rows: Sequence[int], n: int) -> None:
+        text = f"no heartbeat for {ms_text(gap)} ms, {says}"
+        self._hit("no-lost-heartbeat", ident, text, rows, n)
+
+    def _twins(self, ident: int, rows: Sequence[int], times: Sequence[int]) -> bool:
+        """Notice two heartbeats that go beside each other: each second one keeps the period."""
+        if len(times) < 2 * cycles.LEAST_GAPS:
+            return False
+        every, other = cycles.rhythm_of(times[::2]), cycles.rhythm_of(times[1::2])
+        if (
+            every is None
+            or other is None
+            or abs(every.period_us - other.period_us) > (0.05 * every.period_us)
+        ):
+            return False
+        gaps = [b - a for a, b in pairwise(times)]
+        long, short = sorted(gaps[::2]), sorted(gaps[1::2])
+        middle = long[len(long) // 2], short[len(short) // 2]
+        if abs(middle[0] - middle[1]) < 0.2 * max(middle):
+            return False
+        self._double(ident, rows)
+        return True
+
+    def _double(self, ident: int, rows: Sequence[int]) -> None:
+        text = "a second heartbeat comes beside the first: two nodes have this node-ID"
+        self._hit("doubled-node", ident, text, rows[:_KEPT_FRAMES], len(rows))
+
+    # Drives, and what comes once
+
+    def _drives(self, decoder: Decoder) -> None:
+        """Find the fault bit of statuswords: where a mapping tells them, or TPDO1 looks like it."""
+        for ident, rows in sorted(self._rows.items()):
+            if ident not in node_events.PDO_IDS:
+                continue
+            route = decoder.bus(self._bus.name).lasting(ident)
+            layout = getattr(route, "__self__", None)
+            shift = None
+            if isinstance(layout, PdoDecoder) and layout.fields:
+                if not layout.kind.startswith("tpdo"):
+                    continue
+                words = [one for one in layout.fields if one.name == "statusword"]
+                shift = words[0].shift if words and words[0].shift <= 48 else None
+                if shift is None:
+                    continue
+            elif ident & ~node_events.NODE_MASK != 0x180:
+                continue
+            self._statusword(ident, rows, shift)
+
+    def _statusword(self, ident: int, rows: Sequence[int], shift: int | None) -> None:
+        payload = self._bus.picked(self._bus.payload, rows)
+        low, runs = shift or 0, []
+        if isinstance(payload, list):
+            words = [one >> low & 0xFFFF for one in payload]
+            runs = [0, *(at for at in range(1, len(words)) if words[at] != words[at - 1])]
+            values = [words[at] for at in runs]
+        else:
+            table = np.asarray(payload) >> np.uint64(low) & np.uint64(0xFFFF)
+            runs = [0, *(np.flatnonzero(table[1:] != table[:-1]) + 1).tolist()]
+            if len(runs) > len(table) // 4 and shift is None:
+                return
+            values = table[runs].tolist()
+        if shift is None and not self._is_statusword(ident, rows, values):
+            return
+        before = False
+        for at, value in zip(runs, values, strict=True):
+            fault = bool(value & 0x08)
+            if fault and not before:
+                said = node_memory.drive_state(value)
+                text = f"the drive is in fault: statusword {value:04X}h {said}"
+                self._hit("drive-fault", ident, text, [rows[at]])
+            before = fault
+
+    def _is_statusword(self, ident: int, rows: Sequence[int], values: Sequence[int]) -> bool:
+        """Say whether TPDO1 begins with a statusword: all of its states are, and one is enabled."""
+        if any(self._bus.dlc[row] < 2 for row in rows[:_KEPT_FRAMES]):
+            return False
+        if len(set(values)) > 64:
+            return False
+        states = {value & 0x6F for value in values}
+        enabled = {0x21, 0x23, 0x27}
+        usual = {0x00, 0x20, 0x40, 0x60, 0x07, 0x0F, 0x2F, 0x08, 0x28, *enabled}
+        # Bit 4, voltage enabled, and bit 9, remote: one of them is set by every drive that runs.
+        running = {value & 0x210 for value in values if value & 0x6F in enabled}
+        return states <= usual and bool(running) and 0 not in running
+
+    def _once(self) -> None:
+        """Find identifiers that came once, and that nothing explains."""
+        times = self._times
+        if len(self._bus) < _LEAST_FRAMES or self._end_us - times[0] < _LONG_US:
+            return
+        starts = [cut.at_us for cut in self._cuts]
+        heard = set(self._events.nodes)
+        for ident, rows in sorted(self._rows.items()):
+            if len(rows) != 1 or ident & (ERROR | REMOTE) or ident >= FD:
+                continue
+            if node_events.is_event(ident) or ident in node_events.LSS_IDS:
+                continue
+            if ident == node_events.TIME_ID:
+                continue
+            at_us = times[rows[0]]
+            node = node_of(ident)
+            at = bisect_right(starts, at_us)
+            started = at > 0 and at_us - starts[at - 1] < _SOON_US
+            if ident in node_events.PDO_IDS and node in heard and started:
+                continue
+            self._hit("seen-once", ident, f"{_name(ident)} comes once", rows)
+
+    def _grouped(self, hits: Iterable[Hit]) -> list[BusFault]:
+        """Put hits of one rule and node, or CAN-ID, together."""
+        groups: dict[tuple[str, int | None], list[Hit]] = {}
+        for hit in (*hits, *self._hits):
+            key = hit.node if hit.node is not None else -1 if hit.ident is None else ~hit.ident
+            groups.setdefault((hit.rule, key), []).append(hit)
+        return [self._fault(group) for group in groups.values()]
+
+    def _fault(self, hits: Sequence[Hit]) -> BusFault:
+        hits = sorted(hits, key=lambda hit: hit.rows[0])
+        first = hits[0]
+        texts = list(dict.fromkeys(hit.text for hit in hits))
+        text = "; ".join(texts[:_KEPT_TEXTS])
+        if len(texts) > _KEPT_TEXTS:
+            text += f"; and {len(texts) - _KEPT_TEXTS} more"
+        rows = sorted({row for hit in hits for row in hit.rows})
+        times = [self._bus.at_us[row] for row in rows]
+        return BusFault(
+            *(first.rule, self._bus.name, first.node, first.ident, text, min(times), max(times)),
+            sum(hit.amount for hit in hits),
+            tuple(self._bus.place(row) for row in rows[:_KEPT_FRAMES]),
+        )
+
+
+def _merged(parts: Iterable[Sequence[int]]) -> list[int]:
+    rows: list[int] = []
+    for part in parts:
+        rows += _plain(part)
+    rows.sort()
+    return rows
+
+
+def _plain(values: Any) -> list[int]:
+    """Return a list of integers of Python."""
+    if isinstance(values, list):
+        return values
+    found: list[int] = values.tolist() if hasattr(values, "tolist") else list(values)
+    return found
+
+
+def _plain_times(times: Sequence[int], rows: Sequence[int]) -> _TimesOf:
+    return _TimesOf(times, rows)
+
+
+class _TimesOf(Sequence[int]):
+    """The times of some rows, looked up when they are asked for."""
+
+    def __init__(self, times: Sequence[int], rows: Sequence[int]) -> None:
+        self._times, self._rows = times, rows
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def __getitem__(self, at: Any) -> Any:
+        return self._times[self._rows[at]]
+
+
+def _name(ident: int) -> str:
+    """Name an identifier by the pre-defined connection set."""
+    shown = ident_text(ident)
+    if ident == node_events.SYNC_ID:
+        return "SYNC"
+    if ident in node_events.PDO_IDS:
+        block = (ident - 0x180) >> 7
+        return f"{'RPDO' if block % 2 else 'TPDO'}{block // 2 + 1} ({shown})"
+    names = {
+        0x000: "NMT",
+        0x080: "EMCY",
+        0x100: "TIME",
+        0x580: "SDO response",
+        0x600: "SDO request",
+        0x700: "error control",
+    }
+    name = names.get(ident & ~node_events.NODE_MASK) if ident <= STANDARD_MAX else None
+    return f"{name} ({shown})" if name else shown

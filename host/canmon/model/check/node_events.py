@@ -1,0 +1,432 @@
+"""What the services of CANopen tell of nodes in a log: NMT, error control, EMCY and SDO."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Final, NamedTuple
+
+from tickrig.host.canmon.model.check.bus_frames import BusFrames, Hit
+from tickrig.host.canmon.model.decode import decoded
+from tickrig.host.canmon.model.decode.decoder import Decoder
+from tickrig.host.canmon.model.decode.sdo import WRONG_TOGGLE
+from tickrig.host.canmon.model.decode.services import nmt_state_name
+from tickrig.host.canmon.model.frames import ERROR, REMOTE, Record, ms_text
+from tickrig.host.text.values import counted
+from tickrig.wire.can import STANDARD_MAX, ErrorFrame, describe_error_frame
+from tickrig.wire.canopen import nmt, sdo_frame
+from tickrig.wire.canopen.emcy import describe
+
+EMCY_IDS: Final = range(0x081, 0x100)
+PDO_IDS: Final = range(0x181, 0x580)
+RESPONSE_IDS: Final = range(0x581, 0x600)
+REQUEST_IDS: Final = range(0x601, 0x680)
+ERROR_CONTROL_IDS: Final = range(0x701, 0x780)
+SYNC_ID: Final = 0x080
+TIME_ID: Final = 0x100
+LSS_IDS: Final = (0x7E4, 0x7E5)
+NODE_MASK: Final = 0x7F
+_TOGGLE: Final = 0x80
+_STATES: Final = frozenset(map(int, nmt.NmtState))
+_COMMANDS: Final = frozenset(map(int, nmt.NmtCommand))
+_RESETS: Final = frozenset([nmt.NmtCommand.RESET_NODE, nmt.NmtCommand.RESET_COMMUNICATION])
+_TARGETS: Final = {
+    int(nmt.NmtCommand.START): int(nmt.NmtState.OPERATIONAL),
+    int(nmt.NmtCommand.STOP): int(nmt.NmtState.STOPPED),
+    int(nmt.NmtCommand.ENTER_PRE_OPERATIONAL): int(nmt.NmtState.PRE_OPERATIONAL),
+}
+_ANSWER_US: Final = 50_000
+"""A frame of error control answers a remote frame that came at most so long before."""
+_PATIENCE_US: Final = 1_000_000
+"""An SDO request at the end of a log may still be answered for so long."""
+_OBEYS_US: Final = 1_000_000
+"""A node follows an NMT command within so long."""
+_TWINS_US: Final = 100_000
+"""Two answers, or boot-ups, of two nodes with one node-ID come within so long."""
+_PDO_PARAMETERS: Final = range(0x1400, 0x1C00)
+_SYNC_PARAMETERS: Final = range(0x1005, 0x1008)
+_HEARTBEAT_TIME: Final = 0x1017
+_TOGGLE_ABORT: Final = 0x0503_0000
+
+RULES: Final = {
+    "no-error-frames": "error frames",
+    "no-emcy": "EMCY but error reset",
+    "no-reboot": "a boot-up without an NMT reset of a node that was heard",
+    "nmt-stop": "an NMT stop",
+    "nmt-state": "an NMT state that nobody commanded",
+    "guard-toggle": "the toggle bit of guarding",
+    "remote-heartbeat": "a remote frame to a node that sends heartbeats",
+    "doubled-node": "two nodes with one node-ID",
+    "no-sdo-abort": "aborted SDO transfers",
+    "sdo-unanswered": "SDO requests without an answer",
+    "sdo-toggle": "the toggle bit of SDO segments",
+}
+"""The rules that are judged here, and what each finds."""
+
+
+class Cut(NamedTuple):
+    """Something that changes how frames come, so that what was learnt before no longer holds.
+
+    Attributes:
+        at_us: when.
+        node: whose frames; 0 for all.
+    """
+
+    at_us: int
+    node: int
+
+
+@dataclass(slots=True)
+class NodeEvents:
+    """What was heard of one node.
+
+    Attributes:
+        heartbeats: rows of error control that no remote frame asked for, without boot-ups.
+        answers: rows of those that one asked for.
+        asked: rows of remote frames of error control.
+        boots: rows of boot-ups.
+        toggled: a frame had the toggle bit.
+        state: the NMT state that it told last; None before.
+    """
+
+    heartbeats: list[int] = field(default_factory=list)
+    answers: list[int] = field(default_factory=list)
+    asked: list[int] = field(default_factory=list)
+    boots: list[int] = field(default_factory=list)
+    toggled: bool = False
+    state: int | None = None
+    command: tuple[int, int, int] | None = None  # when, the state that it wants, its row
+    told_since: int = 0
+    reset: bool = False
+    requests: int = 0
+    latest_request: bytes = b""
+    latest_answer: tuple[int, bytes, int] | None = None
+
+
+def is_canopen(bus: BusFrames, rows: Mapping[int, Sequence[int]]) -> bool:
+    """Say whether what is spoken on a bus is CANopen.
+
+    Other protocols use the same CAN-IDs for other things, so each kind of identifier is looked
+    at: frames of the right length and content speak for it, others against it.
+    """
+    good: Counter[str] = Counter()
+    bad = 0
+    for ident, found in rows.items():
+        if ident > STANDARD_MAX:
+            continue
+        few = found[:64]
+        sizes = Counter(bus.dlc[row] for row in few)
+        first = {bus.payload[row] & 0xFF for row in few}
+        if ident in ERROR_CONTROL_IDS:
+            fits = sizes[1] * 4 >= len(few) * 3 and {one & ~_TOGGLE for one in first} <= _STATES
+            good["error control"] += fits
+            bad += not fits
+        elif ident == nmt.NMT_COB_ID:
+            fits = sizes[2] * 2 >= len(few) and bool(first & _COMMANDS)
+            good["nmt"] += fits
+            bad += not fits
+        elif ident == SYNC_ID:
+            fits = (sizes[0] + sizes[1]) * 2 > len(few)
+            good["sync"] += fits
+            bad += not fits
+        elif ident in REQUEST_IDS:
+            answered = _answers(bus, few, rows.get(ident - 0x80, ())[:64])
+            good["sdo"] += answered
+            bad += sizes[sdo_frame.FRAME_BYTES] * 2 < len(few)
+        elif ident in RESPONSE_IDS:
+            bad += sizes[sdo_frame.FRAME_BYTES] * 2 < len(few)
+        elif ident in PDO_IDS:
+            good["pdo"] += 1
+        elif ident < SYNC_ID or TIME_ID < ident < PDO_IDS.start:
+            bad += 1
+    strong = good["error control"] + good["sdo"]
+    if strong:
+        return bad <= 2 * strong + good["nmt"] + good["sync"] + good["pdo"]
+    if good["nmt"]:
+        return bad <= 1
+    return bool(good["sync"] and good["pdo"]) and not bad
+
+
+def _answers(bus: BusFrames, requests: Sequence[int], responses: Sequence[int]) -> bool:
+    """Say whether a response names the object of a request."""
+    asked = {bus.payload[row] >> 8 & 0xFF_FFFF for row in requests}
+    return any(
+        bus.payload[row] >> 8 & 0xFF_FFFF in asked and bus.dlc[row] == sdo_frame.FRAME_BYTES
+        for row in responses
+    )
+
+
+class BusEvents:
+    """Walks through the frames of services, and keeps what they tell.
+
+    Args:
+        bus: the frames.
+        times: their times.
+        decoder: puts SDO transfers together, and learns from them.
+        rows: rows of each identifier.
+
+    Attributes:
+        nodes: what was heard, by node-ID.
+        hits: what is wrong.
+        cuts: what changes how frames come.
+        commanded: an NMT command came.
+    """
+
+    def __init__(
+        self,
+        bus: BusFrames,
+        times: Sequence[int],
+        decoder: Decoder,
+        rows: Mapping[int, Sequence[int]],
+    ) -> None:
+        self._bus, self._times, self._decoder = bus, times, decoder
+        self.nodes: defaultdict[int, NodeEvents] = defaultdict(NodeEvents)
+        self.hits: list[Hit] = []
+        self.cuts: list[Cut] = []
+        self.commanded = any(ident == nmt.NMT_COB_ID for ident in rows)
+        self._first = _first_rows(rows)
+        self._asked: dict[tuple[int, int], int] = {}
+        self._silent: list[tuple[int, str, int]] = []
+        self._row = 0
+
+    def take(self, row: int) -> None:
+        """Take a frame of a service."""
+        self._row = row
+        frame, at_us = self._bus.frame(row), int(self._times[row])
+        if isinstance(frame, ErrorFrame):
+            self._hit("no-error-frames", None, None, describe_error_frame(frame))
+            return
+        told = self._decoder.take(Record(at_us, self._bus.name, frame))
+        can_id, data, node = frame.can_id, frame.data, frame.can_id & NODE_MASK
+        if can_id == nmt.NMT_COB_ID:
+            if len(data) == 2 and data[0] in _COMMANDS and not frame.remote:
+                self._command(at_us, data[0], data[1])
+        elif can_id in ERROR_CONTROL_IDS:
+            self._error_control(at_us, node, data, remote=frame.remote)
+        elif can_id in EMCY_IDS and not frame.remote and len(data) >= 2:
+            code = int.from_bytes(data[:2], "little")
+            if code:
+                self._hit("no-emcy", node, can_id, f"EMCY {code:04X}h {describe(code)}")
+        elif can_id in REQUEST_IDS and not frame.remote:
+            one = self.nodes[node]
+            one.requests += 1
+            one.latest_request = data
+            self._asked[node, at_us] = row
+        elif can_id in RESPONSE_IDS and not frame.remote:
+            self._answer(at_us, node, data)
+        for transfer in told.transfers:
+            self._transfer(at_us, transfer)
+
+    def end(self, end_us: int) -> None:
+        """Judge what is known once all frames were taken."""
+        for transfer in self._decoder.pending(end_us):
+            if transfer.duration_us > _PATIENCE_US:
+                self._transfer(end_us, transfer)
+        self._tell_silent()
+        for node, one in sorted(self.nodes.items()):
+            if len(one.heartbeats) >= 2 and not one.toggled:
+                for row in one.asked:
+                    self._row = row
+                    self._hit(
+                        *("remote-heartbeat", node, nmt.ERROR_CONTROL_COB_ID + node | REMOTE),
+                        "a remote frame asks a node that sends heartbeats for its state",
+                    )
+            elif one.toggled:
+                self._guarding(node, one)
+
+    def _hit(self, rule: str, node: int | None, ident: int | None, text: str) -> None:
+        self.hits.append(Hit(rule, node, ident, text, (self._row,)))
+
+    # NMT and error control
+
+    def _command(self, at_us: int, command: int, target: int) -> None:
+        nodes = list(self.nodes) if target == nmt.ALL_NODES else [target]
+        self.cuts.append(Cut(at_us, target))
+        if command == nmt.NmtCommand.STOP:
+            whom = "all nodes" if target == nmt.ALL_NODES else f"node {target}"
+            self._hit("nmt-stop", target or None, nmt.NMT_COB_ID, f"NMT stops {whom}")
+        for node in nodes:
+            one = self.nodes[node]
+            if command in _RESETS:
+                one.reset, one.command = True, None
+            else:
+                one.command, one.told_since = (at_us, _TARGETS[command], self._row), 0
+
+    def _error_control(self, at_us: int, node: int, data: bytes, *, remote: bool) -> None:
+        one = self.nodes[node]
+        if remote:
+            one.asked.append(self._row)
+            return
+        if not data:
+            return
+        answers = bool(one.asked) and (
+            at_us - self._times[one.asked[-1]] <= _ANSWER_US
+            and (not one.answers or one.answers[-1] < one.asked[-1])
+        )
+        if data[0] == nmt.NmtState.INITIALISING and not (answers and one.toggled):
+            self._boot(at_us, node, one)
+            return
+        (one.answers if answers else one.heartbeats).append(self._row)
+        one.toggled |= bool(data[0] & _TOGGLE)
+        self._state(at_us, node, one, data[0] & ~_TOGGLE)
+
+    def _boot(self, at_us: int, node: int, one: NodeEvents) -> None:
+        heard = self._first.get(node, self._row) < self._row
+        latest = one.boots[-1] if one.boots else None
+        if heard and not one.reset:
+            if latest is not None and at_us - self._times[latest] <= _TWINS_US:
+                said = ms_text(at_us - int(self._times[latest]))
+                self._hit(
+                    *("doubled-node", node, nmt.ERROR_CONTROL_COB_ID + node),
+                    f"two boot-ups within {said} ms: two nodes have this node-ID",
+                )
+            else:
+                self._hit(
+                    *("no-reboot", node, nmt.ERROR_CONTROL_COB_ID + node),
+                    "boots again without an NMT reset",
+                )
+        one.boots.append(self._row)
+        one.reset, one.state, one.command = False, int(nmt.NmtState.INITIALISING), None
+        self.cuts.append(Cut(at_us, node))
+
+    def _state(self, at_us: int, node: int, one: NodeEvents, state: int) -> None:
+        before, one.state = one.state, state
+        command, ident = one.command, nmt.ERROR_CONTROL_COB_ID + node
+        one.told_since += 1
+        if state not in _STATES:
+            self._hit("nmt-state", node, ident, f"{state:02X}h is no NMT state")
+        elif before is None or before == nmt.NmtState.INITIALISING:
+            return  # many nodes start themselves (1F80h)
+        elif state != before:
+            wanted = None if command is None else command[1]
+            # Who records without what it sends itself, has no command at all.
+            unseen = state == nmt.NmtState.OPERATIONAL and not self.commanded
+            self.cuts.append(Cut(at_us, node))
+            if state != wanted and not one.reset and not unseen:
+                names = nmt_state_name(before), nmt_state_name(state)
+                self._hit("nmt-state", node, ident, f"{names[0]} to {names[1]} without a command")
+        elif (
+            command is not None
+            and state != command[1]
+            and at_us - command[0] > _OBEYS_US
+            and one.told_since > 2
+        ):
+            names = nmt_state_name(state), nmt_state_name(command[1])
+            said = f"still {names[0]} {ms_text(at_us - command[0])} ms after the command to be"
+            self._hit("nmt-state", node, ident, f"{said} {names[1]}")
+            one.command = None
+
+    def _guarding(self, node: int, one: NodeEvents) -> None:
+        """Compare toggle bits of answers that follow each other."""
+        before: int | None = None
+        boots = iter([*one.boots, len(self._bus)])
+        boot = next(boots)
+        for row in one.answers:
+            while boot < row:
+                before, boot = None, next(boots)
+            toggle = self._bus.payload[row] & _TOGGLE
+            if toggle == before:
+                self._row = row
+                self._hit(
+                    *("guard-toggle", node, nmt.ERROR_CONTROL_COB_ID + node),
+                    "the toggle bit is the same as in the answer before",
+                )
+            before = toggle
+
+    # SDO
+
+    def _answer(self, at_us: int, node: int, data: bytes) -> None:
+        """Notice an answer that comes twice."""
+        one = self.nodes[node]
+        latest, one.latest_answer = one.latest_answer, (at_us, data, one.requests)
+        blocks = one.latest_request[:1] >= b"\xa0"
+        if latest is None or not one.requests or blocks or data[:1] == b"\x80":
+            return
+        if (
+            latest[2] == one.requests
+            and data[:4] == latest[1][:4]
+            and at_us - latest[0] <= _TWINS_US
+        ):
+            self._hit(
+                *("doubled-node", node, sdo_frame.RESPONSE_COB_ID + node),
+                "two answers to one SDO request: two nodes have this node-ID",
+            )
+
+    def _transfer(self, at_us: int, transfer: decoded.Transfer) -> None:
+        """Judge an SDO transfer that ended."""
+        node = transfer.node
+        ident = sdo_frame.REQUEST_COB_ID + node
+        row = self._asked.get((node, transfer.at_us), self._row)
+        entry = transfer.entry
+        name = decoded.write_entry(entry) + (f" {transfer.name}" if transfer.name else "")
+        what = f"{transfer.direction} {name}"
+        outcome = transfer.outcome
+        if outcome is decoded.TransferOutcome.ABORTED:
+            rule = "sdo-toggle" if transfer.abort_code == _TOGGLE_ABORT else "no-sdo-abort"
+            by = "client" if transfer.by_client else "server"
+            reason = sdo_frame.describe_abort(transfer.abort_code)
+            self._hit(rule, node, ident, f"{by} aborts {what}, {reason}")
+        elif outcome is decoded.TransferOutcome.UNANSWERED:
+            self._silent.append((node, f"{what} is not answered", row))
+        elif outcome is decoded.TransferOutcome.BROKEN and not transfer.partial:
+            self._silent.append((node, f"{what} is broken off", row))
+        elif transfer.retries and transfer.mode is decoded.TransferMode.EXPEDITED:
+            again = f"asked again {counted(transfer.retries, 'time')}"
+            self._silent.append((node, f"{what} is not answered, {again}", row))
+        if WRONG_TOGGLE in transfer.flaws:
+            self._hit("sdo-toggle", node, ident, f"{what}: {WRONG_TOGGLE}")
+        if (
+            entry is not None
+            and transfer.direction is decoded.TransferDirection.DOWNLOAD
+            and outcome is decoded.TransferOutcome.DONE
+        ):
+            if entry[0] in _PDO_PARAMETERS or entry[0] == _HEARTBEAT_TIME:
+                self.cuts.append(Cut(at_us, node))
+            elif entry[0] in _SYNC_PARAMETERS:
+                self.cuts.append(Cut(at_us, 0))
+
+    def _tell_silent(self) -> None:
+        """Tell of requests without an answer; those to nodes that nobody heard are one finding."""
+        absent: dict[int, int] = {}
+        for node, text, row in self._silent:
+            if node in self._first:
+                self._row = row
+                self._hit("sdo-unanswered", node, sdo_frame.REQUEST_COB_ID + node, text)
+            else:
+                absent.setdefault(node, row)
+        if absent:
+            nodes = ", ".join(map(str, sorted(absent)))
+            text = f"SDO requests to nodes that were never heard: {nodes}"
+            self.hits.append(Hit("sdo-unanswered", None, None, text, tuple(absent.values())))
+
+
+def _first_rows(rows: Mapping[int, Sequence[int]]) -> dict[int, int]:
+    """Return the first row in which each node sends anything."""
+    first: dict[int, int] = {}
+    for ident, found in rows.items():
+        node = ident & NODE_MASK
+        if node and ident <= STANDARD_MAX and _sends(ident):
+            first[node] = min(int(found[0]), first.get(node, int(found[0])))
+    return first
+
+
+def _sends(ident: int) -> bool:
+    """Say whether a node sends with an identifier of the pre-defined connection set."""
+    tpdo = ident in PDO_IDS and (ident >> 7) % 2 == 1
+    return tpdo or any(ident in ids for ids in (EMCY_IDS, RESPONSE_IDS, ERROR_CONTROL_IDS))
+
+
+def is_event(ident: int) -> bool:
+    """Say whether each frame of an identifier is looked at by itself."""
+    can_id = ident & ~REMOTE
+    return bool(ident & ERROR and not ident >> 30) or (
+        can_id <= STANDARD_MAX
+        and (
+            can_id == nmt.NMT_COB_ID
+            or can_id in EMCY_IDS
+            or can_id in RESPONSE_IDS
+            or can_id in REQUEST_IDS
+            or can_id in ERROR_CONTROL_IDS
+        )
+    )
