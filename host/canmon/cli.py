@@ -17,6 +17,7 @@ _VERBS: Final = {
     "top": (f"{_HERE}.top:command", "Show all identifiers: counts, rates, gaps, jitter."),
     "stats": (f"{_HERE}.stats:command", "Count a log: rates, gaps, jitter, missed cycles."),
     "check": (f"{_HERE}.check:command", "Hold traffic against rules."),
+    "report": (f"{_HERE}.report:command", "Write what was on a bus as one HTML page."),
     "conform": (f"{_HERE}.conform:command", "Judge one CANopen node, clause by clause."),
     "eds": ("tickrig.host.canmon.cli:eds", "Check, mend, compare and show EDS files."),
     "net": ("tickrig.host.canmon.net.group:command", "Set a CANopen network to work."),
@@ -52,6 +53,7 @@ def main() -> None:
     canmon top run.log                            all identifiers in a table
     canmon nodes can0 --eds 3=drive.eds           all nodes
     canmon check run.log --no-emcy --nodes 3,5    exit status 1 if a rule is broken
+    canmon report run.log -o run.html             one page that you can mail
     canmon conform can0 --node 5 --eds drive.eds  is this a CANopen node?
     canmon net can0 scan                          find, address, configure, program nodes
     canmon tui can0                               all there is on one screen

@@ -6,9 +6,7 @@ style sheet and the script of the page, and their hashes are all that the page l
 
 from __future__ import annotations
 
-from base64 import b64encode
 from collections.abc import Mapping
-from hashlib import sha256
 from importlib.resources import files
 from typing import Any, Final
 
@@ -59,15 +57,7 @@ class PageTemplate:
 
     def render(self, **values: Any) -> str:
         """Return the page of these values; the same values give the same bytes."""
+        policy = page_text.content_policy(self._style, self._script)
         return self._template.render(
-            style=Markup(self._style), script=Markup(self._script), policy=self._policy(), **values
+            style=Markup(self._style), script=Markup(self._script), policy=policy, **values
         )
-
-    def _policy(self) -> str:
-        """Return the content security policy: no network, and no style or script but ours."""
-        parts = [("style", self._style), *([("script", self._script)] if self._script else [])]
-        hashes = (
-            f"{kind}-src 'sha256-{b64encode(sha256(text.encode()).digest()).decode()}'"
-            for kind, text in parts
-        )
-        return "; ".join(["default-src 'none'", *hashes, "base-uri 'none'", "form-action 'none'"])

@@ -470,7 +470,7 @@ class ColumnNodes:
 
     def _take_bus(self, bus: BusDecoder, frames: Columns) -> None:
         before = bus.changes
-        for row, record in _rows(frames, _that_matter(bus, frames)):
+        for row, record in one_by_one(frames, that_matter(bus, frames)):
             self._board.take(record, self._decoder.take(record))
             if bus.changes != before:
                 self._feed(frames, np.arange(row + 1, len(frames)))
@@ -478,17 +478,18 @@ class ColumnNodes:
 
     def _feed(self, frames: Columns, rows: Ints) -> None:
         """Take frames whatever they mean."""
-        for _, record in _rows(frames, rows):
+        for _, record in one_by_one(frames, rows):
             self._board.take(record, self._decoder.take(record))
 
 
-def _rows(frames: Columns, rows: Ints) -> Iterator[tuple[int, Record]]:
+def one_by_one(frames: Columns, rows: Ints) -> Iterator[tuple[int, Record]]:
+    """Yield some frames as records, each with its row."""
     for begin in range(0, len(rows), _PIECE):
         piece = rows[begin : begin + _PIECE]
         yield from zip(piece.tolist(), records(select(frames, piece)), strict=True)
 
 
-def _that_matter(bus: BusDecoder, frames: Columns) -> Ints:
+def that_matter(bus: BusDecoder, frames: Columns) -> Ints:
     """Return the rows of frames that can change what is known of nodes."""
     can_ids = (frames.ident & STANDARD_MAX).astype(np.int64)
     can_ids[frames.ident & (EXTENDED | ERROR) != 0] = STANDARD_MAX + 1

@@ -220,6 +220,10 @@ class NodeBoard:
         """Return the nodes by bus and node-ID."""
         return [self._nodes[key] for key in sorted(self._nodes)]
 
+    def row(self, channel: str, node: int) -> NodeStatus | None:
+        """Return a node; None if it is not on the board."""
+        return self._nodes.get((channel, node))
+
     def take(self, record: Record, decoded: Decoded) -> None:
         """Take a decoded frame."""
         self.now_us = max(self.now_us, record.at_us)

@@ -1,0 +1,455 @@
+"""What happened on buses over the time of a log, in as much detail as a page can draw.
+
+>>> bins = TimeBins(most=4, width_us=10)
+>>> for at_us in (0, 5, 12, 35, 77):
+...     bins.add("181", at_us, 1)
+>>> bins.width_us, bins.sums["181"]
+(20, {0: 3, 1: 1, 3: 1})
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections import deque
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from math import isfinite
+from typing import Final, Generic, NamedTuple, Protocol, TypeVar
+
+from tickrig.host.canmon.model.decode.decoded import Decoded, Signal, Transfer, TransferOutcome
+from tickrig.host.canmon.model.decode.decoder import Decoder
+from tickrig.host.canmon.model.decode.node_board import NodeBoard
+from tickrig.host.canmon.model.decode.node_memory import drive_state
+from tickrig.host.canmon.model.decode.services import nmt_state_name
+from tickrig.host.canmon.model.frames import Record, any_ident
+from tickrig.host.canmon.model.traffic import BitRates
+from tickrig.wire.can import ErrorFrame, FdFrame, frame_bits
+from tickrig.wire.canopen.nmt import NmtState
+
+# Theory of operation
+# ===================
+#
+# A log may hold ten million frames, a page a few thousand marks. So nothing here grows with
+# the frames: what is counted goes into bins of equal width, and when there are too many bins,
+# two become one (`TimeBins`). What is a mark (an EMCY, a transfer) is kept one by one up to a
+# number, then every second one, every fourth (`Thinned`); how many there were stays exact.
+# States are changes, and of the changes in one span of time the last one counts (`Bands`).
+#
+# There are two ways in, as everywhere in canmon: `Survey.take` frame by frame, and
+# `ColumnSurvey` in blocks of numpy. Both let `NodeBoard` follow the nodes; a survey is a board
+# that remembers when. Times are relative to the first frame; one before it counts as 0.
+
+T = TypeVar("T")
+Key = TypeVar("Key")
+
+MOST_BINS: Final = 2_000
+_FIRST_WIDTH_US: Final = 1_000
+_MOST_MARKS: Final = 1_000
+_MOST_SIGNALS: Final = 400
+
+
+class TimeBins(Generic[Key]):
+    """Sums over spans of time of equal width, which doubles when there are too many.
+
+    Args:
+        most: how many spans there may be.
+        width_us: of a span at first.
+
+    Attributes:
+        width_us: of a span.
+        sums: by key, the sum of each span that has one.
+        ranges: by key, the least and the greatest value of each span that has one.
+    """
+
+    def __init__(self, most: int = MOST_BINS, width_us: int = _FIRST_WIDTH_US) -> None:
+        self._most, self.width_us = most, width_us
+        self.sums: dict[Key, dict[int, int]] = {}
+        self.ranges: dict[Key, dict[int, tuple[float, float]]] = {}
+
+    def reach(self, at_us: int) -> None:
+        """Make room for a time; spans are merged if there are too many."""
+        shift = (at_us // self.width_us // self._most).bit_length()
+        if not shift:
+            return
+        self.width_us <<= shift
+        for key, spans in self.sums.items():
+            merged: dict[int, int] = {}
+            for place, amount in spans.items():
+                merged[place >> shift] = merged.get(place >> shift, 0) + amount
+            self.sums[key] = merged
+        for name, ranges in self.ranges.items():
+            joined: dict[int, tuple[float, float]] = {}
+            for place, (low, high) in ranges.items():
+                was = joined.get(place >> shift, (low, high))
+                joined[place >> shift] = min(was[0], low), max(was[1], high)
+            self.ranges[name] = joined
+
+    def add(self, key: Key, at_us: int, amount: int) -> None:
+        """Add to the span of a time."""
+        self.reach(at_us)
+        self.add_at(key, at_us // self.width_us, amount)
+
+    def add_at(self, key: Key, place: int, amount: int) -> None:
+        """Add to a span; `reach` has made room for it."""
+        spans = self.sums.setdefault(key, {})
+        spans[place] = spans.get(place, 0) + amount
+
+    def spread_at(self, key: Key, place: int, low: float, high: float) -> None:
+        """Let the range of a span hold these values; `reach` has made room for it."""
+        spans = self.ranges.setdefault(key, {})
+        was = spans.get(place)
+        spans[place] = (low, high) if was is None else (min(was[0], low), max(was[1], high))
+
+
+class Thinned(Generic[T]):
+    """Things in their order: all of them, or every second, every fourth once they are many.
+
+    Attributes:
+        items: those that are kept.
+        count: how many there were.
+    """
+
+    def __init__(self, most: int = _MOST_MARKS) -> None:
+        self._most, self._step = most, 1
+        self.items: list[T] = []
+        self.count = 0
+
+    def append(self, item: T) -> None:
+        """Take one more."""
+        if self.count % self._step == 0:
+            self.items.append(item)
+            if len(self.items) > 2 * self._most:
+                del self.items[1::2]
+                self._step *= 2
+        self.count += 1
+
+
+class Bands:
+    """States as the times at which they begin; of many in one span of time the last is kept.
+
+    Attributes:
+        changes: time and state, in order.
+        count: how many changes there were.
+    """
+
+    def __init__(self, most: int = _MOST_MARKS) -> None:
+        self._most, self._width_us = most, 1
+        self.changes: list[tuple[int, str]] = []
+        self.count = 0
+
+    def take(self, at_us: int, state: str) -> None:
+        """Take a state; one that goes on is no change."""
+        if self.changes and self.changes[-1][1] == state:
+            return
+        self.count += 1
+        if self.changes and self.changes[-1][0] // self._width_us == at_us // self._width_us:
+            self.changes[-1] = self.changes[-1][0], state
+            return
+        self.changes.append((at_us, state))
+        while len(self.changes) > 2 * self._most:
+            self._width_us *= 2
+            last = {when // self._width_us: (when, what) for when, what in self.changes}
+            self.changes = list(last.values())
+
+
+class SignalName(NamedTuple):
+    """Which signal it is: of a node's PDO, or of a message of a DBC file."""
+
+    channel: str
+    node: int | None
+    kind: str
+    name: str
+
+
+@dataclass(slots=True)
+class SignalTrack:
+    """A signal over time; its values are in the bins.
+
+    Attributes:
+        unit: of the values.
+        source: where its name comes from.
+        count: how many values there were.
+        low, high: the least and the greatest of them.
+        states: of a signal whose values have names; None for a number.
+    """
+
+    unit: str = ""
+    source: str = ""
+    count: int = 0
+    low: float = 0.0
+    high: float = 0.0
+    states: Bands | None = None
+
+    def take(self, count: int, low: float, high: float) -> None:
+        """Count values."""
+        self.low = min(self.low, low) if self.count else low
+        self.high = max(self.high, high) if self.count else high
+        self.count += count
+
+
+class Mark(NamedTuple):
+    """A moment on the lane of a node.
+
+    Attributes:
+        at_us: when, since the first frame.
+        text: what it is.
+        span_us: how long it took.
+    """
+
+    at_us: int
+    text: str
+    span_us: int = 0
+
+
+@dataclass(slots=True)
+class NodeLane:
+    """What one node did, and when.
+
+    Attributes:
+        states: NMT states that it told, or was sent to.
+        boots: boot-ups.
+        commands: NMT commands to it.
+        emcys: EMCYs.
+        transfers: SDO transfers that ended well.
+        failures: those that did not.
+        gaps: without a heartbeat that was due: from the last one on.
+    """
+
+    states: Bands = field(default_factory=Bands)
+    boots: Thinned[Mark] = field(default_factory=Thinned)
+    commands: Thinned[Mark] = field(default_factory=Thinned)
+    emcys: Thinned[Mark] = field(default_factory=Thinned)
+    transfers: Thinned[Mark] = field(default_factory=Thinned)
+    failures: Thinned[Mark] = field(default_factory=Thinned)
+    gaps: Thinned[Mark] = field(default_factory=Thinned)
+
+
+class Survey(NodeBoard):
+    """A node board that remembers what happened when.
+
+    Args:
+        decoder: decodes what is taken here, too.
+        expected: as of `NodeBoard`.
+        rates: of the buses, for the length of CAN FD frames.
+
+    Attributes:
+        first_us: time of the first frame, None before there was one.
+        last_us: of the latest.
+        frames: how many there were, by bus.
+        counts: frames by bus and identifier.
+        bits: on each bus.
+        errors: error frames on each bus.
+        values: of signals.
+        lanes: of nodes, by bus and node-ID.
+        signals: by name.
+        signals_left: names of signals for which there was no room.
+    """
+
+    def __init__(
+        self,
+        decoder: Decoder,
+        expected: Mapping[int, str] | None = None,
+        rates: BitRates | None = None,
+    ) -> None:
+        super().__init__(decoder, expected)
+        self._rates = rates or BitRates()
+        self.first_us: int | None = None
+        self.last_us = 0
+        self.frames: dict[str, int] = {}
+        self.counts = TimeBins[tuple[str, int]]()
+        self.bits = TimeBins[str]()
+        self.errors = TimeBins[str]()
+        self.values = TimeBins[SignalName]()
+        self.lanes: dict[tuple[str, int], NodeLane] = {}
+        self.signals: dict[SignalName, SignalTrack] = {}
+        self.signals_left: set[SignalName] = set()
+
+    def since(self, at_us: int) -> int:
+        """Return a time since the first frame, not below 0."""
+        return max(0, at_us - (self.first_us or 0))
+
+    def begin(self, at_us: int) -> None:
+        """Take the time of the first frame."""
+        if self.first_us is None:
+            self.first_us = self.last_us = at_us
+
+    def count(self, record: Record) -> None:
+        """Count a frame."""
+        at_us, channel, frame, _ = record
+        self.begin(at_us)
+        self.last_us, since_us = max(self.last_us, at_us), self.since(at_us)
+        self.frames[channel] = self.frames.get(channel, 0) + 1
+        if isinstance(frame, ErrorFrame):
+            self.errors.add(channel, since_us, 1)
+            return
+        bits = self._rates.bits(frame) if isinstance(frame, FdFrame) else frame_bits(frame)
+        self.counts.add((channel, any_ident(frame)), since_us, 1)
+        self.bits.add(channel, since_us, bits)
+
+    def take(self, record: Record, decoded: Decoded) -> None:
+        """Take a frame for the lanes of nodes; it may be counted elsewhere."""
+        kind, node, channel = decoded.kind, decoded.node, record.channel
+        since_us = self.since(record.at_us)
+        row = None if node is None else self.row(channel, node)
+        told_us, late = (None, 0) if row is None else (row.reported_us, row.late)
+        if row and kind == "boot-up":
+            late -= row.is_late(record.at_us)  # the board counts a late heartbeat alone
+        super().take(record, decoded)
+        if row and told_us is not None and row.late > late:
+            self._gap(channel, row.node, told_us, record.at_us)
+        if kind == "nmt":
+            self._take_command(channel, since_us, decoded)
+        elif node is None:
+            return
+        elif kind == "emcy":
+            self.lane(channel, node).emcys.append(Mark(since_us, decoded.text))
+        elif kind == "sdo":
+            for transfer in decoded.transfers:
+                self._take_transfer(channel, node, transfer)
+        elif kind == "boot-up":
+            lane = self.lane(channel, node)
+            lane.boots.append(Mark(since_us, "boot-up"))
+            lane.states.take(since_us, nmt_state_name(NmtState.PRE_OPERATIONAL))
+        elif kind in ("heartbeat", "guard") and decoded.signals:
+            state = decoded.signals[0].value
+            assert isinstance(state, int)
+            self.lane(channel, node).states.take(since_us, nmt_state_name(state))
+
+    def take_signals(self, record: Record, decoded: Decoded) -> None:
+        """Take the values of a PDO, or of a message of a DBC file."""
+        if not decoded.signals or not (decoded.kind == "dbc" or "pdo" in decoded.kind):
+            return
+        since_us = self.since(record.at_us)
+        for signal in decoded.signals:
+            name = SignalName(record.channel, decoded.node, decoded.kind, signal.name)
+            self._take_signal(name, since_us, signal, decoded.source)
+
+    def track(self, name: SignalName, unit: str, source: str) -> SignalTrack | None:
+        """Return the track of a signal; None if there is no room for one more."""
+        track = self.signals.get(name)
+        if track is None:
+            if len(self.signals) >= _MOST_SIGNALS:
+                self.signals_left.add(name)
+                return None
+            states = Bands() if name.name == "statusword" else None
+            track = self.signals[name] = SignalTrack(unit, source, states=states)
+        return track
+
+    def end(self) -> None:
+        """Take the end of the log: heartbeats that were due by then are missing."""
+        for row in self.rows():
+            if row.reported_us is not None and row.is_late(self.last_us):
+                self._gap(row.channel, row.node, row.reported_us, self.last_us)
+
+    def _gap(self, channel: str, node: int, from_us: int, to_us: int) -> None:
+        begin_us = self.since(from_us)
+        text = f"no heartbeat for {(to_us - from_us) / 1e3:.0f} ms"
+        gap = Mark(begin_us, text, max(0, self.since(to_us) - begin_us))
+        self.lane(channel, node).gaps.append(gap)
+
+    def _take_command(self, channel: str, since_us: int, decoded: Decoded) -> None:
+        for (bus, node), lane in self.lanes.items():
+            if bus == channel and decoded.node in (None, node):
+                lane.commands.append(Mark(since_us, f"NMT {decoded.text}"))
+                row = self.row(channel, node)
+                if row and row.state is None and row.commanded is not None:
+                    lane.states.take(since_us, nmt_state_name(row.commanded))
+
+    def _take_transfer(self, channel: str, node: int, transfer: Transfer) -> None:
+        if not transfer.outcome.answered and self.row(channel, node) is None:
+            return
+        lane = self.lane(channel, node)
+        done = transfer.outcome is TransferOutcome.DONE and not transfer.flaws
+        mark = Mark(self.since(transfer.at_us), str(transfer), transfer.duration_us)
+        (lane.transfers if done else lane.failures).append(mark)
+
+    def lane(self, channel: str, node: int) -> NodeLane:
+        """Return the lane of a node."""
+        lane = self.lanes.get((channel, node))
+        if lane is None:
+            lane = self.lanes[channel, node] = NodeLane()
+        return lane
+
+    def _take_signal(self, name: SignalName, since_us: int, signal: Signal, source: str) -> None:
+        value = signal.value
+        if not isinstance(value, int | float) or not isfinite(value):
+            return
+        track = self.track(name, signal.unit, source)
+        if track is None:
+            return
+        if source == "dbc" and signal.text and track.states is None and not track.count:
+            track.states = Bands()  # an enumerated signal: its values have names
+        track.take(1, float(value), float(value))
+        if track.states is None:
+            self.values.reach(since_us)
+            self.values.spread_at(name, since_us // self.values.width_us, value, value)
+        elif name.name == "statusword" and source != "dbc":
+            track.states.take(since_us, drive_state(int(value)) or "?")
+        else:
+            track.states.take(since_us, signal.text or f"{value:g}")
+
+
+# The frames around some moments, out of a log that is read a second time.
+
+
+class Piece(Protocol):
+    """Some frames of a log, in their order."""
+
+    def times(self) -> Sequence[int]:
+        """Return the time of each."""
+
+    def cut(self, begin: int, end: int) -> list[Record]:
+        """Return some of them, by their places."""
+
+
+@dataclass(slots=True)
+class _Excerpt:
+    """The frames around a moment."""
+
+    number: int
+    records: list[Record]
+    wanted: int
+
+
+def excerpts(pieces: Iterable[Piece], moments: Sequence[int], frames: int) -> list[list[Record]]:
+    """Return the frames around each moment.
+
+    Args:
+        pieces: all frames of a log.
+        moments: times.
+        frames: how many before and how many from each moment on.
+    """
+    order = deque(sorted(range(len(moments)), key=moments.__getitem__))
+    found: list[list[Record]] = [[] for _ in moments]
+    before: list[Record] = []
+    running: list[_Excerpt] = []
+    for piece in pieces:
+        times = piece.times()
+        for one in running:
+            one.records += piece.cut(0, one.wanted)
+            one.wanted -= min(one.wanted, len(times))
+        while order and len(times) and moments[order[0]] <= times[-1]:
+            number = order.popleft()
+            place = bisect_left(times, moments[number])
+            begin = max(0, place - frames)
+            head = before[-(frames - place) :] if place < frames else []
+            end = place + frames
+            records = head + piece.cut(begin, min(end, len(times)))
+            running.append(_Excerpt(number, records, max(0, end - len(times))))
+        running = list(_unfinished(running, found))
+        before = (before + piece.cut(max(0, len(times) - frames), len(times)))[-frames:]
+        if not order and not running:
+            break
+    for one in running:
+        found[one.number] = one.records
+    for number in order:  # behind the last frame
+        found[number] = list(before)
+    return found
+
+
+def _unfinished(running: Iterable[_Excerpt], found: list[list[Record]]) -> Iterator[_Excerpt]:
+    for one in running:
+        if one.wanted:
+            yield one
+        else:
+            found[one.number] = one.records

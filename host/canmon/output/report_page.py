@@ -1,0 +1,434 @@
+"""The report of a log as one HTML page that needs nothing else, and as PDF and PNG of Chromium."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from html import escape
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Final
+
+from tickrig.host.canmon.model.check.rule import TrafficFinding
+from tickrig.host.canmon.model.decode.decoded import Decoded
+from tickrig.host.canmon.model.decode.node_board import NodeStatus, identity_words, pdo_contents
+from tickrig.host.canmon.model.frames import (
+    REMOTE,
+    Record,
+    decoded_text,
+    ident_of,
+    ident_text,
+    load_text,
+    node_of,
+    rate_text,
+)
+from tickrig.host.canmon.model.survey import Mark, Survey, Thinned
+from tickrig.host.text.page_text import content_policy, duration, harmless, json_text, one_line
+from tickrig.host.text.values import counted
+from tickrig.wire.can import CanFrame
+
+Around = Sequence[tuple[Record, Decoded]]
+
+_HERE: Final = Path(__file__).parent
+_NODE: Final = re.compile(r"\bnode (\d{1,3})\b")
+_MOST_POINTS: Final = 60_000
+"""Of all curves together: more would make the page larger than a mail may be."""
+_MOST_IDS: Final = 1_000
+_NMT_NAMES: Final = ("operational", "pre-operational", "stopped", "initialising")
+_SERVICES: Final = {
+    0x080: "EMCY",
+    0x580: "SDO response",
+    0x600: "SDO request",
+    0x700: "heartbeat, guarding",
+}
+_ALONE: Final = {
+    0x000: "NMT",
+    0x080: "SYNC",
+    0x100: "TIME",
+    0x7E4: "LSS answer",
+    0x7E5: "LSS request",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """What rules found, and which rules those were.
+
+    Attributes:
+        findings: in the order of their times.
+        around: the frames around each of the first of them.
+        rules: names of the rules.
+        none: why rules judged nothing, by their names.
+    """
+
+    findings: Sequence[TrafficFinding]
+    around: Sequence[Around] = ()
+    rules: Sequence[str] = ()
+    none: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class ReportHead:
+    """What a page says of itself.
+
+    Attributes:
+        title: of the page.
+        source: what was read, in words.
+        about: lines at its end, each with what is shown as code.
+        bit_rate: of the buses, None where it is not known.
+    """
+
+    title: str
+    source: str
+    about: Sequence[tuple[str, str]]
+    bit_rate: int | None = None
+
+
+def report_page(survey: Survey, verdict: Verdict, head: ReportHead) -> str:
+    """Return the page; the same values give the same bytes."""
+    style, script = (_HERE.joinpath(f"page.{kind}").read_text("utf-8") for kind in ("css", "js"))
+    parts = {
+        "policy": escape(content_policy(style, script)),
+        "title": escape(one_line(head.title)),
+        "summary": escape(" ".join(map(one_line, summary(survey, verdict, head)))),
+        "style": style,
+        "script": script,
+        # Nothing in the text of strangers ends the element that holds it.
+        "data": _page_json(_page_data(survey, verdict, head)),
+    }
+    page = _HERE.joinpath("page.html").read_text("utf-8")
+    return re.sub("@([a-z]+)@", lambda place: parts[place[1]], page)
+
+
+def _page_json(value: object) -> str:
+    text = json_text(value, compact=True, letters=True)
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+
+
+def summary(survey: Survey, verdict: Verdict, head: ReportHead) -> list[str]:
+    """Return three sentences: what there was, who was there, and what is wrong."""
+    return [_what(survey, head), _who(survey.rows()), _wrong(verdict, survey.first_us or 0)]
+
+
+def _what(survey: Survey, head: ReportHead) -> str:
+    frames = sum(survey.frames.values())
+    if survey.first_us is None:
+        return f"{head.source} holds no frame."
+    span_us = survey.last_us - survey.first_us
+    buses = ", ".join(sorted(survey.frames))
+    begun = f", from {_date(survey.first_us)}" if survey.first_us >= _DATED_US else ""
+    bits = sum(sum(spans.values()) for spans in survey.bits.sums.values())
+    load = load_text(bits * 1_000_000 // span_us, head.bit_rate) if span_us else ""
+    busy = f", at a mean load of {load}" if load and len(survey.frames) == 1 else ""
+    return f"{head.source} holds {frames:,} frames of {buses} in {duration(span_us)}{begun}{busy}."
+
+
+def _date(at_us: int) -> str:
+    """Write a date that is read in another place than where the log was made."""
+    try:
+        return f"{datetime.fromtimestamp(at_us // 1_000_000, UTC):%Y-%m-%d %H:%M:%S} UTC"
+    except (ValueError, OverflowError, OSError):
+        return f"{at_us / 1e6:.0f} s"
+
+
+_DATED_US: Final = 1_000_000_000_000_000
+"""Times before it (September 2001) are no dates, but count from the start of a recorder."""
+
+
+def _who(rows: Iterable[NodeStatus]) -> str:
+    present = [row for row in rows if row.present]
+    if not present:
+        return "No CANopen node was heard."
+    groups: dict[str, list[str]] = {}
+    for row in present:
+        told = "in no state that they told" if row.state is None else row.state_text
+        groups.setdefault(told, []).append(str(row.node))
+    parts = [
+        f"{', '.join(nodes)} {'is' if len(nodes) == 1 else 'are'} {state}"
+        for state, nodes in groups.items()
+    ]
+    were = "node was" if len(present) == 1 else "nodes were"
+    return f"{len(present)} {were} heard; at the end {'; '.join(parts)}."
+
+
+def _wrong(verdict: Verdict, first_us: int) -> str:
+    judged = len(verdict.rules) - len(verdict.none)
+    if not verdict.findings:
+        return f"No fault was found by {counted(judged, 'rule')}."
+    first = verdict.findings[0]
+    at = f"{max(0, first.at_us - first_us) / 1e6:.3f} s"
+    return f"{counted(len(verdict.findings), 'fault')} found; the first, at {at}: {first.text}."
+
+
+def _page_data(survey: Survey, verdict: Verdict, head: ReportHead) -> dict[str, object]:
+    span_us = survey.since(survey.last_us)
+    rows = survey.rows()
+    several = len(survey.frames) > 1
+    return {
+        "span": span_us,
+        "findings": [_finding(survey, verdict, number) for number in range(len(verdict.findings))],
+        "around": bool(verdict.around),
+        "judged": _judged(verdict),
+        "buses": [
+            {
+                "name": one_line(channel),
+                "rate": head.bit_rate,
+                "load": _bins(survey.bits.sums.get(channel, {}), survey.bits.width_us),
+                "errors": _bins(survey.errors.sums.get(channel, {}), survey.errors.width_us),
+            }
+            for channel in sorted(survey.frames)
+        ],
+        "nodes": [_node(survey, row, several=several) for row in rows],
+        "nodeHeads": _HEADS,
+        "signals": _signals(survey, several=several),
+        "ids": _idents(survey, rows, max(span_us, 1)),
+        "about": [[one_line(text), harmless(code)] for text, code in _notes(survey, head)],
+    }
+
+
+def _notes(survey: Survey, head: ReportHead) -> Iterable[tuple[str, str]]:
+    yield from head.about
+    if left := len(survey.signals_left):
+        yield f"{counted(left, 'signal')} more had no room.", ""
+    thinned = [
+        f"node {node}: {one.count - len(one.items)} of {one.count} {what}"
+        for (_, node), lane in survey.lanes.items()
+        for what, one in (("EMCYs", lane.emcys), ("SDO transfers", lane.transfers))
+        if len(one.items) < one.count
+    ]
+    if thinned:
+        yield f"Not drawn one by one: {', '.join(thinned)}.", ""
+
+
+def _judged(verdict: Verdict) -> str:
+    held = [name for name in verdict.rules if name not in verdict.none]
+    text = f"Judged by: {', '.join(held)}." if held else "No rule judged anything."
+    none = "; ".join(f"{name}: {why}" for name, why in verdict.none.items())
+    return one_line(f"{text} Not judged: {none}." if none else text)
+
+
+def _key(channel: str, node: int | None) -> str:
+    return "" if node is None else f"{one_line(channel)}/{node}"
+
+
+def _finding(survey: Survey, verdict: Verdict, number: int) -> dict[str, object]:
+    finding = verdict.findings[number]
+    around = verdict.around[number] if number < len(verdict.around) else ()
+    record, channel = finding.record, next(iter(sorted(survey.frames)), "")
+    node = None
+    if record is not None:
+        channel = record.channel
+        node = node_of(ident_of(record.frame)) if isinstance(record.frame, CanFrame) else None
+    if node is None and (named := _NODE.search(finding.text)):
+        node = int(named[1])
+    return {
+        "t": survey.since(finding.at_us),
+        "rule": one_line(finding.rule),
+        "text": one_line(finding.text),
+        "key": _key(channel, node),
+        "count": 1,
+        "frames": [
+            [
+                one.at_us - (survey.first_us or 0),
+                one_line(one.channel),
+                str(one.frame),
+                one_line(decoded_text(decoded)),
+                int(one == record),
+            ]
+            for one, decoded in around
+        ],
+    }
+
+
+_HEADS: Final = (
+    *("Node", "Name", "Identity", "NMT state", "Heartbeat", "Boot-ups", "Drive", "EMCY"),
+    "SDO errors",
+)
+
+
+def _node(survey: Survey, row: NodeStatus, *, several: bool) -> dict[str, object]:
+    lane = survey.lane(row.channel, row.node)
+    label = f"{row.channel} node {row.node}" if several else f"Node {row.node}"
+    period = "" if row.period_us is None else f"{row.period_us / 1e3:g} ms"
+    late = f", late {counted(lane.gaps.count, 'time')}" if lane.gaps.count else ""
+    boots = f"{row.boots}" + f" ({row.unrequested_boots} unasked)" * bool(row.unrequested_boots)
+    cells = (
+        *(label, row.name, identity_words(row), row.state_text, period + late),
+        *(boots, row.drive_state, _emcys(lane.emcys), _failures(lane.failures)),
+    )
+    return {
+        "key": _key(row.channel, row.node),
+        "label": one_line(label),
+        "short": one_line(row.name or row.drive_state),
+        "cells": [one_line(cell) for cell in cells],
+        "states": [part for at_us, state in lane.states.changes for part in (at_us, state)],
+        "pdos": _bins(_pdo_counts(survey, row), survey.counts.width_us),
+        **{
+            name: [[one.at_us, one.span_us, one_line(one.text)] for one in marks.items]
+            for name, marks in (
+                ("gaps", lane.gaps),
+                ("boots", lane.boots),
+                ("commands", lane.commands),
+                ("emcys", lane.emcys),
+                ("transfers", lane.transfers),
+                ("failures", lane.failures),
+            )
+        },
+    }
+
+
+def _emcys(marks: Thinned[Mark]) -> str:
+    return f"{marks.count}, the latest: {marks.items[-1].text}" if marks.items else ""
+
+
+def _failures(marks: Thinned[Mark]) -> str:
+    return f"{marks.count}, the latest: {marks.items[-1].text}" if marks.items else ""
+
+
+def _pdo_counts(survey: Survey, row: NodeStatus) -> dict[int, int]:
+    """Return how many PDOs a node sent in each span: those that are known, else predefined ones."""
+    known = pdo_contents(row)
+    others = {pdo.can_id for pdo in known if pdo.receives}
+    sent = {pdo.can_id for pdo in known if not pdo.receives}
+    sent |= {base + row.node for base in (0x180, 0x280, 0x380, 0x480)} - others
+    counts: dict[int, int] = {}
+    for can_id in sorted(sent):
+        for place, count in survey.counts.sums.get((row.channel, can_id), {}).items():
+            counts[place] = counts.get(place, 0) + count
+    return counts
+
+
+def _bins(spans: Mapping[int, int], width_us: int) -> dict[str, object]:
+    flat = [part for place in sorted(spans) for part in (place, spans[place])]
+    return {"width": width_us, "at": flat}
+
+
+def _signals(survey: Survey, *, several: bool) -> list[dict[str, object]]:
+    """Return the signals with their values; the more there are, the wider their spans."""
+    points = sum(len(spans) for spans in survey.values.ranges.values())
+    shift = max(0, (points // _MOST_POINTS).bit_length())
+    found = []
+    order = sorted(
+        survey.signals.items(), key=lambda one: (one[0].channel, one[0].node or 0, one[0][2:])
+    )
+    for name, track in order:
+        if not track.count:
+            continue
+        where = "" if name.node is None else f"{name.node}."
+        bus = f"{name.channel} " if several else ""
+        one: dict[str, object] = {
+            "key": _key(name.channel, name.node),
+            "name": one_line(f"{bus}{where}{name.name}"),
+            "unit": one_line(track.unit),
+        }
+        if track.states is not None:
+            changes = track.states.changes
+            one["states"] = [part for at_us, text in changes for part in (at_us, one_line(text))]
+        else:
+            one["width"] = survey.values.width_us << shift
+            one["at"] = _ranges(survey.values.ranges.get(name, {}), shift)
+        found.append(one)
+    return found
+
+
+def _ranges(spans: Mapping[int, tuple[float, float]], shift: int) -> list[float]:
+    joined: dict[int, tuple[float, float]] = {}
+    for place, (low, high) in spans.items():
+        was = joined.get(place >> shift, (low, high))
+        joined[place >> shift] = min(was[0], low), max(was[1], high)
+    return [
+        part
+        for place in sorted(joined)
+        for part in (place, _rounded(joined[place][0]), _rounded(joined[place][1]))
+    ]
+
+
+def _rounded(value: float) -> float:
+    """Return a number with as many digits as a picture shows."""
+    short = float(f"{value:.6g}")
+    return int(short) if short.is_integer() and abs(short) < 1e15 else short
+
+
+def _idents(survey: Survey, rows: Sequence[NodeStatus], span_us: int) -> list[dict[str, object]]:
+    meanings = {
+        (row.channel, pdo.can_id): f"node {row.node} {pdo.kind}: {', '.join(pdo.names)}"
+        for row in rows
+        for pdo in pdo_contents(row)
+        if pdo.names
+    }
+    found: list[dict[str, object]] = []
+    for channel, ident in sorted(survey.counts.sums)[:_MOST_IDS]:
+        count = sum(survey.counts.sums[channel, ident].values())
+        text = meanings.get((channel, ident)) or _meaning(ident)
+        rate = rate_text(count * 1e6 / span_us)
+        cells = (channel, ident_text(ident), str(count), rate, text)
+        node = node_of(ident & ~REMOTE)
+        found.append({"key": _key(channel, node), "cells": [one_line(cell) for cell in cells]})
+    return found
+
+
+def _meaning(ident: int) -> str:
+    """Return what the pre-defined connection set says of an identifier."""
+    can_id, asked = ident & ~REMOTE, ", asked for by a remote frame" * bool(ident & REMOTE)
+    if can_id in _ALONE:
+        return _ALONE[can_id] + asked
+    node = node_of(can_id)
+    if node is None:
+        return ""
+    service = _SERVICES.get(can_id - node)
+    return f"node {node} {service or 'PDO, not described'}{asked}"
+
+
+# Pictures of the page.
+
+_BROWSERS: Final = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+_PATIENCE_S: Final = 120
+_WIDTH, _HEIGHT = 1280, 1600
+
+
+class BrowserError(ValueError):
+    """There is no Chromium, or it wrote nothing."""
+
+
+def browser() -> str:
+    """Return the path of Chromium.
+
+    Raises:
+        BrowserError: it is not there.
+    """
+    found = next(filter(None, map(shutil.which, _BROWSERS)), None)
+    if found is None:
+        raise BrowserError(
+            "PDF and PNG are drawn by Chromium, which is not installed: apt-get install chromium,"
+            " or print the page of -o from any browser"
+        )
+    return found
+
+
+def print_page(page: Path, path: Path) -> None:
+    """Draw a page as PDF or PNG, as the suffix of the file says.
+
+    Raises:
+        BrowserError: Chromium is not there, or wrote nothing.
+    """
+    what = "--print-to-pdf" if path.suffix.lower() == ".pdf" else "--screenshot"
+    with TemporaryDirectory(prefix="canmon-") as folder:
+        words = [
+            *(browser(), "--headless=new", "--disable-gpu", "--no-first-run", "--hide-scrollbars"),
+            *("--no-sandbox", "--no-pdf-header-footer", f"--user-data-dir={folder}"),
+            *(f"--window-size={_WIDTH},{_HEIGHT}", "--virtual-time-budget=5000"),
+            *(f"{what}={path.resolve()}", page.resolve().as_uri()),
+        ]
+        try:
+            ended = subprocess.run(
+                words, capture_output=True, text=True, timeout=_PATIENCE_S, check=False
+            )
+        except (OSError, subprocess.TimeoutExpired) as error:
+            raise BrowserError(f"{path}: Chromium wrote nothing: {error}") from None
+    if not path.is_file() or ended.returncode:
+        last = one_line((ended.stderr.strip().splitlines() or ["no message"])[-1])
+        raise BrowserError(f"{path}: Chromium wrote nothing (status {ended.returncode}): {last}")

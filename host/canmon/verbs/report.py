@@ -1,0 +1,335 @@
+"""The verb `report`: what was on a bus, as one page."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import closing
+from pathlib import Path
+from platform import python_version
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any, Final
+
+import click
+
+from tickrig._lazy import LazyModule
+from tickrig._version import __version__
+from tickrig.host.canmon.model.check.checker import Checker, Unjudged
+from tickrig.host.canmon.model.check.rule import TrafficFinding
+from tickrig.host.canmon.model.check.rules import SWITCHES, parse_rules
+from tickrig.host.canmon.model.decode.dbc_file import DbcFile
+from tickrig.host.canmon.model.decode.decoder import Decoder
+from tickrig.host.canmon.model.decode.node_memory import EdsObjects
+from tickrig.host.canmon.model.frames import Record
+from tickrig.host.canmon.model.logs.log_writer import write_log
+from tickrig.host.canmon.model.survey import Piece, Survey, excerpts
+from tickrig.host.canmon.model.traffic import BitRates
+from tickrig.host.canmon.output import listening, report_page
+from tickrig.host.canmon.sources.source import AnySource, BlockLog, Source, block_log, open_source
+from tickrig.host.canmon.verbs import decode_options
+from tickrig.host.cli.can_options import BusOptions
+from tickrig.host.cli.messages import SourceFailed, refusing
+from tickrig.host.cli.options import PATH
+from tickrig.host.text.values import counted
+from tickrig.host.text.whole_file import check_file, write_whole
+
+if TYPE_CHECKING:
+    from tickrig.host.canmon.model.check import column_check
+    from tickrig.host.canmon.model.columns import column_survey
+    from tickrig.host.canmon.model.columns.columns import Columns
+else:  # numpy
+    column_check = LazyModule("tickrig.host.canmon.model.check.column_check")
+    column_survey = LazyModule("tickrig.host.canmon.model.columns.column_survey")
+
+_MOST_AROUND: Final = 200
+"""Findings that are shown with their frames."""
+_MOST_FINDINGS: Final = 2_000
+
+
+@decode_options.source_command(
+    decode_options.decode_options,
+    click.option("-o", "page", type=PATH, metavar="FILE", help="The page, as run.html."),
+    click.option("--pdf", type=PATH, metavar="FILE", help="The page as PDF; needs Chromium."),
+    click.option("--png", type=PATH, metavar="FILE", help="The page as picture; needs Chromium."),
+    click.option("--title", metavar="TEXT", help="Of the page; else the name of the log."),
+    click.option(
+        "--around",
+        type=click.IntRange(0, 100),
+        default=10,
+        show_default=True,
+        help="Frames before and after a finding.",
+    ),
+    listening.span_option,
+)
+def command(  # noqa: PLR0913 - options
+    *,
+    source: Sequence[str],
+    eds: Sequence[str],
+    dbc: Sequence[Path],
+    page: Path | None,
+    pdf: Path | None,
+    png: Path | None,
+    title: str | None,
+    around: int,
+    span_us: int | None,
+    strict: bool,
+    **options: Any,
+) -> None:
+    """Write what was on a bus as one HTML page that needs nothing else.
+
+    The page has a summary, the findings of the rules with the frames around
+    them, a timeline with a lane for each node and signal, the nodes and the
+    CAN-IDs. It loads nothing from a network, so you can mail it. Names of
+    signals come from --eds, --dbc or SDO traffic; a load in percent needs -b.
+
+    \b
+    canmon report run.log -o run.html
+    canmon report run.blf -o run.html --eds 3=drive.eds -b 500000
+    canmon report can0 --for 60s -o bus.html --pdf bus.pdf
+
+    A bus is recorded first, until Ctrl-C or for --for.
+
+    {source}
+    """  # noqa: D301 - click wants the backspace
+    outputs = {"-o": page, "--pdf": pdf, "--png": png}
+    with refusing():
+        _check_outputs(outputs)
+    bus, objects = BusOptions(**options), decode_options.read_eds_files(eds)
+    rates, words = listening.bit_rates_of(source, bus), _named(source)
+    with TemporaryDirectory(prefix="canmon-") as folder:
+        read = _Reading(source, bus, Path(folder), span_us)
+        try:
+            seen = read.whole(lambda: _Seen(objects, dbc, rates))
+            verdict = _verdict(seen, read, around)
+        finally:
+            read.close()
+        about = [
+            (f"Written by canmon (tickrig) {__version__} on Python {python_version()}:", ""),
+            ("Command:", shlex.join(["canmon", *sys.argv[1:]])),
+            *((text, "") for text in [*read.messages, read.failed] if text),
+        ]
+        if left := len(seen.findings) - len(verdict.findings):
+            about.append((f"{counted(left, 'finding')} more had no room.", ""))
+        head = report_page.ReportHead(title or words, words, about, rates.nominal)
+        _write(outputs, report_page.report_page(seen.survey, verdict, head), Path(folder))
+    for line in report_page.summary(seen.survey, verdict, head):
+        click.echo(line)
+    listening.report(read.source, strict)
+
+
+def _named(words: Sequence[str]) -> str:
+    """Return what a page calls a source: a log by its name, wherever it lies."""
+    return ", ".join(Path(word).name if Path(word).is_file() else word for word in words) or "bus"
+
+
+def _check_outputs(outputs: Mapping[str, Path | None]) -> None:
+    """Raise ValueError unless all files that are wanted could be written."""
+    if not any(outputs.values()):
+        raise ValueError("no file: give -o run.html, --pdf run.pdf or --png run.png")
+    for option, path in outputs.items():
+        if path is None:
+            continue
+        check_file(path, option)
+        if option != "-o":
+            kind = f".{option[2:]}"
+            if path.suffix.lower() != kind:
+                raise ValueError(f"{option} {path}: the name does not end in {kind}")
+            report_page.browser()
+
+
+def _write(outputs: Mapping[str, Path | None], text: str, folder: Path) -> None:
+    page = outputs["-o"] or folder / "page.html"
+    try:
+        write_whole(page, text)
+        for path in (outputs["--pdf"], outputs["--png"]):
+            if path is not None:
+                report_page.print_page(page, path)
+    except OSError as error:
+        raise SourceFailed(f"{error.filename or page}: {error.strerror}") from error
+    except report_page.BrowserError as error:
+        raise SourceFailed(str(error)) from None
+
+
+def _verdict(seen: _Seen, read: _Reading, around: int) -> report_page.Verdict:
+    """Return what was found, the first of it with the frames around it."""
+    findings = seen.findings[:_MOST_FINDINGS]
+    moments = [one.at_us for one in findings[:_MOST_AROUND]] if around else []
+    frames = [
+        [(one, seen.decoder.take(one)) for one in found] for found in read.around(moments, around)
+    ]
+    found = {one.rule for one in seen.findings}
+    none = {name: why for name, why in seen.unjudged.rules.items() if name not in found}
+    return report_page.Verdict(findings, frames, seen.rules.names(), none)
+
+
+class _Seen:
+    """What is made of a log: a survey, and what the rules that need no parameter find.
+
+    Attributes:
+        survey: of it.
+        decoder: of the survey.
+        rules: what must hold.
+        findings: what does not.
+        unjudged: what the rules could not judge.
+    """
+
+    def __init__(
+        self, objects: Mapping[int, EdsObjects], dbc: Sequence[Path], rates: BitRates
+    ) -> None:
+        self.decoder = decode_options.decoder_of(objects, dbc)
+        names = {node: found.name for node, found in objects.items()}
+        self.survey = Survey(self.decoder, names, rates)
+        self.rules = parse_rules(dict.fromkeys(SWITCHES, True))
+        self.findings: list[TrafficFinding] = []
+        self.unjudged = Unjudged({})
+        self._heartbeats = {node: ms for node, one in objects.items() if (ms := one.heartbeat_ms)}
+        self._rates = rates
+
+    def by_columns(self, log: BlockLog) -> bool:
+        """Take a log in blocks; False if it is to be read frame by frame."""
+        feed = column_survey.ColumnSurvey(self.decoder, self.survey)
+        checker = column_check.ColumnChecker(self.rules, self._rates.nominal, self._heartbeats)
+
+        def take(block: Columns) -> None:
+            feed.take(block)
+            self.findings += checker.take(block)
+
+        if not listening.take_blocks(log, take):
+            return False
+        self.survey.end()
+        self.findings += checker.end(log.losses(), log.errors())
+        self.unjudged = checker.unjudged(log.without_errors)
+        return True
+
+    def by_frames(self, source: Source) -> None:
+        """Take a log frame by frame."""
+        survey, checker = self.survey, Checker(self.rules, *self._rates, self._heartbeats)
+
+        def take(records: Sequence[Record]) -> None:
+            for record in records:
+                decoded = self.decoder.take(record)
+                survey.count(record)
+                survey.take(record, decoded)
+                survey.take_signals(record, decoded)
+                self.findings += checker.take(record)
+
+        with listening.until_interrupted():
+            listening.listen(source, take, None)
+        survey.end()
+        end_us = survey.last_us
+        self.findings += checker.end(end_us, source.losses(), end_us, source.errors())
+        self.unjudged = checker.unjudged(end_us, source.without_errors)
+
+
+class _Reading:
+    """A source that is read twice: once for all of it, and once for the frames around findings.
+
+    A bus is recorded into a file first.
+
+    Args:
+        words: its SOURCE words.
+        bus: the options of buses.
+        folder: for what is recorded.
+        span_us: how long a bus is heard; None until somebody interrupts it.
+
+    Attributes:
+        source: what was read first, closed at its end.
+        messages: what it says of frames that were lost or are none.
+    """
+
+    def __init__(
+        self, words: Sequence[str], bus: BusOptions, folder: Path, span_us: int | None
+    ) -> None:
+        self._words, self._bus = list(words), bus
+        self.source: AnySource[Any] = open_source(words, bus)
+        self._recorded = self.source.live
+        if self._recorded:
+            self._words = [str(folder / "bus.log")]
+            self._record(self.source, Path(self._words[0]), words, span_us)
+
+    @property
+    def messages(self) -> list[str]:
+        """What the source says of frames that were lost or are none."""
+        return self.source.messages()
+
+    @property
+    def failed(self) -> str:
+        """Why it ended before its time."""
+        return self.source.failed
+
+    def whole(self, make: Callable[[], _Seen]) -> _Seen:
+        """Read all of it."""
+        seen, log = make(), block_log(self._words)
+        if log is not None and _in_columns(seen.decoder):
+            with closing(log):
+                if seen.by_columns(log):
+                    self._read(log)
+                    return seen
+            seen = make()
+        frames = open_source(self._words, self._bus) if self._recorded else self.source
+        with closing(frames):
+            seen.by_frames(frames)
+        self._read(frames)
+        return seen
+
+    def _read(self, source: AnySource[Any]) -> None:
+        if not self._recorded:
+            self.source = source
+
+    def around(self, moments: Sequence[int], frames: int) -> list[list[Record]]:
+        """Return the frames around each moment."""
+        return excerpts(self._pieces(), moments, frames) if moments else []
+
+    def close(self) -> None:
+        """Give back what is open."""
+        self.source.close()
+
+    def _pieces(self) -> Iterator[Piece]:
+        log = block_log(self._words)
+        if log is not None:
+            with closing(log):
+                while not log.ended:
+                    yield from map(column_survey.ColumnPiece, log.poll(0))
+            if not log.no_columns:
+                return
+        source = open_source(self._words, self._bus)
+        with closing(source):
+            while not source.ended:
+                yield _FramePiece(source.poll(0))
+
+    @staticmethod
+    def _record(
+        source: AnySource[Any], path: Path, words: Sequence[str], span_us: int | None
+    ) -> None:
+        writer = write_log(path)
+
+        def take(records: Sequence[Record]) -> None:
+            for record in records:
+                writer.write(record)
+
+        try:
+            with listening.until_interrupted():
+                listening.listen(source, take, span_us)
+        finally:
+            writer.close()
+
+
+class _FramePiece:
+    """Frames of a log, of which some are wanted."""
+
+    def __init__(self, frames: Sequence[Record]) -> None:
+        self._frames = frames
+
+    def times(self) -> Sequence[int]:
+        """Return the time of each frame."""
+        return [one.at_us for one in self._frames]
+
+    def cut(self, begin: int, end: int) -> list[Record]:
+        """Return some of the frames, by their places."""
+        return list(self._frames[begin:end])
+
+
+def _in_columns(decoder: Decoder) -> bool:
+    """Say whether nothing but DBC files decodes before the standard does."""
+    return all(isinstance(one, DbcFile) for one in decoder.first)
