@@ -6,16 +6,21 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import groupby, zip_longest
-from typing import Any, Generic
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, Generic
 
 from tickrig.device.core import Device, W
 from tickrig.device.horizon import Horizon
 from tickrig.emulators.rig.emulated import Emulated
 from tickrig.emulators.rig.station import next_tick_us
-from tickrig.host.text import bench_header, trace
+from tickrig.host.text import bench_header, notebook, trace
 from tickrig.host.text.bench_record import BUS_STATE, BenchParser, BenchRecord
-from tickrig.wire.can import Frames
+from tickrig.host.text.values import format_time
+from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.instant import NEVER
+
+if TYPE_CHECKING:
+    import pandas
 
 # What a replay is made of: the run of one device, and the comparison of what was said.
 
@@ -219,13 +224,98 @@ class BenchRecording:
         """Whether its times are those of a host at its port, not of ticks."""
         return self.header.place is bench_header.Place.PORT
 
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return the lines as a table of pandas, which `pip install 'tickrig[pandas]'` brings.
+
+        The index `time_s` is the time since the beginning in seconds; devices that tick together
+        have the same. Columns: `at_us`, the time in microseconds; `name` of the device or wire;
+        `mark`, as `>` to the device, `<` from it, `!` done to it, `~` a fault of a wire; `text`
+        as in the file; `data`, the bytes; `can_id`; `input` and `value` of what was set. A cell is
+        empty where a line has none.
+
+        Raises:
+            ImportError: pandas is not there.
+        """
+        try:
+            import pandas  # noqa: PLC0415 - an extra, and slow
+        except ImportError:
+            raise ImportError("to_pandas needs pandas: pip install 'tickrig[pandas]'") from None
+        rows = [_row(record) for record in self.records if record.mark is not trace.Mark.END]
+        frame = pandas.DataFrame(rows, columns=_COLUMNS)
+        frame["can_id"] = frame["can_id"].astype("Int64")
+        frame["at_us"] = frame["at_us"].astype("int64")
+        return frame.set_index((frame["at_us"] / 1e6).rename("time_s"))
+
+    def _repr_html_(self) -> str:
+        """Return the devices and the first lines, for Jupyter."""
+        devices = self.header.devices.items()
+        rows = [(name, one.type or "made by a program", one.wire) for name, one in devices]
+        lines = (
+            (format_time(one.at_us), one.name, one.mark, one.written)
+            for one in self.records
+            if one.mark is not trace.Mark.END
+        )
+        facts = f"{self.until_us / 1e6:g} s", f"seed {self.header.seed}"
+        return "".join(
+            (
+                notebook.heading("trace", *facts, *["not whole"] * (not self.ended)),
+                notebook.table(("device", "type", "wire"), rows),
+                notebook.table(("time s", "name", "mark", "text"), lines, "Lines", opened=True),
+            )
+        )
+
     def ticks_of(self, name: str) -> set[int]:
-        """Return the ticks at which a device had traffic or a change."""
+        """Return the ticks at which a device had traffic or a change, in microseconds.
+
+        Args:
+            name: of the device.
+        """
         return {record.at_us for record in self.of(name)}
 
     def of(self, name: str) -> tuple[BenchRecord, ...]:
-        """Return the lines of a device."""
+        """Return the lines of a device.
+
+        Args:
+            name: of the device.
+        """
         return tuple(self._by_name.get(name, ()))
+
+
+_COLUMNS: Final = ["at_us", "name", "mark", "text", "data", "can_id", "input", "value"]
+
+
+def _row(record: BenchRecord) -> tuple[object, ...]:
+    """Return a line as cells of `_COLUMNS`."""
+    traffic, is_traffic = (
+        record.traffic,
+        record.mark
+        in (
+            trace.Mark.TO_DEVICE,
+            trace.Mark.FROM_DEVICE,
+        ),
+    )
+    can_id = traffic.can_id if isinstance(traffic, CanFrame) else None
+    payload = traffic.data if isinstance(traffic, CanFrame) else traffic
+    data = payload if is_traffic else None
+    change = record.change if record.mark is trace.Mark.PHYSICAL else None
+    name, value = change or (None, None)
+    return record.at_us, record.name, str(record.mark), record.written, data, can_id, name, value
+
+
+def read_trace(path: Path | str) -> BenchRecording:
+    """Read a trace of either version.
+
+    Args:
+        path: of the file.
+
+    Returns:
+        The recording; one whose writer was killed ends before its last tick.
+
+    Raises:
+        OSError: the file cannot be read.
+        TraceError: not a trace, or a line of it is damaged. It is a ValueError.
+    """
+    return read_bench_recording(Path(path).read_bytes())
 
 
 def read_bench_recording(data: bytes) -> BenchRecording:

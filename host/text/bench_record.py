@@ -71,9 +71,13 @@ class BenchRecord(NamedTuple):
         """Write the line, without LF."""
         if self.mark is Mark.END:
             return f"{format_time(self.at_us)} ."
+        return f"{format_time(self.at_us)} {self.name} {self.mark} {self.written}"
+
+    @property
+    def written(self) -> str:
+        """What stands behind the mark."""
         traffic = self.traffic
-        text = self.text or (escape(traffic) if isinstance(traffic, bytes) else str(traffic))
-        return f"{format_time(self.at_us)} {self.name} {self.mark} {text}"
+        return self.text or (escape(traffic) if isinstance(traffic, bytes) else str(traffic))
 
     @property
     def change(self) -> tuple[str, Setting] | None:

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from tickrig.emulators.record.frames import by_gap as by_gap
     from tickrig.emulators.record.frames import by_length as by_length
     from tickrig.emulators.record.frames import by_size as by_size
+    from tickrig.emulators.record.replay import BenchRecording as BenchRecording
+    from tickrig.emulators.record.replay import read_trace as read_trace
     from tickrig.emulators.rig.clock import VirtualClock as VirtualClock
     from tickrig.emulators.rig.kernel import kernel as kernel
     from tickrig.emulators.rig.rig import Rig as Rig
@@ -88,6 +90,7 @@ else:
             "tickrig.emulators.serial.outside.sim_serial": ("SimSerial",),
             "tickrig.emulators.serial.rs485_line": ("Rs485Line",),
             "tickrig.emulators.serial.serial_line": ("SerialLine",),
+            "tickrig.emulators.record.replay": ("BenchRecording", "read_trace"),
             "tickrig.emulators.testing.bench.bench": ("Bench", "open_bench"),
             "tickrig.emulators.testing.bench.errors": (
                 "BenchBlocked",

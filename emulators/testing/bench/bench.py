@@ -8,11 +8,13 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Final, Self, TypeVar, cast
 
 from tickrig._lazy import LazyModule
 from tickrig.device.twin.snapshot import MachineSnapshot
 from tickrig.emulators.bench.operator import parse_fault_spec
+from tickrig.emulators.record.replay import BenchRecording, read_trace
 from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.emulators.testing.bench import tasks
 from tickrig.emulators.testing.bench.bench_rig import BenchDescription, Parts, text_of
@@ -29,8 +31,9 @@ from tickrig.emulators.testing.bench.plan_parts import (
 from tickrig.emulators.testing.rig_file.plan import RigPlan, Tolerances
 from tickrig.emulators.testing.rig_file.reader import read_rig_file
 from tickrig.host.links.link import Closing
+from tickrig.host.text import notebook
 from tickrig.host.text.names import near
-from tickrig.host.text.values import Setting, us_of
+from tickrig.host.text.values import Setting, format_time, us_of
 from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
@@ -44,6 +47,16 @@ if TYPE_CHECKING:
 else:  # POSIX
     hardware_mode = LazyModule("tickrig.emulators.testing.bench.modes.hardware_mode")
     real_mode = LazyModule("tickrig.emulators.testing.bench.modes.real_mode")
+
+
+class Transcript(str):
+    """What happened on a bench: a text, which Jupyter shows line by line."""
+
+    __slots__ = ()
+
+    def _repr_html_(self) -> str:
+        return notebook.listing(self.splitlines())
+
 
 # What a test does to one device of a bench, and where its host connects.
 
@@ -80,6 +93,16 @@ class BenchDevice:
         ('', 'state of the RRC', True)
         """
         return self._mode.describe(self.name)
+
+    def _repr_html_(self) -> str:
+        """Return signals with their values, and faults, for Jupyter."""
+        return notebook.heading(self.name, self._mode.wire_of(self.name)) + self._signals_html()
+
+    def _signals_html(self) -> str:
+        described, values = self.describe(), dict[str, object]()
+        if self._mode.name != HARDWARE:  # there a human would be asked for each
+            values = {name: self.get(name) for name in described.named}
+        return described.tables(values)
 
     def set(self, name: str, *values: Setting | Sequence[Setting]) -> None:
         """Set an input, or all inputs of a group.
@@ -499,12 +522,38 @@ class Bench(BenchDevice, Closing):
             return self._mode.patched_time()
         return nullcontext(time)
 
-    def transcript(self) -> str:
+    def transcript(self) -> Transcript:
         """Return the latest lines and frames, and what was done: time, where, direction, text.
 
         10,000 are kept; a line above them says how many came before.
+
+        Returns:
+            A text; Jupyter shows it line by line.
         """
-        return text_of(self._mode.journal())
+        return Transcript(text_of(self._mode.journal()))
+
+    def trace(self) -> BenchRecording:
+        """Return what `save_trace` saves, to look at it: `bench.trace().to_pandas()`.
+
+        Raises:
+            OSError: no temporary file can be written.
+        """
+        with TemporaryDirectory(prefix="tickrig.") as folder:
+            path = Path(folder) / "bench.trace"
+            self.save_trace(path)
+            return read_trace(path)
+
+    def _repr_html_(self) -> str:
+        mode = self._mode
+        time = mode.name if mode.name == HARDWARE else f"{mode.name} time"
+        devices = [(name, mode.wire_of(name)) for name in self.devices]
+        return "".join(
+            (
+                notebook.heading("bench", time, f"{format_time(mode.now_us)} s"),
+                notebook.table(("device", "wire"), devices),
+                self._signals_html(),
+            )
+        )
 
     def save_trace(self, path: Path | str) -> None:
         """Save what all devices received, sent and suffered, for `tickrig replay`.

@@ -29,6 +29,7 @@ from tickrig.emulators.testing.bench.errors import NotOnThisBench
 from tickrig.emulators.testing.bench.mounts import BusMount, LineMount, Mount
 from tickrig.emulators.testing.signals.driver import SignalDriver
 from tickrig.emulators.testing.signals.sources import SignalSpec
+from tickrig.host.text import notebook
 from tickrig.host.text.bench_header import BenchHeader
 from tickrig.host.text.byte_text import escape
 from tickrig.host.text.names import near
@@ -534,6 +535,52 @@ class BenchDescription:
         """What can be pressed."""
         return tuple(n for n, each in self.inputs.items() if each.type is SignalType.BUTTON)
 
+    @property
+    def named(self) -> list[str]:
+        """The names of inputs and outputs, without the objects of CANopen nodes: these are many."""
+        names = dict.fromkeys((*self.inputs, *self.outputs))
+        return [name for name in names if not name.rpartition("/")[2].startswith(_OBJECT)]
+
+    def _repr_html_(self) -> str:
+        """Return tables of inputs, outputs, faults and groups, for Jupyter."""
+        return notebook.heading(self.name) + self.tables({})
+
+    def tables(self, values: Mapping[str, object]) -> str:
+        """Return tables of inputs, outputs, faults and groups, as HTML for Jupyter.
+
+        Args:
+            values: present values, by the name of the input or output.
+        """
+        named = self.named
+        columns = ["name", *["value"] * bool(values), "unit", "what"]
+        inputs = (
+            (
+                one.name,
+                *([values.get(name, "")] if values else ()),
+                f"{one.type.value} {one.low:g}..{one.high:g} {one.unit}",
+                one.text,
+            )
+            for name in named
+            if (one := self.inputs.get(name)) and one.type is not SignalType.FAULT
+        )
+        outputs = (
+            (shown.name, *([values.get(name, "")] if values else ()), shown.unit, shown.text)
+            for name in named
+            if (shown := self.outputs.get(name))
+        )
+        faults = ((usage(name, one), one.text) for name, one in self.faults.items())
+        groups = ((name, " ".join(members)) for name, members in self.groups.items())
+        objects = len({*self.inputs, *self.outputs}) - len(named)
+        return "".join(
+            (
+                notebook.table(columns, outputs, "Outputs", opened=True),
+                notebook.table(columns, inputs, "Inputs"),
+                notebook.table(("fault", "what"), faults, "Faults"),
+                notebook.table(("group", "inputs"), groups, "Groups"),
+                f"<p>{objects} objects of CANopen nodes</p>" if objects else "",
+            )
+        )
+
     def __str__(self) -> str:
         """Return a list for people, without the objects of CANopen nodes: these are many."""
         inputs = {
@@ -557,6 +604,7 @@ class BenchDescription:
         return "\n".join(lines)
 
 
+_OBJECT: Final = "0x"
 _BUS_AND_NODE: Final = (b"bus", b"node")
 """The ends of a node's filter, for people."""
 

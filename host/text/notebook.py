@@ -1,0 +1,79 @@
+"""Tables and listings as HTML for Jupyter, in which foreign text is text only.
+
+A notebook shows what `_repr_html_` returns inside its own page: there is no style sheet and no
+content security policy of ours. So every text is escaped, what cannot be seen is spelt out, and
+nothing has a link, a script or an address.
+
+>>> listing(["<b>"])[-16:]
+'&lt;b&gt;</pre>'
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from html import escape
+from itertools import islice
+from typing import Final
+
+from tickrig.host.text.page_text import harmless
+
+_MOST_CHARACTERS: Final = 400
+_LEFT: Final = ' style="text-align:left"'
+_LISTING: Final = ' style="max-height:30em;overflow:auto;font-family:monospace;line-height:1.3"'
+
+
+def text(value: object) -> str:
+    """Return a value as text that is no markup; a long one is cut, with a count."""
+    shown = str(value)
+    more = len(shown) - _MOST_CHARACTERS
+    if more > 0:
+        shown = f"{shown[:_MOST_CHARACTERS]} … {more} more"
+    return escape(str(harmless(shown)))
+
+
+def heading(title: str, *facts: object) -> str:
+    """Return a title, and facts beside it."""
+    return f"<p><b>{text(title)}</b> {text(' · '.join(map(str, facts)))}</p>"
+
+
+def table(
+    columns: Sequence[str],
+    rows: Iterable[Sequence[object]],
+    title: str = "",
+    *,
+    opened: bool = False,
+    most: int = 200,
+) -> str:
+    """Return a table; empty if there are no rows.
+
+    Args:
+        columns: their titles.
+        rows: the cells.
+        title: makes a table that folds.
+        opened: a table that folds is unfolded at first.
+        most: so many rows are shown; how many more there are stands below.
+    """
+    every = iter(rows)
+    shown = list(islice(every, most))
+    if not shown:
+        return ""
+    left_out = sum(1 for _ in every)
+    head = "".join(f"<th{_LEFT}>{text(one)}</th>" for one in columns)
+    body = "".join(
+        f"<tr>{''.join(f'<td{_LEFT}>{text(cell)}</td>' for cell in row)}</tr>" for row in shown
+    )
+    drawn = f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+    if left_out:
+        drawn += f"<p>… {left_out} more</p>"
+    if not title:
+        return drawn
+    number = len(shown) + left_out
+    state = " open" if opened else ""
+    return f"<details{state}><summary>{text(title)} ({number})</summary>{drawn}</details>"
+
+
+def listing(lines: Sequence[str], most: int = 1_000) -> str:
+    """Return the last lines of a text in a box that scrolls; how many are left out stands above."""
+    left_out = len(lines) - most
+    above = f"… {left_out} earlier lines\n" if left_out > 0 else ""
+    return f"<pre{_LISTING}>{above}{chr(10).join(map(text, lines[-most:]))}</pre>"
