@@ -28,6 +28,34 @@ DEMOS: Final = {
         "Let a potentiometer at one CANopen node turn the motor of another, without a PC in"
         " between.",
     ),
+    "follow": (
+        "tickrig.emulators.demos.cli:follow",
+        "Let two robots follow a preceding one (experiment A, Fig. 96).",
+    ),
+    "leader": (
+        "tickrig.emulators.demos.cli:leader",
+        "Exchange leaders of two pairs of robots, remove a connection and join it again (B1).",
+    ),
+    "four": (
+        "tickrig.emulators.demos.cli:four",
+        "Drive four robots with one joystick, then each with any (B2, Figs. 91 and 101).",
+    ),
+    "joystick": (
+        "tickrig.emulators.demos.cli:joystick",
+        "Drive two robots of different make with one joystick (Fig. 92).",
+    ),
+    "rh3": (
+        "tickrig.emulators.demos.cli:rh3",
+        "Let a cart of Reference Hardware 3 drive to a goal, and along a path.",
+    ),
+    "beego": (
+        "tickrig.emulators.demos.cli:beego",
+        "Drive beego, two CANopen drives at its wheels, with a joystick.",
+    ),
+    "fourx": (
+        "tickrig.emulators.demos.cli:fourx",
+        "Drive FourX, four motor core units at its wheels, with a joystick.",
+    ),
 }
 
 

@@ -3,12 +3,26 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import click
 
 from tickrig.host.cli.can_options import BusCommand, bus_options
-from tickrig.host.cli.options import PATH, works_in
+from tickrig.host.cli.engine_options import openrtm_options
+from tickrig.host.cli.options import PATH, Decorator, add_options, works_in
+
+_PLOT: Final = click.option(
+    "--plot", type=PATH, help="Draw paths and speeds into FILE.png, .svg or .html."
+)
+_LIVE: Final[Decorator] = add_options(
+    _PLOT,
+    click.option(
+        "--control",
+        type=PATH,
+        help="In real time until Ctrl-C: tickrig rtc con and dis --at PATH change the connections.",
+    ),
+    openrtm_options,
+)
 
 
 @click.command()
@@ -56,4 +70,124 @@ def fig120(plot: Path | None, **options: Any) -> None:
     tickrig demo fig120
     tickrig demo fig120 --plot curves.png
     tickrig demo fig120 -i socketcan -c vcan0
+    """  # noqa: D301 - click wants the backspace
+
+
+@click.command()
+@_LIVE
+@works_in("tickrig.emulators.demos.terminal_cli:show_follow")
+def follow(**options: Any) -> None:
+    """Let two robots follow a preceding one (experiment A, Fig. 96).
+
+    A joystick drives Ref-Hard, Segway RMP follows Ref-Hard by its position, and
+    Omni-Wheel follows Segway RMP. In virtual time: the same lines each time. With
+    --control or --openrtm it runs in real time, and others change the connections.
+
+    \b
+    tickrig demo follow --plot follow.png
+    tickrig demo follow --control /tmp/convoy
+    tickrig rtc dis Odometry1.OdometryPosition Follower2.leader --at /tmp/convoy
+    tickrig rtc con Odometry0.OdometryPosition Follower2.leader --at /tmp/convoy
+    """  # noqa: D301 - click wants the backspace
+
+
+@click.command()
+@_LIVE
+@works_in("tickrig.emulators.demos.terminal_cli:show_leader")
+def leader(**options: Any) -> None:
+    """Exchange leaders of two pairs of robots, remove a connection and join it again (B1).
+
+    Two joysticks drive Omni-Wheel and Segway RMP; Ref-Hard and BlackShip follow
+    them. The leaders are exchanged twice, then Ref-Hard's connection is removed,
+    and joined again (Figs. 98 and 99). In virtual time: the same lines each time.
+    With --control or --openrtm it runs in real time, and others change the
+    connections.
+
+    \b
+    tickrig demo leader --plot leader.png
+    tickrig demo leader --control /tmp/convoy --plot leader.png
+    tickrig rtc dis OmniCart0.OdometryPosition Follower0.leader --at /tmp/convoy
+    tickrig rtc con Odometry1.OdometryPosition Follower0.leader --at /tmp/convoy
+    """  # noqa: D301 - click wants the backspace
+
+
+@click.command()
+@_LIVE
+@works_in("tickrig.emulators.demos.terminal_cli:show_four")
+def four(**options: Any) -> None:
+    """Drive four robots with one joystick, then each with any (B2, Figs. 91 and 101).
+
+    It begins as B1 ends. All connections that command a robot are removed, and
+    the robots stop. Then one joystick is connected to all four, and later two of
+    them are given to the other joystick. In virtual time: the same lines each
+    time. With --control or --openrtm it runs in real time, and others change the
+    connections.
+
+    \b
+    tickrig demo four --plot four.png
+    tickrig demo four --openrtm localhost:2809
+    """  # noqa: D301 - click wants the backspace
+
+
+@click.command()
+@_LIVE
+@works_in("tickrig.emulators.demos.terminal_cli:show_joystick")
+def joystick(**options: Any) -> None:
+    """Drive two robots of different make with one joystick (Fig. 92).
+
+    The joystick writes RTC::TimedVelocity of phase 1 to Ref-Hard on two wheels and
+    to Omni-Wheel. In virtual time: the same lines each time. With --control or
+    --openrtm it runs in real time, and others change the connections.
+
+    \b
+    tickrig demo joystick --plot joystick.png
+    tickrig demo joystick --control /tmp/robots
+    tickrig rtc dis JoystickA.out MovingControl1.in --at /tmp/robots
+    """  # noqa: D301 - click wants the backspace
+
+
+@click.command()
+@_PLOT
+@works_in("tickrig.emulators.demos.terminal_cli:show_rh3")
+def rh3(plot: Path | None) -> None:
+    """Let a cart of Reference Hardware 3 drive to a goal, and along a path.
+
+    PositionInput sends a goal, then the square that it has as its path; the cart
+    stands on rough ground. In virtual time: the same lines each time.
+
+    \b
+    tickrig demo rh3
+    tickrig demo rh3 --plot rh3.png
+    """  # noqa: D301 - click wants the backspace
+
+
+@click.command()
+@_PLOT
+@works_in("tickrig.emulators.demos.terminal_cli:show_beego")
+def beego(plot: Path | None) -> None:
+    """Drive beego, two CANopen drives at its wheels, with a joystick.
+
+    The server of RTC-CANopen starts two emulated EPOS as proxies; a joystick
+    drives straight on, along an arc and on the spot. In virtual time: the same
+    lines each time.
+
+    \b
+    tickrig demo beego
+    tickrig demo beego --plot beego.png
+    """  # noqa: D301 - click wants the backspace
+
+
+@click.command()
+@_PLOT
+@works_in("tickrig.emulators.demos.terminal_cli:show_fourx")
+def fourx(plot: Path | None) -> None:
+    """Drive FourX, four motor core units at its wheels, with a joystick.
+
+    The server of RTC-CANopen starts four emulated motor core units as proxies; a
+    joystick drives straight on, along an arc and on the spot. In virtual time: the
+    same lines each time.
+
+    \b
+    tickrig demo fourx
+    tickrig demo fourx --plot fourx.png
     """  # noqa: D301 - click wants the backspace

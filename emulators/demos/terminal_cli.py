@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -9,23 +10,27 @@ import click
 
 from tickrig._lazy import LazyModule
 from tickrig.host.cli.can_options import BusOptions, open_raw
+from tickrig.host.cli.engine_options import take_engines
 from tickrig.host.cli.messages import Refused, failing, refuse_path, warnings_shown
 
 if TYPE_CHECKING:
     import canopen
 
     from tickrig.emulators.commands import picture
-    from tickrig.emulators.demos import fig120, rrc, rtc_lite, tkernel
+    from tickrig.emulators.demos import experiments, fig120, robots, rrc, rtc_lite, tkernel, tracks
     from tickrig.host.links import link
     from tickrig.host.rtc import states
 else:
     canopen, link = LazyModule("canopen"), LazyModule("tickrig.host.links.link")
     states = LazyModule("tickrig.host.rtc.states")
     picture = LazyModule("tickrig.emulators.commands.picture")
+    experiments = LazyModule("tickrig.emulators.demos.experiments")
     fig120 = LazyModule("tickrig.emulators.demos.fig120")
+    robots = LazyModule("tickrig.emulators.demos.robots")
     rrc = LazyModule("tickrig.emulators.demos.rrc")
     rtc_lite = LazyModule("tickrig.emulators.demos.rtc_lite")
     tkernel = LazyModule("tickrig.emulators.demos.tkernel")
+    tracks = LazyModule("tickrig.emulators.demos.tracks")
 
 _WITHIN_A_PROCESS: Final = ("virtual", "tickrig")
 
@@ -49,6 +54,78 @@ def show_rtc_lite(*, virtual: bool) -> None:
 def show_tkernel(*, no_caches: bool) -> None:
     """Run the demonstration of the T-Kernel node, in virtual time."""
     tkernel.run_demo(tkernel.CorridorStage(caches=not no_caches), click.echo)
+
+
+def show_follow(plot: Path | None, **options: Any) -> None:
+    """Run experiment A."""
+    _run_experiment(experiments.FOLLOW, plot, options)
+
+
+def show_leader(plot: Path | None, **options: Any) -> None:
+    """Run experiment B1."""
+    _run_experiment(experiments.LEADER, plot, options)
+
+
+def show_four(plot: Path | None, **options: Any) -> None:
+    """Run experiment B2."""
+    _run_experiment(experiments.FOUR, plot, options)
+
+
+def show_joystick(plot: Path | None, **options: Any) -> None:
+    """Run the experiment of phase 1."""
+    _run_experiment(experiments.JOYSTICK, plot, options)
+
+
+def _run_experiment(
+    experiment: experiments.Experiment, plot: Path | None, options: dict[str, Any]
+) -> None:
+    """Run an experiment in virtual time, or in real time if others can reach it."""
+    control, engines = options.pop("control"), take_engines(options)
+    if plot is not None:
+        picture.check_plot(plot)
+    if control is None and not engines:
+        run = experiments.ConvoyRun(experiment, click.echo)
+        run.play()
+    else:
+        with warnings_shown():
+            run = experiments.serve(experiment, click.echo, control, engines)
+    _draw(plot, run.tracks, run.marks, experiment.title)
+
+
+def show_rh3(plot: Path | None) -> None:
+    """Run the demonstration of Reference Hardware 3."""
+    _run_robot(robots.drive_rh3, plot, "Reference Hardware 3: a goal, then a path")
+
+
+def show_beego(plot: Path | None) -> None:
+    """Run the demonstration of beego."""
+    _run_robot(robots.drive_beego, plot, "beego: two EPOS under a joystick")
+
+
+def show_fourx(plot: Path | None) -> None:
+    """Run the demonstration of FourX."""
+    _run_robot(robots.drive_fourx, plot, "FourX: four motor core units under a joystick")
+
+
+def _run_robot(
+    drive: Callable[[Callable[[str], None]], tracks.RobotTrack], plot: Path | None, title: str
+) -> None:
+    if plot is not None:
+        picture.check_plot(plot)
+    _draw(plot, [drive(click.echo)], (), title)
+
+
+def _draw(
+    plot: Path | None, shown: Sequence[tracks.RobotTrack], marks: Sequence[tracks.Mark], title: str
+) -> None:
+    """Draw what robots did, if a file for it is named."""
+    if plot is None:
+        return
+    try:
+        picture.write_figure(tracks.draw(shown, marks, title), title, plot)
+    except OSError as error:
+        refuse_path("plot", error)
+    click.echo(f"\nThe paths are in {plot}.")
 
 
 def show_fig120(plot: Path | None, **options: Any) -> None:

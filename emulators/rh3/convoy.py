@@ -10,11 +10,12 @@ from tickrig.device.body import OmniBody, OmniParameters, Velocity
 from tickrig.device.body import Pose as BodyPose
 from tickrig.device.rh3.parameters import BaseParameters
 from tickrig.emulators.rh3.closed_loop import Cart, ClosedLoop
+from tickrig.host.control.clock import RealClock
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.host.rtc.motion.geometry import Pose
 from tickrig.host.rtc.motion.options.follower import Follower
-from tickrig.host.rtc.motion.ports import plausible, read_newest, to_pose_2d
-from tickrig.wire.rtc_types import iis
+from tickrig.host.rtc.motion.ports import plausible, read_newest, to_pose_2d, write_velocity
+from tickrig.wire.rtc_types import iis, rtc
 from tickrig.wire.rtc_types.rtc import Time
 
 _WIDE: Final = {"dataport.buffer.length": "64"}
@@ -74,6 +75,52 @@ class OmniCart(RtComponent):
         return ReturnCode.RTC_OK
 
 
+class MovingControl(RtComponent):
+    """Commands a base as a joystick asks, and stops it when the joystick is silent.
+
+    The connector to the joystick may be removed while the stick is pushed; without this component
+    RefHardRh3 would keep the latest velocity.
+
+    Args:
+        instance_name: of the component.
+        phase: of the common interface: 1 is RTC::TimedVelocity, 2 IIS::TimedVelocity.
+
+    Attributes:
+        twist: forward and to the left in m/s, turning in rad/s; None while no command arrives.
+    """
+
+    spec: ClassVar[ModuleSpec] = ModuleSpec("MovingControl", "Takes IIS velocities, phase 1 or 2")
+
+    def __init__(self, instance_name: str, phase: int = 2) -> None:
+        super().__init__(instance_name)
+        self._first: InPort[rtc.TimedVelocity] | None = None
+        self._second: InPort[iis.TimedVelocity] | None = None
+        if phase == 1:
+            self._first = self.add_port(InPort("in", rtc.TimedVelocity))
+        else:
+            self._second = self.add_port(InPort("in", iis.TimedVelocity))
+        self._velocity = self.add_port(OutPort("out", iis.TimedVelocity2D))
+        self.twist: tuple[float, float, float] | None = None
+        self._received_us = 0
+
+    def on_execute(self, ec: ExecutionContext) -> ReturnCode:
+        """Forward the latest command."""
+        if (latest := self._newest()) is not None:
+            self.twist, self._received_us = latest, ec.now_us
+            write_velocity(self._velocity, ec, *latest)
+        elif self.twist is not None and ec.now_us - self._received_us > _WATCHDOG_US:
+            self.twist = None
+            write_velocity(self._velocity, ec, 0.0, 0.0, 0.0)
+        return ReturnCode.RTC_OK
+
+    def _newest(self) -> tuple[float, float, float] | None:
+        if self._first is not None and (first := read_newest(self._first)) is not None:
+            return first.v, 0.0, first.w
+        if self._second is not None and (second := read_newest(self._second)) is not None:
+            return second.vx, second.vy, second.w
+        return None
+
+
 @dataclass(frozen=True, slots=True)
 class _Robot:
     """One robot of a convoy, by the names of its ports.
@@ -97,19 +144,23 @@ class _Robot:
 
 
 class Convoy:
-    """Robots in virtual time; the first keeps its planner, the others do what is joined to them.
+    """Robots in one map frame; the first keeps its planner, the others do what is joined to them.
 
     Args:
         carts: where those on two wheels stand at first.
         omni: where those on omni wheels stand.
+        clock: of a convoy in real time; virtual time without one.
 
     Attributes:
         loop: carts, their lines and the manager.
         robots: carts first.
     """
 
-    def __init__(self, carts: Sequence[Pose], omni: Sequence[Pose] = ()) -> None:
-        self.loop = ClosedLoop(*[BaseParameters() for _ in carts])
+    def __init__(
+        self, carts: Sequence[Pose], omni: Sequence[Pose] = (), clock: RealClock | None = None
+    ) -> None:
+        pace = None if clock is None else 1.0
+        self.loop = ClosedLoop(*[BaseParameters() for _ in carts], pace=pace, clock=clock)
         self.robots = (
             *(self._cart(n, pose) for n, pose in enumerate(carts)),
             *(self._omni_cart(n, pose) for n, pose in enumerate(omni)),

@@ -1,0 +1,184 @@
+"""What robots of a demonstration did: planned and driven paths, and speeds, as a picture."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from math import cos, nan, sin
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+from tickrig.emulators.commands.picture import new_figure
+from tickrig.host.rtc.motion.geometry import Pose, wrap
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+LOOK_US: Final = 100_000
+"""From one look at the robots to the next."""
+
+_COLOURS: Final = ("tab:blue", "tab:orange", "tab:green", "tab:red")
+_NEVER: Final = Pose(nan, nan, nan)
+"""Interrupts a line of the picture."""
+
+
+class Look(NamedTuple):
+    """A robot at one time.
+
+    Attributes:
+        time_s: since the start.
+        pose: where it is.
+        planned: where it is told to be; None if nothing tells it.
+        gap_m: how far it is from the robot that it follows, None if it follows none.
+    """
+
+    time_s: float
+    pose: Pose
+    planned: Pose | None = None
+    gap_m: float | None = None
+
+    @property
+    def gap(self) -> float:
+        """The same for a curve, which NaN interrupts."""
+        return nan if self.gap_m is None else self.gap_m
+
+
+@dataclass(slots=True)
+class RobotTrack:
+    """What one robot did.
+
+    Attributes:
+        name: of the robot.
+        looks: at it, one each `LOOK_US`.
+        corners: of the planned path, if it is known before the run; else `looks` have it.
+    """
+
+    name: str
+    looks: list[Look] = field(default_factory=list)
+    corners: Sequence[Pose] = ()
+
+    @property
+    def planned(self) -> Sequence[Pose]:
+        """The planned path; a pose of NaN interrupts it."""
+        return self.corners or [look.planned or _NEVER for look in self.looks]
+
+    def speeds(self) -> Iterator[tuple[float, float, float]]:
+        """Yield time in s, speed in m/s and turning in rad/s between looks."""
+        for before, now in pairwise(self.looks):
+            step_s = now.time_s - before.time_s
+            way_m = before.pose.distance(now.pose)
+            backward = before.pose.along(now.pose) < -way_m / 2  # sideways counts as forward
+            turn = wrap(now.pose.heading - before.pose.heading)
+            yield now.time_s, (-way_m if backward else way_m) / step_s, turn / step_s
+
+
+class Mark(NamedTuple):
+    """A moment at which somebody changed something.
+
+    Attributes:
+        time_s: since the start.
+        text: what was changed.
+    """
+
+    time_s: float
+    text: str
+
+
+def advanced(pose: Pose, velocity: tuple[float, float, float], step_s: float) -> Pose:
+    """Return where a command takes a robot that obeys at once.
+
+    Args:
+        pose: where it is.
+        velocity: forward and to the left in m/s, turning in rad/s.
+        step_s: for how long, s.
+
+    >>> advanced(Pose(), (0.5, 0.0, 0.0), 2.0)
+    Pose(x=1.0, y=0.0, heading=0.0)
+    """
+    forward, left, turn = velocity
+    middle = pose.heading + turn * step_s / 2
+    return Pose(
+        pose.x + (forward * cos(middle) - left * sin(middle)) * step_s,
+        pose.y + (forward * sin(middle) + left * cos(middle)) * step_s,
+        wrap(pose.heading + turn * step_s),
+    )
+
+
+# The picture: paths in the plane at the left, curves over time at the right (Fig. 99).
+
+
+def draw(tracks: Sequence[RobotTrack], marks: Sequence[Mark], title: str) -> Figure:
+    """Draw paths, speeds and gaps.
+
+    Args:
+        tracks: of the robots.
+        marks: numbered in the picture, and listed below it.
+        title: of the picture.
+    """
+    follows = any(look.gap_m is not None for track in tracks for look in track.looks)
+    figure = new_figure(12, 7)
+    figure.suptitle(title)
+    grid = figure.add_gridspec(2 + follows, 2, width_ratios=(5, 4))
+    ground = figure.add_subplot(grid[:, 0])
+    curves = [figure.add_subplot(grid[row, 1]) for row in range(2 + follows)]
+    for track, colour in zip(tracks, _COLOURS, strict=False):
+        _draw_path(ground, track, marks, colour)
+        times, speeds, turns = zip(*track.speeds(), strict=True)
+        curves[0].plot(times, speeds, color=colour, label=track.name)
+        curves[1].plot(times, turns, color=colour)
+        if any(look.gap_m is not None for look in track.looks):
+            gaps = [look.gap for look in track.looks]
+            curves[2].plot([look.time_s for look in track.looks], gaps, color=colour)
+    ground.plot([], [], "--", color="black", label="planned")
+    ground.plot([], [], color="black", label="driven")
+    ground.plot([], [], "o", color="black", label="start")
+    ground.plot([], [], "s", color="black", label="end")
+    ground.set_aspect("equal", adjustable="datalim")
+    ground.set_xlabel("x, m")
+    ground.set_ylabel("y, m")
+    ground.legend(loc="best", fontsize="small")
+    for axes in curves[:-1]:
+        axes.sharex(curves[-1])
+        axes.tick_params(labelbottom=False)
+    for axes, label in zip(
+        curves, ("speed, m/s", "turning, rad/s", "distance to the leader, m"), strict=False
+    ):
+        axes.set_ylabel(label)
+    curves[-1].set_xlabel("time, s")
+    for axes in (ground, *curves):
+        axes.grid(visible=True, alpha=0.3)
+    _draw_marks(curves, marks)
+    if marks:
+        lines = (f"({n}) {mark.time_s:.0f} s: {mark.text}" for n, mark in enumerate(marks, 1))
+        figure.supxlabel("\n".join(lines), fontsize="small", x=0.02, ha="left")
+    return figure
+
+
+def _draw_path(ground: Axes, track: RobotTrack, marks: Sequence[Mark], colour: str) -> None:
+    driven, planned = [look.pose for look in track.looks], track.planned
+    ground.plot([p.x for p in driven], [p.y for p in driven], color=colour, label=track.name)
+    ground.plot([p.x for p in planned], [p.y for p in planned], "--", color=colour, zorder=3)
+    ground.plot(driven[0].x, driven[0].y, "o", color=colour)
+    ground.plot(driven[-1].x, driven[-1].y, "s", color=colour)
+    for number, mark in enumerate(marks, 1):
+        there = next((look.pose for look in track.looks if look.time_s >= mark.time_s), driven[-1])
+        ground.plot(there.x, there.y, ".", color=colour)
+        ground.annotate(
+            f"{number}", there[:2], xytext=(3, 3), textcoords="offset points", fontsize="small"
+        )
+
+
+def _draw_marks(curves: Sequence[Axes], marks: Sequence[Mark]) -> None:
+    for number, mark in enumerate(marks, 1):
+        for axes in curves:
+            axes.axvline(mark.time_s, color="gray", linestyle=":", linewidth=1)
+        curves[0].annotate(
+            f"{number}",
+            (mark.time_s, 1.0),
+            xycoords=("data", "axes fraction"),
+            xytext=(0, 2),
+            textcoords="offset points",
+            ha="center",
+            fontsize="small",
+        )
