@@ -25,7 +25,14 @@ from tickrig.host.canmon.model.check.rules import (
     parse_rule_file,
     parse_rules,
 )
-from tickrig.host.canmon.model.frames import DumpLines, Record, Stamp, decoded_text
+from tickrig.host.canmon.model.frames import (
+    DumpLines,
+    Record,
+    Stamp,
+    decoded_text,
+    ident_text,
+    seconds_text,
+)
 from tickrig.host.canmon.output import listening
 from tickrig.host.canmon.sources.source import AnySource, BlockLog, Source, block_log, open_source
 from tickrig.host.canmon.verbs import decode_options
@@ -37,10 +44,12 @@ from tickrig.host.text.values import counted
 from tickrig.host.text.whole_file import write_whole
 
 if TYPE_CHECKING:
-    from tickrig.host.canmon.model.check import column_check
+    from tickrig.host.canmon.model.check import column_check, diagnosis
     from tickrig.host.canmon.model.columns.columns import Columns
-else:  # numpy
+    from tickrig.host.canmon.model.decode.node_memory import EdsObjects
+else:  # numpy; decoders
     column_check = LazyModule("tickrig.host.canmon.model.check.column_check")
+    diagnosis = LazyModule("tickrig.host.canmon.model.check.diagnosis")
 
 
 # What `check` finds, shown as it comes: as text, or as objects in JSON.
@@ -189,11 +198,11 @@ _rule_options: Final[Decorator] = add_options(
 """Add a rule each as an option."""
 
 
-def _read_rules(files: Iterable[Path], options: Mapping[str, object]) -> Rules:
+def _read_rules(files: Sequence[Path], options: Mapping[str, object]) -> Rules:
     """Return the rules of files and options together.
 
     Raises:
-        Refused: a rule that is none, a file that cannot be read, or no rule at all.
+        Refused: a rule that is none, a file that cannot be read or has no rule.
     """
     words: RuleValues = {}
     for path in files:
@@ -203,9 +212,13 @@ def _read_rules(files: Iterable[Path], options: Mapping[str, object]) -> Rules:
         given["max_load"] = options["max_load"]
     with refusing():
         rules = parse_rules(joined(words, given), load_rule)
-    if rules == Rules(bit_rate=rules.bit_rate):
-        raise Refused("no rule: give --no-emcy, --max-load or others, or a file rules.toml")
+    if files and _is_empty(rules):
+        raise Refused(f"no rule in {' or '.join(map(str, files))}: leave it out for the usual ones")
     return rules
+
+
+def _is_empty(rules: Rules) -> bool:
+    return rules == Rules(bit_rate=rules.bit_rate)
 
 
 def _file(path: Path) -> RuleValues:
@@ -238,6 +251,14 @@ _MOST_AROUND: Final = 1_000
         show_default=True,
         help="Frames before and after what a RULE finds.",
     ),
+    click.option(
+        "--max",
+        "most",
+        type=click.IntRange(1),
+        default=20,
+        show_default=True,
+        help="Findings without a RULE, and frames of each, that are shown.",
+    ),
     click.option("--junit", "report_path", type=PATH, metavar="FILE", help="Write a JUnit report."),
     click.option("--sarif", "sarif_path", type=PATH, metavar="FILE", help="Write a SARIF report."),
     click.option("--jsonl", is_flag=True, help="Findings as JSON, one a line."),
@@ -256,6 +277,7 @@ def command(  # noqa: PLR0913 - options
     dbc: Sequence[Path],
     span_us: int | None,
     around: int,
+    most: int,
     report_path: Path | None,
     sarif_path: Path | None,
     jsonl: bool,
@@ -264,12 +286,20 @@ def command(  # noqa: PLR0913 - options
     strict: bool,
     **options: Any,
 ) -> None:
-    """Hold traffic against rules; exit status 1 if one does not hold, 5 if there was none.
+    """Say what is wrong on a bus or in a log; exit status 1 if anything is.
 
-    Rules are options, or a TOML file with the same names: no_emcy = true,
-    heartbeat = ["3=100ms±20%"]. Each finding is a line with time and frame.
+    Without a rule, all that need no parameter are held: what is usual is learnt
+    from the frames. A bus is heard until Ctrl-C, or for --for. Findings are
+    grouped by rule and node, each with its frames. The rules that were held are
+    listed on standard error. Exit status 5 if nothing could be judged.
+
+    With rules, only these are held. They are options, or a TOML file with the
+    same names: no_emcy = true, heartbeat = ["3=100ms±20%"].
 
     \b
+    canmon check run.log
+    canmon check can0 -b 500000 --for 60s
+    canmon check run.log --eds 3=drive.eds --max 5
     canmon check run.log --no-emcy --no-sdo-abort --nodes 3,16-18
     canmon check run.log rules.toml --junit out.xml
     canmon check can0 -b 500000 --for 60s --max-load 60 --heartbeat 3=100ms±20%
@@ -282,6 +312,13 @@ def command(  # noqa: PLR0913 - options
     bus = BusOptions(**{name: options[name] for name in _NAMES})
     bit_rate = _bit_rate(rules, words, bus)
     objects = decode_options.read_eds_files(eds)
+    if _is_empty(rules):
+        held_frames = _Usual(words, bus, bit_rate or rules.bit_rate, objects, reopen=reopen)
+        held_frames.listen(span_us)
+        held_frames.show(jsonl=jsonl, stamp=Stamp(stamp) if stamp else None, most=most)
+        held_frames.write(report_path, sarif_path)
+        held_frames.end(strict)
+        return
     decoder = decode_options.decoder_of(objects, dbc) if rules.expressions else None
     heartbeats = {node: ms for node, one in objects.items() if (ms := one.heartbeat_ms)}
     kept = bool(report_path or sarif_path)
@@ -312,6 +349,141 @@ def command(  # noqa: PLR0913 - options
         click.get_current_context().exit(_BROKEN)
     if unjudged:
         raise NothingJudged(unjudged)
+
+
+# What is wrong without a rule.
+
+_MOST_FRAMES: Final = 20_000_000
+"""Frames of a bus that are kept: 700 MB."""
+
+
+class _Usual:
+    """Holds what comes against what is usual.
+
+    Args:
+        words: SOURCE words.
+        bus: options of buses.
+        bit_rate: bits a second, None if it is not known.
+        eds: what EDS files say, by node-ID.
+        reopen: wait for a bus that goes away.
+    """
+
+    def __init__(
+        self,
+        words: Sequence[str],
+        bus: BusOptions,
+        bit_rate: int | None,
+        eds: Mapping[int, EdsObjects],
+        *,
+        reopen: bool,
+    ) -> None:
+        self._words, self._bus, self._reopen = words, bus, reopen
+        self._make = partial(diagnosis.Diagnoser, bit_rate, eds)
+        self._diagnoser = self._make()
+        self._source: AnySource[Columns] | Source
+
+    def listen(self, span_us: int | None) -> None:
+        """Take all that comes, until somebody interrupts it or the time is over."""
+        log = block_log(self._words)
+        if log is not None:
+            with closing(log):
+                if listening.take_blocks(log, self._diagnoser.take):
+                    self._source = log
+                    return
+            self._diagnoser = self._make()  # CAN FD: read it again, frame by frame
+        source = open_source(self._words, self._bus)
+        if self._reopen:
+            source.reopen()
+        self._source = source
+        with closing(source), listening.until_interrupted():
+            listening.listen(source, self._take, span_us)
+
+    def _take(self, records: Sequence[Record]) -> None:
+        if self._diagnoser.kept.frames < _MOST_FRAMES:
+            self._diagnoser.take(records)
+
+    def show(self, *, jsonl: bool, stamp: Stamp | None, most: int) -> None:
+        """Show what was found."""
+        source = self._source
+        lost = [f"{source.lost} frames were lost"] if source.lost else []
+        self._diagnoser.without_errors = source.without_errors
+        self._found = found = self._diagnoser.diagnosis(lost, source.errors())
+        lines = DumpLines(stamp) if stamp else None
+        if lines and found.frames:
+            lines.stamp(min(bus.at_us[0] for bus in self._diagnoser.kept))
+        text_of = _fault_json if jsonl else partial(_fault_text, lines=lines, most=most)
+        shown = found.faults if jsonl else found.faults[:most]
+        if shown:
+            with until_unread():
+                click.echo("\n".join(map(text_of, shown)))
+        left = len(found.faults) - len(shown)
+        self._said = [f"and {counted(left, 'finding')} more: --max {len(found.faults)}"] * bool(left)
+
+    def write(self, junit_path: Path | None, sarif_path: Path | None) -> None:
+        """Write reports."""
+        found = self._found
+        findings = [
+            TrafficFinding(fault.first_us, fault.rule, str(fault).partition(": ")[2])
+            for fault in found.faults
+        ]
+        why = self._source.failed or self._nothing()
+        suite = " ".join(self._words)
+        judged = suite, list(diagnosis.RULES), findings, why, found.unjudged
+        _write("--junit", junit_path, junit, judged)
+        _write("--sarif", sarif_path, sarif, judged)
+
+    def _nothing(self) -> str:
+        return "" if self._found.frames else _no_frame(self._source, self._words)
+
+    def end(self, strict: bool) -> None:
+        """Say what was judged, and end with the exit status."""
+        found, nothing = self._found, self._nothing()
+        said = [*self._said, f"judged: {', '.join(found.judged)}"]
+        by_reason: dict[str, list[str]] = {}
+        for name, why in found.unjudged.items():
+            by_reason.setdefault(why, []).append(name)
+        said += [f"not judged, {why}: {', '.join(names)}" for why, names in by_reason.items()]
+        counts = Counter(fault.rule for fault in found.faults)
+        rules = ", ".join(f"{rule}: {count}" for rule, count in sorted(counts.items()))
+        said.append(f"{counted(counts.total(), 'finding')}{': ' * bool(rules)}{rules}")
+        listening.report(self._source, strict, [] if nothing else said)
+        if found.faults:
+            click.get_current_context().exit(_BROKEN)
+        if nothing:
+            raise NothingJudged(nothing)
+
+
+def _fault_text(fault: diagnosis.BusFault, lines: DumpLines | None, most: int) -> str:
+    """Write a finding: a line with its time, and one with its frames."""
+
+    def time(at_us: int) -> str:
+        return lines.stamp(at_us).strip() if lines else f"({seconds_text(at_us, 1)})"
+
+    times = "" if fault.amount == 1 else f" [{fault.amount} times]"
+    head = f"{time(fault.first_us)} {fault}{times}"
+    shown = [f"{place.number} {time(place.at_us)}" for place in fault.frames[:most]]
+    more = len(fault.frames) - len(shown)
+    shown += [f"and {more} more"] * bool(more)
+    return f"{head}\n    frames: {', '.join(shown)}" if shown else head
+
+
+def _fault_json(fault: diagnosis.BusFault) -> str:
+    """Write a finding as an object."""
+    return json_text(
+        {
+            "v": 1,
+            "t": fault.first_us / 1e6,
+            "last": fault.last_us / 1e6,
+            "rule": fault.rule,
+            "ch": fault.channel,
+            "node": fault.node,
+            "id": None if fault.ident is None else ident_text(fault.ident),
+            "text": fault.text,
+            "n": fault.amount,
+            "frames": [{"n": place.number, "t": place.at_us / 1e6} for place in fault.frames],
+        },
+        letters=True,
+    )
 
 
 class NothingJudged(click.ClickException):

@@ -122,8 +122,13 @@ def rhythm_of(times: Sequence[int]) -> Rhythm | None:
         return None
     missing: list[tuple[int, int]] = []
     extra: list[int] = []
-    for level in levels:
-        found = _odd(gaps, times, level, quiet)
+    for place, level in enumerate(levels):
+        # Where the period changes, a window belongs to both.
+        inner = level._replace(
+            begin=level.begin + _WINDOW * (place > 0),
+            end=level.end - _WINDOW * (place < len(levels) - 1),
+        )
+        found = _odd(gaps, inner, quiet)
         most = max(3, _MOST_ODD * (level.end - level.begin))
         missing += found[0] if len(found[0]) <= most else []
         extra += found[1] if len(found[1]) <= most else []
@@ -184,7 +189,7 @@ def _levels(windows: Sequence[tuple[int, int]], gaps: int) -> list[Level]:
 
 
 def _odd(
-    gaps: Sequence[int], times: Sequence[int], level: Level, quiet: int
+    gaps: Sequence[int], level: Level, quiet: int
 ) -> tuple[list[tuple[int, int]], list[int]]:
     """Return the gaps of a level where frames are missing, and the frames that are too many."""
     period = level.period_us

@@ -31,7 +31,7 @@
 from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 from types import MappingProxyType
@@ -50,7 +50,6 @@ from tickrig.host.canmon.model.decode import node_memory
 from tickrig.host.canmon.model.decode.decoder import Decoder
 from tickrig.host.canmon.model.decode.pdos import PdoDecoder
 from tickrig.host.canmon.model.frames import ERROR, FD, REMOTE, Record, ident_text, ms_text, node_of
-from tickrig.host.canmon.model.traffic import WINDOW_US, Load
 from tickrig.host.text.values import counted
 from tickrig.wire.can import STANDARD_MAX, CanFrame, frame_bits
 from tickrig.wire.canopen import nmt, sdo_frame
@@ -61,6 +60,8 @@ if TYPE_CHECKING:
     from tickrig.host.canmon.model.columns.columns import Columns
 else:  # an extra
     np = LazyModule("numpy")
+
+NO_LOSS: Final = "no-loss"
 
 RULES: Final[Mapping[str, str]] = MappingProxyType(
     {
@@ -79,7 +80,8 @@ RULES: Final[Mapping[str, str]] = MappingProxyType(
         "seen-once": "a CAN-ID that comes once",
         "silence": "a bus that is silent",
         "time-back": "a time that goes back",
-        "max-load": "a second with a load above 80 %",
+        NO_LOSS: "frames that were lost",
+        "max-load": "half a second with a load above 80 %",
     }
 )
 """All rules, and what each finds."""
@@ -90,6 +92,9 @@ _KEPT_FRAMES: Final = 1_000
 _KEPT_TEXTS: Final = 3
 _LOST_AFTER: Final = 1.5
 """A heartbeat is lost after so many of its periods, as on the node board."""
+_LEAST_PAIRS: Final = 4
+_LOAD_US: Final = 500_000
+_LOAD_STEP_US: Final = 50_000
 _LONG_US: Final = 1_000_000
 _LEAST_FRAMES: Final = 100
 _SOON_US: Final = 1_500_000
@@ -131,7 +136,8 @@ class BusFault(NamedTuple):
 
     def __str__(self) -> str:
         """Write rule, place and text."""
-        return f"{self.rule}: {self.where}: {self.text}"
+        where = f"{self.where}: " if self.where else ""
+        return f"{self.rule}: {where}{self.text}"
 
 
 class Diagnosis(NamedTuple):
@@ -157,6 +163,9 @@ class Diagnoser:
         bit_rate: bits a second, for the load; None if it is not known.
         eds: what EDS files say, by node-ID.
         without_errors: why the source has no error frames whatever happened.
+
+    Attributes:
+        kept: the frames that came.
     """
 
     def __init__(
@@ -165,15 +174,20 @@ class Diagnoser:
         eds: Mapping[int, node_memory.EdsObjects] = _NO_NODES,
         without_errors: str = "",
     ) -> None:
-        self._bit_rate, self._eds, self._without_errors = bit_rate, eds, without_errors
+        self._bit_rate, self._eds, self.without_errors = bit_rate, eds, without_errors
         self.kept = FrameKeeper()
 
     def take(self, frames: Columns | Iterable[Record]) -> None:
         """Take frames in the order of the log: a block of columns, or records."""
         self.kept.take(frames)
 
-    def diagnosis(self) -> Diagnosis:
-        """Judge what has come until now."""
+    def diagnosis(self, lost: Iterable[str] = (), errors: Iterable[str] = ()) -> Diagnosis:
+        """Judge what has come until now.
+
+        Args:
+            lost: what the source says was lost.
+            errors: what the source says of errors beside its error frames.
+        """
         faults: list[BusFault] = []
         judged: set[str] = set()
         why: dict[str, str] = {}
@@ -182,9 +196,12 @@ class Diagnoser:
             faults += one.faults()
             judged |= one.judged
             why |= one.unjudged
-        if self._without_errors and "no-error-frames" not in {fault.rule for fault in faults}:
+        for rule, texts in ((NO_LOSS, lost), ("no-error-frames", errors)):
+            faults += [BusFault(rule, "", None, None, text, 0, 0, 1, ()) for text in texts]
+        judged |= {NO_LOSS} if self.kept.frames else set()
+        if self.without_errors and "no-error-frames" not in {fault.rule for fault in faults}:
             judged.discard("no-error-frames")
-            why["no-error-frames"] = self._without_errors
+            why["no-error-frames"] = self.without_errors
         if not self.kept.frames:
             why = dict.fromkeys(RULES, "no frame came")
         faults.sort(key=lambda fault: (fault.first_us, fault.channel, fault.rule))
@@ -251,12 +268,38 @@ class _BusJudge:
         self._events = events
         events.end(self._end_us)
         self._cuts = sorted(events.cuts)
-        self.judged |= RULES.keys() - _ANY_BUS
+        self.unjudged |= self._without()
+        self.judged |= RULES.keys() - _ANY_BUS - self.unjudged.keys()
         self._lengths(decoder)
         self._rhythms()
-        self._drives(decoder)
+        if not self._drives(decoder):
+            self.judged.discard("drive-fault")
+            self.unjudged["drive-fault"] = "no statusword of CiA 402 came"
         self._once()
         return self._grouped(events.hits)
+
+    def _without(self) -> dict[str, str]:
+        """Say why rules have nothing to judge."""
+        heard, nodes = self._rows.keys(), self._events.nodes.values()
+        have = {
+            "pdo-": ("no PDO came", any(ident in node_events.PDO_IDS for ident in heard)),
+            "sync-": ("no SYNC came", node_events.SYNC_ID in heard),
+            "sdo-": ("no SDO came", any(ident in node_events.REQUEST_IDS for ident in heard)),
+            "guard-": ("no node is guarded", any(one.toggled for one in nodes)),
+            "remote-": ("no heartbeats came", any(len(one.heartbeats) > 1 for one in nodes)),
+            "no-lost-": ("no heartbeats came", any(len(one.heartbeats) > 2 for one in nodes)),
+            "seen-once": ("the log is short", self._is_long()),
+        }
+        return {
+            rule: why
+            for start, (why, there) in have.items()
+            if not there
+            for rule in RULES
+            if rule.startswith(start)
+        }
+
+    def _is_long(self) -> bool:
+        return len(self._bus) >= _LEAST_FRAMES and self._end_us - self._times[0] >= _LONG_US
 
     def _hit(
         self, rule: str, ident: int | None, text: str, rows: Sequence[int], n: int = 1
@@ -278,19 +321,24 @@ class _BusJudge:
             self.unjudged["max-load"] = "no bit rate is known: give -b, as -b 500000"
             return
         self.judged.add("max-load")
-        bus, seconds = self._bus, Load(self._times[0])
-        bits = self._bits()
-        windows = []
-        for row, amount in enumerate(bits):
-            if amount and (one := seconds.take(self._times[row], amount)):
-                windows.append((one, row))
-        windows.append((seconds.end(), len(bus) - 1))
-        for window, row in windows:
-            percent = window.bits * 100_000_000 / (self._bit_rate * WINDOW_US)
-            if percent > MOST_LOAD:
-                begin = bisect_left(self._times, window.at_us)
-                text = f"load {percent:.1f} % in a second, at most {MOST_LOAD:g} % is right"
-                self._hit("max-load", None, text, [begin, row])
+        steps: Counter[int] = Counter()
+        first_us, most = self._times[0], MOST_LOAD / 100 * self._bit_rate * _LOAD_US / 1_000_000
+        for at_us, bits in zip(self._times, self._bits(), strict=True):
+            steps[(at_us - first_us) // _LOAD_STEP_US] += bits
+        width, total, over_us = _LOAD_US // _LOAD_STEP_US, 0, first_us
+        window: deque[int] = deque()
+        for step in sorted(steps) if self._end_us - first_us >= _LOAD_US else ():
+            window.append(step)
+            total += steps[step]
+            while window[0] <= step - width:
+                total -= steps[window.popleft()]
+            begin_us = first_us + (step + 1) * _LOAD_STEP_US - _LOAD_US
+            if total > most and begin_us >= over_us:
+                over_us = begin_us + _LOAD_US
+                begin, end = (bisect_left(self._times, at) for at in (begin_us, over_us))
+                percent = total * 100_000_000 / (self._bit_rate * _LOAD_US)
+                text = f"load {percent:.1f} % in {_LOAD_US // 1_000} ms, at most {MOST_LOAD:g} %"
+                self._hit("max-load", None, f"{text} is right", [begin, end - 1])
 
     def _bits(self) -> Sequence[int]:
         """Return the bits of each classic frame on the bus, 0 for others."""
@@ -486,7 +534,7 @@ class _BusJudge:
         pieces = self._pieces(ident, rows)
         for piece in pieces:
             times = [self._times[row] for row in piece]
-            if not times or self._twins(ident, piece, times):
+            if not times or self._two_beats(ident, piece, times):
                 continue
             rhythm = cycles.rhythm_of(times)
             if rhythm is None:
@@ -509,9 +557,9 @@ class _BusJudge:
     ) -> tuple[int | None, Sequence[tuple[int, int]]]:
         """Return the period of heartbeats that are too few to learn it surely, and gaps above."""
         gaps = sorted(b - a for a, b in pairwise(times))
-        told_ms = self._eds[node].heartbeat_ms if node in self._eds else 0
-        period = told_ms * 1_000 or (gaps[len(gaps) // 2] if len(gaps) >= 2 else 0)
-        if not period or (not told_ms and gaps[0] < period / 2):
+        eds_ms = self._eds[node].heartbeat_ms if node in self._eds else 0
+        period = eds_ms * 1_000 or (gaps[len(gaps) // 2] if len(gaps) >= 2 else 0)
+        if not period or (not eds_ms and gaps[0] < period / 2):
             return None, ()
         missing = [
             (at, 1) for at, (a, b) in enumerate(pairwise(times)) if b - a > _LOST_AFTER * period
@@ -530,24 +578,25 @@ class _BusJudge:
         text = f"no heartbeat for {ms_text(gap)} ms, {says}"
         self._hit("no-lost-heartbeat", ident, text, rows, n)
 
-    def _twins(self, ident: int, rows: Sequence[int], times: Sequence[int]) -> bool:
+    def _two_beats(self, ident: int, rows: Sequence[int], times: Sequence[int]) -> bool:
         """Notice two heartbeats that go beside each other: each second one keeps the period."""
-        if len(times) < 2 * cycles.LEAST_GAPS:
-            return False
-        every, other = cycles.rhythm_of(times[::2]), cycles.rhythm_of(times[1::2])
-        if (
-            every is None
-            or other is None
-            or abs(every.period_us - other.period_us) > (0.05 * every.period_us)
-        ):
-            return False
         gaps = [b - a for a, b in pairwise(times)]
-        long, short = sorted(gaps[::2]), sorted(gaps[1::2])
-        middle = long[len(long) // 2], short[len(short) // 2]
-        if abs(middle[0] - middle[1]) < 0.2 * max(middle):
-            return False
-        self._double(ident, rows)
-        return True
+        pairs = [b - a for a, b in zip(times, times[2:], strict=False)]
+        for values in (gaps, pairs):
+            if len(values) < _LEAST_PAIRS:
+                continue
+            period = sorted(values)[len(values) // 2]
+            found = [
+                at
+                for at, pair in enumerate(pairs)
+                if abs(pair - period) <= 0.05 * period
+                and abs(gaps[at] - gaps[at + 1]) > 0.2 * period
+            ]
+            short = sorted(min(gaps[at], gaps[at + 1]) for at in found)
+            if len(found) >= _LEAST_PAIRS and short[-1] - short[0] <= 0.1 * period:
+                self._double(ident, [rows[at + 1] for at in found])
+                return True
+        return False
 
     def _double(self, ident: int, rows: Sequence[int]) -> None:
         text = "a second heartbeat comes beside the first: two nodes have this node-ID"
@@ -555,8 +604,13 @@ class _BusJudge:
 
     # Drives, and what comes once
 
-    def _drives(self, decoder: Decoder) -> None:
-        """Find the fault bit of statuswords: where a mapping tells them, or TPDO1 looks like it."""
+    def _drives(self, decoder: Decoder) -> int:
+        """Find the fault bit of statuswords: where a mapping tells them, or TPDO1 looks like it.
+
+        Returns:
+            How many PDOs have one.
+        """
+        drives = 0
         for ident, rows in sorted(self._rows.items()):
             if ident not in node_events.PDO_IDS:
                 continue
@@ -572,9 +626,11 @@ class _BusJudge:
                     continue
             elif ident & ~node_events.NODE_MASK != 0x180:
                 continue
-            self._statusword(ident, rows, shift)
+            drives += self._statusword(ident, rows, shift)
+        return drives
 
-    def _statusword(self, ident: int, rows: Sequence[int], shift: int | None) -> None:
+    def _statusword(self, ident: int, rows: Sequence[int], shift: int | None) -> bool:
+        """Judge a statusword; return whether it is one."""
         payload = self._bus.picked(self._bus.payload, rows)
         low, runs = shift or 0, []
         if isinstance(payload, list):
@@ -585,10 +641,10 @@ class _BusJudge:
             table = np.asarray(payload) >> np.uint64(low) & np.uint64(0xFFFF)
             runs = [0, *(np.flatnonzero(table[1:] != table[:-1]) + 1).tolist()]
             if len(runs) > len(table) // 4 and shift is None:
-                return
+                return False
             values = table[runs].tolist()
         if shift is None and not self._is_statusword(ident, rows, values):
-            return
+            return False
         before = False
         for at, value in zip(runs, values, strict=True):
             fault = bool(value & 0x08)
@@ -597,6 +653,7 @@ class _BusJudge:
                 text = f"the drive is in fault: statusword {value:04X}h {said}"
                 self._hit("drive-fault", ident, text, [rows[at]])
             before = fault
+        return True
 
     def _is_statusword(self, ident: int, rows: Sequence[int], values: Sequence[int]) -> bool:
         """Say whether TPDO1 begins with a statusword: all of its states are, and one is enabled."""
@@ -614,7 +671,7 @@ class _BusJudge:
     def _once(self) -> None:
         """Find identifiers that came once, and that nothing explains."""
         times = self._times
-        if len(self._bus) < _LEAST_FRAMES or self._end_us - times[0] < _LONG_US:
+        if not self._is_long():
             return
         starts = [cut.at_us for cut in self._cuts]
         heard = set(self._events.nodes)
@@ -631,7 +688,13 @@ class _BusJudge:
             started = at > 0 and at_us - starts[at - 1] < _SOON_US
             if ident in node_events.PDO_IDS and node in heard and started:
                 continue
-            self._hit("seen-once", ident, f"{_name(ident)} comes once", rows)
+            name = _name(ident) if node in heard else ident_text(ident)
+            self._hits.append(
+                Hit(
+                    *("seen-once", node if node in heard else None, ident),
+                    *(f"{name} comes once", tuple(rows)),
+                )
+            )
 
     def _grouped(self, hits: Iterable[Hit]) -> list[BusFault]:
         """Put hits of one rule and node, or CAN-ID, together."""

@@ -42,7 +42,7 @@ _PATIENCE_US: Final = 1_000_000
 """An SDO request at the end of a log may still be answered for so long."""
 _OBEYS_US: Final = 1_000_000
 """A node follows an NMT command within so long."""
-_TWINS_US: Final = 100_000
+_PAIR_US: Final = 100_000
 """Two answers, or boot-ups, of two nodes with one node-ID come within so long."""
 _PDO_PARAMETERS: Final = range(0x1400, 0x1C00)
 _SYNC_PARAMETERS: Final = range(0x1005, 0x1008)
@@ -84,7 +84,7 @@ class NodeEvents:
     Attributes:
         heartbeats: rows of error control that no remote frame asked for, without boot-ups.
         answers: rows of those that one asked for.
-        asked: rows of remote frames of error control.
+        requested: rows of remote frames of error control.
         boots: rows of boot-ups.
         toggled: a frame had the toggle bit.
         state: the NMT state that it told last; None before.
@@ -92,7 +92,7 @@ class NodeEvents:
 
     heartbeats: list[int] = field(default_factory=list)
     answers: list[int] = field(default_factory=list)
-    asked: list[int] = field(default_factory=list)
+    requested: list[int] = field(default_factory=list)
     boots: list[int] = field(default_factory=list)
     toggled: bool = False
     state: int | None = None
@@ -150,9 +150,9 @@ def is_canopen(bus: BusFrames, rows: Mapping[int, Sequence[int]]) -> bool:
 
 def _answers(bus: BusFrames, requests: Sequence[int], responses: Sequence[int]) -> bool:
     """Say whether a response names the object of a request."""
-    asked = {bus.payload[row] >> 8 & 0xFF_FFFF for row in requests}
+    objects = {bus.payload[row] >> 8 & 0xFF_FFFF for row in requests}
     return any(
-        bus.payload[row] >> 8 & 0xFF_FFFF in asked and bus.dlc[row] == sdo_frame.FRAME_BYTES
+        bus.payload[row] >> 8 & 0xFF_FFFF in objects and bus.dlc[row] == sdo_frame.FRAME_BYTES
         for row in responses
     )
 
@@ -186,7 +186,7 @@ class BusEvents:
         self.cuts: list[Cut] = []
         self.commanded = any(ident == nmt.NMT_COB_ID for ident in rows)
         self._first = _first_rows(rows)
-        self._asked: dict[tuple[int, int], int] = {}
+        self._requests: dict[tuple[int, int], int] = {}
         self._silent: list[tuple[int, str, int]] = []
         self._row = 0
 
@@ -197,7 +197,7 @@ class BusEvents:
         if isinstance(frame, ErrorFrame):
             self._hit("no-error-frames", None, None, describe_error_frame(frame))
             return
-        told = self._decoder.take(Record(at_us, self._bus.name, frame))
+        said = self._decoder.take(Record(at_us, self._bus.name, frame))
         can_id, data, node = frame.can_id, frame.data, frame.can_id & NODE_MASK
         if can_id == nmt.NMT_COB_ID:
             if len(data) == 2 and data[0] in _COMMANDS and not frame.remote:
@@ -212,10 +212,10 @@ class BusEvents:
             one = self.nodes[node]
             one.requests += 1
             one.latest_request = data
-            self._asked[node, at_us] = row
+            self._requests[node, at_us] = row
         elif can_id in RESPONSE_IDS and not frame.remote:
             self._answer(at_us, node, data)
-        for transfer in told.transfers:
+        for transfer in said.transfers:
             self._transfer(at_us, transfer)
 
     def end(self, end_us: int) -> None:
@@ -223,10 +223,11 @@ class BusEvents:
         for transfer in self._decoder.pending(end_us):
             if transfer.duration_us > _PATIENCE_US:
                 self._transfer(end_us, transfer)
-        self._tell_silent()
+        self._judge_silent()
         for node, one in sorted(self.nodes.items()):
             if len(one.heartbeats) >= 2 and not one.toggled:
-                for row in one.asked:
+                one.heartbeats = sorted([*one.heartbeats, *one.answers])
+                for row in one.requested:
                     self._row = row
                     self._hit(
                         *("remote-heartbeat", node, nmt.ERROR_CONTROL_COB_ID + node | REMOTE),
@@ -256,13 +257,13 @@ class BusEvents:
     def _error_control(self, at_us: int, node: int, data: bytes, *, remote: bool) -> None:
         one = self.nodes[node]
         if remote:
-            one.asked.append(self._row)
+            one.requested.append(self._row)
             return
         if not data:
             return
-        answers = bool(one.asked) and (
-            at_us - self._times[one.asked[-1]] <= _ANSWER_US
-            and (not one.answers or one.answers[-1] < one.asked[-1])
+        answers = bool(one.requested) and (
+            at_us - self._times[one.requested[-1]] <= _ANSWER_US
+            and (not one.answers or one.answers[-1] < one.requested[-1])
         )
         if data[0] == nmt.NmtState.INITIALISING and not (answers and one.toggled):
             self._boot(at_us, node, one)
@@ -275,7 +276,7 @@ class BusEvents:
         heard = self._first.get(node, self._row) < self._row
         latest = one.boots[-1] if one.boots else None
         if heard and not one.reset:
-            if latest is not None and at_us - self._times[latest] <= _TWINS_US:
+            if latest is not None and at_us - self._times[latest] <= _PAIR_US:
                 said = ms_text(at_us - int(self._times[latest]))
                 self._hit(
                     *("doubled-node", node, nmt.ERROR_CONTROL_COB_ID + node),
@@ -346,7 +347,7 @@ class BusEvents:
         if (
             latest[2] == one.requests
             and data[:4] == latest[1][:4]
-            and at_us - latest[0] <= _TWINS_US
+            and at_us - latest[0] <= _PAIR_US
         ):
             self._hit(
                 *("doubled-node", node, sdo_frame.RESPONSE_COB_ID + node),
@@ -357,7 +358,7 @@ class BusEvents:
         """Judge an SDO transfer that ended."""
         node = transfer.node
         ident = sdo_frame.REQUEST_COB_ID + node
-        row = self._asked.get((node, transfer.at_us), self._row)
+        row = self._requests.get((node, transfer.at_us), self._row)
         entry = transfer.entry
         name = decoded.write_entry(entry) + (f" {transfer.name}" if transfer.name else "")
         what = f"{transfer.direction} {name}"
@@ -369,7 +370,11 @@ class BusEvents:
             self._hit(rule, node, ident, f"{by} aborts {what}, {reason}")
         elif outcome is decoded.TransferOutcome.UNANSWERED:
             self._silent.append((node, f"{what} is not answered", row))
-        elif outcome is decoded.TransferOutcome.BROKEN and not transfer.partial:
+        elif (
+            outcome is decoded.TransferOutcome.BROKEN
+            and not transfer.partial
+            and WRONG_TOGGLE not in transfer.flaws
+        ):
             self._silent.append((node, f"{what} is broken off", row))
         elif transfer.retries and transfer.mode is decoded.TransferMode.EXPEDITED:
             again = f"asked again {counted(transfer.retries, 'time')}"
@@ -386,7 +391,7 @@ class BusEvents:
             elif entry[0] in _SYNC_PARAMETERS:
                 self.cuts.append(Cut(at_us, 0))
 
-    def _tell_silent(self) -> None:
+    def _judge_silent(self) -> None:
         """Tell of requests without an answer; those to nodes that nobody heard are one finding."""
         absent: dict[int, int] = {}
         for node, text, row in self._silent:

@@ -36,6 +36,85 @@ LATE = (
 HEARTBEAT = ("--heartbeat", "3=100ms+-20%")
 
 
+SOUND = "".join(f"({at / 10:.6f}) can0 703#05\n" for at in range(10, 40))
+LOST = SOUND.replace("(2.500000) can0 703#05\n", "")
+
+
+@pytest.mark.parametrize("small_bytes", [0, 1 << 20])
+def test_without_a_rule_all_that_need_no_parameter_are_held(
+    small_bytes: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(block_log, "SMALL_BYTES", small_bytes)
+    result = check(write(tmp_path / "run.log", SOUND))
+    assert (result.exit_code, result.stdout) == (0, "")
+    judged, *others, summary = result.stderr.splitlines()
+    assert judged.startswith("judged: ")
+    assert "no-lost-heartbeat" in judged
+    assert "not judged, no bit rate is known: give -b, as -b 500000: max-load" in others
+    assert any(one.startswith("not judged, no PDO came") for one in others)
+    assert summary == "0 findings"
+
+
+@pytest.mark.parametrize("small_bytes", [0, 1 << 20])
+def test_what_is_wrong_without_a_rule_is_told_with_its_frames(
+    small_bytes: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(block_log, "SMALL_BYTES", small_bytes)
+    result = check(write(tmp_path / "run.log", LOST))
+    assert (result.exit_code, result.stdout.splitlines()) == (
+        1,
+        [
+            "(2.400000) no-lost-heartbeat: can0 node 3: no heartbeat for 200.000 ms,"
+            " one each 100.000 before",
+            "    frames: 15 (2.400000), 16 (2.600000)",
+        ],
+    )
+    assert result.stderr.splitlines()[-1] == "1 finding: no-lost-heartbeat: 1"
+    zero = check(write(tmp_path / "run.log", LOST), "-t", "z").stdout
+    assert "    frames: 15 (001.400000), 16 (001.600000)" in zero
+
+
+def test_findings_without_a_rule_are_objects(tmp_path: Path) -> None:
+    (line,) = check(write(tmp_path / "run.log", LOST), "--jsonl").stdout.splitlines()
+    assert json.loads(line) == {
+        **{"v": 1, "t": 2.4, "last": 2.6, "rule": "no-lost-heartbeat", "ch": "can0", "node": 3},
+        **{"id": "703", "text": "no heartbeat for 200.000 ms, one each 100.000 before", "n": 1},
+        "frames": [{"n": 15, "t": 2.4}, {"n": 16, "t": 2.6}],
+    }
+
+
+def test_findings_without_a_rule_go_into_reports(tmp_path: Path) -> None:
+    log, junit, sarif = write(tmp_path / "run.log", LOST), tmp_path / "a.xml", tmp_path / "a.sarif"
+    check(log, "--junit", str(junit), "--sarif", str(sarif))
+    suite = ET.fromstring(junit.read_bytes()).find("testsuite")
+    assert suite is not None
+    assert suite.get("failures") == "1"
+    (result,) = json.loads(sarif.read_text("utf-8"))["runs"][0]["results"]
+    assert result["ruleId"] == "no-lost-heartbeat"
+
+
+def test_only_so_many_findings_and_frames_are_shown(tmp_path: Path) -> None:
+    text = LOST + "(4.000000) can0 083#3081110000000000\n"
+    result = check(write(tmp_path / "run.log", text), "--max", "1")
+    assert result.stdout.splitlines()[1:] == ["    frames: 15 (2.400000), and 1 more"]
+    assert "and 1 finding more: --max 2" in result.stderr
+
+
+def test_where_no_frame_came_nothing_is_judged_without_a_rule(tmp_path: Path) -> None:
+    result = check(write(tmp_path / "run.log", ""))
+    assert (result.exit_code, result.stdout) == (5, "")
+    assert result.stderr.splitlines()[-1].startswith("Error: nothing was judged: no frame in")
+
+
+def test_a_file_without_a_rule_is_refused(log: str, tmp_path: Path) -> None:
+    rules = write(tmp_path / "rules.toml", "bitrate = 500000\n")
+    result = check(log, rules)
+    assert (result.exit_code, result.stderr) == (
+        2,
+        f"Error: no rule in {rules}: leave it out for the usual ones\n",
+    )
+
+
 @pytest.fixture
 def log(tmp_path: Path) -> str:
     return write(tmp_path / "run.log", LOG)
@@ -199,7 +278,6 @@ def test_a_source_may_name_the_bit_rate() -> None:
 @pytest.mark.parametrize(
     ("words", "status", "reason"),
     [
-        ((), 2, "no rule: give --no-emcy, --max-load or others, or a file rules.toml"),
         (("--max-load", "50"), 2, "a limit of the load needs the bit rate: give -b, as -b 500000"),
         (("--nodes", "x"), 2, "nodes 'x' is not like 3 or 3-7"),
         (("--nodes", "3-1"), 2, "nodes '3-1': the lower node-ID stands first, as 1-3"),

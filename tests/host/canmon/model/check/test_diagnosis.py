@@ -2,9 +2,75 @@
 
 from __future__ import annotations
 
-from tickrig.host.canmon.model.check.diagnosis import diagnose
+import pytest
+
+from tests.host.canmon.model.check.sound_log import FAULTS, Plan, faulty, sound
+from tickrig.host.canmon.model.check import bus_frames
+from tickrig.host.canmon.model.check.diagnosis import RULES, Diagnoser, diagnose
 from tickrig.host.canmon.model.frames import Record
 from tickrig.wire.can import CanFrame
+
+PLANS = {
+    "usual": Plan(),
+    "guarded": Plan(guarded=True),
+    "500 kbit/s": Plan(2, 6_000, 20, 500, 500_000),
+    "fast": Plan(3, 5_000, 8, 250),
+}
+
+
+@pytest.fixture(params=[1 << 60, 0], ids=["lists", "numpy"])
+def both_ways(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Judge frames in lists and in arrays of numpy."""
+    monkeypatch.setattr(bus_frames, "_MANY", request.param)
+
+
+@pytest.mark.usefixtures("both_ways")
+@pytest.mark.parametrize("plan", PLANS.values(), ids=PLANS)
+def test_a_sound_log_has_no_finding(plan: Plan) -> None:
+    found = diagnose([sound(plan)], plan.bit_rate)
+    assert [str(fault) for fault in found.faults] == []
+    known = {*found.judged, *found.unjudged}
+    assert known == RULES.keys()
+    assert ("guard-toggle" in found.unjudged) is not plan.guarded
+
+
+@pytest.mark.usefixtures("both_ways")
+@pytest.mark.parametrize("plan", PLANS.values(), ids=PLANS)
+@pytest.mark.parametrize("name", FAULTS)
+def test_a_fault_is_found_without_a_rule(name: str, plan: Plan) -> None:
+    rule, node, _ = FAULTS[name]
+    found = [(one.rule, one.node) for one in diagnose([faulty(name, plan)], plan.bit_rate).faults]
+    assert (rule, node) in found
+    # A node that does not stop when NMT stops it is another fault.
+    assert set(found) <= {(rule, node), ("nmt-state", node)}
+
+
+@pytest.mark.parametrize("begin", [1, 200, 800])
+def test_a_log_may_begin_in_the_middle(begin: int) -> None:
+    assert diagnose([sound()[begin:]]).faults == ()
+
+
+@pytest.mark.parametrize("end", [300, 900, -1])
+def test_a_log_may_end_in_the_middle(end: int) -> None:
+    assert diagnose([sound()[:end]]).faults == ()
+
+
+def test_buses_are_judged_by_themselves() -> None:
+    other = [one._replace(channel="can1") for one in faulty("PDO missing", PLANS["fast"])]
+    both = sorted([*sound(), *other], key=lambda record: record.at_us)
+    (fault,) = diagnose([both]).faults
+    assert (fault.rule, fault.channel) == ("pdo-missing", "can1")
+    shown = [both[place.number - 1] for place in fault.frames]
+    assert {(one.channel, str(one.frame)[:3]) for one in shown} == {("can1", "185")}
+
+
+def test_what_came_is_judged_again_and_again() -> None:
+    one = Diagnoser()
+    records = faulty("NMT stop")
+    one.take(records[:1_000])
+    assert one.diagnosis().faults == ()
+    one.take(records[1_000:])
+    assert [fault.rule for fault in one.diagnosis().faults] == ["nmt-stop"]
 
 
 def test_a_heartbeat_that_is_left_out_is_found() -> None:
