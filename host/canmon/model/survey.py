@@ -9,9 +9,8 @@
 
 from __future__ import annotations
 
-from bisect import bisect_left
 from collections import deque
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from math import isfinite
 from typing import Final, Generic, NamedTuple, Protocol, TypeVar
@@ -395,61 +394,58 @@ class Survey(NodeBoard):
 class Piece(Protocol):
     """Some frames of a log, in their order."""
 
-    def times(self) -> Sequence[int]:
-        """Return the time of each."""
+    def __len__(self) -> int:
+        """Return how many there are."""
 
-    def cut(self, begin: int, end: int) -> list[Record]:
+    def cut(self, begin: int, end: int, /) -> list[Record]:
         """Return some of them, by their places."""
 
 
 @dataclass(slots=True)
 class _Excerpt:
-    """The frames around a moment."""
+    """The frames around one of them."""
 
     number: int
     records: list[Record]
     wanted: int
 
 
-def excerpts(pieces: Iterable[Piece], moments: Sequence[int], frames: int) -> list[list[Record]]:
-    """Return the frames around each moment.
+def excerpts(pieces: Iterable[Piece], numbers: Iterable[int], frames: int) -> dict[int, _Frames]:
+    """Return the frames around some of them.
 
     Args:
         pieces: all frames of a log.
-        moments: times.
-        frames: how many before and how many from each moment on.
+        numbers: the places of these in the log, from 1.
+        frames: how many before and behind each.
+
+    Returns:
+        By number, the place of the first frame in the log, and the frames.
     """
-    order = deque(sorted(range(len(moments)), key=moments.__getitem__))
-    found: list[list[Record]] = [[] for _ in moments]
+    order = deque(sorted(set(numbers)))
+    found: dict[int, _Frames] = {}
     before: list[Record] = []
     running: list[_Excerpt] = []
+    passed = 0
     for piece in pieces:
-        times = piece.times()
+        size = len(piece)
         for one in running:
-            one.records += piece.cut(0, one.wanted)
-            one.wanted -= min(one.wanted, len(times))
-        while order and len(times) and moments[order[0]] <= times[-1]:
+            one.records += piece.cut(0, min(one.wanted, size))
+            one.wanted -= min(one.wanted, size)
+        running = [one for one in running if one.wanted]
+        while order and order[0] <= passed + size:
             number = order.popleft()
-            place = bisect_left(times, moments[number])
-            begin = max(0, place - frames)
-            head = before[-(frames - place) :] if place < frames else []
-            end = place + frames
-            records = head + piece.cut(begin, min(end, len(times)))
-            running.append(_Excerpt(number, records, max(0, end - len(times))))
-        running = list(_unfinished(running, found))
-        before = (before + piece.cut(max(0, len(times) - frames), len(times)))[-frames:]
+            row = number - 1 - passed
+            begin, end = max(0, row - frames), row + frames + 1
+            head = before[-(frames - row) :] if row < frames else []
+            records = head + piece.cut(begin, min(end, size))
+            found[number] = passed + begin + 1 - len(head), records
+            if end > size:
+                running.append(_Excerpt(number, records, end - size))
         if not order and not running:
             break
-    for one in running:
-        found[one.number] = one.records
-    for number in order:  # behind the last frame
-        found[number] = list(before)
+        before = (before + piece.cut(max(0, size - frames), size))[-frames:] if frames else []
+        passed += size
     return found
 
 
-def _unfinished(running: Iterable[_Excerpt], found: list[list[Record]]) -> Iterator[_Excerpt]:
-    for one in running:
-        if one.wanted:
-            yield one
-        else:
-            found[one.number] = one.records
+_Frames = tuple[int, list[Record]]

@@ -248,9 +248,16 @@ const nmtClass = name => NMT.includes(name) ? name : "other";
 const painters = {
   findings(group, lane, x, y) {
     data.findings.forEach((one, number) => {
-      const place = x(one.t);
-      if (!ofNode(one) || place < drawn.left - 5 || place > drawn.left + drawn.width + 5) return;
-      const mark = draw(group, "path", {class: fits(`${one.rule} ${one.text}`) ? "found" : "found dim", d: `M${place - 5} ${y + 3}h10l-5 12z`});
+      if (!ofNode(one)) return;
+      let path = "", before = -10;
+      for (const t of one.at.length ? one.at : [one.t]) {
+        const place = x(t);
+        if (place < drawn.left - 5 || place > drawn.left + drawn.width + 5 || place - before < 2) continue;
+        before = place;
+        path += `M${place - 5} ${y + 3}h10l-5 12z`;
+      }
+      if (!path) return;
+      const mark = draw(group, "path", {class: fits(`${one.rule} ${one.text}`) ? "found" : "found dim", d: path});
       mark.dataset.mark = number;
     });
   },
@@ -339,7 +346,9 @@ function under(lane, t, reach) {
     for (const one of found.slice(0, 5)) lines.push(`${seconds(one[0])}  ${one[2]}`);
     if (found.length > 5) lines.push(`and ${found.length - 5} more`);
   };
-  if (lane.kind === "findings") add(data.findings.filter(ofNode).map(one => [one.t, 0, `${one.rule}: ${one.text}`]));
+  if (lane.kind === "findings") {
+    add(data.findings.filter(ofNode).flatMap(one => (one.at.length ? one.at : [one.t]).map(t => [t, 0, `${one.rule}: ${one.text}`])));
+  }
   if (lane.kind === "load") {
     const found = valueAt(lane.bus.load, t, 2), rate = (found ? found[0] : 0) * perSecond(lane.bus.load);
     lines.push(lane.bus.rate ? `${(rate / lane.bus.rate * 100).toFixed(2)} %` : `${(rate / 1e3).toFixed(2)} kbit/s`);

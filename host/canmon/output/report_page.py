@@ -6,21 +6,20 @@ import re
 import shutil
 import subprocess
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from html import escape
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Final
+from typing import Final, NamedTuple
 
-from tickrig.host.canmon.model.check.rule import TrafficFinding
+from tickrig.host.canmon.model.check.diagnosis import BusFault, Diagnosis
 from tickrig.host.canmon.model.decode.decoded import Decoded
 from tickrig.host.canmon.model.decode.node_board import NodeStatus, identity_words, pdo_contents
 from tickrig.host.canmon.model.frames import (
     REMOTE,
     Record,
     decoded_text,
-    ident_of,
     ident_text,
     load_text,
     node_of,
@@ -29,15 +28,15 @@ from tickrig.host.canmon.model.frames import (
 from tickrig.host.canmon.model.survey import Mark, Survey, Thinned
 from tickrig.host.text.page_text import content_policy, duration, harmless, json_text, one_line
 from tickrig.host.text.values import counted
-from tickrig.wire.can import CanFrame
 
 Around = Sequence[tuple[Record, Decoded]]
 
 _HERE: Final = Path(__file__).parent
-_NODE: Final = re.compile(r"\bnode (\d{1,3})\b")
 _MOST_POINTS: Final = 60_000
 """Of all curves together: more would make the page larger than a mail may be."""
 _MOST_IDS: Final = 1_000
+_MOST_FAULTS: Final = 1_000
+_MOST_PLACES: Final = 100
 _NMT_NAMES: Final = ("operational", "pre-operational", "stopped", "initialising")
 _SERVICES: Final = {
     0x080: "EMCY",
@@ -54,21 +53,16 @@ _ALONE: Final = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class Verdict:
-    """What rules found, and which rules those were.
+class Verdict(NamedTuple):
+    """What is wrong.
 
     Attributes:
-        findings: in the order of their times.
-        around: the frames around each of the first of them.
-        rules: names of the rules.
-        none: why rules judged nothing, by their names.
+        diagnosis: all of it.
+        around: by the number of a frame, the number of the first one around it, and these.
     """
 
-    findings: Sequence[TrafficFinding]
-    around: Sequence[Around] = ()
-    rules: Sequence[str] = ()
-    none: Mapping[str, str] = field(default_factory=dict)
+    diagnosis: Diagnosis
+    around: Mapping[int, tuple[int, Around]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,23 +150,27 @@ def _who(rows: Iterable[NodeStatus]) -> str:
 
 
 def _wrong(verdict: Verdict, first_us: int) -> str:
-    judged = len(verdict.rules) - len(verdict.none)
-    if not verdict.findings:
-        return f"No fault was found by {counted(judged, 'rule')}."
-    first = verdict.findings[0]
-    at = f"{max(0, first.at_us - first_us) / 1e6:.3f} s"
-    return f"{counted(len(verdict.findings), 'fault')} found; the first, at {at}: {first.text}."
+    faults, judged = verdict.diagnosis.faults, verdict.diagnosis.judged
+    if not faults:
+        return f"No fault was found by {counted(len(judged), 'rule')}."
+    first = faults[0]
+    at = f"{max(0, first.first_us - first_us) / 1e6:.3f} s"
+    more = f", {counted(sum(one.amount for one in faults), 'time')} in all"
+    return (
+        f"{counted(len(faults), 'fault')} found{more}; the first, at {at}: {first.where}:"
+        f" {first.text}."
+    )
 
 
 def _page_data(survey: Survey, verdict: Verdict, head: ReportHead) -> dict[str, object]:
     span_us = survey.since(survey.last_us)
     rows = survey.rows()
-    several = len(survey.frames) > 1
+    several, faults = len(survey.frames) > 1, verdict.diagnosis.faults
     return {
         "span": span_us,
-        "findings": [_finding(survey, verdict, number) for number in range(len(verdict.findings))],
+        "findings": [_finding(survey, one, verdict) for one in faults[:_MOST_FAULTS]],
         "around": bool(verdict.around),
-        "judged": _judged(verdict),
+        "judged": _judged(verdict.diagnosis),
         "buses": [
             {
                 "name": one_line(channel),
@@ -186,12 +184,14 @@ def _page_data(survey: Survey, verdict: Verdict, head: ReportHead) -> dict[str, 
         "nodeHeads": _HEADS,
         "signals": _signals(survey, several=several),
         "ids": _idents(survey, rows, max(span_us, 1)),
-        "about": [[one_line(text), harmless(code)] for text, code in _notes(survey, head)],
+        "about": [[one_line(text), harmless(code)] for text, code in _notes(survey, verdict, head)],
     }
 
 
-def _notes(survey: Survey, head: ReportHead) -> Iterable[tuple[str, str]]:
+def _notes(survey: Survey, verdict: Verdict, head: ReportHead) -> Iterable[tuple[str, str]]:
     yield from head.about
+    if (faults := len(verdict.diagnosis.faults)) > _MOST_FAULTS:
+        yield f"{faults - _MOST_FAULTS} of {faults} findings had no room.", ""
     if left := len(survey.signals_left):
         yield f"{counted(left, 'signal')} more had no room.", ""
     thinned = [
@@ -204,10 +204,10 @@ def _notes(survey: Survey, head: ReportHead) -> Iterable[tuple[str, str]]:
         yield f"Not drawn one by one: {', '.join(thinned)}.", ""
 
 
-def _judged(verdict: Verdict) -> str:
-    held = [name for name in verdict.rules if name not in verdict.none]
-    text = f"Judged by: {', '.join(held)}." if held else "No rule judged anything."
-    none = "; ".join(f"{name}: {why}" for name, why in verdict.none.items())
+def _judged(diagnosis: Diagnosis) -> str:
+    judged = ", ".join(diagnosis.judged)
+    text = f"Judged by: {judged}." if judged else "No rule judged anything."
+    none = "; ".join(f"{name}: {why}" for name, why in diagnosis.unjudged.items())
     return one_line(f"{text} Not judged: {none}." if none else text)
 
 
@@ -215,31 +215,26 @@ def _key(channel: str, node: int | None) -> str:
     return "" if node is None else f"{one_line(channel)}/{node}"
 
 
-def _finding(survey: Survey, verdict: Verdict, number: int) -> dict[str, object]:
-    finding = verdict.findings[number]
-    around = verdict.around[number] if number < len(verdict.around) else ()
-    record, channel = finding.record, next(iter(sorted(survey.frames)), "")
-    node = None
-    if record is not None:
-        channel = record.channel
-        node = node_of(ident_of(record.frame)) if isinstance(record.frame, CanFrame) else None
-    if node is None and (named := _NODE.search(finding.text)):
-        node = int(named[1])
+def _finding(survey: Survey, fault: BusFault, verdict: Verdict) -> dict[str, object]:
+    places = fault.frames[:_MOST_PLACES]
+    numbers = {place.number for place in fault.frames}
+    first, around = verdict.around.get(places[0].number, (0, ())) if places else (0, ())
     return {
-        "t": survey.since(finding.at_us),
-        "rule": one_line(finding.rule),
-        "text": one_line(finding.text),
-        "key": _key(channel, node),
-        "count": 1,
+        "t": survey.since(fault.first_us) if places else 0,
+        "at": [survey.since(place.at_us) for place in places],
+        "rule": one_line(fault.rule),
+        "text": one_line(f"{fault.where}: {fault.text}".removeprefix(": ")),
+        "key": _key(fault.channel, fault.node),
+        "count": fault.amount,
         "frames": [
             [
                 one.at_us - (survey.first_us or 0),
                 one_line(one.channel),
                 str(one.frame),
                 one_line(decoded_text(decoded)),
-                int(one == record),
+                int(number in numbers),
             ]
-            for one, decoded in around
+            for number, (one, decoded) in enumerate(around, first)
         ],
     }
 

@@ -15,9 +15,7 @@ import click
 
 from tickrig._lazy import LazyModule
 from tickrig._version import __version__
-from tickrig.host.canmon.model.check.checker import Checker, Unjudged
-from tickrig.host.canmon.model.check.rule import TrafficFinding
-from tickrig.host.canmon.model.check.rules import SWITCHES, parse_rules
+from tickrig.host.canmon.model.check import diagnosis
 from tickrig.host.canmon.model.decode.dbc_file import DbcFile
 from tickrig.host.canmon.model.decode.decoder import Decoder
 from tickrig.host.canmon.model.decode.node_memory import EdsObjects
@@ -31,20 +29,16 @@ from tickrig.host.canmon.verbs import decode_options
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.messages import SourceFailed, refusing
 from tickrig.host.cli.options import PATH
-from tickrig.host.text.values import counted
 from tickrig.host.text.whole_file import check_file, write_whole
 
 if TYPE_CHECKING:
-    from tickrig.host.canmon.model.check import column_check
     from tickrig.host.canmon.model.columns import column_survey
     from tickrig.host.canmon.model.columns.columns import Columns
 else:  # numpy
-    column_check = LazyModule("tickrig.host.canmon.model.check.column_check")
     column_survey = LazyModule("tickrig.host.canmon.model.columns.column_survey")
 
 _MOST_AROUND: Final = 200
 """Findings that are shown with their frames."""
-_MOST_FINDINGS: Final = 2_000
 
 
 @decode_options.source_command(
@@ -65,7 +59,7 @@ _MOST_FINDINGS: Final = 2_000
 def command(  # noqa: PLR0913 - options
     *,
     source: Sequence[str],
-    eds: Sequence[str],
+    eds: decode_options.EdsOptions,
     dbc: Sequence[Path],
     page: Path | None,
     pdf: Path | None,
@@ -109,8 +103,6 @@ def command(  # noqa: PLR0913 - options
             ("Command:", shlex.join(["canmon", *sys.argv[1:]])),
             *((text, "") for text in [*read.messages, read.failed] if text),
         ]
-        if left := len(seen.findings) - len(verdict.findings):
-            about.append((f"{counted(left, 'finding')} more had no room.", ""))
         head = report_page.ReportHead(title or words, words, about, rates.nominal)
         _write(outputs, report_page.report_page(seen.survey, verdict, head), Path(folder))
     for line in report_page.summary(seen.survey, verdict, head):
@@ -153,25 +145,22 @@ def _write(outputs: Mapping[str, Path | None], text: str, folder: Path) -> None:
 
 def _verdict(seen: _Seen, read: _Reading, around: int) -> report_page.Verdict:
     """Return what was found, the first of it with the frames around it."""
-    findings = seen.findings[:_MOST_FINDINGS]
-    moments = [one.at_us for one in findings[:_MOST_AROUND]] if around else []
-    frames = [
-        [(one, seen.decoder.take(one)) for one in found] for found in read.around(moments, around)
-    ]
-    found = {one.rule for one in seen.findings}
-    none = {name: why for name, why in seen.unjudged.rules.items() if name not in found}
-    return report_page.Verdict(findings, frames, seen.rules.names(), none)
+    shown = seen.diagnosis.faults[:_MOST_AROUND] if around else ()
+    found = read.around([one.frames[0].number for one in shown if one.frames], around)
+    decoded = {
+        number: (first, [(record, seen.decoder.take(record)) for record in records])
+        for number, (first, records) in found.items()
+    }
+    return report_page.Verdict(seen.diagnosis, decoded)
 
 
 class _Seen:
-    """What is made of a log: a survey, and what the rules that need no parameter find.
+    """What is made of a log: a survey, and what is wrong.
 
     Attributes:
         survey: of it.
         decoder: of the survey.
-        rules: what must hold.
-        findings: what does not.
-        unjudged: what the rules could not judge.
+        diagnosis: what is wrong by all rules that need no parameter.
     """
 
     def __init__(
@@ -180,31 +169,25 @@ class _Seen:
         self.decoder = decode_options.decoder_of(objects, dbc)
         names = {node: found.name for node, found in objects.items()}
         self.survey = Survey(self.decoder, names, rates)
-        self.rules = parse_rules(dict.fromkeys(SWITCHES, True))
-        self.findings: list[TrafficFinding] = []
-        self.unjudged = Unjudged({})
-        self._heartbeats = {node: ms for node, one in objects.items() if (ms := one.heartbeat_ms)}
-        self._rates = rates
+        self.diagnosis = diagnosis.Diagnosis((), (), {}, 0)
+        self._diagnoser = diagnosis.Diagnoser(rates.nominal, objects)
 
     def by_columns(self, log: BlockLog) -> bool:
         """Take a log in blocks; False if it is to be read frame by frame."""
         feed = column_survey.ColumnSurvey(self.decoder, self.survey)
-        checker = column_check.ColumnChecker(self.rules, self._rates.nominal, self._heartbeats)
 
         def take(block: Columns) -> None:
             feed.take(block)
-            self.findings += checker.take(block)
+            self._diagnoser.take(block)
 
         if not listening.take_blocks(log, take):
             return False
-        self.survey.end()
-        self.findings += checker.end(log.losses(), log.errors())
-        self.unjudged = checker.unjudged(log.without_errors)
+        self._end()
         return True
 
     def by_frames(self, source: Source) -> None:
         """Take a log frame by frame."""
-        survey, checker = self.survey, Checker(self.rules, *self._rates, self._heartbeats)
+        survey = self.survey
 
         def take(records: Sequence[Record]) -> None:
             for record in records:
@@ -212,14 +195,15 @@ class _Seen:
                 survey.count(record)
                 survey.take(record, decoded)
                 survey.take_signals(record, decoded)
-                self.findings += checker.take(record)
+            self._diagnoser.take(records)
 
         with listening.until_interrupted():
             listening.listen(source, take, None)
-        survey.end()
-        end_us = survey.last_us
-        self.findings += checker.end(end_us, source.losses(), end_us, source.errors())
-        self.unjudged = checker.unjudged(end_us, source.without_errors)
+        self._end()
+
+    def _end(self) -> None:
+        self.survey.end()
+        self.diagnosis = self._diagnoser.diagnosis()
 
 
 class _Reading:
@@ -277,9 +261,9 @@ class _Reading:
         if not self._recorded:
             self.source = source
 
-    def around(self, moments: Sequence[int], frames: int) -> list[list[Record]]:
-        """Return the frames around each moment."""
-        return excerpts(self._pieces(), moments, frames) if moments else []
+    def around(self, numbers: Sequence[int], frames: int) -> Mapping[int, tuple[int, list[Record]]]:
+        """Return the frames around some, by their numbers, as `excerpts` does."""
+        return excerpts(self._pieces(), numbers, frames) if numbers else {}
 
     def close(self) -> None:
         """Give back what is open."""
@@ -321,11 +305,11 @@ class _FramePiece:
     def __init__(self, frames: Sequence[Record]) -> None:
         self._frames = frames
 
-    def times(self) -> Sequence[int]:
-        """Return the time of each frame."""
-        return [one.at_us for one in self._frames]
+    def __len__(self) -> int:
+        """Return how many frames there are."""
+        return len(self._frames)
 
-    def cut(self, begin: int, end: int) -> list[Record]:
+    def cut(self, begin: int, end: int, /) -> list[Record]:
         """Return some of the frames, by their places."""
         return list(self._frames[begin:end])
 

@@ -215,11 +215,10 @@ class ColumnPiece:
     def __init__(self, columns: Columns) -> None:
         self._columns = columns
 
-    def times(self) -> Sequence[int]:
-        """Return the time of each frame."""
-        times: Sequence[int] = self._columns.at_us  # type: ignore[assignment]  # it is searched
-        return times
+    def __len__(self) -> int:
+        """Return how many frames there are."""
+        return len(self._columns)
 
-    def cut(self, begin: int, end: int) -> list[Record]:
+    def cut(self, begin: int, end: int, /) -> list[Record]:
         """Return some of the frames, by their places."""
-        return records(select(self._columns, np.arange(begin, min(end, len(self._columns)))))
+        return records(select(self._columns, np.arange(begin, end)))

@@ -73,7 +73,7 @@ def test_three_sentences_say_what_there_was(log: str, tmp_path: Path) -> None:
     lines = report(log, "-o", tmp_path / "run.html", "-b", "500k").stdout.splitlines()
     assert lines[0].startswith("run.log holds 358 frames of can0 in 5.90 s, from 2020-09-13 12:26")
     assert lines[1] == "1 node was heard; at the end 3 is operational."
-    assert re.match(r"[0-9]+ faults found; the first, at 0\.602 s: node 3: server aborts", lines[2])
+    assert re.match(r"[0-9]+ faults found, [0-9]+ times in all; the first, at 0\.", lines[2])
     page = unescape((tmp_path / "run.html").read_text("utf-8"))
     assert " ".join(lines) in page
 
@@ -99,7 +99,7 @@ def test_load_and_error_frames_are_in_bins(data: dict[str, Any]) -> None:
 
 def test_a_finding_has_its_node_and_the_frames_around(data: dict[str, Any]) -> None:
     abort = next(one for one in data["findings"] if one["rule"] == "no-sdo-abort")
-    assert (abort["t"], abort["key"]) == (602_000, "can0/3")
+    assert (abort["t"], abort["at"], abort["key"]) == (602_000, [602_000], "can0/3")
     here = [frame for frame in abort["frames"] if frame[4]]
     assert [frame[2] for frame in here] == ["583#8099990000000206"]
     times = [frame[0] for frame in abort["frames"]]
