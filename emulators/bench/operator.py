@@ -11,8 +11,8 @@ from typing import ClassVar, Final, NamedTuple, Protocol
 from tickrig.device.physical import SignalType
 from tickrig.device.twin import Copyable
 from tickrig.emulators.rig.emulated import Inputs
+from tickrig.emulators.rig.event_queue import EventQueue
 from tickrig.emulators.rig.faults import FaultForm, bind_arguments, spelled
-from tickrig.emulators.rig.station import EventQueue
 from tickrig.host.text.names import near
 from tickrig.host.text.values import Setting, parse_time_us
 from tickrig.wire.instant import NEVER

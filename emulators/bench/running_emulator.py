@@ -13,8 +13,8 @@ from tickrig.emulators.bench.operator import Operator, WireFaults
 from tickrig.emulators.record.recorder import CandumpFile, TraceFile, TraceRecorder
 from tickrig.emulators.record.wire_log import WireLine, WireLog
 from tickrig.emulators.rig.emulated import HasSignals, read_signal
+from tickrig.emulators.rig.event_queue import EventQueue
 from tickrig.emulators.rig.rig import Rig
-from tickrig.emulators.rig.station import EventQueue
 from tickrig.host.text.byte_text import escape
 from tickrig.host.text.trace import Mark
 from tickrig.host.text.values import Setting, format_time

@@ -18,8 +18,8 @@ from tickrig.emulators.bench.running_emulator import RunningEmulator, Transcript
 from tickrig.emulators.commands.device_type import ConfiguredDevice, DeviceType
 from tickrig.emulators.commands.run import EmulatorRun, RunOptions, mistakes_in
 from tickrig.emulators.record.recorder import TraceFile
+from tickrig.emulators.rig.event_queue import EventQueue
 from tickrig.emulators.rig.faults import FaultyPort
-from tickrig.emulators.rig.station import EventQueue
 from tickrig.emulators.scenario import ScenarioParser, ScenarioPlayer, ScenarioStep
 from tickrig.emulators.serial.emulator import Emulator, SerialHub
 from tickrig.emulators.serial.network import NetworkPort, ServeUrl, parse_serve_url

@@ -54,9 +54,10 @@ from tickrig.device.horizon import Horizon
 from tickrig.device.twin import Copyable, Listeners, Part, restore, state_of, twin
 from tickrig.device.twin.snapshot import MachineSnapshot
 from tickrig.emulators.rig.clock import Clock, VirtualClock
+from tickrig.emulators.rig.event_queue import EventQueue
 from tickrig.emulators.rig.kernel import enter_stations, kernel, run, tick_stations
 from tickrig.emulators.rig.port import Host, OutsideBridge, Wire
-from tickrig.emulators.rig.station import EventQueue, Station, Timetable, is_wire_port, next_tick_us
+from tickrig.emulators.rig.station import Station, Timetable, is_wire_port, next_tick_us
 from tickrig.wire.instant import NEVER
 
 # What joins devices beside their wires.

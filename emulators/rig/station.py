@@ -1,13 +1,13 @@
-"""When there is work: of a device on a port, of several at which tick, and between ticks."""
+"""A device on a port, when it has work, and which of several have work at which tick."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable
 from heapq import heappop, heappush
-from typing import Any, Final, Generic, Protocol, TypeGuard
+from typing import Any, Generic, Protocol, TypeGuard
 
 from tickrig.device.core import Device, W
-from tickrig.device.twin import Copyable, Part, restore, state_of
+from tickrig.device.twin import Copyable
 from tickrig.emulators.rig.kernel import StationFields, TimetableFields, in_kernel
 from tickrig.emulators.rig.port import Port, Wire
 from tickrig.wire.instant import NEVER
@@ -168,69 +168,3 @@ class Timetable(TimetableFields):
                 return
             del self._stations[heappop(self._ticks)]
         self.first_us = NEVER
-
-
-_Action = Callable[[int], None]
-"""Something to do; it is told the time in microseconds."""
-
-_SPARE: Final = 64
-"""So many forgotten actions may stay, and as many as there are others."""
-
-_Entry = tuple[int, int, Hashable, _Action]
-"""When, the number of its entering, its key, and what."""
-
-
-class EventQueue(Part):
-    """Actions by time; those of the same time in the order they were entered."""
-
-    def __init__(self) -> None:
-        self._number = 0
-        self._heap: list[_Entry] = []
-        self._entered: dict[Hashable, int] = {}
-        """The number of what holds for each key; others in the heap were forgotten."""
-        self.due_us = NEVER
-
-    def put(self, key: Hashable, t_us: int, action: _Action) -> None:
-        """Enter an action; one entered before under the same key is forgotten."""
-        self._number += 1
-        self._entered[key] = self._number
-        heappush(self._heap, (t_us, self._number, key, action))
-        self._note_due()
-
-    def wake(self, key: Hashable, t_us: int) -> None:
-        """Let the rig stop at a time, for its watchers to look; as `put` of doing nothing."""
-        self.put(key, t_us, _nothing)
-
-    def __getstate__(self) -> object:
-        """Return the state without what was forgotten: it need not be copied."""
-        return state_of(self, {"_heap": sorted(filter(self._holds, self._heap))})
-
-    def __setstate__(self, state: object) -> None:
-        """Go on with what was copied."""
-        restore(self, state)
-
-    def drop(self, key: Hashable) -> None:
-        """Forget an action; one that is not there is no error."""
-        if self._entered.pop(key, None) is not None:
-            self._note_due()
-
-    def run(self, now_us: int) -> None:
-        """Do what is due at `now_us`."""
-        while self.due_us <= now_us:
-            _, _, key, action = self._heap[0]
-            self.drop(key)
-            action(now_us)
-
-    def _note_due(self) -> None:
-        if len(self._heap) > 2 * len(self._entered) + _SPARE:
-            self._heap = sorted(entry for entry in self._heap if self._holds(entry))
-        while self._heap and not self._holds(self._heap[0]):
-            heappop(self._heap)
-        self.due_us = self._heap[0][0] if self._heap else NEVER
-
-    def _holds(self, entry: _Entry) -> bool:
-        return self._entered.get(entry[2]) == entry[1]
-
-
-def _nothing(now_us: int) -> None:
-    """Do nothing."""

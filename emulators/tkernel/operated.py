@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 
 from tickrig.emulators.bench.operator import AssemblyFaults, FaultSpec, Operator
 from tickrig.emulators.rig.emulated import HasSignals
-from tickrig.emulators.rig.station import EventQueue
+from tickrig.emulators.rig.event_queue import EventQueue
 
 
 class Operated:

@@ -12,10 +12,10 @@ from typing import Final, Literal
 from serial.serialutil import SerialException
 
 from tickrig.device.twin import Copyable
+from tickrig.emulators.rig.event_queue import EventQueue
 from tickrig.emulators.rig.port import ByteEnd
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_waits import Looks, OneThread
-from tickrig.emulators.rig.station import EventQueue
 from tickrig.wire.instant import NEVER
 from tickrig.wire.uart import PS_PER_US, Character, UartReceiver, UartSetting
 

@@ -21,10 +21,10 @@ from tickrig.emulators.record.recorder import TraceRecorder
 from tickrig.emulators.record.wire_log import Splitter, WireLine, WireLog
 from tickrig.emulators.rig.clock import Clock
 from tickrig.emulators.rig.emulated import HasSignals
+from tickrig.emulators.rig.event_queue import EventQueue
 from tickrig.emulators.rig.faults import FaultForm, FaultyPort, usage
 from tickrig.emulators.rig.port import OutsideBridge
 from tickrig.emulators.rig.rig import Rig
-from tickrig.emulators.rig.station import EventQueue
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
 from tickrig.emulators.testing.bench.mounts import BusMount, LineMount, Mount
 from tickrig.emulators.testing.signals.driver import SignalDriver

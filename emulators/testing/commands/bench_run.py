@@ -15,7 +15,7 @@ from tickrig.emulators.bench.running_emulator import STATE, RunningEmulator
 from tickrig.emulators.commands.run import EmulatorRun, RunOptions, mistakes_in
 from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.rig.emulated import read_signal
-from tickrig.emulators.rig.station import EventQueue
+from tickrig.emulators.rig.event_queue import EventQueue
 from tickrig.emulators.scenario import ScenarioParser, ScenarioPlayer, ScenarioStep
 from tickrig.emulators.serial.pty_port import PtyPort
 from tickrig.emulators.testing.bench.bench_rig import BenchOperator, BenchRig, line_text

@@ -28,7 +28,7 @@ from tickrig.emulators.canopen.node_spec import NodeSpec, parse_ids, parse_node
 from tickrig.emulators.canopen.store_file import StoreError, StoreFile
 from tickrig.emulators.commands.run import EmulatorRun, RunOptions, mistakes_in
 from tickrig.emulators.record.recorder import CandumpFile
-from tickrig.emulators.rig.station import EventQueue
+from tickrig.emulators.rig.event_queue import EventQueue
 from tickrig.emulators.scenario import ScenarioParser, ScenarioPlayer, ScenarioStep, Send
 from tickrig.emulators.testing.rig_file.plan import DeviceKind, DevicePlan, RigFileError, RigPlan
 from tickrig.emulators.testing.rig_file.probe import eds_cache

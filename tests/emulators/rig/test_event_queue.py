@@ -6,7 +6,7 @@ from math import log2
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.emulators.rig.station import EventQueue
+from tickrig.emulators.rig.event_queue import EventQueue
 from tickrig.wire.instant import NEVER
 
 

@@ -14,7 +14,7 @@ from typing import IO, Any, Final, Protocol
 from tickrig.device.physical import InputSignal, SignalType
 from tickrig.emulators.bench.operator import AssemblyFaults, FaultOrder, FaultSpec, Operator
 from tickrig.emulators.rig.emulated import HasSignals
-from tickrig.emulators.rig.station import EventQueue
+from tickrig.emulators.rig.event_queue import EventQueue
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
 from tickrig.emulators.testing.bench.errors import (
     BenchBlocked,
