@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Generator
+from importlib.util import find_spec
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -15,6 +16,8 @@ from tests.soak import examples
 from tickrig.emulators.testing.plugin import pytest_plugin
 
 collect_ignore = ["tests/outside", "tests/stranger"]  # of others: tests/test_*.py install them
+if find_spec("labgrid") is None:  # an extra that is no part of the development environment
+    collect_ignore.append("src/tickrig/testing/labgrid.py")
 
 # How long an example takes says something about the machine, not about the code.
 settings.register_profile(

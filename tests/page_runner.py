@@ -18,7 +18,7 @@ from typing import Final
 from tests.environment import Environment
 
 BLOCK: Final = re.compile(r"^```(\w+)\n(.*?)^```", re.DOTALL | re.MULTILINE)
-FILE: Final = re.compile(r"# ([\w./-]+\.(?:py|toml|txt|csv|ini))\n")
+FILE: Final = re.compile(r"# ([\w./-]+\.(?:py|toml|txt|csv|ini|yaml|robot))\n")
 INSTALLING: Final = ("python3 -m venv", ". .venv", "pip install 'tickrig")
 TIMEOUT_S: Final = 60
 

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from tickrig.emulators.testing.machine.fuzz_one_input import fuzz_one_input as fuzz_one_input
     from tickrig.emulators.testing.properties.check_device import check_device as check_device
     from tickrig.host.canopen.master.canopen_master import open_master as open_master
+    from tickrig.testing.case import BenchTestCase as BenchTestCase
+    from tickrig.testing.robot import BenchLibrary as BenchLibrary
 else:
     __all__, __getattr__, __dir__ = lazy(
         __name__,
@@ -46,5 +48,7 @@ else:
             "tickrig.emulators.testing.machine.fuzz_one_input": ("fuzz_one_input",),
             "tickrig.emulators.testing.properties.check_device": ("check_device",),
             "tickrig.host.canopen.master.canopen_master": ("open_master",),
+            "tickrig.testing.case": ("BenchTestCase",),
+            "tickrig.testing.robot": ("BenchLibrary",),
         },
     )

@@ -1,0 +1,132 @@
+"""A bench in labgrid: a resource that names it, and a driver with its console and its power.
+
+`imports: [tickrig.testing.labgrid]` in the environment file registers both.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import attr
+from labgrid.driver import Driver
+from labgrid.driver.consoleexpectmixin import ConsoleExpectMixin
+from labgrid.factory import target_factory
+from labgrid.protocol import ConsoleProtocol, PowerProtocol
+from labgrid.resource import Resource
+from pexpect import TIMEOUT
+
+from tickrig.emulators.testing.bench.bench import Bench, BenchDevice, open_bench
+
+_TEXT = attr.validators.instance_of(str)
+_NUMBER = attr.validators.instance_of(float)
+
+
+@target_factory.reg_resource
+@attr.s(eq=False)
+class TickrigBench(Resource):
+    """The bench of a rig file.
+
+    Attributes:
+        rig: the rig file, relative to the environment file.
+        mode: `virtual`, `real` or `hardware`.
+        device: whose console and power it is, if there are several devices.
+    """
+
+    rig: str = attr.ib(validator=_TEXT)
+    mode: str = attr.ib(default="virtual", validator=_TEXT)
+    device: str = attr.ib(default="", validator=_TEXT)
+
+
+@target_factory.reg_driver
+@attr.s(eq=False)
+class TickrigDriver(ConsoleExpectMixin, Driver, ConsoleProtocol, PowerProtocol):
+    """Console and power of a bench, and the bench itself.
+
+    Activating the driver opens it, with its supply on; deactivating closes it.
+
+    Attributes:
+        delay: how long `cycle` leaves the supply off, in seconds of the bench.
+        txdelay: pause between chunks that the console sends, in seconds of the machine.
+        txchunk: bytes in each of these chunks.
+        bench: the bench, as long as the driver is active.
+    """
+
+    bindings = {"place": TickrigBench}  # noqa: RUF012 - as all drivers of labgrid
+
+    delay: float = attr.ib(default=2.0, validator=_NUMBER)
+    txdelay: float = attr.ib(default=0.0, validator=_NUMBER)
+    txchunk: int = attr.ib(default=1, validator=attr.validators.instance_of(int))
+
+    place: Any
+    target: Any
+    bench: Bench
+
+    def __attrs_post_init__(self) -> None:
+        """Be ready to be activated."""
+        super().__attrs_post_init__()
+        self._port: Any = None
+
+    def on_activate(self) -> None:
+        """Open the bench."""
+        rig, env = self.place.rig, self.target.env
+        self.bench = open_bench(
+            rig if env is None else env.config.resolve_path(rig), mode=self.place.mode
+        )
+
+    def on_deactivate(self) -> None:
+        """Close the bench."""
+        self.close()
+        self.bench.close()
+
+    @property
+    def device(self) -> BenchDevice:
+        """The device of the resource, or the whole bench."""
+        return self.bench[self.place.device] if self.place.device else self.bench
+
+    def open(self) -> None:
+        """Open the serial line."""
+        if self._port is None:
+            self._port = self.device.serial()
+
+    def close(self) -> None:
+        """Close the serial line."""
+        port, self._port = self._port, None
+        if port is not None:
+            port.close()
+
+    def _read(self, size: int = 1, timeout: float = 0.0, max_size: int | None = None) -> bytes:
+        """Read as labgrid's SerialDriver: `size` bytes or what is there, at most `max_size`."""
+        self.open()
+        self._port.timeout = timeout
+        wanted = max(size, self._port.in_waiting)
+        read: bytes = self._port.read(min(wanted, max_size) if max_size else wanted)
+        if not read:
+            raise TIMEOUT(f"nothing came within {timeout:.2f} s")
+        return read
+
+    def _write(self, data: bytes) -> int:
+        self.open()
+        written: int = self._port.write(data)
+        return written
+
+    @Driver.check_active
+    def on(self) -> None:
+        """Give the device its supply."""
+        self.device.switch_on()
+
+    @Driver.check_active
+    def off(self) -> None:
+        """Take it away."""
+        self.device.switch_off()
+
+    @Driver.check_active
+    def cycle(self) -> None:
+        """Take it away, and give it again after `delay`."""
+        self.off()
+        self.bench.run_for(round(self.delay * 1_000_000))
+        self.on()
+
+    @Driver.check_active
+    def can_bus(self) -> Any:
+        """Open the CAN bus as a python-can bus."""
+        return self.device.can_bus()

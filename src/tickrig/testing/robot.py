@@ -1,0 +1,224 @@
+"""Keywords of Robot Framework for a bench."""
+
+from __future__ import annotations
+
+import re
+from collections import deque
+from pathlib import Path
+from typing import Any, Final
+
+from tickrig._version import __version__
+from tickrig.emulators.record.wire_log import WireLine
+from tickrig.emulators.testing.bench.bench import Bench, BenchDevice, open_bench
+from tickrig.emulators.testing.plugin.journal_text import last_lines
+from tickrig.host.text.byte_text import escape, unescape
+from tickrig.host.text.trace import Mark
+from tickrig.host.text.values import Setting, parse_setting
+from tickrig.wire.can import CanFrame
+
+_LINES: Final = 20
+_KEPT: Final = 10_000
+
+
+class BenchLibrary:
+    """Keywords for a bench of emulated or real devices, one bench at a time.
+
+    A test that fails shows the last lines and frames of its bench, and the bench is closed when the
+    test is over. Names of several devices are `DEVICE/NAME`.
+
+    Attributes:
+        ROBOT_LIBRARY_SCOPE: each test has a library of its own.
+        ROBOT_LIBRARY_VERSION: that of tickrig.
+        ROBOT_LISTENER_API_VERSION: the library listens for the end of a test.
+        ROBOT_LIBRARY_LISTENER: itself.
+    """
+
+    ROBOT_LIBRARY_SCOPE = "TEST"
+    ROBOT_LIBRARY_VERSION = __version__
+    ROBOT_LISTENER_API_VERSION = 3
+
+    def __init__(self) -> None:
+        self.ROBOT_LIBRARY_LISTENER = self
+        self._bench: Bench | None = None
+        self._links: dict[str, Any] = {}
+        self._heard: deque[tuple[str, str]] = deque(maxlen=_KEPT)
+
+    def _end_test(self, data: object, result: Any) -> None:
+        """Show what happened, and close the bench; Robot Framework calls it."""
+        if self._bench is None:
+            return
+        if result.failed:
+            result.message += f"\n\nWhat passed last:\n{last_lines(self._bench, _LINES)}"
+        self.close_bench()
+
+    @property
+    def bench(self) -> Bench:
+        """The bench that is open.
+
+        Raises:
+            RuntimeError: none is.
+        """
+        if self._bench is None:
+            raise RuntimeError("no bench is open: use `Open Bench` first")
+        return self._bench
+
+    def open_bench(self, what: str, mode: str = "virtual", seed: int | None = None) -> None:
+        """Open a bench: of a rig file (``rig.toml``), or of one device by its type (``rrc``).
+
+        Args:
+            what: the rig file, or the type.
+            mode: ``virtual`` or ``real``; ``hardware`` with a rig file.
+            seed: of all chance; that of the rig file, or 0, unless given.
+        """
+        self.close_bench()
+        if Path(what).suffix in (".toml", ".yml", ".yaml"):
+            self._bench = open_bench(what, mode=mode, seed=seed)
+        else:
+            self._bench = Bench(what, mode=mode, seed=seed or 0)
+        self._bench._mode.hear(self._hear)
+
+    def close_bench(self) -> None:
+        """Close the bench. One that is not open is no error."""
+        bench, self._bench = self._bench, None
+        self._links.clear()
+        self._heard.clear()
+        if bench is not None:
+            bench.close()
+
+    def _hear(self, line: WireLine) -> None:
+        if line.mark is Mark.FROM_DEVICE:
+            self._heard.append((line.source, escape(line.data)))
+
+    def _of(self, device: str) -> BenchDevice:
+        return self.bench[device] if device else self.bench
+
+    def advance(self, duration: str) -> None:
+        """Let time pass: ``100ms``, ``2s``.
+
+        Args:
+            duration: how long.
+        """
+        self.bench.run_for(duration)
+
+    def send(self, text: str, device: str = "", end: str = r"\n") -> None:
+        r"""Send a line as the host; ``\xhh`` is a byte.
+
+        Args:
+            text: the line without its end.
+            device: to which device, if there are several wires.
+            end: its end.
+        """
+        self._link(device).send(unescape(text + end))
+
+    def send_frame(self, frame: str, device: str = "") -> None:
+        """Send a CAN frame in candump's notation, as ``701#05``.
+
+        Args:
+            frame: the frame.
+            device: on whose bus, if there are several.
+        """
+        self._link(device).send((CanFrame.parse(frame),))
+
+    def _link(self, device: str) -> Any:
+        if device not in self._links:
+            self._links[device] = self._of(device).link
+        return self._links[device]
+
+    def expect(self, pattern: str, within: str = "1s", device: str = "") -> str:
+        """Wait for a line or a frame of a device, and return it.
+
+        Lines that came since the last one that was expected count, too.
+
+        Args:
+            pattern: the whole line, or the frame in candump's notation; ``*`` stands for anything.
+            within: for how long at most.
+            device: of which device, or wire; of any unless given.
+        """
+        wanted = re.compile(".*".join(map(re.escape, pattern.split("*"))), re.DOTALL)
+        bench, passed = self.bench, list[str]()
+        sources = {"", device, bench._mode.wire_of(device)} if device else set()
+
+        def came() -> bool:
+            while self._heard:
+                source, text = self._heard.popleft()
+                if not sources or source in sources:
+                    passed.append(text)
+                    if wanted.fullmatch(text):
+                        return True
+            return False
+
+        if not bench.wait_until(came, within):
+            others = ", ".join(map(repr, passed[-3:])) or "nothing"
+            raise AssertionError(f"{pattern!r} did not come within {within}; what came: {others}")
+        return passed[-1]
+
+    def order_fault(self, fault: str, duration: str | None = None) -> None:
+        """Let a fault come: ``cut``, ``cut@2s-3s``, ``axis2/sdo_slow=2s``.
+
+        Args:
+            fault: the fault, with its arguments.
+            duration: how long it stays; for ever unless given.
+        """
+        self.bench.fault(fault, for_=duration)
+
+    def clear_fault(self, name: str) -> None:
+        """Let a fault go.
+
+        Args:
+            name: of the fault.
+        """
+        self.bench.clear(name)
+
+    def press(self, button: str, duration: str = "100ms") -> None:
+        """Press a button and let it go.
+
+        Args:
+            button: its name.
+            duration: how long it is pressed.
+        """
+        self.bench.press(button, duration)
+
+    def set_input(self, name: str, *values: str) -> None:
+        """Set an input, or all inputs of a group.
+
+        Args:
+            name: of the input or group.
+            *values: one, or one for each input of the group.
+        """
+        self.bench.set(name, *(parse_setting(str(value)) for value in values))
+
+    def get_signal(self, name: str) -> Setting:
+        """Return an input, an output, or an object of a CANopen node (``axis2/0x6041``).
+
+        Args:
+            name: of the signal.
+        """
+        return self.bench.get(name)
+
+    def signal_should_be(self, name: str, value: str, within: str = "0ms") -> None:
+        """Wait until a signal has a value.
+
+        Args:
+            name: of the signal.
+            value: the value.
+            within: for how long at most.
+        """
+        wanted, bench = parse_setting(str(value)), self.bench
+        if not bench.wait_until(lambda: bench.get(name) == wanted, within):
+            raise AssertionError(f"{name} is {bench.get(name)!r}, not {wanted!r} within {within}")
+
+    def switch_off(self, device: str = "") -> None:
+        """Take the supply away.
+
+        Args:
+            device: of which device; of all unless given.
+        """
+        self._of(device).switch_off()
+
+    def switch_on(self, device: str = "") -> None:
+        """Give the supply again.
+
+        Args:
+            device: to which device; to all unless given.
+        """
+        self._of(device).switch_on()
