@@ -17,7 +17,8 @@
 # A silence of `gap` ends a frame that has only begun, so a lost byte costs one frame. `by_gap`
 # knows the silence alone: its frame is whole when the silence is over, which is later than its
 # last byte. `due_us` says when; `WireLog` asks it before it takes anything later, so request
-# and answer stand in the order and with the times in which they passed.
+# and answer stand in the order and with the times in which they passed; and it lets the rig
+# stop there (`WireLog.follow`), so that the last frame ends as well.
 #
 # The log shows text. Without a description a frame is shown in hex. A description is a function
 # of a frame, or an object with such a method `parse` (a Struct of the library construct): it
@@ -204,6 +205,16 @@ class FrameLog:
     def last_us(self) -> int:
         """When the latest byte came."""
         return self._splitter.last_us
+
+    @property
+    def by_gap(self) -> bool:
+        """Whether silence alone ends frames, so that each one that has begun may be whole."""
+        return self._rule.cut is _never_whole
+
+    @property
+    def ends_by_time(self) -> bool:
+        """Whether a silence ends frames."""
+        return self._rule.gap_us < NEVER
 
     @property
     def begun(self) -> bytes:

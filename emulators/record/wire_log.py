@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 from tickrig.emulators.record.frames import FrameLog
+from tickrig.emulators.rig.rig import Rig
 from tickrig.host.text.trace import Mark
 from tickrig.wire.can import CanFrame, ErrorFrame
+from tickrig.wire.instant import NEVER
 from tickrig.wire.lines import LineSplitter
 
 
@@ -67,6 +70,19 @@ class WireLog:
         self._splitters = {mark: splitter(mark) for mark in (Mark.TO_DEVICE, Mark.FROM_DEVICE)}
         self._begun = dict.fromkeys(self._splitters, (0, b""))
         self._count = 0
+        self._wake: Callable[[int], None] | None = None
+
+    def follow(self, rig: Rig, name: str) -> None:
+        """Let frames end by a silence when it is over, not when something is heard later.
+
+        Args:
+            rig: whose time passes.
+            name: of the line.
+        """
+        logs = self._splitters.values()
+        if any(isinstance(each, FrameLog) and each.ends_by_time for each in logs):
+            self._wake = partial(rig.event_queue.wake, ("silence", name))
+            rig.watchers.append(self._end_silent)
 
     def hear(self, at_us: int, mark: Mark, data: bytes) -> None:
         """Take what passed, cut anywhere."""
@@ -76,6 +92,7 @@ class WireLog:
             for line in splitter(at_us, data):
                 self.add(at_us, mark, line)
             self._begun[mark] = at_us, splitter.begun
+            self._wake_at_silence()
             return
         begun = (self._begun[mark][1] + data)[-_MOST_BEGUN:]
         for line in splitter(at_us, data):
@@ -90,11 +107,25 @@ class WireLog:
                 for line in splitter(at_us, b""):
                     self.add(splitter.last_us, mark, line)
                 self._begun[mark] = at_us, b""
+                self._wake_at_silence()
 
-    def unfinished(self) -> tuple[WireLine, ...]:
-        """Return what has begun and did not end, of each direction; not numbered."""
-        begun = self._begun.items()
-        return tuple(WireLine(0, at_us, mark, data) for mark, (at_us, data) in begun if data)
+    def _wake_at_silence(self) -> None:
+        logs = self._splitters.values()
+        due_us = min((each.due_us for each in logs if isinstance(each, FrameLog)), default=NEVER)
+        if self._wake is not None and due_us < NEVER:
+            self._wake(due_us)
+
+    def unfinished(self, *, by_gap: bool = False) -> tuple[WireLine, ...]:
+        """Return what has begun and did not end, of each direction; not numbered.
+
+        Args:
+            by_gap: return the frames that silence alone ends instead: each may be whole.
+        """
+        return tuple(
+            WireLine(0, at_us, mark, data)
+            for mark, (at_us, data) in self._begun.items()
+            if data and by_gap == getattr(self._splitters[mark], "by_gap", False)
+        )
 
     def add(
         self, at_us: int, mark: Mark, line: bytes | CanFrame | ErrorFrame, source: str = ""

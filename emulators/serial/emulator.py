@@ -107,6 +107,7 @@ class Emulator(RunningEmulator):
             tap, changed = Tap(outside, self.log.hear), self._line_changed if line.uart else None
             bridges = [Bridge(self.line.b, tap, outside.attend, changed)]
         self.rig = Rig(station, bridges=bridges, clock=clock, event_queue=self.event_queue)
+        self.log.follow(self.rig, name)
 
     def _line_changed(self, setting: UartSetting) -> None:
         assert self._outside is not None  # who asks is its bridge

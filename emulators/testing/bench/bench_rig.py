@@ -133,16 +133,24 @@ class Journal(WireLog):
 
         return hear
 
-    def unfinished(self) -> tuple[WireLine, ...]:
+    def follow(self, rig: Rig, name: str = "") -> None:
+        """Let frames end by a silence when it is over."""
+        for source, log in self._logs:
+            log.follow(rig, source)
+
+    def unfinished(self, *, by_gap: bool = False) -> tuple[WireLine, ...]:
         """Return what has begun on serial lines and did not end, by the time of its last byte."""
         found = [
-            replace(line, source=name) for name, log in self._logs for line in log.unfinished()
+            replace(line, source=name)
+            for name, log in self._logs
+            for line in log.unfinished(by_gap=by_gap)
         ]
         return tuple(sorted(found, key=lambda line: line.at_us))
 
     def lines(self) -> tuple[WireLine, ...]:
-        """Return what is kept."""
-        return self.since(0)
+        """Return what is kept, with the frames that silence alone will end."""
+        begun = enumerate(self.unfinished(by_gap=True), start=self._count + 1)
+        return (*self.since(0), *(replace(line, number=number) for number, line in begun))
 
     def mappings(self) -> tuple[WireLine, ...]:
         """Return the frames before those that are kept which say what PDOs carry."""
@@ -645,6 +653,7 @@ class BenchRig(RunningEmulator):
                 mount.wire.faults.listeners.append(self.journal.of_lost(mount.name))
                 for node, faults in mount.node_faults.items():
                     faults.listeners.append(self.journal.of_faults(node, _BUS_AND_NODE))
+        self.journal.follow(self.rig)
 
     def _note(self, text: str) -> None:
         """Note what was done; the signals and faults of what is alone have no prefix."""

@@ -21,8 +21,9 @@ from tickrig.emulators.record.frames import (
     hex_text,
 )
 from tickrig.emulators.record.wire_log import WireLog
-from tickrig.emulators.serial.emulator import LineSettings
+from tickrig.emulators.serial.emulator import Emulator, LineSettings
 from tickrig.emulators.testing.bench.bench import Bench
+from tickrig.emulators.testing.plugin.journal_text import last_lines
 from tickrig.host.text.trace import Mark
 from tickrig.wire.instant import NEVER
 
@@ -143,8 +144,9 @@ def test_a_log_has_request_and_answer_each_with_its_own_time() -> None:
     log.hear(9_000, Mark.TO_DEVICE, b"\x04")
     seen = [(line.at_us, str(line.mark), line.data) for line in log.since(0)]
     assert seen == [(2_000, ">", b"0102"), (6_000, "<", b"03")]
-    (begun,) = log.unfinished()
+    (begun,) = log.unfinished(by_gap=True)
     assert (begun.at_us, begun.data) == (9_000, b"04")
+    assert log.unfinished() == ()
 
 
 def test_a_transcript_shows_frames_of_an_undescribed_protocol_in_hex() -> None:
@@ -160,6 +162,38 @@ def test_a_transcript_shows_frames_of_an_undescribed_protocol_in_hex() -> None:
     assert "> 01020304 05" in text
     assert "< 01020304 05" in text
     assert "the host hears 07 where the device sent 0708" in text
+
+
+def test_the_last_frame_ends_by_the_gap() -> None:
+    with Bench(Lamp(b""), line=LineSettings(splitter=by_gap("5ms"))) as bench:
+        answered = bench.on_line("0102")
+        bench.link.send(b"\x01\x02")
+        bench.run_for("1ms")  # it may be whole: no gap is over
+        assert [line[9:] for line in bench.transcript().splitlines()] == [
+            "lamp > 0102",
+            "lamp < 0102",
+        ]
+        assert last_lines(bench, 20) == bench.transcript()
+        assert bench.wait_until(answered, "1s")
+        assert bench.now_us < 10_000
+        assert len(bench.transcript().splitlines()) == 2
+
+
+def test_a_frame_that_a_gap_breaks_off_is_shown_when_the_gap_is_over() -> None:
+    with Bench(Lamp(b""), line=LineSettings(splitter=by_size(3, gap="5ms"))) as bench:
+        bench.link.send(b"\x01\x02")
+        bench.run_for("2ms")
+        assert "lamp > 0102  (not ended)" in last_lines(bench, 20)
+        bench.run_for("5ms")
+        assert "lamp > 0102" in bench.transcript().splitlines()[0]
+
+
+def test_an_emulator_hears_the_last_frame_when_the_gap_is_over() -> None:
+    emulator = Emulator("lamp", Lamp(b""), line=LineSettings(splitter=by_gap("5ms")))
+    emulator.send(0, b"\x01\x02")
+    for _ in range(20):
+        emulator.step()
+    assert [line.data for line in emulator.log.since(0)] == [b"0102", b"0102"]
 
 
 def test_a_struct_of_construct_is_a_description() -> None:
