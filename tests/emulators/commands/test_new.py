@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -52,6 +53,26 @@ def test_a_binary_device_is_green_when_it_is_made() -> None:
     done = run_tests("my-gadget")
     assert (done.returncode, done.stderr) == (0, ""), done.stdout
     assert "passed" in done.stdout
+
+
+@pytest.mark.parametrize("kind", [(), ("--binary",)])
+def test_what_is_made_follows_the_rules_of_style(kind: tuple[str, ...]) -> None:
+    rules = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["ruff"]
+    new("my-lamp", *kind)
+    for verb in (
+        [
+            "check",
+            f"--select={','.join(rules['lint']['select'])}",
+            f"--ignore={','.join(rules['lint']['ignore'])}",
+            "--per-file-ignores=tests/**:D",
+            "--config=lint.pydocstyle.convention='google'",
+            "--output-format=concise",
+        ],
+        ["format", "--check"],
+    ):
+        words = ["ruff", *verb, "--isolated", f"--line-length={rules['line-length']}", "."]
+        done = subprocess.run(words, cwd="my-lamp", capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stdout + done.stderr
 
 
 FAILS = """
