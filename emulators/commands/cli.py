@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Any, Final
 
 import click
 
-from tickrig.host.cli.options import LazyGroup, version_option
+from tickrig.host.cli.options import LazyGroup, version_option, works_in
 
 # The command `tickrig demo`; each demonstration stands with its device.
 
@@ -71,6 +71,33 @@ def demo(context: click.Context) -> None:
             click.echo(f"tickrig demo {name:8}  {what}")
 
 
+@click.command()
+@click.option("--json", "as_json", is_flag=True, help="Write the table as JSON, for programs.")
+@click.option(
+    *("--need", "needs"),
+    multiple=True,
+    metavar="CHECK",
+    help="Exit status 1 without it: a name of the table, as socketcan or tui; may be repeated.",
+)
+@works_in("tickrig.emulators.commands.doctor:run_doctor")
+def doctor(**options: Any) -> None:
+    """See what of this machine tickrig can use, and what to do.
+
+    A row for each check: ok, note (it works, and there is something to know) or missing. It
+    looks at Python, packages and extras, groups, SocketCAN, ports and adapters, and how well the
+    machine keeps time. It needs no root, changes nothing, and ends within half a minute.
+
+    Exit status 0: all that is needed is there: Python 3.11 or newer, the packages of tickrig,
+    pseudo-terminals, and what --need names. 1: something needed is missing. All other rows are
+    for information.
+
+    \b
+    tickrig doctor
+    tickrig doctor --need socketcan --need tui      in CI, before the tests
+    tickrig doctor --json
+    """  # noqa: D301 - click wants the backspace
+
+
 _HERE: Final = "tickrig.emulators.commands"
 _TESTING: Final = "tickrig.emulators.testing.commands"
 _COMMANDS: Final = {
@@ -91,6 +118,10 @@ _COMMANDS: Final = {
         "Operate and watch the emulator whose control socket is SOCKET.",
     ),
     "demo": (f"{_HERE}.cli:demo", "Show an emulated device and a host at work."),
+    "doctor": (
+        f"{_HERE}.cli:doctor",
+        "See what of this machine tickrig can use, and what to do.",
+    ),
     "emu": (f"{_HERE}.emu_cli:emu", "Emulate a device, ours or that of an installed package."),
     "init": (
         f"{_TESTING}.init_cli:init",
@@ -128,6 +159,7 @@ def main() -> None:
     tickrig init                                  write a rig file to begin with
     tickrig check rig.toml                        see what is wrong with a rig file
     tickrig run rig.toml                          run the bench of a rig file
+    tickrig doctor                                see what this machine has
     tickrig new device lamp                       begin a device of your own
     tickrig compare run.trace                     compare a recording with the emulator
     tickrig record /dev/ttyUSB0 -o run.trace      record a real device and its host

@@ -4,7 +4,7 @@ A notebook shows what `_repr_html_` returns inside its own page: there is no sty
 content security policy of ours. So every text is escaped, what cannot be seen is spelt out, and
 nothing has a link, a script or an address.
 
->>> listing(["<b>"])[-16:]
+>>> listing(["<b>"])[-15:]
 '&lt;b&gt;</pre>'
 """
 
