@@ -8,7 +8,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import ClassVar
 
@@ -17,7 +17,9 @@ import pytest
 
 from tests.host.canmon.terminal import Terminal
 from tests.interop.buses import GROUP, PORT
+from tickrig.emulators.bench.child import running
 from tickrig.emulators.tkernel.ucode_table import EXAMPLE
+from tickrig.host.control.client import ControlClient
 from tickrig.host.links.terminal import MOST_WAITING
 
 pytestmark = pytest.mark.realtime
@@ -211,6 +213,22 @@ def test_an_emulator_writes_its_trace_to_the_end_though_its_terminal_is_stuck(
     assert trace.read_text("ascii").splitlines()[-1].endswith(" .")
 
 
+CHAIR = "the port of an emulated RRC whose VR2 is on"
+
+
+@contextmanager
+def with_chair(words: tuple[str, ...]) -> Iterator[list[str]]:
+    """Give the words of a command with the port of an RRC, if they name one."""
+    if CHAIR not in words:
+        yield [*words]
+        return
+    with running("tickrig.emulators.rrc.cli") as rrc, ControlClient(rrc.control) as control:
+        control.request("press", name="power_button")
+        while control.request("get", names=["state"])["values"] != {"state": "Standby"}:
+            control.request("status")
+        yield [str(rrc.link) if word == CHAIR else word for word in words]
+
+
 SCRIPT = '"$@" 2>&1 & echo $!; wait $!; echo status $?'
 BACKGROUND: dict[str, tuple[str, tuple[str, ...], int]] = {
     "rrc-emu": ("rrc_emu", (), 0),
@@ -222,6 +240,8 @@ BACKGROUND: dict[str, tuple[str, tuple[str, ...], int]] = {
     "tkernel-emu": ("tkernel_emu", (), 0),
     "canopen-slave-emu": ("canopen_slave_emu", ("--node", "5=epos", *MULTICAST), 0),
     "rtc-canopen-server": ("rtc_canopen_server", ("robot.yaml", *MULTICAST), 0),
+    "rrc watch": ("rrc", (CHAIR, "watch"), 130),
+    "rrc limit": ("rrc", (CHAIR, "limit", "50", "50"), 130),
     "tickrig emu": ("tickrig", ("emu", "rrc"), 0),
     "tickrig run": ("tickrig", ("run", "rig.toml"), 0),
     "tickrig rtc run": ("tickrig", ("rtc", "run", "--control", "control"), 0),
@@ -251,10 +271,16 @@ def test_sigint_ends_what_a_script_has_begun_in_the_background(
     (tmp_path / "robot.yaml").write_text(DEFINITION, "utf-8")
     (tmp_path / "table.txt").write_text(EXAMPLE, "utf-8")
     point, words, status = BACKGROUND[name]
-    program = [sys.executable, "-u", "-c", command(point), *words]
-    with subprocess.Popen(
-        ["sh", "-c", SCRIPT, "sh", *program], stdout=subprocess.PIPE, text=True, cwd=tmp_path
-    ) as script:
+    program = [sys.executable, "-u", "-c", command(point)]
+    with (
+        with_chair(words) as given,
+        subprocess.Popen(
+            ["sh", "-c", SCRIPT, "sh", *program, *given],
+            stdout=subprocess.PIPE,
+            text=True,
+            cwd=tmp_path,
+        ) as script,
+    ):
         assert script.stdout is not None
         pid = int(script.stdout.readline())
         while not select.select([script.stdout], [], [], 0.01)[0]:
@@ -266,15 +292,22 @@ def test_sigint_ends_what_a_script_has_begun_in_the_background(
 
 @pytest.mark.parametrize(
     "name",
-    [name for name in BACKGROUND if name not in {"tickrig demo", "canmon dump", "canmon check"}],
+    [
+        name
+        for name in BACKGROUND
+        if name not in {"tickrig demo", "canmon dump", "canmon check", "rrc watch"}
+    ],
 )
 def test_who_ends_a_command_in_the_moment_it_says_how_ends_it(name: str, tmp_path: Path) -> None:
     (tmp_path / "rig.toml").write_text('[device.chair]\ntype = "rrc"\n', "utf-8")
     (tmp_path / "robot.yaml").write_text(DEFINITION, "utf-8")
     (tmp_path / "table.txt").write_text(EXAMPLE, "utf-8")
     point, words, status = BACKGROUND[name]
-    program = [sys.executable, "-c", IMPATIENT + command(point), *words]
-    ended = subprocess.run(program, capture_output=True, text=True, cwd=tmp_path, check=False)
+    program = [sys.executable, "-c", IMPATIENT + command(point)]
+    with with_chair(words) as given:
+        ended = subprocess.run(
+            [*program, *given], capture_output=True, text=True, cwd=tmp_path, check=False
+        )
     assert (ended.returncode, "Ctrl-C ends" in ended.stderr) == (status, True), ended.stderr
 
 

@@ -1,6 +1,7 @@
-"""Draw the operator panel into an SVG file, from a run in virtual time.
+"""Draw a panel into an SVG file, from a run in virtual time.
 
-`python tools/rrc_panel_picture.py docs/pictures/rrc-panel.svg`
+`python tools/rrc_panel_picture.py docs/pictures/rrc-panel.svg` draws `rrc-emu --panel`,
+with `rrc-host-panel.svg` it draws `rrc URL --panel`.
 """
 
 from __future__ import annotations
@@ -15,10 +16,17 @@ from typing import Final
 from tickrig.device.rrc.machine import Rrc
 from tickrig.emulators.bench.control import EmulatorControl
 from tickrig.emulators.bench.running_emulator import Transcript
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.sim_link import SimLink
+from tickrig.emulators.rig.station import Station
 from tickrig.emulators.rrc.panel import RrcPanel
 from tickrig.emulators.scenario import ScenarioParser, ScenarioPlayer
 from tickrig.emulators.serial.emulator import Emulator
+from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.host.control.requests import Object
+from tickrig.host.rrc.chair import Chair, Guard
+from tickrig.host.rrc.panel import ChairPanel
+from tickrig.host.rrc.pilot import Pilot
 
 FONTS: Final = re.compile(r"\s*@font-face \{.*?\}", re.DOTALL)
 """Textual names fonts of another site; without them a reader's own are taken."""
@@ -58,5 +66,32 @@ async def _draw(control: EmulatorControl) -> str:
         return FONTS.sub("", panel.export_screenshot(title="rrc-emu --panel"))
 
 
+def host_picture() -> str:
+    """Return the host's panel as SVG, while the host drives forward and to the left."""
+    line, rrc = SerialLine(), Rrc()
+    rig = Rig(Station(rrc, line.a))
+    for pressed in (0, 1, 0):
+        rrc.inputs.set("power_button", pressed)
+        rig.run_for(400_000)
+    rrc.inputs.set("stick_v_pct", 15)
+    with Chair(SimLink(rig, line.b), Guard()) as chair:
+        return asyncio.run(_draw_host(Pilot(chair), rig))
+
+
+async def _draw_host(pilot: Pilot, rig: Rig) -> str:
+    panel = ChairPanel(pilot, "/dev/ttyACM0")
+    async with panel.run_test(size=(80, 24)) as keys:
+        await keys.press("2", "h", "up", "up", "up", "up", "left", "left", "space")
+        until_us = rig.now_us + 500_000
+        while rig.now_us < until_us:
+            pilot.step()
+        panel.look()
+        await keys.pause()
+        return FONTS.sub("", panel.export_screenshot(title="rrc /dev/ttyACM0 --panel"))
+
+
+PICTURES: Final = {"rrc-panel": picture, "rrc-host-panel": host_picture}
+
 if __name__ == "__main__":
-    Path(sys.argv[1]).write_text(picture(), "utf-8")
+    path = Path(sys.argv[1])
+    path.write_text(PICTURES[path.stem](), "utf-8")

@@ -236,11 +236,15 @@ class _Line:
     """One line of the terminal that is written again; nothing if standard error is none.
 
     A terminal that takes nothing does not keep the chair waiting.
+
+    Attributes:
+        is_live: standard error is a terminal.
     """
 
     def __init__(self) -> None:
         self._output = TerminalOutput(2) if sys.stderr.isatty() else None
         self._text, self._due_us = "", 0
+        self.is_live = self._output is not None
 
     def show(self, now_us: int, text: str) -> None:
         if self._output is not None and text != self._text and now_us >= self._due_us:
@@ -281,6 +285,9 @@ def drive(*, v_pct: int, w_pct: int, speed: int, for_us: int | None, no_dead_man
             line.show(client.now_us, _shown(client) + control.hint)
 
 
+_STICK_DRIVES: Final = "the stick drives, Ctrl-C ends"
+
+
 def limit(*, speed: int, for_us: int | None, leave: bool, **limits: int) -> None:
     """Let the stick drive."""
     if leave and for_us is not None:
@@ -293,11 +300,13 @@ def limit(*, speed: int, for_us: int | None, leave: bool, **limits: int) -> None
         if leave:
             chair.leave_driving()
             return
+        if not line.is_live:  # in a script, or in the background of one
+            say(_STICK_DRIVES)
         end_us = NEVER if for_us is None else client.now_us + for_us
         while not ended.number and client.now_us < end_us:
             client.run_for(STEP_US)
             chair.watch()
-            line.show(client.now_us, f"{_shown(client)}   the stick drives, Ctrl-C ends")
+            line.show(client.now_us, f"{_shown(client)}   {_STICK_DRIVES}")
 
 
 def _once(act: Callable[[RrcClient], object]) -> None:

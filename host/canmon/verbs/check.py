@@ -417,7 +417,9 @@ class _Usual:
             with until_unread():
                 click.echo("\n".join(map(text_of, shown)))
         left = len(found.faults) - len(shown)
-        self._said = [f"and {counted(left, 'finding')} more: --max {len(found.faults)}"] * bool(left)
+        self._said = [f"and {counted(left, 'finding')} more: --max {len(found.faults)}"] * bool(
+            left
+        )
 
     def write(self, junit_path: Path | None, sarif_path: Path | None) -> None:
         """Write reports."""

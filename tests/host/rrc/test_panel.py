@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import runpy
 from collections.abc import Awaitable, Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -14,6 +16,8 @@ from tickrig.host.rrc import panel as chair_panel
 from tickrig.host.rrc.chair import ChairStopped
 from tickrig.host.rrc.panel import HELP, ChairPanel
 from tickrig.host.rrc.pilot import Drives, Pilot
+
+TOOL = Path(__file__).parents[3] / "tools" / "rrc_panel_picture.py"
 
 Act = Callable[["Seat", Any], Awaitable[None]]
 
@@ -221,3 +225,10 @@ def test_a_pad_that_is_gone_stops_the_chair() -> None:
     assert bench.out_pct() == (0, 0)
     assert [text for _, _, text in pilot.view.lines][-1] == "the pad is gone"
     assert pilot.view.drives is Drives.STOPPED
+
+
+def test_the_picture_is_the_panel() -> None:
+    drawn = runpy.run_path(str(TOOL))["host_picture"]().replace("&#160;", " ")
+    for text in ("DRIVES", "host drives", "/dev/ttyACM0", "speed mode 2"):
+        assert text in drawn
+    assert "@font-face" not in drawn

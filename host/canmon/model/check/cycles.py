@@ -188,9 +188,7 @@ def _levels(windows: Sequence[tuple[int, int]], gaps: int) -> list[Level]:
     return levels
 
 
-def _odd(
-    gaps: Sequence[int], level: Level, quiet: int
-) -> tuple[list[tuple[int, int]], list[int]]:
+def _odd(gaps: Sequence[int], level: Level, quiet: int) -> tuple[list[tuple[int, int]], list[int]]:
     """Return the gaps of a level where frames are missing, and the frames that are too many."""
     period = level.period_us
     off = max(0.2 * period, 4 * quiet, min(_FLOOR_US, period / 3))
