@@ -1,4 +1,4 @@
-"""Draw each tab of the monitor at three sizes into small SVG files, from a run in virtual time.
+"""Draw each tab of the monitor, and its settings, at three sizes: small SVG files of one virtual run.
 
 `python tools/canmon_tabs_picture.py docs/pictures` draws them all, and
 `python tools/canmon_tabs_picture.py docs/pictures nodes-80x24` some of them.
@@ -24,8 +24,10 @@ from tickrig.host.canmon.model.decode.node_memory import read_eds_objects
 from tickrig.host.canmon.model.frames import AnyRecord, Record
 from tickrig.host.canmon.sources.source import AnySource
 from tickrig.host.canmon.tui.app import MonitorApp
-from tickrig.host.canmon.tui.panels.panel import Panel, make_panels
+from tickrig.host.canmon.tui.panels.panel import make_panels
 from tickrig.host.canmon.tui.session import Model, Session
+from tickrig.host.canmon.workspace import MonitorSetup, PanelSettings, Workspace
+from tickrig.host.cli.can_options import BusOptions
 from tickrig.wire.can import CanFrame
 
 SIZES: Final = ((80, 24), (120, 40), (200, 60))
@@ -113,7 +115,13 @@ def run() -> MonitorApp:
         for event in events:
             _happen(event, source, bench.operator)
     session.step(1_000)
-    return MonitorApp(session, panels)
+    setup = MonitorSetup(
+        source=(BUS,),
+        options=BusOptions(bitrate=BIT_RATE),
+        eds={node: Path(f"eds/{MODELS[node]}.eds") for node in DESCRIBED},
+        eds_dir=(Path("eds"),),
+    )
+    return MonitorApp(session, panels, PanelSettings(Workspace(), setup, panels))
 
 
 def _happen(event: str, source: RunSource, operator: Operator) -> None:
@@ -136,7 +144,12 @@ async def pictures(wanted: Collection[str] = ()) -> dict[str, str]:
                 name = f"{panel.title}-{width}x{height}"
                 if not wanted or name in wanted:
                     await pilot.press(str(number))
-                    drawn[name] = await _draw(monitor, panel, pilot)
+                    drawn[name] = await _draw(monitor, pilot)
+            name = f"settings-{width}x{height}"
+            if not wanted or name in wanted:
+                await pilot.press("f2")
+                drawn[name] = await _draw(monitor, pilot)
+                await pilot.press("escape")
     return drawn
 
 
@@ -144,7 +157,7 @@ STILL: Final = 12
 """After so many pictures the frames of the run are past: the rate is 0."""
 
 
-async def _draw(monitor: MonitorApp, panel: Panel, pilot: object) -> str:
+async def _draw(monitor: MonitorApp, pilot: object) -> str:
     for badge in monitor.query("AlarmsPanel"):
         badge.refresh_badge()
     for _ in range(3):  # a size that has come needs another picture

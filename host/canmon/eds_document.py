@@ -1,9 +1,10 @@
-"""EDS files that verbs are given."""
+"""EDS files that verbs are given, and the options that name them."""
 
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -11,11 +12,11 @@ import click
 
 from tickrig._lazy import LazyModule
 from tickrig.host.canopen.errors import SdoFailed
-from tickrig.host.cli.messages import Refused, refuse_path, say
+from tickrig.host.cli.messages import Refused, refuse_path, refusing, say, show_findings
 from tickrig.host.cli.options import PATH
 
 if TYPE_CHECKING:
-    from tickrig.host.canmon.model.decode import eds_folder
+    from tickrig.host.canmon.model.decode import eds_folder, node_memory
     from tickrig.host.canopen import eds
     from tickrig.host.canopen.bus_file import bus_file
     from tickrig.host.canopen.commissioning.node_bus import NodeBus
@@ -26,6 +27,7 @@ else:  # slow
     bus_file = LazyModule("tickrig.host.canopen.bus_file.bus_file")
     documents = LazyModule("tickrig.host.canopen.data_sheet.document")
     eds_folder = LazyModule("tickrig.host.canmon.model.decode.eds_folder")
+    node_memory = LazyModule("tickrig.host.canmon.model.decode.node_memory")
     eds = LazyModule("tickrig.host.canopen.eds")
     eds_file = LazyModule("tickrig.wire.canopen.eds.eds_file")
 
@@ -155,3 +157,50 @@ def read_eds_folders(folders: Sequence[Path]) -> eds_folder.EdsFolder | None:
         except (OSError, ValueError) as error:
             raise Refused(f"--eds-dir {folder}: {getattr(error, 'strerror', error)}") from None
     return eds_folder.EdsFolder(folders) if folders else None
+
+
+_EDS: Final = re.compile(
+    r"(?P<node>0[xX][0-9A-Fa-f]{1,2}|[0-9]{1,3})(?:-(?P<last>[0-9]{1,3}))?=(?P<path>.+)"
+)
+
+
+def read_eds_paths(
+    paths: Mapping[int, Path],
+    folders: Sequence[Path] = (),
+    notify: Callable[[str], None] = say,
+) -> eds_folder.EdsFiles:
+    """Read files by node-ID; Refused if one cannot be read, or is no EDS.
+
+    What is wrong in a file, and not used, is told on standard error.
+
+    Args:
+        paths: the files.
+        folders: in which those of other nodes are looked for.
+        notify: takes a line about each choice.
+    """
+    found = {node: _read(node, path) for node, path in paths.items()}
+    show_findings(odd for objects in found.values() for odd in objects.findings)
+    return eds_folder.EdsFiles(found, read_eds_folders(folders), notify)
+
+
+def eds_paths(words: Sequence[str]) -> dict[int, Path]:
+    """Return the files that `--eds` names, by node-ID; Refused if a word is wrong."""
+    return {node: path for word in words for node, path in _split(word).items()}
+
+
+def _split(word: str) -> dict[int, Path]:
+    match = _EDS.fullmatch(word)
+    text = match["node"] if match else "0"
+    node = int(text, 16 if text[1:2] in ("x", "X") else 10)
+    last = int(match["last"]) if match and match["last"] else node
+    if match is None or not 1 <= node <= last <= 127:
+        raise Refused(
+            f"--eds {word!r} is not NODE=FILE with a node-ID 1..127, as 3=drive.eds"
+            " or 1-3=drive.eds"
+        )
+    return dict.fromkeys(range(node, last + 1), Path(match["path"]))
+
+
+def _read(node: int, path: Path) -> node_memory.EdsObjects:
+    with refusing("--eds", eds_file.EdsError):
+        return node_memory.read_eds_objects(path, node)

@@ -274,22 +274,27 @@ class MonitorSetup:
         )
 
     def write(self, workspace: Workspace) -> None:
-        """Put it into a workspace."""
+        """Put it into a workspace; what it does not have is taken out."""
         bus: dict[str, Any] = {
-            name: list(value) if isinstance(value, tuple) else value
+            name: (list(value) if isinstance(value, tuple) else value) or None
             for name in _OPTIONS
-            if (value := getattr(self.options, name))
+            for value in (getattr(self.options, name),)
         }
         bus["source"] = [_relative(workspace, word) for word in self.source]
         for name, paths in (("dbc", self.dbc), ("eds_dir", self.eds_dir)):
-            if paths:
-                bus[name] = [_relative(workspace, str(path), is_path=True) for path in paths]
+            words = [_relative(workspace, str(path), is_path=True) for path in paths]
+            bus[name] = words or None
         workspace.put(_BUS, bus)
+        kept = workspace.section(_NODES)
+        gone = {key: {"eds": None} for key, node in kept.items() if "eds" in node}
         workspace.put(
             _NODES,
             {
-                str(node): {"eds": _relative(workspace, str(path), is_path=True)}
-                for node, path in sorted(self.eds.items())
+                **gone,
+                **{
+                    str(node): {"eds": _relative(workspace, str(path), is_path=True)}
+                    for node, path in sorted(self.eds.items())
+                },
             },
         )
 
@@ -378,7 +383,7 @@ class PanelSettings:
     """
 
     def __init__(self, workspace: Workspace, setup: MonitorSetup, panels: Sequence[_Kept]) -> None:
-        self.workspace, self._setup, self._panels = workspace, setup, tuple(panels)
+        self.workspace, self.setup, self._panels = workspace, setup, tuple(panels)
         self._conflict = ""
 
     def load(self) -> None:
@@ -430,7 +435,7 @@ class PanelSettings:
             raise
 
     def _put(self) -> None:
-        self._setup.write(self.workspace)
+        self.setup.write(self.workspace)
         for panel in self._panels:
             self.workspace.put(panel.section, panel.save())
 

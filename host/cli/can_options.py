@@ -61,13 +61,13 @@ class BusOptions:
         return words + [f"--data-bitrate={self.data_bitrate}"] * bool(self.data_bitrate)
 
 
-def _bit_s(text: str) -> int:
+def parse_bit_rate(text: str) -> int:
     """Read a bit rate: 500000, 500k, 1M.
 
     Raises:
         ValueError: it is none.
 
-    >>> _bit_s("500k"), _bit_s("1M"), _bit_s("125000")
+    >>> parse_bit_rate("500k"), parse_bit_rate("1M"), parse_bit_rate("125000")
     (500000, 1000000, 125000)
     """
     match = _BIT_RATE.fullmatch(text)
@@ -84,7 +84,7 @@ class _BitRate(click.ParamType):  # type: ignore[type-arg] # generic since click
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
         """Read it."""
         try:
-            return _bit_s(str(value))
+            return parse_bit_rate(str(value))
         except ValueError as error:
             self.fail(str(error), param, ctx)
 
@@ -218,7 +218,7 @@ def open_raw(options: BusOptions, instead: str = "") -> tuple[can.BusABC, str, s
 
     from tickrig.host.links.can_link import bus_reason, prepare_bus  # noqa: PLC0415
 
-    _check_interface(options.interface)
+    check_interface(options.interface)
     given = _given(options)
     try:
         config = load_config(config=dict(given))
@@ -251,7 +251,8 @@ def _let_go(error: Exception) -> None:
     log.disabled = False
 
 
-def _check_interface(interface: str | None) -> None:
+def check_interface(interface: str | None) -> None:
+    """Refuse an interface that python-can does not have."""
     if interface is not None and interface not in (names := _interfaces()):
         raise Refused(f"-i {interface!r} is none of python-can: {', '.join(names)}")
 

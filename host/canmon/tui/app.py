@@ -6,30 +6,46 @@ import sys
 from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, ClassVar, Final
+from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple, TypeVar
 
 import click
 from rich.segment import Segment
 from rich.style import Style
 from textual.app import ComposeResult, SystemCommand
 from textual.binding import Binding, BindingType
+from textual.compose import compose
 from textual.events import Click
 from textual.screen import ModalScreen, Screen
 from textual.strip import Strip
 from textual.widget import Widget
 from textual.widgets import Input, TabbedContent, TabPane
 
+from tickrig._lazy import LazyModule
 from tickrig.host.canmon import workspace
+from tickrig.host.canmon.eds_document import read_eds_folders
+from tickrig.host.canmon.model.decode.eds_folder import EdsFiles
+from tickrig.host.canmon.model.decode.node_memory import read_eds_objects
 from tickrig.host.canmon.model.frames import load_text
 from tickrig.host.canmon.model.recorder.recorder import Recorder, RecorderState
+from tickrig.host.canmon.output.listening import bit_rates_of
 from tickrig.host.canmon.output.recording import WORDS_METAVAR, read_recording
-from tickrig.host.canmon.tui.panels.panel import Panel
-from tickrig.host.canmon.tui.session import DecodedFrame, Session, Task
+from tickrig.host.canmon.sources.source import BusSpec, LineSpec, parse_source
+from tickrig.host.canmon.tui import settings as fields
+from tickrig.host.canmon.tui.panels.alarms_panel import AlarmsPanel
+from tickrig.host.canmon.tui.panels.panel import Panel, make_panels
+from tickrig.host.canmon.tui.panels.trace_panel import TracePanel
+from tickrig.host.canmon.tui.session import DecodedFrame, Model, Session, Task, open_session
 from tickrig.host.cli.messages import Refused, SourceFailed
+from tickrig.host.text.toml_reader import load_toml
 from tickrig.host.text.values import counted
 from tickrig.host.tui import FramedApp, KeyFooter, Line
 from tickrig.wire.can import Frames
 from tickrig.wire.instant import NEVER
+
+if TYPE_CHECKING:
+    from tickrig.host.canmon.sources import bus_source
+else:  # python-can is slow
+    bus_source = LazyModule("tickrig.host.canmon.sources.bus_source")
 
 # A task that records what the session hears, while somebody wants it.
 
@@ -37,6 +53,8 @@ _LOOK_US: Final = 100_000
 """How often it is called while no frame comes."""
 
 _WORDS: Final = "run.log"
+
+_P = TypeVar("_P", bound=Panel)
 
 _Light = tuple[str, str]
 """A text and its style."""
@@ -257,6 +275,61 @@ class _ExportScreen(ModalScreen[str]):
         self.dismiss("")
 
 
+# What is replaced as a whole when buses or files change.
+
+
+class _Work(NamedTuple):
+    """A session, and what shows and keeps it."""
+
+    session: Session
+    panels: tuple[Panel, ...]
+    recorder: RecorderTask
+    panel_settings: workspace.PanelSettings
+
+
+def _ends(setup: workspace.MonitorSetup) -> set[tuple[str | None, str | None]]:
+    """Return the buses and ports of a setup, by interface and channel."""
+    words = [parse_source(word) for word in setup.source]
+    found: set[tuple[str | None, str | None]] = set()
+    for word in words or [BusSpec()]:
+        if isinstance(word, BusSpec):
+            whole = bus_source.merged(word, setup.options)
+            found.add((whole.interface, whole.channel))
+        elif isinstance(word, LineSpec):
+            found.add(("serial", word.port))
+    return found
+
+
+def _read_files(setup: workspace.MonitorSetup) -> EdsFiles:
+    """Read the EDS files; FieldError if one is none."""
+    with fields.of_field("eds"):
+        objects = {node: read_eds_objects(path, node) for node, path in setup.eds.items()}
+    with fields.of_field("eds_dir"):
+        return EdsFiles(objects, read_eds_folders(setup.eds_dir))
+
+
+_FIELDS: Final = {"trace": "filter", "alarms": "rules"}
+"""Fields of settings, by the panels that take them."""
+
+
+def _hand_on(
+    before: Panel | RecorderTask,
+    after: Panel | RecorderTask,
+    changes: dict[str, Any],
+    buses: Mapping[str, object],
+) -> None:
+    """Give settings of a panel to another one, with changes; FieldError if one is wrong."""
+    scratch = workspace.Workspace()
+    scratch.put(before.section, before.save())
+    settings = scratch.section(before.section) | changes
+    if settings.get("bus") not in buses:
+        settings.pop("bus", None)
+    try:
+        after.load(settings)
+    except workspace.SettingError as error:
+        raise fields.FieldError(_FIELDS.get(before.section, "source"), str(error)) from None
+
+
 _PAINT_S: Final = 0.1
 _SAVE_S: Final = 2.0
 _SWITCH_S: Final = 0.002
@@ -271,6 +344,9 @@ class MonitorApp(FramedApp):
         panels: the tabs.
         panel_settings: keeps their settings; without one nothing is kept until it is exported.
         recorder: what records; a new one unless given.
+
+    Attributes:
+        reopens: buses that go away are opened again.
     """
 
     TITLE = "canmon"
@@ -286,6 +362,7 @@ class MonitorApp(FramedApp):
         Binding("f9", "stop", "stop all", priority=True, key_display="F9"),
         *[Binding(f"{n}", f"tab({n})", f"tab {n}", show=False) for n in range(1, 10)],
         Binding("w", "export", "save as"),
+        Binding("f2", "settings", "settings", key_display="F2"),
         Binding("f8", "record", "record", key_display="F8"),
         Binding("f4", "trigger", "trigger", key_display="F4"),
     ]
@@ -299,6 +376,8 @@ class MonitorApp(FramedApp):
     ) -> None:
         super().__init__()
         self.recorder = recorder or RecorderTask(session)
+        self.reopens = False
+        self._moving, self._section = False, panels[0].section
         self.animation_level = "none"  # each picture goes over a line that may be slow
         self.session, self.panels = session, tuple(panels)
         self.panel_settings = panel_settings or workspace.PanelSettings(
@@ -307,7 +386,7 @@ class MonitorApp(FramedApp):
 
     def compose(self) -> ComposeResult:
         """Lay out the tabs."""
-        with TabbedContent(initial=_tab(self.panels[0])):
+        with TabbedContent(initial=f"tab-{self._section}"):
             for number, panel in enumerate(self.panels, 1):
                 with TabPane(f"{number} {panel.title}", id=_tab(panel)):
                     yield panel
@@ -362,12 +441,15 @@ class MonitorApp(FramedApp):
     def refresh_view(self) -> None:
         """Paint what is on the screen."""
         self.session.check()
-        if self.screen_stack and self.query(StatusLine):
+        if self.screen_stack and not self._moving and self.query(StatusLine):
+            while self.session.notes:
+                self.notify(self.session.notes.popleft(), timeout=10)
             self.shown.refresh_view()
             self.query_one(StatusLine).refresh_view()
 
     def on_tabbed_content_tab_activated(self) -> None:
         """Let the keys go to the panel, and paint it at once."""
+        self._section = self.shown.section
         if not self.shown.query("*:focus"):
             self.shown.enter()
         self.refresh_view()
@@ -399,6 +481,137 @@ class MonitorApp(FramedApp):
                 self.notify(str(error), severity="error")
                 return
             self.notify(f"settings are kept in {name}")
+
+    def action_settings(self) -> None:
+        """Show what is set, and apply what is changed."""
+        trace, alarms = self._panel(TracePanel), self._panel(AlarmsPanel)
+        now = fields.Settings(
+            self.panel_settings.setup,
+            trace.filter_text if trace else "",
+            alarms.rules_text if alarms else "",
+        )
+        self.push_screen(fields.SettingsScreen(now, partial(self._apply, now)))
+
+    def _apply(self, before: fields.Settings, after: fields.Settings) -> None:
+        """Use other settings; FieldError if they cannot be used: then nothing has changed."""
+        changes: dict[str, dict[str, Any]] = {}
+        if after.filter != before.filter:
+            changes["trace"] = {"filter": after.filter}
+        if after.rules != before.rules:
+            changes["alarms"] = {"rules": load_toml(after.rules)}
+        if after.setup == before.setup:
+            self._apply_words(changes, after)
+        elif self.recorder.running:
+            raise fields.FieldError("source", "a recording runs: F8 ends it")
+        else:
+            work = self._opened(before.setup, after.setup, changes)
+            self._moving = True
+            self.call_later(self._move, work)
+
+    def _apply_words(self, changes: Mapping[str, object], after: fields.Settings) -> None:
+        trace, alarms = self._panel(TracePanel), self._panel(AlarmsPanel)
+        if alarms and "alarms" in changes:
+            with fields.of_field("rules"):
+                alarms.take_rules(after.rules)
+        if trace and "trace" in changes:
+            with fields.of_field("filter"):
+                trace.apply_filter(after.filter)
+
+    def _opened(
+        self,
+        before: workspace.MonitorSetup,
+        after: workspace.MonitorSetup,
+        changes: Mapping[str, dict[str, Any]],
+    ) -> _Work:
+        """Open other buses or read other files, and end what ran; FieldError if that fails.
+
+        A bus that is in both is closed first, for most adapters are opened once; if it cannot be
+        opened as it is wanted, it is opened as it was.
+        """
+        old, files = self.session, _read_files(after)
+        with fields.of_field("dbc"):
+            model = Model(files, after.dbc, *bit_rates_of(after.source, after.options))
+        is_same = (before.source, before.options) == (after.source, after.options)
+        if is_same and old.source.live and not old.source.ended:
+            work = self._made(old.over(model), after, changes)
+            old.close()
+            rows = old.model.trace.rows(old.model.trace.first, old.model.trace.count)
+            work.session.feed([row.record for row in rows])
+            return work
+        if "-" in after.source:
+            raise fields.FieldError("source", "standard input can be named at the start only")
+        shares = bool(_ends(before) & _ends(after))
+        if shares:
+            self._close(old)
+        try:
+            with fields.of_field("source"):
+                session = open_session(after.source, after.options, model)
+            try:
+                work = self._made(session, after, changes)
+            except fields.FieldError:
+                session.source.close()
+                raise
+        except fields.FieldError:
+            if shares:
+                self._open_again(old, before)
+            raise
+        if not shares:
+            self._close(old)
+        return work
+
+    def _close(self, session: Session) -> None:
+        session.disarm()
+        session.close()
+        session.source.close()
+
+    def _open_again(self, session: Session, setup: workspace.MonitorSetup) -> None:
+        """Let a session go on that was closed for others, which did not open."""
+        try:
+            again = open_session(setup.source, setup.options, Model())
+        except (Refused, SourceFailed) as error:
+            session.model.failed = f"{error.message}; F2 opens another bus"
+            return
+        session.resume(again.source, again.buses)
+        if self.reopens:
+            session.source.reopen()
+
+    def _made(
+        self,
+        session: Session,
+        setup: workspace.MonitorSetup,
+        changes: Mapping[str, dict[str, Any]],
+    ) -> _Work:
+        """Return panels for a session, set as those that are shown, but for some changes."""
+        panels, recorder = make_panels(session, session.notes.append), RecorderTask(session)
+        by_section = {panel.section: panel for panel in panels}
+        for one in self.panels:
+            if one.section in by_section:
+                change = changes.get(one.section, {})
+                _hand_on(one, by_section[one.section], change, session.buses)
+        _hand_on(self.recorder, recorder, {}, {})
+        panel_settings = workspace.PanelSettings(
+            self.panel_settings.workspace, setup, [*panels, recorder]
+        )
+        return _Work(session, tuple(panels), recorder, panel_settings)
+
+    async def _move(self, work: _Work) -> None:
+        """Show another session in the place of the one that was closed."""
+        started = self.session.started
+        self.session, self.panels, self.recorder, self.panel_settings = work
+        base = self.screen_stack[0]
+        async with base.batch():
+            await base.query("*").exclude(".-textual-system").remove()
+            await base.mount_all(compose(self))
+        self._moving = False
+        if self.reopens:
+            self.session.source.reopen()
+        if started:
+            self.session.start()
+        self.save()
+        self.refresh_view()
+
+    def _panel(self, kind: type[_P]) -> _P | None:
+        return next((panel for panel in self.panels if isinstance(panel, kind)), None)
 
     def action_record(self) -> None:
         """Ask what to record, or end the recording."""

@@ -188,6 +188,7 @@ class Session:
         sent: how many were.
         withheld: how many were not, because it was not armed.
         trouble: why a frame could not be sent; empty if all could.
+        notes: lines for people, until they are shown.
     """
 
     def __init__(
@@ -203,6 +204,8 @@ class Session:
         self.marks: deque[Mark] = deque(maxlen=_MARKS_KEPT)
         self.armed, self.trouble = False, ""
         self.sent = self.withheld = 0
+        self.notes: deque[str] = deque(maxlen=_MARKS_KEPT)
+        model.eds.notify = self.notes.append
         self._clock, self._watch = clock, Stopwatch()
         self._echo: list[Record] = []
         self._stop, self._pool = threading.Event(), ThreadPoolExecutor(1, "canmon")
@@ -235,6 +238,27 @@ class Session:
             self.armed = False
             for task in self.tasks:
                 task.stop()
+
+    @property
+    def started(self) -> bool:
+        """Whether its thread reads."""
+        return self._thread is not None
+
+    def over(self, model: Model) -> Session:
+        """Return another session on this source, once this one is closed."""
+        return Session(self.source, model, self.buses, self._clock)
+
+    def resume(self, source: AnySource[AnyRecord], buses: Mapping[str, _Send]) -> None:
+        """Go on after `close`, on a source that was opened again."""
+        self.source, self.buses = source, dict(buses)
+        self._stop, self._pool = threading.Event(), ThreadPoolExecutor(1, "canmon")
+        if self.started:
+            self.start()
+
+    def feed(self, records: Sequence[AnyRecord]) -> None:
+        """Take frames that were heard before."""
+        with self.lock:
+            self._take(records)
 
     def start(self) -> None:
         """Begin to read, in a thread of its own."""

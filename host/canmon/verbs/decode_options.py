@@ -6,7 +6,6 @@ The decoder is imported when it is wanted: a verb that does without starts faste
 from __future__ import annotations
 
 import functools
-import re
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -19,7 +18,7 @@ import click
 from tickrig._lazy import LazyModule
 from tickrig.host.canmon import eds_document
 from tickrig.host.cli.can_options import BusCommand, bus_options, fd_options
-from tickrig.host.cli.messages import Refused, refusing, say, show_findings
+from tickrig.host.cli.messages import refusing, say
 from tickrig.host.cli.options import PATH, Decorator, add_options
 
 if TYPE_CHECKING:
@@ -27,19 +26,10 @@ if TYPE_CHECKING:
     from tickrig.host.canmon.model.decode import dbc_file, eds_folder, node_memory
     from tickrig.host.canmon.model.decode import filter as filters
     from tickrig.host.canmon.model.decode.decoder import Decoder
-    from tickrig.wire.canopen.eds import eds_file
 else:  # slow
     extensions = LazyModule("tickrig.host.canmon.extensions")
     dbc_file = LazyModule("tickrig.host.canmon.model.decode.dbc_file")
-    eds_folder = LazyModule("tickrig.host.canmon.model.decode.eds_folder")
     filters = LazyModule("tickrig.host.canmon.model.decode.filter")
-    node_memory = LazyModule("tickrig.host.canmon.model.decode.node_memory")
-    eds_file = LazyModule("tickrig.wire.canopen.eds.eds_file")
-
-
-_EDS: Final = re.compile(
-    r"(?P<node>0[xX][0-9A-Fa-f]{1,2}|[0-9]{1,3})(?:-(?P<last>[0-9]{1,3}))?=(?P<path>.+)"
-)
 
 
 class EdsOptions(NamedTuple):
@@ -102,7 +92,9 @@ def read_eds_files(eds: EdsOptions) -> eds_folder.EdsFiles:
 
     Files of the folders are chosen when a node tells its identity, and each choice is said.
     """
-    return read_eds_paths(eds_paths(eds.words), eds.folders, _say_beside_pictures)
+    return eds_document.read_eds_paths(
+        eds_document.eds_paths(eds.words), eds.folders, _say_beside_pictures
+    )
 
 
 def _say_beside_pictures(text: str) -> None:
@@ -112,25 +104,6 @@ def _say_beside_pictures(text: str) -> None:
         context.call_on_close(functools.partial(say, text))
     else:
         say(text)
-
-
-def read_eds_paths(
-    paths: Mapping[int, Path],
-    folders: Sequence[Path] = (),
-    notify: Callable[[str], None] = say,
-) -> eds_folder.EdsFiles:
-    """Read files by node-ID; Refused if one cannot be read, or is no EDS.
-
-    What is wrong in a file, and not used, is told on standard error.
-
-    Args:
-        paths: the files.
-        folders: in which those of other nodes are looked for.
-        notify: takes a line about each choice.
-    """
-    found = {node: _read(node, path) for node, path in paths.items()}
-    show_findings(odd for objects in found.values() for odd in objects.findings)
-    return eds_folder.EdsFiles(found, eds_document.read_eds_folders(folders), notify)
 
 
 def make_decoder(eds: EdsOptions = _NO_EDS, dbc: Sequence[Path] = ()) -> Decoder:
@@ -151,35 +124,12 @@ def refusing_dbc() -> Iterator[None]:
         yield
 
 
-def eds_paths(words: Sequence[str]) -> dict[int, Path]:
-    """Return the files that `--eds` names, by node-ID; Refused if a word is wrong."""
-    return {node: path for word in words for node, path in _split(word).items()}
-
-
 def read_filter(text: str | None) -> filters.Filter | None:
     """Read what `-F` says; Refused with the column if it is no filter."""
     if text is None:
         return None
     with refusing("", filters.FilterError):
         return filters.parse_filter(text)
-
-
-def _split(word: str) -> dict[int, Path]:
-    match = _EDS.fullmatch(word)
-    text = match["node"] if match else "0"
-    node = int(text, 16 if text[1:2] in ("x", "X") else 10)
-    last = int(match["last"]) if match and match["last"] else node
-    if match is None or not 1 <= node <= last <= 127:
-        raise Refused(
-            f"--eds {word!r} is not NODE=FILE with a node-ID 1..127, as 3=drive.eds"
-            " or 1-3=drive.eds"
-        )
-    return dict.fromkeys(range(node, last + 1), Path(match["path"]))
-
-
-def _read(node: int, path: Path) -> node_memory.EdsObjects:
-    with refusing("--eds", eds_file.EdsError):
-        return node_memory.read_eds_objects(path, node)
 
 
 # What verbs that take SOURCE words share.

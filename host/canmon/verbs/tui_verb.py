@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tickrig._lazy import LazyModule
+from tickrig.host.canmon import eds_document
 from tickrig.host.canmon.output.listening import bit_rates_of, report
 from tickrig.host.canmon.verbs import decode_options
 from tickrig.host.canmon.workspace import MonitorSetup, PanelSettings, Workspace, WorkspaceError
@@ -66,7 +67,7 @@ def command(  # noqa: PLR0913 - options
     said = MonitorSetup(
         source=tuple(source),
         options=BusOptions(**options),
-        eds=decode_options.eds_paths(eds.words),
+        eds=eds_document.eds_paths(eds.words),
         dbc=tuple(dbc),
         eds_dir=eds.folders,
     )
@@ -76,6 +77,7 @@ def command(  # noqa: PLR0913 - options
         raise Refused("canmon tui needs a terminal; canmon top prints a table without one")
     if reopen:
         monitor.session.source.reopen()
+        monitor.reopens = True
     try:
         monitor.run_session()
     finally:
@@ -93,7 +95,7 @@ def _monitor(path: Path | None, said: MonitorSetup) -> app.MonitorApp:
     with refusing("", WorkspaceError):
         workspace = Workspace() if path is None else Workspace.read(path)
         setup = MonitorSetup.read(workspace).under(said)
-        objects = decode_options.read_eds_paths(setup.eds, setup.eds_dir)
+        objects = eds_document.read_eds_paths(setup.eds, setup.eds_dir)
         with decode_options.refusing_dbc():
             model = sessions.Model(objects, setup.dbc, *bit_rates_of(setup.source, setup.options))
         session = sessions.open_session(setup.source, setup.options, model)

@@ -187,15 +187,19 @@ class AlarmsPanel(Panel):
         if not area.display:
             return
         try:
-            rules = parse_rules(load_toml(area.text), load_rule)
-            with self.session.lock:
-                self.held.hold(rules)
+            self.take_rules(area.text)
         except ValueError as error:
             wrong.update(str(error))
             wrong.display = True
             return
-        self.rules_text, self._own = area.text, True
         self.action_leave()
+
+    def take_rules(self, text: str) -> None:
+        """Hold rules, written as TOML; ValueError if they are none."""
+        rules = parse_rules(load_toml(text), load_rule)
+        with self.session.lock:
+            self.held.hold(rules)
+        self.rules_text, self._own = text, True
 
     def action_leave(self) -> None:
         """Go back to the alarms."""
