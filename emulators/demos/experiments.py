@@ -9,7 +9,7 @@ from itertools import accumulate, pairwise
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from tickrig.emulators.demos.tracks import LOOK_US, Look, Mark, RobotTrack, advanced
+from tickrig.emulators.demos.tracks import LOOK_US, Mark, RobotSample, RobotTrack, advanced
 from tickrig.emulators.rh3.commands.served_cart import CartClock, ServedCart
 from tickrig.emulators.rh3.convoy import Convoy, MovingControl
 from tickrig.host.cli.control import serving_control, stopped_by_signals
@@ -316,7 +316,7 @@ class ConvoyRun:
                     gap_m = pose.distance(poses[leaders[number]])
                     is_new = self._leader_of.get(number) != leaders[number]
                     planned = None if is_new else poses[leaders[number]]  # no line to the new one
-                track.looks.append(Look(now_us / _SECOND_US, pose, planned, gap_m))
+                track.looks.append(RobotSample(now_us / _SECOND_US, pose, planned, gap_m))
             self._leader_of = leaders
             self._note_connectors(now_us / _SECOND_US)
         if now_us % _ROW_US == 0:

@@ -95,8 +95,15 @@ def _draw(samples: Sequence[CurveSample]) -> Figure:
     above.set_ylabel("analogue input 1, V")
     above.set_ylim(-0.2, 5.2)
     references = [sample.reference_deg for sample in samples]
-    below.plot(times, references, color="tab:gray", drawstyle="steps-post", label="reference")
-    below.plot(times, [sample.angle_deg for sample in samples], color="tab:blue", label="shaft")
+    below.plot(
+        times, references, color="tab:gray", drawstyle="steps-post", label="reference 6411h:01"
+    )
+    below.plot(
+        times,
+        [sample.angle_deg for sample in samples],
+        color="tab:blue",
+        label="shaft of the motor",
+    )
     below.set_ylabel("angle, degrees")
     below.set_xlabel("time, s")
     below.legend(loc="upper left")
@@ -395,11 +402,12 @@ def _look(stage: Fig120Stage, start_us: int) -> CurveSample:
 
 
 def _arrival(samples: list[CurveSample]) -> str:
-    """Say when the shaft came to rest at the last reference."""
+    """Say where the shaft rests, and when it came within 0.01 deg of the last reference."""
     wanted = samples[-1].reference_deg
     late = [sample for sample in samples if abs(sample.angle_deg - wanted) > _AT_REST_DEG]
     after_s = (late[-1].time_s if late else samples[0].time_s) - samples[0].time_s
-    return f"At {wanted:.4f} deg after {after_s:.3f} s."
+    rest_deg = samples[-1].angle_deg
+    return f"The shaft rests at {rest_deg:.4f} deg, {after_s:.3f} s after the step."
 
 
 def _number(value: Setting) -> float:

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from tickrig.device.rh3.parameters import BaseParameters
 from tickrig.emulators.canopen.models import MODELS
-from tickrig.emulators.demos.tracks import LOOK_US, Look, RobotTrack, advanced
+from tickrig.emulators.demos.tracks import LOOK_US, RobotSample, RobotTrack, advanced
 from tickrig.emulators.rh3.closed_loop import ClosedLoop
 from tickrig.emulators.testing.bench.bench import open_bench
 from tickrig.host.rtc.canopen.definition import DeviceFile, SystemDefinition, read_device_file
@@ -44,7 +44,7 @@ def drive_rh3(echo: _Echo) -> RobotTrack:
 
     def watch(sample: TrackSample) -> None:
         if loop.now_us % LOOK_US == 0:
-            track.looks.append(Look(loop.now_us / _SECOND_US, sample.pose))
+            track.looks.append(RobotSample(loop.now_us / _SECOND_US, sample.pose))
 
     for text, points in (
         ("PositionInput sends a goal.", [_GOAL]),
@@ -107,7 +107,7 @@ def _drive_wheels(name: str, base: WheeledBase, echo: _Echo) -> RobotTrack:
                 float(bench.get(f"body/{output}")) for output in ("x_m", "y_m", "heading_deg")
             )
             pose = Pose(x_m, y_m, radians(heading_deg))
-            track.looks.append(Look(link.now_us / _SECOND_US, pose, planned))
+            track.looks.append(RobotSample(link.now_us / _SECOND_US, pose, planned))
             if link.now_us % _ROW_US == 0:
                 echo(
                     f"{link.now_us / _SECOND_US:8.1f}{forward_pct:6}{left_pct:6}"

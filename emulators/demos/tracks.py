@@ -23,7 +23,7 @@ _NEVER: Final = Pose(nan, nan, nan)
 """Interrupts a line of the picture."""
 
 
-class Look(NamedTuple):
+class RobotSample(NamedTuple):
     """A robot at one time.
 
     Attributes:
@@ -55,7 +55,7 @@ class RobotTrack:
     """
 
     name: str
-    looks: list[Look] = field(default_factory=list)
+    looks: list[RobotSample] = field(default_factory=list)
     corners: Sequence[Pose] = ()
 
     @property

@@ -20,7 +20,7 @@ from tests.host.rtc.engines.openrtm.name_server import eventually
 from tickrig.emulators.commands.cli import main
 from tickrig.emulators.demos import experiments
 from tickrig.emulators.demos.experiments import ConvoyRun, Experiment
-from tickrig.emulators.demos.tracks import Look, RobotTrack, draw
+from tickrig.emulators.demos.tracks import RobotSample, RobotTrack, draw
 
 DEADLINE_S = 60.0
 LIVE = ("follow", "leader", "four", "joystick")
@@ -37,7 +37,7 @@ def played(experiment: str) -> ConvoyRun:
     return run
 
 
-def between(track: RobotTrack, from_s: float, to_s: float) -> list[Look]:
+def between(track: RobotTrack, from_s: float, to_s: float) -> list[RobotSample]:
     return [look for look in track.looks if from_s <= look.time_s <= to_s]
 
 

@@ -60,7 +60,7 @@ def test_the_table_shows_the_pdo_and_when_the_shaft_arrived() -> None:
     assert result.exit_code == 0, result.output
     assert "The master has left the bus." in result.output
     assert "   00 40         90.0027     90.0024" in result.output
-    assert "At 179.9615 deg after 0.229 s." in result.output
+    assert "The shaft rests at 90.0024 deg, 0.229 s after the step." in result.output
 
 
 @pytest.mark.parametrize(
@@ -118,4 +118,4 @@ def test_it_runs_in_real_time_on_a_bus_of_python_can() -> None:
     result = fig120("-i", "udp_multicast", "-c", GROUP)
     assert result.exit_code == 0, result.output
     assert 5 < time.monotonic() - start < 50
-    assert "At 179.9615 deg after 0.2" in result.output
+    assert "The shaft rests at 179.96" in result.output
