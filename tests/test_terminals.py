@@ -246,6 +246,7 @@ BACKGROUND: dict[str, tuple[str, tuple[str, ...], int]] = {
     "tickrig run": ("tickrig", ("run", "rig.toml"), 0),
     "tickrig rtc run": ("tickrig", ("rtc", "run", "--control", "control"), 0),
     "tickrig demo": ("tickrig", ("demo", "rtc-lite"), 130),
+    "tickrig demo leader": ("tickrig", ("demo", "leader", "--control", "control"), 0),
     "canmon dump": ("canmon", ("dump", *BUS), 0),
     "canmon check": ("canmon", ("check", *BUS, "--known", "001"), 1),
     "canmon gateway": ("canmon", ("gateway", *BUS, "--listen", "0"), 0),

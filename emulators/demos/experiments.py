@@ -264,8 +264,6 @@ class ConvoyRun:
         self._leaders = {robot.position: number for number, robot in enumerate(convoy.robots)}
         self._join()
         convoy.loop.activate()
-        self._echo(f"  time s{''.join(f'{name:>16}' for name in experiment.names)}")
-        self.look(0)
 
     @property
     def ports(self) -> dict[str, str]:
@@ -275,8 +273,14 @@ class ConvoyRun:
             f"base{n}": it.velocity for n, it in robots
         }
 
+    def begin(self) -> None:
+        """Print the head of the table, and where the robots stand."""
+        self._echo(f"  time s{''.join(f'{name:>16}' for name in self._experiment.names)}")
+        self.look(0)
+
     def play(self) -> None:
         """Play the acts in virtual time."""
+        self.begin()
         loop = self.convoy.loop
         acts = self._experiment.acts
         for act, until in pairwise(acts):
@@ -407,6 +411,7 @@ def serve(
             )
         hint = "" if control is None else f"\n  tickrig rtc ls -l --at {control}"
         say(f"{', '.join(experiment.names)}. Ctrl-C ends.{hint}")
+        run.begin()
         cart.run()
     clock.serve = None
     return run
