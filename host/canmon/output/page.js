@@ -430,15 +430,15 @@ function pointers() {
 // Tables, tools and keys.
 
 function table(id, heads, rows, kinds) {
-  const found = at(id);
+  const found = at(id), used = heads.map((_, n) => rows.some(cells => cells[n]));
   found.textContent = "";
   const head = make("tr");
-  heads.forEach((text, n) => head.append(make("th", text, kinds[n] === "number" ? "number" : "")));
+  heads.forEach((text, n) => { if (used[n]) head.append(make("th", text, kinds[n] || "")); });
   const top = make("thead"), body = make("tbody");
   top.append(head);
   for (const cells of rows) {
     const row = make("tr");
-    cells.forEach((text, n) => row.append(make("td", text, kinds[n])));
+    cells.forEach((text, n) => { if (used[n]) row.append(make("td", text, kinds[n] || "")); });
     body.append(row);
   }
   found.append(top, body);
@@ -446,9 +446,10 @@ function table(id, heads, rows, kinds) {
 
 function tables() {
   const nodes = data.nodes.filter(one => ofNode(one) && fits(one.cells.join(" ")));
-  table("node-table", data.nodeHeads, nodes.map(one => one.cells), []);
+  table("node-table", data.nodeHeads, nodes.map(one => one.cells), ["short", "", "long", "short", "short", "", "", "long", "long"]);
   const ids = data.ids.filter(one => ofNode({key: one.key}) && fits(one.cells.join(" ")));
-  table("id-table", ["Bus", "CAN-ID", "Frames", "1/s", "Meaning"], ids.map(one => one.cells), ["", "mono", "number", "number", ""]);
+  table("id-table", ["Bus", "CAN-ID", "Frames", "1/s", "Meaning"],
+    ids.map(one => data.buses.length > 1 ? one.cells : ["", ...one.cells.slice(1)]), ["short", "mono", "number", "number", "long"]);
   const list = at("signal-list");
   list.textContent = "";
   data.signals.forEach((signal, number) => {

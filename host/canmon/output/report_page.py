@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 import subprocess
@@ -368,14 +369,14 @@ def _idents(survey: Survey, rows: Sequence[NodeStatus], span_us: int) -> list[di
 
 def _meaning(ident: int) -> str:
     """Return what the pre-defined connection set says of an identifier."""
-    can_id, asked = ident & ~REMOTE, ", asked for by a remote frame" * bool(ident & REMOTE)
+    can_id, remote = ident & ~REMOTE, ", asked for by a remote frame" * bool(ident & REMOTE)
     if can_id in _ALONE:
-        return _ALONE[can_id] + asked
+        return _ALONE[can_id] + remote
     node = node_of(can_id)
     if node is None:
         return ""
     service = _SERVICES.get(can_id - node)
-    return f"node {node} {service or 'PDO, not described'}{asked}"
+    return f"node {node} {service or 'PDO, not described'}{remote}"
 
 
 # Pictures of the page.
@@ -404,6 +405,11 @@ def browser() -> str:
     return found
 
 
+def _unboxed() -> Sequence[str]:
+    """Chromium refuses to run as root in its sandbox; in containers all is root."""
+    return ["--no-sandbox"] if hasattr(os, "geteuid") and os.geteuid() == 0 else []
+
+
 def print_page(page: Path, path: Path) -> None:
     """Draw a page as PDF or PNG, as the suffix of the file says.
 
@@ -414,7 +420,7 @@ def print_page(page: Path, path: Path) -> None:
     with TemporaryDirectory(prefix="canmon-") as folder:
         words = [
             *(browser(), "--headless=new", "--disable-gpu", "--no-first-run", "--hide-scrollbars"),
-            *("--no-sandbox", "--no-pdf-header-footer", f"--user-data-dir={folder}"),
+            *("--no-pdf-header-footer", f"--user-data-dir={folder}", *_unboxed()),
             *(f"--window-size={_WIDTH},{_HEIGHT}", "--virtual-time-budget=5000"),
             *(f"{what}={path.resolve()}", page.resolve().as_uri()),
         ]
