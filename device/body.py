@@ -11,12 +11,12 @@ from typing import Final, NamedTuple
 
 from tickrig.device.twin import Copyable, Immutable
 
-# Where a body is, and how far an arc takes it.
+# Poses, and how an arc changes them.
 
 
 @dataclass(frozen=True, slots=True)
 class Pose(Immutable):
-    """A place on a plane, and the way to look.
+    """A position and heading on a plane.
 
     Attributes:
         x_m: metres.
@@ -68,7 +68,7 @@ def arc(
     )
 
 
-# Where a wheel touches the ground.
+# Contact of a wheel with the ground.
 
 GRAVITY_M_S2: Final = 9.80665
 """Standard gravity."""
@@ -127,18 +127,18 @@ class Contact:
 # A body on driven wheels at its left and right side.
 
 STEP_S: Final = 1e-3
-"""Length of a step; drives tick as often."""
+"""Length of a step; drives tick at the same period."""
 
 SIDES: Final = {
     "differential": (("left",), ("right",)),
     "skid-steer": (("front_left", "rear_left"), ("front_right", "rear_right")),
 }
-"""Wheels at the left and at the right, by the kind of body."""
+"""Names of the wheels on the left and on the right side, by kind of body."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BodyParameters(Immutable):
-    """What a body is like.
+    """Parameters of a body on driven wheels.
 
     Attributes:
         kind: of `SIDES`.
@@ -148,7 +148,7 @@ class BodyParameters(Immutable):
         friction: coefficient between wheels and ground, None if they never slip.
 
     Raises:
-        ValueError: no such kind, or a length or mass that cannot be.
+        ValueError: unknown kind, or a length or mass out of range.
     """
 
     kind: str
@@ -158,7 +158,7 @@ class BodyParameters(Immutable):
     friction: float | None = None
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be."""
+        """Raise ValueError if a parameter is out of range."""
         if self.kind not in SIDES:
             raise ValueError(f"kind {self.kind!r} is not one of {', '.join(SIDES)}")
         for name, value in (("wheel_radius_m", self.wheel_radius_m), ("tread_m", self.tread_m)):
@@ -186,7 +186,7 @@ class WheeledBody(Copyable):
     sideways, rolling resistance, slopes, collisions.
 
     Args:
-        parameters: what it is like.
+        parameters: dimensions, mass and friction.
 
     Attributes:
         pose: where it is; it may be put elsewhere.
@@ -206,7 +206,7 @@ class WheeledBody(Copyable):
         self._angles = dict.fromkeys(parameters.wheels, 0.0)
 
     def step(self, angles_rad: Mapping[str, float]) -> None:
-        """Let a step pass in which the wheels have turned to these angles."""
+        """Advance by one step in which the wheels have turned to these angles."""
         ways = {}
         for name, contact in self.contacts.items():
             ways[name] = contact.roll(angles_rad[name] - self._angles[name], STEP_S)
@@ -237,12 +237,12 @@ def _mean(values: Sequence[float]) -> float:
     return reduce(add, values, 0.0) / len(values)
 
 
-# A body on three omni wheels: it goes any way, and turns meanwhile.
+# A body on three omni wheels, which can translate and turn at the same time.
 
 _OMNI_STEP_S: Final = 1e-3
 
 _BEARINGS: Final = (pi / 3, pi, -pi / 3)
-"""Where the wheels are, from the front to the left; each rolls at right angles to that."""
+"""Directions of the wheels, from the front to the left; each rolls at right angles to that."""
 
 
 class Velocity(NamedTuple):
@@ -255,7 +255,7 @@ class Velocity(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OmniParameters(Immutable):
-    """What a body is like.
+    """Parameters of a body on omni wheels.
 
     Attributes:
         wheel_radius_m: of each wheel.
@@ -273,13 +273,13 @@ class OmniParameters(Immutable):
     most_rad_s: float = 20.0
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be."""
+        """Raise ValueError if a parameter is not above 0."""
         for name in ("wheel_radius_m", "base_radius_m", "response_s", "most_rad_s"):
             if not 0 < (value := getattr(self, name)) < 1_000:
                 raise ValueError(f"{name} {value} is not above 0 and below 1000")
 
     def wheel_speeds(self, velocity: Velocity) -> tuple[float, ...]:
-        """Return the speeds of the wheels in rad/s; all slower alike where one is too fast."""
+        """Return the speeds of the wheels in rad/s; all are scaled down if one is too fast."""
         vx, vy, turn = velocity.vx, velocity.vy, velocity.w * self.base_radius_m
         rims = (vy * cos(at) - vx * sin(at) + turn for at in _BEARINGS)
         speeds = tuple(rim / self.wheel_radius_m for rim in rims)
@@ -287,7 +287,7 @@ class OmniParameters(Immutable):
         return tuple(speed * share for speed in speeds)
 
     def velocity(self, speeds: tuple[float, ...]) -> Velocity:
-        """Return how the body goes when its wheels turn at these speeds.
+        """Return the velocity of the body for these wheel speeds.
 
         >>> omni = OmniParameters()
         >>> [round(n, 6) for n in omni.velocity(omni.wheel_speeds(Velocity(0.1, -0.2, 0.3)))]
@@ -307,7 +307,7 @@ class OmniBody(Copyable):
     Not emulated: rollers, slip, mass, encoders, the driver.
 
     Attributes:
-        parameters: what it is like.
+        parameters: dimensions and response.
         pose: where it is; it may be put elsewhere.
         velocity: in the latest step.
     """
@@ -318,7 +318,7 @@ class OmniBody(Copyable):
     _speeds: tuple[float, ...] = field(default=(0.0, 0.0, 0.0), init=False)
 
     def step(self, wanted: Velocity) -> None:
-        """Go on for a millisecond."""
+        """Advance by one millisecond."""
         share = _OMNI_STEP_S / (_OMNI_STEP_S + self.parameters.response_s)
         wheels = zip(self._speeds, self.parameters.wheel_speeds(wanted), strict=True)
         self._speeds = tuple(speed + (target - speed) * share for speed, target in wheels)

@@ -1,4 +1,4 @@
-"""Chance that is the same on every machine and every run."""
+"""Random numbers that are the same on every machine and in every run."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Chance(Part):
     """A seeded generator of integers (SplitMix64: Steele, Lea, Flood 2014).
 
     Args:
-        seed: the run's seed.
+        seed: the seed of the run.
         stream: name of one of its independent streams.
 
     >>> Chance(0).draw() == 0xE220_A839_7B1D_CDAF  # the authors' first number for seed 0
@@ -37,19 +37,19 @@ class Chance(Part):
         return z ^ (z >> 31)
 
     def skip(self, draws: int) -> None:
-        """Go on as after so many draws, at once."""
+        """Skip a number of draws at once."""
         self._state = (self._state + draws * _GOLDEN_GAMMA) & _MASK
 
     def hit(self, threshold: int) -> bool:
-        """Draw once: True with the probability that `threshold_of` was given."""
+        """Draw once; return True with the probability given to `threshold_of`."""
         return self.draw() < threshold
 
     def hits(self, threshold: int, draws: int) -> list[int]:
-        """Draw so often as `hit` would, and return which draws hit, counted from 0.
+        """Draw several times as `hit` does; return the numbers of the draws that hit, from 0.
 
         Args:
-            threshold: what `threshold_of` gave.
-            draws: how many, 0 or more.
+            threshold: the value of `threshold_of`.
+            draws: number of draws, 0 or more.
         """
         found: list[int] = []
         for first in range(0, draws, _LANES):  # side by side: a fifth of the time of calls of `hit`
@@ -68,7 +68,7 @@ class Chance(Part):
 
 @cache
 def _lanes(count: int) -> tuple[int, int, int]:
-    """Return 1, the steps of the state and a mask of 64 bits, for so many lanes of 128 bits."""
+    """Return 1, the steps of the state and a mask of 64 bits, for some lanes of 128 bits."""
     places = [128 * at for at in range(count)]
     ones = sum(1 << place for place in places)
     gammas = sum(((at + 1) * _GOLDEN_GAMMA & _MASK) << place for at, place in enumerate(places))
@@ -76,11 +76,11 @@ def _lanes(count: int) -> tuple[int, int, int]:
 
 
 def threshold_of(rate: float) -> int:
-    """Return what `Chance.hit` needs to be True at a rate of 0..1."""
+    """Return the threshold with which `Chance.hit` is True at a rate of 0..1."""
     return round(rate * 2**64)
 
 
 def check_rate(name: str, rate: float) -> None:
-    """Raise ValueError unless a fault of this name can have this rate."""
+    """Raise ValueError unless the rate of a fault is above 0 and at most 1."""
     if not 0 < rate <= 1:
         raise ValueError(f"{name} takes a rate above 0 and up to 1, as {name}=0.01; got {rate:g}")

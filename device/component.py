@@ -1,7 +1,7 @@
-"""RT components on devices: what a developer writes, and what runs its callbacks (OMG RTC 1.1).
+"""RT components on devices: base class, and the runner of its callbacks (OMG RTC 1.1).
 
-RTC-Lite nodes and DeviceRTCs on CANopen have them. Each adds its ports, where their values
-are, and what moves the life cycle.
+RTC-Lite nodes and DeviceRTCs on CANopen use them. Each adds its ports, the storage of their values,
+and the life cycle.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ P = TypeVar("P")
 
 
 class DeviceReturnCode(IntEnum):
-    """What a callback returns (OMG RTC 1.1, ReturnCode_t)."""
+    """Return code of a callback (OMG RTC 1.1, ReturnCode_t)."""
 
     RTC_OK = 0
     RTC_ERROR = 1
@@ -31,23 +31,22 @@ class DeviceReturnCode(IntEnum):
 
 
 ERROR: Final = DeviceReturnCode.RTC_ERROR
-"""What a callback returns that failed."""
+"""Return codes of a failed callback."""
 
 Result = DeviceReturnCode | None
-"""What a callback returns; nothing means that all went well."""
+"""Return value of a callback; None means success."""
 
 
 class DeviceComponent(Copyable):
-    """A component on a device; a subclass says what it is and does.
+    """A component on a device; a subclass defines its properties and callbacks.
 
-    Ports are declared as attributes of the class; each component has its own. Callbacks
-    may be left out. One that cannot fail is declared `-> None`; one that can returns
-    `ERROR`. Power-on makes a new component: what a callback keeps in `self` is the
-    device's RAM.
+    Ports are declared as attributes of the class; each component has its own. Callbacks are
+    optional. One that cannot fail is declared `-> None`; one that can returns `ERROR`. Power-on
+    makes a new component: values kept in `self` are the device's RAM.
 
     Attributes:
         type_name: type of the component.
-        physical: physical inputs that the device has beside its wire.
+        physical: physical inputs of the device beside its wire.
         inputs: their values.
     """
 
@@ -56,42 +55,42 @@ class DeviceComponent(Copyable):
     inputs: QuantityBank
 
     def _own_ports(self, port_class: type[P]) -> list[P]:
-        """Give the component ports of its own, as its class declares them; return them."""
+        """Set the component's own copies of the declared ports, and return them."""
         own = {name: copy(port) for name, port in declared(type(self), port_class)}
         for name, port in own.items():
             setattr(self, name, port)
         return list(own.values())
 
     def on_initialize(self) -> Result:
-        """Begin: Created becomes Inactive; after an error it stays Created."""
+        """Initialize: Created becomes Inactive; after an error it stays Created."""
 
     def on_finalize(self) -> Result:
-        """End, once."""
+        """Finalize; called once."""
 
     def on_activated(self) -> Result:
-        """Become Active; an error leads to Error."""
+        """Activate: Inactive becomes Active; an error leads to Error."""
 
     def on_deactivated(self) -> Result:
-        """Leave Active; an error leads to Error, unless that is where it goes anyway."""
+        """Deactivate: leave Active; an error leads to Error."""
 
     def on_execute(self) -> Result:
-        """Work, once a period while Active; an error leads to Error."""
+        """Execute, once a period while Active; an error leads to Error."""
 
     def on_aborting(self) -> Result:
-        """Come from Active to Error; the result does not matter."""
+        """Abort, on the way from Active to Error; the return value is ignored."""
 
     def on_error(self) -> Result:
-        """Work, once a period while in Error; the result does not matter on CANopen."""
+        """Handle the error, once a period while in Error; CANopen ignores the return value."""
 
     def on_reset(self) -> Result:
-        """Leave Error; after an error it stays there."""
+        """Reset: Error becomes Inactive; after an error it stays in Error."""
 
 
 C = TypeVar("C", bound=DeviceComponent)
 
 
 class CallbackRunner(Generic[C]):
-    """Runs the callbacks of a component, and keeps in mind what ran.
+    """Runs the callbacks of a component, and counts them.
 
     Attributes:
         component: the component.
@@ -105,7 +104,7 @@ class CallbackRunner(Generic[C]):
         self.latest, self.calls, self.executed = "", 0, 0
 
     def call(self, callback: str) -> bool:
-        """Run a callback by its name; False if it failed."""
+        """Run a callback by its name; return False if it failed."""
         self.latest = callback
         self.calls += 1
         self.executed += callback == "on_execute"
@@ -115,13 +114,13 @@ class CallbackRunner(Generic[C]):
 
 @dataclass(slots=True)
 class Timer:
-    """A timer as execution context (RTC-Lite type 22h, DeviceRTC): periods from its start on.
+    """A timer as execution context (RTC-Lite type 22h, DeviceRTC), with periods from its start.
 
-    It does not drift, and a period that is missed is left out.
+    It does not drift; missed periods are skipped.
 
     Attributes:
-        rate_hz: periods a second; a new rate holds from the next start.
-        due_us: when the next period ends, `NEVER` while it stands still.
+        rate_hz: periods a second; a new rate applies from the next start.
+        due_us: when the next period ends, `NEVER` while it is stopped.
     """
 
     rate_hz: int
@@ -129,34 +128,34 @@ class Timer:
     _start_us: int = field(default=0, init=False)
 
     def start(self, now_us: int) -> None:
-        """Begin the first period."""
+        """Start the first period."""
         self._start_us = now_us
         self._note_due(now_us)
 
     def stop(self) -> None:
-        """Stand still."""
+        """Stop the timer."""
         self.due_us = NEVER
 
     def run(self, now_us: int) -> None:
-        """Run or go on running."""
+        """Start the timer unless it runs."""
         if self.due_us == NEVER:
             self.start(now_us)
 
     def elapsed(self, now_us: int) -> bool:
-        """Whether a period has ended; the next one is that which ends after `now_us`."""
+        """Return whether a period has ended, and schedule the first end after `now_us`."""
         if now_us < self.due_us:
             return False
         self._note_due(now_us)
         return True
 
     def _note_due(self, now_us: int) -> None:
-        """Look for the first end of a period after `now_us`."""
+        """Schedule the first end of a period after `now_us`."""
         periods = (now_us - self._start_us) * self.rate_hz // 1_000_000 + 1
         self.due_us = self._start_us - -periods * 1_000_000 // self.rate_hz
 
 
 def declared(owner: type, kind: type[P]) -> Iterator[tuple[str, P]]:
-    """Give the attributes of a class and its bases that are of a kind, the bases first.
+    """Yield the attributes of one kind of a class and its bases, the bases first.
 
     >>> class Lamp:
     ...     bright, name = 5, "lamp"
@@ -170,7 +169,7 @@ def declared(owner: type, kind: type[P]) -> Iterator[tuple[str, P]]:
 
 
 def shown(value: Any) -> float | str:
-    """Return the value of a port as an output: truth values as numbers, sequences as text."""
+    """Return the value of a port as an output: booleans as numbers, sequences as text."""
     if isinstance(value, tuple):
         return " ".join(str(shown(element)) for element in value)
     return int(value) if isinstance(value, bool) else value

@@ -1,4 +1,4 @@
-"""The contract every emulated device keeps."""
+"""The interface of every emulated device."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ W = TypeVar("W")  # one tick's traffic: bytes on a line, tuple[CanFrame, ...] on
 
 
 class Device(Protocol[W]):
-    """A Mealy machine on a tick: traffic in, traffic out, one step a tick."""
+    """A Mealy machine: traffic in, traffic out, one step per tick."""
 
     @property
     def tick_us(self) -> int:
@@ -19,16 +19,14 @@ class Device(Protocol[W]):
 
     @property
     def due_us(self) -> int:
-        """The earliest time at which anything would happen without input.
+        """The earliest time at which anything happens without input.
 
-        A rig in virtual time jumps to it. It may be in the past (the next tick
-        then does the work) or `NEVER`. A tick before it, without traffic, must
-        change nothing that anybody could ever see.
+        A rig in virtual time jumps to it. It may be in the past (the next tick then does the work)
+        or `NEVER`. A tick before it, without traffic, must have no visible effect.
 
-        It may become earlier in `tick` and `reset`, and by what is done to the
-        device between steps: inputs, a write to its dictionary. A rig looks
-        again whenever it is asked to go on; what one device does to another
-        within a step is heard of only through the wire.
+        It may become earlier in `tick` and `reset`, and by changes between steps: inputs, a write
+        to the dictionary. A rig reads it again at each call that advances the time; within a step,
+        one device affects another only through the wire.
         """
         ...
 
@@ -40,23 +38,23 @@ class Device(Protocol[W]):
 
         Args:
             now_us: time since the rig was started, a multiple of `tick_us`.
-            rx: what arrived since the last tick, in wire order.
+            rx: traffic that arrived since the last tick, in wire order.
 
         Returns:
-            What the device sends in this tick, in wire order. Bad input is
-            answered as the real device answers it; it never raises.
+            The traffic that the device sends in this tick, in wire order. It answers bad input as
+            the real device does, and never raises.
         """
         ...
 
 
 class UartDevice(Device[bytes], Protocol):
-    """A device that changes the setting of its serial line while it runs."""
+    """A device that can change the setting of its serial line at run time."""
 
     @property
     def uart(self) -> UartSetting | None:
         """The setting of its UART, as the latest tick or `reset` left it; None without a UART.
 
-        What a tick returns is still sent with the setting before that tick. The new one counts
-        when the last stop bit has passed; from then on the device also receives with it.
+        The result of a tick is still sent with the setting before that tick. The new setting
+        applies after its last stop bit; from then on the device also receives with it.
         """
         ...

@@ -1,4 +1,4 @@
-"""How far the devices of a rig may work ahead of their ticks."""
+"""The limit up to which devices of a rig may compute ahead of their ticks."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from tickrig.device.twin import Part
 
 
 class Horizon(Part):
-    """What a rig knows of time, told to those devices on it that have an attribute `horizon`.
+    """Time limits of a rig, shared with its devices that have an attribute `horizon`.
 
     Attributes:
         passed_us: all ticks up to this time are done.
-        until_us: up to this time nobody looks at a device between its ticks, except in an
-            action of the event queue, and what it sends and hears is all that is seen of it.
+        until_us: up to this time nothing reads a device between its ticks, except an action of the
+            event queue; only its traffic is observed.
     """
 
     __slots__ = ("passed_us", "until_us")

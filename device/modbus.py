@@ -12,25 +12,25 @@ from tickrig.wire import modbus
 from tickrig.wire.errors import WireError
 from tickrig.wire.instant import NEVER
 
-# Holding registers under names; a number of 32 bits takes two, its high half first.
+# Named holding registers; a number of 32 bits takes two, its high half first.
 
 _WORD: Final = 0x1_0000
 
 
 @dataclass(frozen=True, slots=True)
 class Register(Immutable):
-    """A number that a master sees.
+    """A number that a master can read.
 
     Attributes:
         address: of its first register.
-        name: what the device calls it.
-        text: what it is, with its unit.
-        words: registers it takes, 1 or 2.
+        name: name in the device.
+        text: description with the unit.
+        words: number of registers, 1 or 2.
         signed: in two's complement.
         low: smallest value that a master may write.
         high: largest value that a master may write.
         initial: value after power-up.
-        writable: a master may write it.
+        writable: whether a master may write it.
     """
 
     address: int
@@ -51,7 +51,7 @@ class Registers(Part):
 
     Args:
         table: the numbers.
-        measured: those that are asked for when a master reads them.
+        measured: functions that compute numbers when a master reads them.
     """
 
     def __init__(
@@ -69,7 +69,7 @@ class Registers(Part):
         self.reset()
 
     def reset(self) -> None:
-        """Return to what holds after power-up."""
+        """Restore the values after power-up."""
         self._values = {name: register.initial for name, register in self.table.items()}
 
     def __getitem__(self, name: str) -> int:
@@ -78,11 +78,11 @@ class Registers(Part):
         return self._values[name] if measure is None else measure()
 
     def __setitem__(self, name: str, value: int) -> None:
-        """Set a number, as the device itself does."""
+        """Set a number from inside the device."""
         self._values[name] = value
 
     def check(self, first: int, count: int) -> None:
-        """Raise Refusal if a register is not there."""
+        """Raise Refusal if a register does not exist."""
         if (first, count) == self._latest_read:
             return
         found = [self._find(address) for address in range(first, first + count)]
@@ -90,17 +90,17 @@ class Registers(Part):
         self._latest_read = (first, count)
 
     def read(self, first: int, count: int) -> list[int]:
-        """Return registers; Refusal if one is not there."""
+        """Return registers; Refusal if one does not exist."""
         self.check(first, count)
         values = {name: self[name] for name in dict(self._places)}
         return [values[name] >> shift & 0xFFFF for name, shift in self._places]
 
     def write(self, first: int, values: Sequence[int]) -> dict[str, int]:
-        """Write registers, all or none; return what was written, by name.
+        """Write registers, all or none; return the written numbers by name.
 
         Raises:
-            Refusal: one is not there, or read-only, or would be written by half, or its
-                value is out of range.
+            Refusal: a register does not exist, is read-only, would be written by half, or its value
+                is out of range.
         """
         written: dict[str, int] = {}
         at = first
@@ -133,27 +133,27 @@ def _joined(register: Register, words: Sequence[int]) -> int:
     return value
 
 
-# The slave's side of a line: frames parted by silence, requests answered in turn.
+# The slave's side of a line: frames separated by silence, requests answered in order.
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class ModbusSlave(Copyable):
     """Answers a master on an RTU line.
 
-    A frame ends with silence; it is served then, and the answer leaves at once. What is
-    no frame, or for somebody else, is passed over, as the standard says.
+    A frame ends with silence; it is then served, and the answer is sent at once. Invalid frames and
+    frames for other slaves are ignored, as in the standard.
 
     Not emulated: function codes beside 03, 06, 10h and 17h, diagnostics, the
     refusal of frames with a gap of 1.5 characters.
 
     Args:
-        registers: what it holds.
-        written: called with what a master wrote, by name.
+        registers: the registers.
+        written: called with the numbers that a master wrote, by name.
         address: 1..247.
-        silence_us: what ends a frame.
+        silence_us: silence that ends a frame.
 
     Attributes:
-        served: requests for this slave that were answered or obeyed.
+        served: requests for this slave that were answered or executed.
         garbled: frames with a wrong length or CRC.
         last_request_us: when the last request for this slave was served.
     """
@@ -170,17 +170,17 @@ class ModbusSlave(Copyable):
         self.reset()
 
     def reset(self) -> None:
-        """Forget what was heard."""
+        """Drop the received bytes."""
         self._frame, self._last_us = b"", 0
         self.served = self.garbled = self.last_request_us = 0
 
     @property
     def due_us(self) -> int:
-        """When the frame that has begun ends, if nothing more comes."""
+        """When the frame in progress ends if no more bytes arrive."""
         return self._last_us + self._silence_us if self._frame else NEVER
 
     def tick(self, now_us: int, rx: bytes) -> bytes:
-        """Take bytes; return an answer."""
+        """Receive bytes; return an answer."""
         answer = b""
         if now_us >= self.due_us:
             answer, self._frame = self._serve(now_us, self._frame), b""

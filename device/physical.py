@@ -16,12 +16,12 @@ from tickrig.device.twin import Immutable
 
 
 class SignalType(Enum):
-    """What a physical input is.
+    """Type of a physical input.
 
     Attributes:
         LEVEL: a quantity, such as a stick, a voltage or a load.
         BUTTON: 1 while pressed.
-        TEXT: words, or bytes in hex.
+        TEXT: text, or bytes in hex.
         FAULT: 1 while the physical fault is present.
     """
 
@@ -36,16 +36,16 @@ class InputSignal(Immutable):
     """A physical input.
 
     Attributes:
-        name: what scenario files and panels call it.
-        text: what it is, for people.
+        name: name in scenario files and panels.
+        text: description for people.
         type: level, button, text or fault.
         low: smallest value.
         high: largest value.
         unit: unit of the value, empty for a plain number.
         initial: value at the start of the rig.
-        real: takes fractions; a device keeps it in a `QuantityBank`.
-        counts: of a converter: what its object holds at `low` and at `high`, and a step between;
-            empty without one.
+        real: accepts fractions; a device keeps it in a `QuantityBank`.
+        counts: of a converter: the counts of its object at `low` and at `high`, and of one step;
+            empty without a converter.
     """
 
     name: str
@@ -61,11 +61,11 @@ class InputSignal(Immutable):
 
 @dataclass(frozen=True, slots=True)
 class OutputSignal(Immutable):
-    """A physical output: what an observer would see on the device.
+    """A physical output: a property of the device that an observer can see.
 
     Attributes:
-        name: what scenario files and panels call it.
-        text: what it is, for people.
+        name: name in scenario files and panels.
+        text: description for people.
         unit: unit of the value, empty for a plain number.
     """
 
@@ -76,7 +76,7 @@ class OutputSignal(Immutable):
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class QuantityBank:
-    """The values of a device's physical inputs: whole numbers, and fractions where they are real.
+    """The values of a device's physical inputs: whole numbers, or fractions if `real` is set.
 
     `bank["supply_v"]` is the present value. A change takes effect at the device's next tick.
 
@@ -88,7 +88,7 @@ class QuantityBank:
     Attributes:
         table: the inputs by name, in order of declaration.
         groups: names of several inputs that are set together.
-        changed: whether anything was set since the device last looked.
+        changed: whether an input was set since the device last checked.
 
     >>> bank = QuantityBank([InputSignal("supply_v", "supply", high=15, initial=12.5, real=True)])
     >>> bank.set("supply_v", 11.75)
@@ -117,11 +117,11 @@ class QuantityBank:
         """Set an input.
 
         Args:
-            name: which.
-            value: what it becomes, in its unit and range.
+            name: of the input.
+            value: the new value, in its unit and range.
 
         Raises:
-            ValueError: no such input, no number of its kind, or one out of its range.
+            ValueError: unknown input, wrong kind of number, or value out of range.
         """
         self._values[name] = self.check(name, value)
         self.changed = True
@@ -129,14 +129,14 @@ class QuantityBank:
             self._on_change()
 
     def check(self, name: str, value: int | float | str) -> int | float:
-        """Check a value, without setting it.
+        """Check a value without setting it.
 
         Args:
             name: of the input.
-            value: what it would become.
+            value: the value to check.
 
         Returns:
-            What it would be set to.
+            The value that `set` would store.
 
         Raises:
             ValueError: as `set`.
@@ -156,7 +156,7 @@ class QuantityBank:
         """List the inputs of a type.
 
         Args:
-            signal_type: which type.
+            signal_type: the type.
 
         Returns:
             Their names, in order of declaration.
@@ -164,17 +164,17 @@ class QuantityBank:
         return tuple(item.name for item in self.table.values() if item.type is signal_type)
 
     def find(self, name: str, signal_type: SignalType | None = None) -> InputSignal:
-        """Look the description of an input up.
+        """Look up the description of an input.
 
         Args:
             name: of the input.
-            signal_type: what it must be, if given.
+            signal_type: required type, if given.
 
         Returns:
             The description.
 
         Raises:
-            ValueError: no such input, or none of this type.
+            ValueError: unknown input, or another type.
         """
         item = self.table.get(name)
         if item is None or signal_type not in (None, item.type):
@@ -198,10 +198,10 @@ class InputBank(QuantityBank):
     Attributes:
         table: the inputs by name, in order of declaration.
         groups: names of several inputs that are set together.
-        changed: whether anything was set since the device last looked.
+        changed: whether an input was set since the device last checked.
 
     Raises:
-        ValueError: an input of the table takes fractions, which a `QuantityBank` keeps.
+        ValueError: an input of the table accepts fractions; use a `QuantityBank`.
     """
 
     __slots__ = ()

@@ -1,4 +1,4 @@
-"""An infra-red reader of ucodes on its serial line."""
+"""An infra-red reader of ucodes on a serial line."""
 
 from __future__ import annotations
 
@@ -15,38 +15,38 @@ from tickrig.wire.instant import NEVER
 from tickrig.wire.lines import LineSplitter
 from tickrig.wire.ucode import MAX_LEVEL, ROUNDS, LineType, UcodeLine, parse_ucode
 
-# What a reader is like. The source names no product; these are choices.
+# Parameters of a reader. The source names no product; these are choices.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReaderParameters(Immutable):
-    """A reader.
+    """Parameters of a reader.
 
     Attributes:
-        range_m: how far it hears a marker, 0.1..99.
-        cone_deg: whole angle in which it hears, around where it looks, 1..360.
+        range_m: range at which it receives a marker, 0.1..99.
+        cone_deg: full angle of reception around its heading, 1..360.
 
     Raises:
-        ValueError: a value that cannot be.
+        ValueError: a value out of range.
     """
 
     range_m: float = 3.0
     cone_deg: int = 90
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be."""
+        """Raise ValueError if a value is out of range."""
         if not 0.1 <= self.range_m <= 99:
             raise ValueError(f"range_m {self.range_m} is not in 0.1..99 m")
         if not 1 <= self.cone_deg <= 360:
             raise ValueError(f"cone_deg {self.cone_deg} is not in 1..360 degrees")
 
 
-# Infra-red markers in the environment, and which of them a reader hears.
+# Infra-red markers in the environment, and their reception by a reader.
 
 
 @dataclass(frozen=True, slots=True)
 class Marker(Immutable):
-    """A marker that sends its ucode to all sides, on a flat floor.
+    """A marker that sends its ucode in all directions, on a flat floor.
 
     Attributes:
         ucode: 128 bits, 32 hex digits in capitals.
@@ -54,7 +54,7 @@ class Marker(Immutable):
         y_m: its place, to the left of x.
 
     Raises:
-        ValueError: no ucode, or no place.
+        ValueError: invalid ucode or position.
     """
 
     ucode: str
@@ -62,7 +62,7 @@ class Marker(Immutable):
     y_m: float
 
     def __post_init__(self) -> None:
-        """Refuse what is no marker."""
+        """Raise ValueError if ucode or position is invalid."""
         if not (isfinite(self.x_m) and isfinite(self.y_m)):
             raise ValueError(f"a marker has a place, got {self.x_m}, {self.y_m}")
         if parse_ucode(self.ucode) != self.ucode:
@@ -71,11 +71,11 @@ class Marker(Immutable):
 
 @dataclass(frozen=True, slots=True)
 class Reception(Immutable):
-    """A marker that was heard.
+    """A received marker.
 
     Attributes:
-        ucode: what it sent.
-        level: of its signal: 100 % at the reader, falling to 1 % at the end of the range.
+        ucode: the received ucode.
+        level: signal level: 100 % at the reader, falling to 1 % at the end of the range.
     """
 
     ucode: str
@@ -85,16 +85,16 @@ class Reception(Immutable):
 def receive(
     markers: Sequence[Marker], pose: Pose, parameters: ReaderParameters, share: float = 1.0
 ) -> tuple[Reception, ...]:
-    """Return the markers that a reader hears, the nearest first.
+    """Return the markers that a reader receives, the nearest first.
 
-    Not there: walls, which infra-red light does not pass; markers that disturb one another;
+    Not emulated: walls, which infra-red light does not pass; markers that disturb one another;
     reflections.
 
     Args:
-        markers: those that send.
+        markers: the sending markers.
         pose: of the reader.
         parameters: its range and cone.
-        share: of its range that is left, as of a dirty window, 0..1.
+        share: remaining share of the range, such as behind a dirty window, 0..1.
     """
     range_m, half_rad = parameters.range_m * share, radians(parameters.cone_deg) / 2
     found = []
@@ -108,7 +108,7 @@ def receive(
     return tuple(reception for _, _, reception in sorted(found, key=lambda item: item[:2]))
 
 
-# The physical side of a reader: where it is, what disturbs it, and what breaks.
+# Physical inputs and outputs of a reader: place, disturbances and faults.
 
 _FAR_M: Final = 10_000
 _MOST_MARKERS: Final = 1_000
@@ -121,7 +121,7 @@ INPUTS: Final = (
     InputSignal("heading_rad", "where it looks", low=-1e6, high=1e6, unit="rad", real=True),
     InputSignal("dark_marker", "the marker without supply, from 1; 0 if none", high=_MOST_MARKERS),
     InputSignal("dirty_window", "dust: half of the range is left", SignalType.FAULT),
-    InputSignal("sunlight", "light that leaves nothing to be heard", SignalType.FAULT),
+    InputSignal("sunlight", "light that drowns all markers", SignalType.FAULT),
     InputSignal("power_cut", "the supply is off, and everything is forgotten", SignalType.FAULT),
 )
 
@@ -129,20 +129,20 @@ _GROUPS: Final = {"pose": ("x_m", "y_m", "heading_rad")}
 
 OUTPUTS: Final = (
     OutputSignal("listening", "1 while it listens"),
-    OutputSignal("in_view", "markers that it would hear now"),
-    OutputSignal("received", "markers heard in the latest round"),
+    OutputSignal("in_view", "markers in range now"),
+    OutputSignal("received", "markers received in the latest round"),
     OutputSignal("rounds", "rounds since power-up"),
-    OutputSignal("refused", "lines that were no command, since power-up"),
+    OutputSignal("refused", "lines that are not commands, since power-up"),
 )
 
 
 _TICK_US: Final = 1_000
 _BOOT_US: Final = 200_000
-"""From power-up to the first line; what comes before is lost."""
+"""Time from power-up to the first line; bytes received before are lost."""
 
 _ROUND_US: Final = 100_000
 MOST_RECEIVED: Final = 6
-"""Markers of a round: as many lines as 38400 bit/s carry in it."""
+"""Largest number of markers in a round: as many lines as fit at 38400 bit/s."""
 
 _VERSION: Final = 1
 _DIRTY_SHARE: Final = 0.5
@@ -152,20 +152,20 @@ class UcodeReader(Copyable):
     """A reader; a `Device[bytes]`.
 
     It listens in rounds of 100 ms. At the end of each it sends a line for each marker that it
-    heard, the nearest first and six at most, then one that ends the round. What it is
-    and where it looks is that of the end of the round.
+    received, the nearest first and six at most, then one that ends the round. Its pose at the end
+    of the round applies.
 
-    The report (3.4.43.3 (4), Fig. 123) has the reader and no protocol of it: the lines and all
+    The report (3.4.43.3 (4), Fig. 123) shows the reader without a protocol: the lines and all
     numbers are ours. Not emulated: walls, markers that disturb one another, bits of the light.
 
     Args:
-        parameters: what it is like.
-        markers: those of its environment, 1000 at most.
+        parameters: of the reader.
+        markers: in its environment, 1000 at most.
 
     Attributes:
-        type_name: what its device type is called, for traces.
-        inputs: what the world does to it, see `INPUTS`.
-        markers: they may be changed; the next round hears them.
+        type_name: name of its device type, for traces.
+        inputs: its physical inputs, see `INPUTS`.
+        markers: they may be changed; the next round uses them.
     """
 
     type_name: ClassVar[str] = "ucode-reader"
@@ -181,27 +181,27 @@ class UcodeReader(Copyable):
 
     @property
     def tick_us(self) -> int:
-        """How finely it keeps time."""
+        """Resolution of its time."""
         return _TICK_US
 
     @property
     def due_us(self) -> int:
-        """When anything would happen without input."""
+        """The time of the next event without input."""
         return 0 if self._restarted or self._switched else self._due_us
 
     @property
     def outputs(self) -> Mapping[str, OutputSignal]:
-        """What `read` knows."""
+        """The outputs that `read` accepts."""
         return _OUTPUTS
 
     @property
     def pose(self) -> Pose:
-        """Where it is."""
+        """Pose of the reader."""
         return Pose(*(self.inputs[name] for name in _GROUPS["pose"]))
 
     @property
     def in_view(self) -> tuple[Reception, ...]:
-        """What it would hear now."""
+        """The markers in range now."""
         if not self._on or self.inputs["sunlight"]:
             return ()
         dark = self.inputs["dark_marker"]
@@ -210,11 +210,11 @@ class UcodeReader(Copyable):
         return receive(senders, self.pose, self.parameters, share)
 
     def reset(self) -> None:
-        """Begin as after power-up."""
+        """Restore the state after power-up."""
         self._restarted = True
 
     def read(self, name: str, /) -> int | float:
-        """Look at an output.
+        """Return the present value of an output.
 
         Args:
             name: one of `outputs`.
@@ -223,12 +223,12 @@ class UcodeReader(Copyable):
             Its value.
 
         Raises:
-            KeyError: there is none of that name.
+            KeyError: there is no output of that name.
         """
         return _READ[name](self)
 
     def tick(self, now_us: int, rx: bytes, /) -> bytes:
-        """Take what arrived, and go on to now.
+        """Receive the bytes that arrived, and advance to now.
 
         Args:
             now_us: time since the rig was started, a multiple of `tick_us`.
@@ -270,7 +270,7 @@ class UcodeReader(Copyable):
         self._lines.clear()
 
     def _begin(self, now_us: int) -> bytes:
-        """Booted: tell who it is, and listen."""
+        """After booting, send the identification and listen."""
         self._booting = False
         self._listen(now_us)
         return self._identification()

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import pytest
@@ -86,6 +86,21 @@ PHRASES = re.compile(
 )
 """What reads as translated: say who does what, in the verb that the field has for it."""
 
+ODD = re.compile(
+    r"""(?:
+    ^(?:Say|Know|Hear|Put\ up\ with|Give\ (?:the|its|all)|Let\ (?:it|go|pass)|Be\ (?:as|told))\b
+    | \bsays?\ whether\b | \bas\ people\ \w+ | \bwhat\ (?:it\ is\ like|cannot\ be)\b
+    | \bput\ up\ with\b | \bso\ many\b
+    )""",
+    re.VERBOSE,
+)
+"""The same in docstrings and messages, beside `PHRASES`."""
+
+CLEAN = ("device", "wire", "src/tickrig")
+"""Folders whose docstrings, help and messages have no such phrases."""
+
+GENERATED = {"wire/rtc_types/rtc.py", "wire/rtc_types/iis.py"}
+
 NOT_YET = {
     *("CHANGELOG.md", "docs/performance.md", "docs/architecture.md", "docs/howto/upgrading.md"),
     "docs/reference/canopen/conformance.md",  # written by tools/conform-stacks
@@ -112,3 +127,38 @@ def test_phrases_are_found() -> None:
 def test_no_page_has_a_retired_phrase(page: Path) -> None:
     if str(page.relative_to(ROOT)) not in NOT_YET:
         assert phrases(page.read_text("utf-8")) == []
+
+
+def texts(module: Path) -> Iterator[tuple[int, str]]:
+    """Yield docstrings, help and messages of a module, without code; each with its line."""
+    for node in ast.walk(ast.parse(module.read_text("utf-8"))):
+        match node:
+            case ast.Constant(value=str(text)) if " " in text.strip():
+                text = re.sub(r"^ *(?:>>>|\.\.\.) .*$", "", text, flags=re.MULTILINE)
+                yield node.lineno, re.sub(r"^ *\w+: ", "", text, flags=re.MULTILINE)
+
+
+def test_docstrings_and_messages_are_texts(tmp_path: Path) -> None:
+    module = tmp_path / "a.py"
+    module.write_text('"""Say whether.\n\nArgs:\n    told: who.\n"""\nf"{a} is none of {b}"\n')
+    assert [text.split() for _, text in texts(module)] == [
+        ["Say", "whether.", "Args:", "who."],
+        ["is", "none", "of"],
+    ]
+
+
+def modules_of(folders: Iterable[str]) -> list[Path]:
+    found = {path for folder in folders for path in (ROOT / folder).rglob("*.py")}
+    found |= {ROOT / folder for folder in folders if folder.endswith(".py")}
+    return sorted(path for path in found if str(path.relative_to(ROOT)) not in GENERATED)
+
+
+@pytest.mark.parametrize("folder", CLEAN)
+def test_no_docstring_or_message_has_a_retired_phrase(folder: str) -> None:
+    found = [
+        f"{module.relative_to(ROOT)}:{line}: {phrase}"
+        for module in modules_of([folder])
+        for line, text in texts(module)
+        for phrase in (*phrases(text), *ODD.findall(text.strip()))
+    ]
+    assert found == []

@@ -1,1 +1,1 @@
-"""What is on the wire, and nothing else: bytes to values and back."""
+"""Codecs: conversion between bytes on the wire and values."""

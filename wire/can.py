@@ -1,4 +1,4 @@
-r"""Classic CAN frames and their candump notation.
+r"""CAN and CAN FD frames: candump notation, length on the bus, error frames, logs.
 
 >>> str(CanFrame.parse("705#7F")), str(CanFrame.parse("705#R1"))
 ('705#7F', '705#R1')
@@ -68,7 +68,7 @@ _NOTATION: Final = re.compile(
 
 
 class CanFrame(NamedTuple):
-    """A data or remote frame. Not checked: it is made millions of times; see `checked`.
+    """A data or remote frame. It is not validated, for speed; see `checked`.
 
     Attributes:
         can_id: 0x000..0x7FF, extended 0x0000_0000..0x1FFF_FFFF.
@@ -94,14 +94,14 @@ class CanFrame(NamedTuple):
         """Read candump's compact notation.
 
         Args:
-            text: `ID#DATA`, or `ID#R` with an optional length; an ID of 8 digits is a 29-bit one.
+            text: `ID#DATA`, or `ID#R` with an optional length; an ID with 8 digits is 29-bit.
 
         Returns:
             The frame.
 
         Raises:
             FramingError: not a frame in this notation.
-            FieldError: an identifier or length that CAN does not have.
+            FieldError: an identifier or length out of range.
         """
         match = _NOTATION.fullmatch(text.strip())
         if match is None:
@@ -123,7 +123,7 @@ class CanFrame(NamedTuple):
             The frame itself.
 
         Raises:
-            FieldError: it cannot be on a CAN bus.
+            FieldError: it is not a valid CAN frame.
         """
         most = EXTENDED_MAX if self.extended else STANDARD_MAX
         if not 0 <= self.can_id <= most:
@@ -143,7 +143,7 @@ class CanFrame(NamedTuple):
 
 
 def data_frame(can_id: int, data: bytes) -> CanFrame:
-    """Return `CanFrame(can_id, data)`, in a third of the time: 11-bit, not checked."""
+    """Return `CanFrame(can_id, data)` in a third of the time: 11-bit, not validated."""
     return _new(CanFrame, (can_id, data, False, False, 0))
 
 
@@ -202,14 +202,14 @@ _MAX_STUFFED: Final = 29
 """Of the 118 bits from start of frame to the end of the CRC: all but the first of each fifth."""
 
 _STUFFED_BITS: Final = 256
-"""Place in a row of the number of stuff bits so far; before it stand the rows that follow."""
+"""Position in a row of the number of stuff bits so far; the following rows are before it."""
 
 KEPT_HEADS: Final = 4_096
 
 _Row = list[Any]
 
 _heads: Final[dict[int, tuple[int, _Row, int]]] = {}
-"""What was begun before: a plain table, for `lru_cache` keeps an order of use that costs 1 %."""
+"""Cache of frame heads: a plain dict, because the order that `lru_cache` keeps costs 1 %."""
 
 
 def frame_bits(frame: CanFrame) -> int:
@@ -227,7 +227,7 @@ def frame_bits(frame: CanFrame) -> int:
 
 
 def _head(key: int) -> tuple[int, _Row, int]:
-    """Begin a frame: its bits without stuff bits, and row and CRC behind the DLC."""
+    """Return the bits of a frame without stuff bits, and row and CRC after the DLC."""
     can_id, extended, remote, length = key >> 6, key >> 5 & 1, key >> 4 & 1, key & 0xF
     control = remote << 6 | length
     if extended:
@@ -246,11 +246,11 @@ def _head(key: int) -> tuple[int, _Row, int]:
 
 @lru_cache(1)
 def _rows() -> list[_Row]:
-    """Lay the automaton out, so that bytes are followed without a step of Python for each.
+    """Build the table of the automaton, so that bytes need no Python step each.
 
     Returns:
-        By the state in which a frame begins: by each byte what follows it, and so on; at
-        `_STUFFED_BITS` how many bits were stuffed on the way there.
+        The rows by initial state: by each byte the next row; at `_STUFFED_BITS` the number of bits
+        stuffed so far.
     """
     steps = [stuffed * _STATES + (state >> 8) for stuffed, state in zip(STUFFED, NEXT, strict=True)]
     rows: list[_Row] = [[] for _ in range(_STATES * (_MAX_STUFFED + 1) + max(steps))]
@@ -274,7 +274,7 @@ def crc16(stream: bytes) -> int:
 
 
 def _feed(state: int, byte: int) -> tuple[int, int]:
-    """Return the state after eight more bits, and how many bits were stuffed."""
+    """Return the state after eight more bits, and the number of stuffed bits."""
     fill = _FILL_BITS.get(state, 0)
     last, run = (None, 0) if fill else (state >> 2, (state & 3) + 1)
     stuffed = 0
@@ -289,14 +289,14 @@ def _feed(state: int, byte: int) -> tuple[int, int]:
 
 _FED: Final = tuple(_feed(state, byte) for state in range(_STATES) for byte in range(256))
 NEXT: Final = tuple(state << 8 for state, _ in _FED)
-"""By state << 8 | byte: the state after it << 8."""
+"""Next state << 8, by state << 8 | byte."""
 STUFFED: Final = tuple(stuffed for _, stuffed in _FED)
-"""By state << 8 | byte: how many bits are stuffed."""
+"""Number of stuffed bits, by state << 8 | byte."""
 
 
 MAX_FD_BYTES: Final = 64
 FD_LENGTHS: Final = (*range(9), 12, 16, 20, 24, 32, 48, 64)
-"""Bytes that a frame can have, by data length code (ISO 11898-1)."""
+"""Number of data bytes by data length code (ISO 11898-1)."""
 
 BRS: Final = 0x1
 ESI: Final = 0x2
@@ -308,7 +308,7 @@ _FD_NOTATION: Final = re.compile(
 
 
 class FdFrame(NamedTuple):
-    """A CAN FD frame; it is always a data frame. Not checked, see `checked`.
+    """A CAN FD frame; it is always a data frame. It is not validated; see `checked`.
 
     Attributes:
         can_id: 0x000..0x7FF, extended 0x0000_0000..0x1FFF_FFFF.
@@ -324,17 +324,17 @@ class FdFrame(NamedTuple):
 
     @property
     def brs(self) -> bool:
-        """Its data are sent at the data bit rate (bit rate switch)."""
+        """Whether its data are sent at the data bit rate (bit rate switch)."""
         return bool(self.flags & BRS)
 
     @property
     def esi(self) -> bool:
-        """Its sender was error passive (error state indicator)."""
+        """Whether its sender was error passive (error state indicator)."""
         return bool(self.flags & ESI)
 
     @property
     def remote(self) -> bool:
-        """No: CAN FD has no remote frames."""
+        """Always False: CAN FD has no remote frames."""
         return False
 
     @property
@@ -347,15 +347,15 @@ class FdFrame(NamedTuple):
         """Read candump's compact notation.
 
         Args:
-            text: `ID##FDATA`: F is one hex digit, 1 BRS and 2 ESI; other flags are passed over.
-                An ID of 8 digits is a 29-bit one. Data are filled up as `checked` says.
+            text: `ID##FDATA`: F is one hex digit, 1 BRS and 2 ESI; other flags are ignored. An ID
+                with 8 digits is 29-bit. Data are padded as in `checked`.
 
         Returns:
             The frame.
 
         Raises:
             FramingError: not a frame in this notation.
-            FieldError: an identifier or length that CAN FD does not have.
+            FieldError: an identifier or length out of range.
         """
         match = _FD_NOTATION.fullmatch(text.strip())
         if match is None:
@@ -373,11 +373,11 @@ class FdFrame(NamedTuple):
         """Check the frame.
 
         Returns:
-            The frame; data of a length that CAN FD does not have are filled up with zeros to the
-            next one, as a controller sends them.
+            The frame; data of an invalid length are padded with zeros to the next valid one, as a
+            controller does.
 
         Raises:
-            FieldError: it cannot be on a CAN FD bus.
+            FieldError: it is not a valid CAN FD frame.
         """
         most = EXTENDED_MAX if self.extended else STANDARD_MAX
         if not 0 <= self.can_id <= most:
@@ -398,12 +398,12 @@ class FdFrame(NamedTuple):
 class FdBits(NamedTuple):
     """The length of a frame on the bus.
 
-    The rate is taken to switch behind the bit BRS and before the CRC delimiter; it does at the
-    sample points of these two, which differ from bus to bus.
+    The rate is assumed to switch after the bit BRS and before the CRC delimiter; in reality it
+    switches at the sample points of these two, which differ from bus to bus.
 
     Attributes:
         nominal: bits at the nominal bit rate, with the interframe space.
-        fast: bits at the data bit rate; none in a frame without BRS.
+        fast: bits at the data bit rate; 0 in a frame without BRS.
     """
 
     nominal: int
@@ -413,7 +413,7 @@ class FdBits(NamedTuple):
 # Stuff count with its parity (4), CRC 17 or 21, and a fixed stuff bit before each four bits
 # of these.
 _CRC_FIELD: Final = {False: 4 + 17 + 6, True: 4 + 21 + 7}
-"""Stuff count, CRC and fixed stuff bits: of no more than 16 bytes, and of more."""
+"""Bits of stuff count, CRC and fixed stuff bits: for up to 16 bytes, and for more."""
 
 _TAIL: Final = 1 + 2 + 7 + INTERFRAME_BITS  # CRC delimiter, ACK, end of frame
 _KEPT: Final = 1_024
@@ -422,8 +422,8 @@ _KEPT: Final = 1_024
 def fd_bits(frame: FdFrame) -> FdBits:
     """Return the bits of a frame with stuff bits and interframe space (ISO 11898-1).
 
-    From start of frame to the data bits are stuffed as in classic CAN. The CRC field has stuff
-    bits at fixed places; the first of them stands for one that the last data would want.
+    From start of frame to the data bits are stuffed as in classic CAN. The CRC field has stuff bits
+    at fixed places; the first replaces one that the last data bits would need.
     """
     data, length = frame.data, frame.dlc
     nominal, fast, state = _fd_head(frame.can_id, frame.extended, frame.flags, length)
@@ -440,7 +440,7 @@ def fd_bits(frame: FdFrame) -> FdBits:
 
 @lru_cache(_KEPT)
 def _fd_head(can_id: int, extended: bool, flags: int, dlc: int) -> tuple[int, int, int]:
-    """Return the bits at each rate but those of data and CRC, and the state before the data."""
+    """Return the bits at each rate without data and CRC, and the state before the data."""
     brs, esi = flags & BRS, flags >> 1 & 1
     if extended:
         # SOF, 11 bits, SRR IDE, 18 bits, RRS FDF r0, BRS; below: SOF, 11 bits, RRS IDE FDF
@@ -454,7 +454,7 @@ def _fd_head(can_id: int, extended: bool, flags: int, dlc: int) -> tuple[int, in
 
 
 def _stuff(last: int, run: int, stream: str) -> tuple[int, int, int]:
-    """Return value and run of the last bit, and how many bits were stuffed."""
+    """Return value and run of the last bit, and the number of stuffed bits."""
     stuffed = 0
     for bit in map(int, stream):
         run = run + 1 if bit == last else 1
@@ -465,11 +465,11 @@ def _stuff(last: int, run: int, stream: str) -> tuple[int, int, int]:
 
 
 def parse_sent(text: str) -> CanFrame | FdFrame:
-    """Read a frame in candump's compact notation, of CAN FD where it has `##`.
+    """Read a frame in candump's compact notation; `##` marks CAN FD.
 
     Raises:
         FramingError: not a frame in this notation.
-        FieldError: an identifier or length that there is not.
+        FieldError: an identifier or length out of range.
     """
     return FdFrame.parse(text) if "##" in text else CanFrame.parse(text)
 
@@ -494,8 +494,8 @@ class ErrorFrame(NamedTuple):
     """An error frame of SocketCAN (linux/can/error.h).
 
     Attributes:
-        error_class: what failed, a set of CAN_ERR_ bits.
-        data: eight bytes that say more.
+        error_class: class of the error, a set of CAN_ERR_ bits.
+        data: eight bytes with details.
     """
 
     error_class: int
@@ -503,7 +503,7 @@ class ErrorFrame(NamedTuple):
 
     @classmethod
     def parse(cls, text: str) -> ErrorFrame:
-        """Read candump's notation; FramingError if it is no error frame."""
+        """Read candump's notation; FramingError if it is not an error frame."""
         match = _ERROR_NOTATION.fullmatch(text)
         if match is None:
             raise FramingError(f"{text!r} is not an error frame like {NO_ACK}")
@@ -515,10 +515,10 @@ class ErrorFrame(NamedTuple):
 
 
 NO_ACK: Final = ErrorFrame(0x20)
-"""Nobody acknowledged a frame: CAN_ERR_ACK."""
+"""No node acknowledged a frame: CAN_ERR_ACK."""
 
 BIT_ERROR: Final = ErrorFrame(0x88, bytes((0, 0, 1, 0, 0, 0, 0, 0)))
-"""A bit on the bus was not the one that was sent: CAN_ERR_PROT and BUSERROR, PROT_BIT."""
+"""A bit on the bus differed from the sent one: CAN_ERR_PROT and BUSERROR, PROT_BIT."""
 
 
 class ErrorClass(IntFlag):
@@ -604,7 +604,7 @@ _DETAILS: Final = {
 
 
 def describe_error_frame(frame: ErrorFrame) -> str:
-    """Return what an error frame says, in words.
+    """Return the meaning of an error frame as text.
 
     >>> describe_error_frame(ErrorFrame(0x240)), describe_error_frame(ErrorFrame(0))
     ('bus-off', 'unknown')
@@ -628,16 +628,16 @@ _ERROR: Final = re.compile(r"[23][0-9A-Fa-f]{7}#.*")  # bit 29: no identifier ha
 
 
 class CandumpError(ValueError):
-    """A line that is none of a CAN log."""
+    """A line that is not a line of a CAN log."""
 
 
 class LogLine(NamedTuple):
     """One frame or error frame of a log.
 
     Attributes:
-        at_us: when it had ended.
+        at_us: end of the frame.
         channel: name of the bus, without blanks.
-        received: what was on the bus.
+        received: the frame.
     """
 
     at_us: int
@@ -651,7 +651,7 @@ class LogLine(NamedTuple):
 
 
 def parse_line(line: str, number: int = 1) -> LogLine:
-    """Read one line; CandumpError if it is none."""
+    """Read one line; CandumpError if it is invalid."""
     match = _LINE.fullmatch(line.rstrip())
     if match is None:
         raise CandumpError(
@@ -670,7 +670,7 @@ def parse_log(text: str) -> tuple[LogLine, ...]:
     """Read a log; empty lines are skipped.
 
     Raises:
-        CandumpError: a line that is none.
+        CandumpError: an invalid line.
     """
     lines = enumerate(text.splitlines(), 1)
     return tuple(parse_line(line, number) for number, line in lines if line.strip())

@@ -1,7 +1,7 @@
-"""What a codec says about bytes it cannot read.
+"""Errors of codecs for bytes that they cannot read.
 
 WireError (ValueError)
- +-- FramingError     no message here: bad name, length or terminator
+ +-- FramingError not a message: bad name, length or terminator
  +-- ChecksumError    a whole message, but its check does not match
  +-- FieldError       a sound message with a field out of range
 """
@@ -18,14 +18,14 @@ class WireError(ValueError):
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class FramingError(WireError):
-    """No message here: bad name, length or terminator."""
+    """Not a message: bad name, length or terminator."""
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class ChecksumError(WireError):
-    """A whole message, but its check does not match."""
+    """A complete message with a wrong checksum."""
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class FieldError(WireError):
-    """A sound message with a field out of range."""
+    """A valid message with a field out of range."""

@@ -1,4 +1,4 @@
-"""Instants: points in time as whole microseconds, counted from when their clock started."""
+"""Instants: points in time as whole microseconds since the start of a clock."""
 
 from __future__ import annotations
 
@@ -7,5 +7,5 @@ from typing import Final
 NEVER: Final = 2**62 - 1
 """A time in microseconds that never comes: later than any other.
 
-It is the largest int that compiled code keeps without an object (drives: 5 % of their time).
+It is the largest int that compiled code stores without an object (5 % faster drives).
 """

@@ -1,4 +1,4 @@
-"""Cut a byte stream into LF-terminated lines."""
+"""Split a byte stream into LF-terminated lines."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from tickrig._compiled import mypyc_attr
 
 @mypyc_attr(serializable=True)
 class LineSplitter:
-    r"""Collects bytes and gives whole lines; chunking makes no difference.
+    r"""Collects bytes into whole lines, however they are split into chunks.
 
     Args:
-        max_bytes: a line that grows longer is given out in pieces, so that
-            noise without LF cannot fill the memory.
+        max_bytes: a longer line is returned in pieces, so that noise without LF cannot fill the
+            memory.
 
     >>> splitter = LineSplitter()
     >>> splitter.push(b"OK:be"), splitter.push(b"ep\r\nEV:")
@@ -23,13 +23,13 @@ class LineSplitter:
         self._max_bytes = max_bytes
 
     def push(self, data: bytes) -> list[bytes]:
-        """Take bytes in, and give whole lines out.
+        """Add received bytes and return the completed lines.
 
         Args:
-            data: what came.
+            data: the received bytes.
 
         Returns:
-            The lines that have ended, without LF and one CR before it.
+            The completed lines, without LF and one CR before it.
         """
         *lines, tail = (self._tail + data).split(b"\n")
         out = []
@@ -44,5 +44,5 @@ class LineSplitter:
         return [line[at : at + size] for at in range(0, max(1, len(line)), size)]
 
     def clear(self) -> None:
-        """Forget a line that has only begun."""
+        """Discard an incomplete line."""
         self._tail = b""

@@ -9,7 +9,7 @@ Frames of Modbus RTU: an address, a message, and a CRC with its low byte first.
 >>> f"{_crc16(b'123456789'):04X}"
 '4B37'
 
-Requests on holding registers, and what answers them.
+Requests on holding registers, and their responses.
 
 Sources: Modbus Application Protocol 1.1b3, functions 03, 06, 10h and 17h, and
 MODBUS Exception Responses.
@@ -37,9 +37,9 @@ _crc16: Final[Callable[[bytes], int]] = crcmod.mkCrcFun(0x1_8005, 0xFFFF, rev=Tr
 MAX_FRAME_BYTES: Final = 256
 _MIN_FRAME_BYTES: Final = 4
 BROADCAST: Final = 0
-"""Address of all slaves; none of them answers."""
+"""Broadcast address; no slave answers."""
 ADDRESSES: Final = range(1, 248)
-"""Addresses of single slaves."""
+"""Addresses of individual slaves."""
 
 SHORTEST_SILENCE_US: Final = 1_750
 """Silence between frames above 19200 bit/s (Modbus over Serial Line 1.02, RTU framing)."""
@@ -67,7 +67,7 @@ def parse_frame(frame: bytes) -> tuple[int, bytes]:
     """Read a frame; return its address and its message.
 
     Raises:
-        FramingError: a length that no frame has.
+        FramingError: an invalid length.
         ChecksumError: a wrong CRC.
     """
     if not _MIN_FRAME_BYTES <= len(frame) <= MAX_FRAME_BYTES:
@@ -86,14 +86,14 @@ ERROR_BIT: Final = 0x80
 MAX_READ: Final = 125
 MAX_WRITE: Final = 123
 MAX_WRITE_WHILE_READ: Final = 121
-"""Most registers that a function carries."""
+"""Largest number of registers by function."""
 
 _PAIR: Final = struct.Struct(">HH")
 _WRITE_HEAD: Final = struct.Struct(">HHB")
 
 
 class ExceptionCode(IntEnum):
-    """Why a slave did not do what it was asked for."""
+    """Exception codes: why a slave refused a request."""
 
     ILLEGAL_FUNCTION = 1
     ILLEGAL_DATA_ADDRESS = 2
@@ -112,12 +112,12 @@ class Refusal(WireError):  # noqa: N818 - what the slave does
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """A request; what it writes is written before it reads.
+    """A request; writes happen before reads.
 
     Attributes:
         function: its code.
-        read: first register and number of registers to be read.
-        write: first register and values to be written.
+        read: first register and number of registers to read.
+        write: first register and values to write.
     """
 
     function: int
@@ -126,7 +126,7 @@ class Request:
 
 
 def encode_request(request: Request) -> bytes:
-    """Write a request as its function code tells."""
+    """Write a request in the format of its function code."""
     out = bytes([request.function])
     if request.read is not None:
         out += _PAIR.pack(*request.read)
@@ -144,7 +144,7 @@ def parse_request(message: bytes) -> Request:
     """Read a request.
 
     Raises:
-        Refusal: a function that is not here, or numbers that it cannot have.
+        Refusal: an unknown function, or numbers out of range.
     """
     function, data = message[0], message[1:]
     if function == READ:
@@ -161,7 +161,7 @@ def parse_request(message: bytes) -> Request:
 
 
 def encode_response(request: Request, values: Sequence[int] = ()) -> bytes:
-    """Write the answer to a request that was done; `values` are those that were read."""
+    """Write the response to a successful request; `values` are the read values."""
     out = bytes([request.function])
     if request.read is not None:
         return out + bytes([2 * len(values)]) + _pack_registers(values)
@@ -173,7 +173,7 @@ def encode_response(request: Request, values: Sequence[int] = ()) -> bytes:
 
 
 def encode_exception(function: int, code: ExceptionCode) -> bytes:
-    """Write the answer to a request that was not done."""
+    """Write the response to a refused request."""
     return bytes([function | ERROR_BIT, code])
 
 
@@ -198,8 +198,8 @@ def _write(data: bytes, most: int) -> tuple[int, tuple[int, ...]]:
     if len(data) < _WRITE_HEAD.size:
         raise Refusal(ExceptionCode.ILLEGAL_DATA_VALUE)
     first, count, size = _WRITE_HEAD.unpack_from(data)
-    # A wrong byte count is an illegal value (03), whatever the registers are: the standard
-    # judges the numbers of a request before its addresses.
+    # A wrong byte count is an illegal value (03), whatever the registers are: the standard checks
+    # the numbers of a request before its addresses.
     if not size == 2 * count == len(data) - _WRITE_HEAD.size:
         raise Refusal(ExceptionCode.ILLEGAL_DATA_VALUE)
     _checked(first, count, most)
@@ -215,7 +215,7 @@ def _checked(first: int, count: int, most: int) -> int:
     return count
 
 
-# Registers of the RH3 base's driver (rh3-control, drive protocol: register map A).
+# Registers of the driver of the RH3 base (rh3-control, drive protocol: register map A).
 #
 # Numbers of 32 bits take two registers, the high half first.
 
@@ -260,7 +260,7 @@ class Address(IntEnum):
 
 
 class Mode(IntEnum):
-    """What the targets mean (0010h)."""
+    """Meaning of the targets (0010h)."""
 
     FREE = 0
     VELOCITY = 1
@@ -268,7 +268,7 @@ class Mode(IntEnum):
 
 
 class Command(IntEnum):
-    """What a master tells the driver (0011h)."""
+    """Commands of a master to the driver (0011h)."""
 
     NONE = 0
     ENABLE = 1
@@ -280,7 +280,7 @@ class Command(IntEnum):
 
 
 class Status(IntFlag):
-    """What the driver says of itself (0200h); bits 5 and 6 are ours."""
+    """Status of the driver (0200h); bits 5 and 6 are ours."""
 
     ENABLED = 0x01
     MOVING = 0x02
@@ -292,7 +292,7 @@ class Status(IntFlag):
 
 
 class Fault(IntFlag):
-    """Why a wheel has no power (0201h, 0202h); ours, the proposal names none."""
+    """Reason for switching a wheel off (0201h, 0202h); ours, the proposal defines none."""
 
     OVER_CURRENT = 0x01
     ENCODER = 0x04
@@ -301,7 +301,7 @@ class Fault(IntFlag):
 
 
 class Report(NamedTuple):
-    """What a master reads each period: 12 registers from `Address.STATUS` on.
+    """Registers that a master reads each period: 12 from `Address.STATUS` on.
 
     Attributes:
         status: of the driver.
@@ -328,7 +328,7 @@ class Report(NamedTuple):
 
 
 REPORT: Final = (Address.STATUS.value, 12)
-"""First register and number of them."""
+"""First register and number of registers."""
 
 
 def wide(value: int) -> tuple[int, int]:
@@ -341,7 +341,7 @@ def wide(value: int) -> tuple[int, int]:
 
 
 def _signed(high: int, low: int) -> int:
-    """Return the number that two registers make.
+    """Return the number in two registers.
 
     >>> _signed(65_535, 65_535), _signed(1, 5_998)
     (-1, 71534)

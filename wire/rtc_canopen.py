@@ -46,20 +46,20 @@ from tickrig.wire.errors import FieldError
 T = TypeVar("T")
 
 MAX_TEXT: Final = 255
-"""Characters that a text port holds; ours."""
+"""Largest number of characters of a text port; ours."""
 
 
 @dataclass(frozen=True, slots=True)
 class CanopenPortType(Generic[T]):
-    """A data type of a port; each element of a value is an object of the dictionary.
+    """A data type of a port; each element of a value is an object in the dictionary.
 
     Attributes:
         name: the RTC name of Table 4.
         data_type: the CANopen data type of an element.
         kind: the Python type of an element.
         length: number of elements.
-        many: a value is a tuple of its elements, always as many; else it is the one element.
-        width: bits of an element where its data type leaves them open.
+        many: True if a value is a tuple of `length` elements, False if it is a single element.
+        width: bits of an element if its data type does not define them.
 
     Raises:
         ValueError: a sequence without elements.
@@ -78,19 +78,19 @@ class CanopenPortType(Generic[T]):
             raise ValueError(f"a sequence of {self.length} elements, at least 1 is needed")
 
     def sequence(self, length: int) -> CanopenPortType[tuple[T, ...]]:
-        """Return the type of so many elements together (DECISION K3)."""
+        """Return the sequence type with this number of elements (DECISION K3)."""
         return CanopenPortType(
             self.name, self.data_type, self.kind, length, many=True, width=self.width
         )
 
     @property
     def element_bits(self) -> int:
-        """Bits of an element, as Table 4 has them; 0 for a text."""
+        """Bits of an element in Table 4; 0 for a text."""
         return self.width or self.data_type.bits
 
     @property
     def bits(self) -> int:
-        """Bits of a value in a PDO; 0 for a text, which fits none."""
+        """Bits of a value in a PDO; 0 for a text, which does not fit into a PDO."""
         return self.element_bits * self.length
 
     @property
@@ -106,7 +106,7 @@ class CanopenPortType(Generic[T]):
         return bytes(self.max_bytes if self.element_bits else 0)
 
     def encode(self, value: T) -> tuple[bytes, ...]:
-        """Return the bytes of each element; FieldError if the type has no such value."""
+        """Return the bytes of each element; FieldError if the value is not of this type."""
         items: Any = value if self.many else (value,)
         if len(items) != self.length:
             raise FieldError(f"{len(items)} elements of {self.name}, {self.length} are needed")
@@ -152,39 +152,39 @@ PORT_TYPES: Final[Mapping[str, CanopenPortType[Any]]] = MappingProxyType(
         )
     }
 )
-"""Table 4 by RTC name, but for Integer; LongLong is ours (DECISION K5)."""
+"""Table 4 by RTC name, without Integer; LongLong is ours (DECISION K5)."""
 
 INTEGER: Final = "Integer"
 _INTEGERS: Final = {8: DataType.INTEGER8, 16: DataType.INTEGER16, 32: DataType.INTEGER32}
 
 
 def integer(word_bits: int) -> CanopenPortType[int]:
-    """Return Integer on a device whose words have so many bits (Table 4, note 1).
+    """Return Integer for a device with this word size (Table 4, note 1).
 
     Raises:
-        ValueError: not 8, 16 or 32.
+        ValueError: the word size is not 8, 16 or 32.
     """
     if word_bits not in _INTEGERS:
         raise ValueError(f"a word of {word_bits} bits; Integer has 8, 16 or 32")
     return CanopenPortType(INTEGER, _INTEGERS[word_bits], int)
 
 
-# The profile of a DeviceRTC, and where its ports are in the dictionary (DECISION K2, K3, K17).
+# The profile of a DeviceRTC, and the place of its ports in the dictionary (DECISION K2, K3, K17).
 
 FIRST_PORT: Final = 0x2100
 """Index of the first port; the others follow in order of declaration."""
 
 _PORT_OBJECTS: Final = range(FIRST_PORT, 0x6000)
-"""Up to the end of the manufacturer's objects (CiA 301)."""
+"""Indices of ports, up to the end of the manufacturer-specific objects (CiA 301)."""
 
 _MOST_PDOS: Final = 512
-"""Each way (CiA 301: 1400h to 15FFh, 1800h to 19FFh)."""
+"""Largest number of PDOs in each direction (CiA 301: 1400h to 15FFh, 1800h to 19FFh)."""
 
 MOST_ELEMENTS: Final = 254
-"""Sub-indices of an array (CiA 301)."""
+"""Largest number of elements of an array (CiA 301)."""
 
 _PREDEFINED_PDOS: Final = 4
-"""Each way: the pre-defined connection set has COB-IDs for so many."""
+"""PDOs in each direction with a COB-ID of the pre-defined connection set."""
 
 _CAN_IDS: Final = range(0x181, 0x6E0)
 
@@ -195,14 +195,14 @@ _VERSION: Final = re.compile(r"[0-9]{1,4}\.[0-9]{1,4}(\.[0-9]{1,4})?")
 
 
 class PortDirection(Enum):
-    """Way of the data, seen from the device."""
+    """Direction of the data, seen from the device."""
 
     IN = "in"
     OUT = "out"
 
 
 class PortTransport(StrEnum):
-    """What carries the values of a port."""
+    """Transport of the values of a port."""
 
     PDO = "pdo"
     SDO = "sdo"
@@ -210,7 +210,7 @@ class PortTransport(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class CanopenPortProfile:
-    """A port as it is declared.
+    """Declaration of a port.
 
     Attributes:
         name: a letter, then up to 31 letters, digits and underscores.
@@ -228,12 +228,12 @@ class CanopenPortProfile:
 
     @property
     def fits_pdo(self) -> bool:
-        """Whether a PDO has room for a value."""
+        """Whether a value fits into a PDO."""
         return 0 < self.port_type.bits <= MAX_PDO_BITS
 
     @property
     def by_sdo(self) -> bool:
-        """Whether its object is read and written by SDO alone."""
+        """Whether its object is read and written by SDO only."""
         return self.transport is PortTransport.SDO or not self.fits_pdo
 
 
@@ -260,7 +260,7 @@ class PlacedPort:
     def cob_id(self) -> int | None:
         """CAN-ID of RPDO n for an in-port, of TPDO n for an out-port.
 
-        Without the node-ID if `relative`; None if none is named: the PDO is off.
+        It is without the node-ID if `relative`; None without a CAN-ID: the PDO is off.
         """
         if not self.relative:
             return self.profile.cob_id
@@ -269,16 +269,16 @@ class PlacedPort:
 
     @property
     def subs(self) -> tuple[int, ...]:
-        """Sub-indices of its elements: 0 of a variable, 1 and up of an array."""
+        """Sub-indices of its elements: 0 for a variable, 1 and up for an array."""
         length = self.profile.port_type.length
         return (0,) if length == 1 else tuple(range(1, length + 1))
 
     @property
     def mapping(self) -> tuple[int, ...]:
-        """What its PDO carries, as the mapping parameter says it.
+        """The mapping parameter of its PDO.
 
-        Booleans have a bit each (Table 4). Dummy bits fill up the last byte of an RPDO; a TPDO
-        can have none (CiA 301), so its last byte ends with zeros that nothing is mapped to.
+        Each Boolean has one bit (Table 4). Dummy bits pad the last byte of an RPDO; a TPDO cannot
+        have them (CiA 301), so its last byte ends with unmapped zeros.
         """
         kind = self.profile.port_type
         mapped = [MappedObject(self.index, sub, kind.element_bits).encode() for sub in self.subs]
@@ -288,19 +288,19 @@ class PlacedPort:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RtcProfile:
-    """What a component says of itself.
+    """The profile of a component.
 
     Attributes:
-        type_name: as a name of a port; 1008h.
-        version: as 1.0 or 1.0.2; 100Ah, and the revision number 1018h:03.
+        type_name: spelled like a name of a port; 1008h.
+        version: such as 1.0 or 1.0.2; 100Ah, and the revision number 1018h:03.
         vendor: who made it, for the EDS.
-        category: what it is, for people.
+        category: description for people.
         rate_hz: how often `on_execute` runs, 1..1000 Hz.
-        product_code: 1018h:02; unless given, the CRC-32 of the type name.
+        product_code: 1018h:02; by default the CRC-32 of the type name.
         ports: in order of declaration.
 
     Raises:
-        ValueError: one line that says what came and what is allowed.
+        ValueError: an invalid value; one line with the value and the allowed ones.
     """
 
     type_name: str
@@ -312,7 +312,7 @@ class RtcProfile:
     ports: tuple[CanopenPortProfile, ...] = ()
 
     def __post_init__(self) -> None:
-        """Check all of it (DECISION K17)."""
+        """Check the profile (DECISION K17)."""
         _check_name("type_name", self.type_name)
         if not _VERSION.fullmatch(self.version):
             raise ValueError(f"version {self.version!r} is not like 1.0 or 1.0.2")
@@ -337,7 +337,7 @@ class RtcProfile:
         return int(major) << 16 | int(minor)
 
     def placed(self, direction: PortDirection | None = None) -> tuple[PlacedPort, ...]:
-        """Return the ports with their places; those with a PDO of one direction, or all."""
+        """Return the ports with their objects: all, or those with a PDO in one direction."""
         return tuple(
             port
             for port in self._place()
@@ -400,7 +400,7 @@ def _check_name(what: str, name: str) -> None:
 
 
 def _fits_a_line(text: str) -> bool:
-    """Say whether an EDS, C and YAML hold a text as it is."""
+    """Return whether EDS, C and YAML can contain a text unchanged."""
     return text.isascii() and text.isprintable() and text == text.strip() and ";" not in text
 
 
@@ -451,7 +451,7 @@ _ACCESS: Final = {
     (PortDirection.IN, True): RW,
     (PortDirection.OUT, True): RO,
 }
-"""By direction, and whether SDO alone carries the port."""
+"""Access by direction and by SDO-only transport."""
 
 
 def _add_port(table: ObjectTable, port: PlacedPort) -> None:

@@ -1,13 +1,13 @@
 r"""SCIP of scanning range finders: commands, replies, scans, descriptions; 2.0 and 1.1.
 
-Numbers as characters of 6 bits, and the sum behind each line (SCIP 2.0, data encoding).
+Numbers as characters of 6 bits, and the sum after each line (SCIP 2.0, data encoding).
 
 >>> encode_number(1_234, 2), encode_number(5_432, 3), encode_number(16_000_000, 4)
 (b'CB', b'1Dh', b'm2@0')
 >>> with_sum(b"DMIN:20;", b"DMIN:20")
 b'DMIN:20;4'
 
-What a host asks of a sensor: symbol, parameters, and a string that comes back with the reply.
+Commands of a host: symbol, parameters, and a string that the reply repeats.
 
 >>> Command.parse(b"GD0044072501;left")
 Command(symbol='GD', parameters='0044072501', string=';left')
@@ -24,21 +24,21 @@ The data of a scan: time stamp, and distances in blocks of 64 characters, each w
 SCIP 1.1, in which a URG-04LX starts: no sums, statuses of one character, distances of two.
 
 Sources: HokuyoAIST, urg_nz (gearbox) and urg_library as hosts; two recordings of real sensors
-(`tests/golden/scip_urg_04lx.json`). The document itself is not public any more.
+(`tests/golden/scip_urg_04lx.json`). The document itself is no longer public.
 
 >>> encode_reply(b"L1", SCIP1_OK)
 b'L1\n0\n\n'
 >>> encode_reply(b"G38438401", SCIP1_OK, encode_distances([1_234]))
 b'G38438401\n0\nCB\n\n'
 
-What a sensor answers: echo, status, lines of data, an empty line.
+Replies of a sensor: echo, status, lines of data, an empty line.
 
 >>> Reply(b"BM", "00").encode()
 b'BM\n00P\n\n'
 >>> ReplySplitter().push(b"BM\n00P\n\n")
 [Reply(echo=b'BM', status='00', lines=())]
 
-Lines such as `DMIN:20;4`: what VV, PP and II tell of a sensor.
+Lines such as `DMIN:20;4`: the replies to VV, PP and II.
 
 >>> encode_lines({"DMIN": "20"})
 (b'DMIN:20;4',)
@@ -62,7 +62,7 @@ from tickrig.wire.errors import ChecksumError, FieldError, FramingError, WireErr
 
 OK: Final = "00"
 DATA: Final = "99"
-"""Behind the echo of a scan that was asked for with MD or MS."""
+"""Status after the echo of a scan of MD or MS."""
 
 REPEATED: Final = "0B"
 TOO_SHORT: Final = "0C"
@@ -74,7 +74,7 @@ STRING_LETTERS: Final = "0H"
 LASER_OFF: Final = "10"
 LASER_TROUBLE: Final = "50"
 MOTOR_TROUBLE: Final = "51"
-"""50..97 are hardware trouble; which is which is ours."""
+"""50..97 are hardware faults; their assignment is ours."""
 
 
 _BITS: Final = 6
@@ -83,19 +83,19 @@ _ZERO: Final = 0x30
 _CHARACTERS: Final = bytes(range(_ZERO, _ZERO + _MASK + 1))
 
 _BASE64: Final = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/"
-"""Other characters of 6 bits, four for three bytes: a fifth of the time of shifts and masks."""
+"""Base64 characters of 6 bits, four for three bytes: five times as fast as shifts and masks."""
 
 _FROM_BASE64: Final = bytes.maketrans(_BASE64, _CHARACTERS)
 _TO_BASE64: Final = bytes.maketrans(_CHARACTERS, _BASE64)
 _MOST: Final = 4
-"""Characters of a number."""
+"""Number of characters of a number."""
 
 
 def encode_numbers(values: Sequence[int], width: int) -> bytes:
-    """Return numbers in `width` characters each, 1 to 4, one behind the other.
+    """Return numbers in `width` characters each, 1 to 4, one after the other.
 
     Raises:
-        FieldError: one needs more.
+        FieldError: a number needs more characters.
     """
     for value in (min(values, default=0), max(values, default=0)):
         if not 0 <= value < 1 << _BITS * width:
@@ -112,11 +112,11 @@ def encode_numbers(values: Sequence[int], width: int) -> bytes:
 
 
 def parse_numbers(data: bytes, width: int) -> tuple[int, ...]:
-    """Return the numbers that characters make, `width` each, 1 to 4.
+    """Return the numbers in characters, `width` each, 1 to 4.
 
     Raises:
-        FieldError: a character that carries none.
-        FramingError: half a number at the end.
+        FieldError: an invalid character.
+        FramingError: an incomplete number at the end.
     """
     # Before base64 sees them: `a2b_base64` skips what it does not know.
     if strange := data.translate(None, _CHARACTERS):
@@ -139,17 +139,17 @@ def encode_number(value: int, width: int) -> bytes:
 
 
 def parse_number(data: bytes) -> int:
-    """Return the number that all characters make; FieldError if one carries none."""
+    """Return the number in all characters; FieldError if one is invalid."""
     return parse_numbers(data, len(data))[0]
 
 
 def _line_sum(data: bytes) -> bytes:
-    """Return the character that sums a line up."""
+    """Return the sum character of a line."""
     return bytes((_ZERO + (sum(data) & _MASK),))
 
 
 def with_sum(line: bytes, summed: bytes | None = None) -> bytes:
-    """Return a line with its sum behind it, the sum of `summed` if that is given."""
+    """Return a line followed by its sum, or by the sum of `summed` if given."""
     return line + _line_sum(line if summed is None else summed)
 
 
@@ -192,11 +192,11 @@ SIZES: Final[Mapping[str, tuple[int, ...]]] = {
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """One command, as it came or goes; nothing of it is checked.
+    """One command, received or to send; it is not validated.
 
     Attributes:
         symbol: two letters.
-        parameters: all, one behind the other.
+        parameters: all, one after the other.
         string: with its semicolon, empty if there is none.
     """
 
@@ -213,12 +213,12 @@ class Command:
 
     @property
     def echo(self) -> bytes:
-        """The line with which a reply begins."""
+        """The line at the start of a reply."""
         return f"{self.symbol}{self.parameters}{self.string}".encode("latin-1")
 
     @property
     def fields(self) -> tuple[str, ...]:
-        """The parameters, each for itself, cut as `SIZES` says."""
+        """The separate parameters, split according to `SIZES`."""
         out, at = [], 0
         for size in SIZES[self.symbol]:
             out.append(self.parameters[at : at + size])
@@ -237,7 +237,7 @@ WIDTHS: Final = {"D": 3, "S": 2}
 
 
 def encode_scan(time_ms: int, distances: Sequence[int], width: int) -> tuple[bytes, ...]:
-    """Return the lines behind the status; FieldError for a number that does not fit."""
+    """Return the lines after the status; FieldError for a number that does not fit."""
     data = encode_numbers(distances, width)
     blocks = [data[at : at + _BLOCK_BYTES] for at in range(0, len(data), _BLOCK_BYTES)]
     return tuple(with_sum(line) for line in (encode_number(time_ms, _TIME_WIDTH), *blocks))
@@ -247,9 +247,9 @@ def parse_scan(lines: Sequence[bytes], width: int) -> tuple[int, tuple[int, ...]
     """Return time stamp in ms and distances in mm.
 
     Raises:
-        ChecksumError: of a line.
-        FramingError: no time stamp, or half a distance.
-        FieldError: a character that carries no number.
+        ChecksumError: a line with a wrong sum.
+        FramingError: no time stamp, or an incomplete distance.
+        FieldError: an invalid character.
     """
     # Each line has a sum of its own, and a distance may lie across two blocks of 64
     # characters: take the sums off first, join, then cut.
@@ -261,15 +261,15 @@ def parse_scan(lines: Sequence[bytes], width: int) -> tuple[int, tuple[int, ...]
 
 
 SWITCH: Final = b"SCIP2.0"
-"""The command after which a sensor speaks SCIP 2.0, until it is without power."""
+"""The command that switches a sensor to SCIP 2.0 until power-off."""
 
 SCIP1_OK: Final = b"0"
 ERROR: Final = b"E"
-"""What QT is answered with, by which hosts know SCIP 1.1; anything but 0 is an error."""
+"""Answer to QT, by which hosts detect SCIP 1.1; anything but 0 is an error."""
 
 _WIDTH: Final = 2
 FARTHEST_MM: Final = 4_095
-"""What two characters carry."""
+"""Largest number in two characters."""
 
 
 def encode_reply(echo: bytes, status: bytes, lines: Iterable[bytes] = ()) -> bytes:
@@ -286,7 +286,7 @@ def encode_distances(distances: Sequence[int]) -> tuple[bytes, ...]:
 _END: Final = b"\n\n"
 _STATUS_BYTES: Final = 2
 MOST_BYTES: Final = 16_384
-"""No reply is longer: a whole scan has less than 3000 bytes."""
+"""Largest size of a reply: a whole scan has less than 3000 bytes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -294,9 +294,9 @@ class Reply:
     """One reply.
 
     Attributes:
-        echo: the command, with the scans that remain in the place of their number.
+        echo: the command, with the remaining scans in place of their number.
         status: two characters.
-        lines: behind the status, as they came, each with its sum.
+        lines: after the status, as received, each with its sum.
     """
 
     echo: bytes
@@ -331,10 +331,10 @@ class Reply:
 
 @mypyc_attr(serializable=True)
 class ReplySplitter:
-    """Collects bytes and gives whole replies; chunking makes no difference.
+    """Collects bytes into whole replies, however they are split into chunks.
 
     Attributes:
-        garbled: how many replies were none.
+        garbled: number of invalid replies.
     """
 
     def __init__(self) -> None:
@@ -342,7 +342,7 @@ class ReplySplitter:
         self.garbled = 0
 
     def push(self, data: bytes) -> list[Reply]:
-        """Take bytes in; give whole replies out."""
+        """Add received bytes; return completed replies."""
         # LF LF ends a reply and cannot occur inside: no line of a reply is empty.
         *whole, self._tail = (self._tail + data).split(_END)
         if len(self._tail) > MOST_BYTES:
@@ -357,7 +357,7 @@ class ReplySplitter:
 
 
 def encode_lines(values: Mapping[str, str]) -> tuple[bytes, ...]:
-    """Return the lines; the semicolon is no part of the sum."""
+    """Return the lines; the sum does not include the semicolon."""
     texts = [f"{key}:{value}".encode("latin-1") for key, value in values.items()]
     return tuple(with_sum(text + b";", text) for text in texts)
 
@@ -366,8 +366,8 @@ def parse_lines(lines: Iterable[bytes]) -> dict[str, str]:
     """Return the values by their keys.
 
     Raises:
-        FramingError: a line that is none.
-        ChecksumError: of a line.
+        FramingError: an invalid line.
+        ChecksumError: a line with a wrong sum.
     """
     values = {}
     for line in lines:
@@ -383,7 +383,7 @@ def parse_lines(lines: Iterable[bytes]) -> dict[str, str]:
 
 @dataclass(frozen=True, slots=True)
 class Specification:
-    """What PP tells: limits in mm, steps, turns per minute.
+    """The reply to PP: limits in mm, steps, turns per minute.
 
     Attributes:
         model: its name.
@@ -419,7 +419,7 @@ class Specification:
         """Read a reply to PP.
 
         Raises:
-            WireError: a line that is none, or a number that is missing, none or below 0.
+            WireError: an invalid line, or a number that is missing, invalid or below 0.
         """
         values = parse_lines(lines)
         numbers = []

@@ -1,4 +1,4 @@
-"""Characters of a UART on a serial line, and how one of another setting samples them."""
+"""Characters of a UART on a serial line, and their reception with another setting."""
 
 from __future__ import annotations
 
@@ -10,30 +10,30 @@ from tickrig.wire.errors import FieldError
 from tickrig.wire.instant import NEVER
 
 Parity = Literal["N", "E", "O", "M", "S"]
-"""None, even, odd, mark (always 1), space (always 0)."""
+"""Parity: none, even, odd, mark (always 1), space (always 0)."""
 
 PS_PER_US: Final = 1_000_000
 PS_PER_S: Final = 1_000_000 * PS_PER_US
-"""Bits of a fast line are shorter than a microsecond: here, times are in picoseconds."""
+"""Times here are in picoseconds, because bits of a fast line are shorter than a microsecond."""
 
 _OVERSAMPLING: Final = 16
-"""Samples of a receiver for each of its bits."""
+"""Samples of a receiver per bit."""
 
 _MID_BIT: Final = _OVERSAMPLING // 2
 
 
 @dataclass(frozen=True, slots=True)
 class UartSetting:
-    """How a UART sends and receives characters.
+    """The setting of a UART.
 
     Attributes:
         baud: bit rate in bit/s, at least 1.
         data_bits: of a character, 5 to 8, the lowest first.
-        parity: of the bit behind them.
-        stop_bits: 1, 1.5 or 2; a receiver looks at the first alone.
+        parity: of the bit after them.
+        stop_bits: 1, 1.5 or 2; a receiver checks only the first.
 
     Raises:
-        FieldError: a value that no UART has.
+        FieldError: a value out of range.
 
     >>> str(UartSetting(9_600, 7, "E", 2)), UartSetting(9_600, 7, "E", 2).frame_bits
     ('9600 7E2', 11)
@@ -56,7 +56,7 @@ class UartSetting:
             raise FieldError(f"{self.stop_bits} stop bits: a UART has 1, 1.5 or 2")
 
     def __str__(self) -> str:
-        """Write it as people do: `115200 8N1`."""
+        """Return the usual notation: `115200 8N1`."""
         return f"{self.baud} {self.data_bits}{self.parity}{self.stop_bits:g}"
 
     @property
@@ -65,17 +65,17 @@ class UartSetting:
         return 1 + self.data_bits + (self.parity != "N") + self.stop_bits
 
     def duration_ps(self, characters: int = 1) -> int:
-        """Compute how long characters take that are sent back to back.
+        """Compute the duration of characters sent back to back.
 
         Args:
-            characters: how many.
+            characters: number of characters.
         """
         # Twice as many half bits: 1.5 stop bits stay whole numbers. Rounded once, over all
         # characters.
         return int(characters * 2 * self.frame_bits) * PS_PER_S // (2 * self.baud)
 
     def parity_bit(self, value: int) -> int:
-        """Compute the bit behind the data bits of a character; the stop bit if there is none.
+        """Compute the parity bit of a character; 1, the stop bit, if there is none.
 
         Args:
             value: the character.
@@ -102,7 +102,7 @@ class UartSetting:
             start_ps: when its start bit begins.
 
         Yields:
-            1 or 0, and until when in ps; the stop bits as one.
+            level 1 or 0 and its end in ps; the stop bits as one level.
         """
         for number, bit in enumerate(self.bits(value), start=1):
             yield bit, start_ps + number * PS_PER_S // self.baud
@@ -111,10 +111,10 @@ class UartSetting:
 
 @dataclass(frozen=True, slots=True)
 class Character:
-    """What a UART has received.
+    """A character received by a UART.
 
     Attributes:
-        value: the data bits as they were sampled.
+        value: the sampled data bits.
         end_ps: when its first stop bit ends.
         framing_error: the line was 0 where a stop bit should have been.
         parity_error: the parity bit is not that of the value.
@@ -130,18 +130,18 @@ class Character:
 
 @dataclass(slots=True)
 class UartReceiver:
-    """Samples a line 16 times a bit, and makes characters of it.
+    """Samples a line 16 times per bit, and assembles characters.
 
-    A sample of 0 after one of 1 is the edge of a start bit. Half a bit later it has to be 0
-    still; then each bit is sampled once, in its middle (National Semiconductor PC16550D has this
-    clock of 16 times the baud rate). After a framing error or a break the line has to be 1 again
-    before there can be a start bit; the PC16550D takes the missing stop bit for a start bit.
+    A sample of 0 after one of 1 is the edge of a start bit. Half a bit later it must still be 0;
+    then each bit is sampled once, in its middle (National Semiconductor PC16550D has this clock of
+    16 times the baud rate). After a framing error or a break the line has to be 1 again before
+    there can be a start bit; the PC16550D treats the missing stop bit as a start bit.
 
     Not emulated: majority votes of several samples, FIFOs and their overrun.
 
     Args:
         setting: its setting.
-        now_ps: from when on it looks at the line, which is idle.
+        now_ps: start of sampling; the line is idle.
     """
 
     setting: UartSetting
@@ -151,23 +151,23 @@ class UartReceiver:
     _idle: bool = field(init=False, default=True)  # the line was 1, a 0 is a start bit
 
     def __post_init__(self) -> None:
-        """Begin with the first sample from `now_ps` on."""
+        """Start with the first sample at or after `now_ps`."""
         self._next = self._sample_from(self.now_ps)
 
     @property
     def due_ps(self) -> int:
-        """When the stop bit of the character that is being received is sampled, else `NEVER`."""
+        """When the stop bit of the present character is sampled, `NEVER` without a character."""
         if self._sampled is None:
             return NEVER
         left = self._frame_samples - len(self._sampled) - 1
         return self._time_of(self._next + left * _OVERSAMPLING)
 
     def push(self, level: int, until_ps: int) -> Iterator[Character]:
-        """Let the line have a level from where the last push ended.
+        """Set the level of the line from the end of the previous push on.
 
         Args:
             level: 1 or 0.
-            until_ps: until when; a time that has passed is no error.
+            until_ps: end of the level; a time in the past is allowed.
 
         Yields:
             The characters that are complete.
@@ -184,7 +184,7 @@ class UartReceiver:
                 self._next += _MID_BIT
 
     def _sample(self, frame: list[int], level: int) -> Iterator[Character]:
-        """Take the middle of a bit."""
+        """Sample the middle of a bit."""
         taken = self._next
         frame.append(level)
         self._next += _OVERSAMPLING
@@ -229,16 +229,16 @@ class UartReceiver:
 def sample(
     data: bytes, sender: UartSetting, receiver: UartSetting, start_ps: int = 0
 ) -> tuple[Character, ...]:
-    """Let a UART receive what one of another setting sends back to back.
+    """Receive with one UART setting what another setting sends back to back.
 
     Args:
-        data: what is sent.
-        sender: the setting at which it is sent.
-        receiver: the setting of the UART that receives it.
-        start_ps: when the first start bit begins.
+        data: the sent bytes.
+        sender: the setting of the sender.
+        receiver: the setting of the receiver.
+        start_ps: start of the first start bit.
 
     Returns:
-        What is received of it, until the line has been idle for a character.
+        The received characters, until the line has been idle for a character.
 
     >>> [hex(got.value) for got in sample(b"OK", UartSetting(115_200), UartSetting(115_200))]
     ['0x4f', '0x4b']

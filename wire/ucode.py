@@ -21,7 +21,7 @@ from tickrig.wire.errors import ChecksumError, FieldError, FramingError
 
 BAUD: Final = 38_400
 ROUNDS: Final = 1 << 16
-"""Rounds are counted up to here, and from 0 again."""
+"""Largest round number; then counting restarts at 0."""
 
 MAX_LEVEL: Final = 100
 _UCODE: Final = re.compile(r"[0-9A-Fa-f]{32}", re.ASCII)
@@ -30,15 +30,15 @@ _LINE: Final = re.compile(rb"\$([A-Z]{2}(?:,[0-9A-Za-z]*)*)\*([0-9A-F]{4})")
 
 
 class LineType(Enum):
-    """What a line is.
+    """Kind of a line.
 
     Attributes:
         READER: after power-up, and the answer to ID: version of the protocol, range in mm, cone
             in degrees, 1 while it listens.
-        UCODE: a marker that was heard: round, ucode, level of the signal in per cent.
-        ROUND: the end of a round: its number, and how many markers were heard in it.
-        LIGHT: the end of a round in which too much light left nothing to be heard: its number.
-        REFUSED: the answer to what is no command.
+        UCODE: a received marker: round, ucode, level of the signal in per cent.
+        ROUND: the end of a round: its number, and the number of markers received in it.
+        LIGHT: the end of a round in which too much light drowned all markers: its number.
+        REFUSED: the answer to an invalid command.
     """
 
     READER = "UI"
@@ -55,17 +55,17 @@ HIGHEST: Final = {
     LineType.LIGHT: (ROUNDS - 1,),
     LineType.REFUSED: (),
 }
-"""The fields of each kind: numbers from 0 to this, None for a ucode."""
+"""The fields of each kind: numbers from 0 to this value, None for a ucode."""
 
 _COMMANDS: Final = (b"ID", b"ON", b"OFF")
-"""What a host may send, each with LF: tell who it is, listen, listen no more."""
+"""Commands of a host, each with LF: identify, start listening, stop listening."""
 
 
 def parse_ucode(text: str) -> str:
-    """Return a ucode as it is written: 128 bits, 32 hex digits in capitals.
+    """Return a ucode in normal form: 128 bits, 32 hex digits in capitals.
 
     Raises:
-        FieldError: it is none.
+        FieldError: it is not a ucode.
 
     >>> parse_ucode("00001c00000000000001000000000abc")
     '00001C00000000000001000000000ABC'
@@ -81,18 +81,18 @@ class UcodeLine:
     """A line of a reader.
 
     Attributes:
-        type: what it is.
-        fields: as `HIGHEST` has them; ucodes as 32 hex digits in capitals.
+        type: its kind.
+        fields: as in `HIGHEST`; ucodes as 32 hex digits in capitals.
 
     Raises:
-        FieldError: fields that this kind does not have.
+        FieldError: the fields do not fit the kind.
     """
 
     type: LineType
     fields: tuple[int | str, ...]
 
     def __post_init__(self) -> None:
-        """Refuse fields of other kinds."""
+        """Raise FieldError if the fields do not fit the kind."""
         highest = HIGHEST[self.type]
         if len(self.fields) != len(highest):
             raise FieldError(f"{self.type.value} has {len(highest)} fields, not {len(self.fields)}")
@@ -112,9 +112,9 @@ def parse_line(line: bytes) -> UcodeLine:
     """Read a line without its end.
 
     Raises:
-        FramingError: no line of a reader.
-        ChecksumError: its sum is another.
-        FieldError: fields that its kind does not have.
+        FramingError: not a line of a reader.
+        ChecksumError: wrong sum.
+        FieldError: fields that do not fit the kind.
     """
     if (match := _LINE.fullmatch(line)) is None:
         raise FramingError(f"no line of a ucode reader: {line[:60]!r}")
@@ -135,7 +135,7 @@ def parse_line(line: bytes) -> UcodeLine:
 def _field(word: str, limit: int | None) -> int | str:
     if limit is None:
         return parse_ucode(word)
-    # The length is looked at before `int`, which would take long for a million digits.
+    # The length is checked before `int`, which would take long for a million digits.
     if not word.isdigit() or len(word) > len(str(limit)):
         raise FieldError(f"{word[:40]!r} is no number of 0..{limit}")
     return int(word)

@@ -1,1 +1,1 @@
-"""CANopen slaves after CiA 301 and CiA 305: one class a service."""
+"""CANopen slaves according to CiA 301 and CiA 305: one class for each service."""

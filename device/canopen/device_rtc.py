@@ -1,4 +1,4 @@
-"""A component on CANopen as a device: life cycle, ports, terminals."""
+"""An RT component on a CANopen device: life cycle, ports, terminals."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ T = TypeVar("T")
 
 
 class CanopenPort(Generic[T]):
-    """What both kinds of ports have.
+    """Base of both kinds of ports.
 
     Args:
         name: a letter, then up to 31 letters, digits and underscores.
@@ -53,7 +53,7 @@ class CanopenPort(Generic[T]):
 
     @property
     def profile(self) -> rtc_canopen.CanopenPortProfile:
-        """The port as the profile of its component has it."""
+        """The port as an entry of the component's profile."""
         return rtc_canopen.CanopenPortProfile(
             self.name, self.direction, self.port_type, self.cob_id, self.transport
         )
@@ -65,23 +65,23 @@ class CanopenPort(Generic[T]):
 
 
 class CanopenInPort(CanopenPort[T]):
-    """Where the bus writes, by RPDO or SDO, and the component reads.
+    """A port that the bus writes, by RPDO or SDO, and the component reads.
 
     Attributes:
-        is_new: whether the bus has written since it was read, also the same value.
+        is_new: whether the bus has written it since the latest read, even with the same value.
     """
 
     direction: ClassVar[rtc_canopen.PortDirection] = rtc_canopen.PortDirection.IN
     is_new: bool = False
 
     def join(self, entries: Sequence[Entry], event: Callable[[Entry], None]) -> None:
-        """Keep its value in these objects, and hear of each write."""
+        """Keep its value in these objects, and note each write."""
         super().join(entries, event)
         for entry in entries:
             entry.written = self._on_written
 
     def read(self) -> T:
-        """Return the present value; it is not new any more."""
+        """Return the present value; it is no longer new."""
         self.is_new = False
         return self.value
 
@@ -90,15 +90,15 @@ class CanopenInPort(CanopenPort[T]):
 
 
 class CanopenOutPort(CanopenPort[T]):
-    """Where the component writes; its TPDO goes out once in a tick with a write."""
+    """A port that the component writes; its TPDO is sent once in a tick with a write."""
 
     direction: ClassVar[rtc_canopen.PortDirection] = rtc_canopen.PortDirection.OUT
 
     def write(self, value: T) -> None:
-        """Leave a value; it is sent in Active, also if it is the same as before.
+        """Set the value; it is sent in Active, even if it has not changed.
 
         Raises:
-            ValueError: the type has no such value.
+            ValueError: the value is not one of the port's type.
         """
         for entry, data in zip(self.entries, self.port_type.encode(value), strict=True):
             entry.assign(data)
@@ -109,7 +109,7 @@ class CanopenOutPort(CanopenPort[T]):
 
 
 class CanopenComponent(DeviceComponent):
-    """A component on a CANopen device; a subclass says what it is and does.
+    """A component on a CANopen device; a subclass defines its properties and callbacks.
 
     Ports have objects from 2100h on in order of declaration. Reset Node makes a new
     component, as power-on does.
@@ -120,11 +120,11 @@ class CanopenComponent(DeviceComponent):
         vendor: who made it.
         category: what it is.
         rate_hz: how often `on_execute`, `error_check` and `on_error` run (DECISION K12).
-        product_code: 1018h:02, 0 for one that is made of the type name.
-        strict_cia301: whether NMT leads out of Error as CiA 301 has it (DECISION K9).
+        product_code: 1018h:02, 0 derives one from the type name.
+        strict_cia301: whether NMT commands leave Error as in CiA 301 (DECISION K9).
 
     Raises:
-        ValueError: a profile or ports that cannot be.
+        ValueError: invalid profile or ports.
 
     >>> from tickrig.device.canopen.device_rtc import CanopenInPort, CanopenOutPort
     >>> from tickrig.wire.rtc_canopen import LONG
@@ -152,7 +152,7 @@ class CanopenComponent(DeviceComponent):
 
     @classmethod
     def profile(cls) -> rtc_canopen.RtcProfile:
-        """Return what the component says of itself; ValueError if that cannot be."""
+        """Return the profile of the component; ValueError if it is invalid."""
         try:
             return rtc_canopen.RtcProfile(
                 type_name=cls.type_name,
@@ -167,7 +167,7 @@ class CanopenComponent(DeviceComponent):
             raise ValueError(f"{cls.__name__}: {error}") from None
 
     def error_check(self) -> Result:
-        """Look after the device, once a period while Inactive; an error leads to Error."""
+        """Check the device once a period while Inactive; an error leads to Error."""
 
 
 class CanopenEcho(CanopenComponent):
@@ -180,18 +180,19 @@ class CanopenEcho(CanopenComponent):
     outlet = CanopenOutPort("out", rtc_canopen.LONG)
 
     def on_execute(self) -> None:
-        """Hand on what is new."""
+        """Copy new values from the in-port to the out-port."""
         if self.inlet.is_new:
             self.outlet.write(self.inlet.read())
 
 
-# States of a DeviceRTC and what runs on the way (NEDO report, 3.4.43.3, Table 3, Fig. 110).
+# States of a DeviceRTC and the callbacks of each transition (NEDO report, 3.4.43.3, Table 3, Fig.
+# 110).
 #
-# Where figure and table are silent the decisions K6 to K13 of the project hold.
+# Where figure and table leave a case open, decisions K6 to K13 of the project apply.
 
 
 class RtcState(Enum):
-    """State of a component (OMG RTC 1.1, LifeCycleState), and what comes after the end."""
+    """State of a component (OMG RTC 1.1, LifeCycleState), and one for the time after the end."""
 
     CREATED = "Created"
     INACTIVE = "Inactive"
@@ -206,14 +207,14 @@ _STATES: Final = {
     NmtState.OPERATIONAL: RtcState.ACTIVE,
     NmtState.STOPPED: RtcState.ERROR,
 }
-"""Table 3, for a component that was initialized."""
+"""Table 3, for an initialized component."""
 
 _ACTIVITIES: Final = {
     RtcState.INACTIVE: "error_check",
     RtcState.ACTIVE: "on_execute",
     RtcState.ERROR: "on_error",
 }
-"""What a state does at the rate of the component."""
+"""The periodic callback of each state."""
 
 _Effects = Mapping[NmtCommand, tuple[str, ...]]
 
@@ -241,7 +242,7 @@ _ADMITTED: Final[Mapping[RtcState, _Effects]] = {
     RtcState.ERROR: _RESETS,  # K8, K9
     RtcState.FINALIZED: {},
 }
-"""Commands that are carried out, and what runs before (M8, M9, K10)."""
+"""Permitted commands, and the callback that runs before each (M8, M9, K10)."""
 
 _STRICT_ERROR: Final[_Effects] = {
     **_RESETS,
@@ -256,32 +257,32 @@ _ENTERED: Final[Mapping[tuple[NmtState, NmtState], tuple[str, ...]]] = {
     (NmtState.OPERATIONAL, NmtState.PRE_OPERATIONAL): ("on_deactivated",),  # M3
     (NmtState.OPERATIONAL, NmtState.STOPPED): ("on_deactivated", "on_aborting"),  # M6, M7, K6
 }
-"""What runs after a change of the NMT state; nothing on M4 and M5 (K7)."""
+"""The callback after a change of the NMT state; none on M4 and M5 (K7)."""
 
 _ENDING: Final = {
     RtcState.INACTIVE: ("on_finalize",),
     RtcState.ACTIVE: ("on_deactivated", "on_finalize"),
     RtcState.ERROR: ("on_finalize",),
 }
-"""What runs before the end (M11)."""
+"""The callback before the end (M11)."""
 
 
 # The life cycle of RTC inside the NMT states (NEDO report, 3.4.43.3, Fig. 110).
 
 
 class CanopenLifeCycle(CallbackRunner[CanopenComponent]):
-    """Runs the callbacks of a component when its node changes its NMT state, and before.
+    """Runs the callbacks of a component before and after its node changes its NMT state.
 
-    The NMT state is the state of the component, once that is initialized. Whoever
-    changes it, master, error behaviour or the component itself, the callbacks are the
-    same; they run at once, after all services have heard of the change.
+    The NMT state is the state of the component, once the component is initialized. The same
+    callbacks run whether the master, the error behaviour or the component itself changes the state;
+    they run at once, after all services have been notified.
 
     Args:
         node: the slave.
         make: makes a component, joined to the dictionary.
 
     Attributes:
-        component: the component as it is; a reset of the node makes a new one.
+        component: the present component; a reset of the node makes a new one.
     """
 
     def __init__(self, node: CanopenSlave, make: Callable[[], CanopenComponent]) -> None:
@@ -289,7 +290,7 @@ class CanopenLifeCycle(CallbackRunner[CanopenComponent]):
         self.create()
 
     def create(self) -> None:
-        """Begin with a new component (M1)."""
+        """Make a new component (M1)."""
         super().__init__(self._make())
         self._initialized = self._finalized = False
 
@@ -302,19 +303,19 @@ class CanopenLifeCycle(CallbackRunner[CanopenComponent]):
 
     @property
     def activity(self) -> str:
-        """Callback that the state runs at the component's rate, empty if it has none."""
+        """Name of the periodic callback of the present state, empty if there is none."""
         name = _ACTIVITIES.get(self.state, "")
         own = name and getattr(type(self.component), name) is not getattr(CanopenComponent, name)
         return name if own else ""
 
     def boots(self) -> bool:
-        """Run `on_initialize` if that is due; say whether the node boots (M1, K11)."""
+        """Run `on_initialize` if it is due; return whether the node boots (M1, K11)."""
         if not self._initialized and not self._finalized:
             self._initialized = self.call("on_initialize")
         return self._initialized and not self._finalized
 
     def admits(self, command: NmtCommand) -> bool:
-        """Run what comes before an NMT command; say whether it is carried out."""
+        """Run the callback before an NMT command; return whether to carry out the command."""
         state = self.state
         table = _ADMITTED[state]
         if state is RtcState.ERROR and self.component.strict_cia301:
@@ -329,7 +330,7 @@ class CanopenLifeCycle(CallbackRunner[CanopenComponent]):
         return True
 
     def moved(self, old: NmtState, new: NmtState) -> None:
-        """Run the callbacks of a change that was made; an error leads to Error."""
+        """Run the callbacks after a change of state; an error leads to Error."""
         well = self._call_all(_ENTERED.get((old, new), ()))
         if well or new is NmtState.STOPPED:
             return
@@ -338,19 +339,19 @@ class CanopenLifeCycle(CallbackRunner[CanopenComponent]):
         self._node.enter(NmtState.STOPPED)
 
     def run(self) -> None:
-        """Run what the state does; an error leads to Error (M5, M6)."""
+        """Run the periodic callback of the state; an error leads to Error (M5, M6)."""
         if not self.call(self.activity) and self.state is not RtcState.ERROR:
             self._node.enter(NmtState.STOPPED)
 
     def finalize(self) -> None:
-        """End (M11): the node falls silent until its supply was cut."""
+        """End (M11): the node is silent until its supply has been cut."""
         if self.state in _ENDING:
             self._call_all(_ENDING[self.state])
             self._finalized = True
             self._node.reset_node()
 
     def _call_all(self, callbacks: tuple[str, ...]) -> bool:
-        """Run callbacks, all of them; False if one failed."""
+        """Run all given callbacks; return False if one failed."""
         results = [self.call(name) for name in callbacks]
         return all(results)
 
@@ -414,8 +415,8 @@ def _text_of(life: CanopenLifeCycle, name: str) -> float | str:
 class DeviceRtc(Application):
     """Runs a component with the NMT state of its node (NEDO report, 3.4.43.3, Fig. 110).
 
-    Callbacks take no time. What the state does at the component's rate begins one
-    period after the state was entered.
+    Callbacks take no time. The periodic callback runs for the first time one period after the state
+    was entered.
 
     Not emulated: service ports, configuration sets, several components on one node.
 
@@ -428,7 +429,7 @@ class DeviceRtc(Application):
         life: the life cycle, with the component.
 
     Raises:
-        ValueError: physical inputs that cannot be.
+        ValueError: invalid physical inputs.
     """
 
     def __init__(self, node: CanopenSlave, slot: int, kind: type[CanopenComponent]) -> None:
@@ -442,7 +443,7 @@ class DeviceRtc(Application):
         node.entered = self._moved
 
     def read(self, name: str) -> float | str:
-        """Look at an output, as it was left by the latest tick.
+        """Return an output as the latest tick left it.
 
         Args:
             name: one of `outputs`.
@@ -451,12 +452,12 @@ class DeviceRtc(Application):
             Its value.
 
         Raises:
-            KeyError: there is none of that name.
+            KeyError: there is no output of that name.
         """
         return _text_of(self.life, name)
 
     def power_on(self) -> None:
-        """Begin with a new component."""
+        """Make a new component."""
         self.life.create()
 
     def start(self) -> None:
@@ -464,7 +465,7 @@ class DeviceRtc(Application):
         self._timer.stop()
 
     def on_execute(self, now_us: int) -> None:
-        """Run what the state of the component does, if a period has ended."""
+        """Run the periodic callback of the state if a period has ended."""
         if self.inputs[_SHUT_DOWN]:
             self.life.finalize()
         if self._timer.elapsed(now_us):
@@ -472,7 +473,7 @@ class DeviceRtc(Application):
         self.schedule(self._timer.due_us)
 
     def _moved(self, old: NmtState, new: NmtState) -> None:
-        """Let the new state count its periods from now on, then run the callbacks."""
+        """Restart the period for the new state, then run the callbacks."""
         self._timer.stop()
         if self.life.activity:
             self._timer.start(self.node.now_us)
@@ -493,13 +494,13 @@ class DeviceRtc(Application):
 
 
 def make_dictionary(kind: type[CanopenComponent]) -> Dictionary:
-    """Make the objects of a component; ValueError if its profile cannot be."""
+    """Make the objects of a component; ValueError if its profile is invalid."""
     table = rtc_canopen.object_table(kind.profile())
     return Dictionary(table, table.objects)
 
 
 def application_of(kind: type[CanopenComponent]) -> ServiceMaker:
-    """Return what makes the application of a component."""
+    """Return a function that makes the application for a component."""
     return partial(DeviceRtc, kind=kind)
 
 
@@ -511,9 +512,9 @@ def make_device_rtc(
     Args:
         kind: the component.
         node_id: 1..127, or 255 for a slave that waits for LSS.
-        nonvolatile: what it kept from an earlier life.
+        nonvolatile: memory kept from an earlier run.
 
     Raises:
-        ValueError: a component or a node-ID that cannot be.
+        ValueError: invalid component or node-ID.
     """
     return make_slave(make_dictionary(kind), node_id, nonvolatile, application_of(kind))

@@ -17,10 +17,10 @@ from tickrig.wire.canopen.sdo_frame import AbortCode
 
 
 class SdoAbort(Exception):  # noqa: N818 - the standard's word
-    """The access is refused; it never leaves the slave but as an abort frame.
+    """The access is refused; the SDO server answers with an abort frame.
 
     Attributes:
-        code: why.
+        code: the abort code.
     """
 
     def __init__(self, code: AbortCode) -> None:
@@ -29,7 +29,7 @@ class SdoAbort(Exception):  # noqa: N818 - the standard's word
 
 
 def whole_number(value: Value) -> int:
-    """Return a value that must be an integer; SdoAbort if the dictionary says otherwise."""
+    """Return a value that must be an integer; SdoAbort if it is not."""
     if not isinstance(value, int):
         raise SdoAbort(AbortCode.PARAMETER_INCOMPATIBLE)
     return value
@@ -38,8 +38,8 @@ def whole_number(value: Value) -> int:
 # Theory of operation
 # ===================
 #
-# An entry keeps the bytes that go over the wire, and no other form of the value. Four doors
-# lead to them, and which one is taken decides who is asked and who is told:
+# An entry keeps the bytes that go over the wire, and no other form of the value. Four methods
+# change them, and differ in what is checked and who is notified:
 #
 #            access  size  guard  limits   watchers  written   used by
 # download     x      x     x      x          x         x      SDO
@@ -47,9 +47,9 @@ def whole_number(value: Value) -> int:
 # force                                       x         x      tools inside, in place of the bus
 # assign                                      x                the device itself, resets
 #
-# `watchers` hear of a value that has changed, `written` of each write, the same value too.
-# A service whose object starts something when it is written (1017h, "save") takes
-# `written`, one that follows a value takes `watch`.
+# `watchers` are called when a value has changed, `written` after each write, even of the same
+# value. A service whose object starts something when it is written (1017h, "save") takes `written`,
+# one that follows a value takes `watch`.
 #
 # The order of the checks is that of the abort codes which a client gets: access (0601
 # 0001h, 2h), size (0607 0012h, 13h), what the object itself refuses (its own code), limits
@@ -80,8 +80,8 @@ OnEntry = Callable[["Entry"], None]
 class Entry(Part):
     """The value of a variable, or of one element of an array or record.
 
-    Its bytes are kept as they go over the wire. The service that owns an object
-    hangs its rules onto the entry; each of them is called with the entry.
+    The value is kept as the bytes on the wire. The service that owns an object attaches its
+    callbacks to the entry; each is called with the entry.
 
     Args:
         description: name, type, access and limits; shared with other slaves.
@@ -91,12 +91,12 @@ class Entry(Part):
         data: the present value as bytes.
         guard: called with a value that comes over the bus; raises SdoAbort to refuse it.
         written: called after a value came over the bus.
-        source: gives the bytes to read instead of `data`; may raise SdoAbort.
-        measured: `source` gives what is measured, whenever it is asked; it never raises, and
-            asking changes nothing.
+        source: returns the bytes to read instead of `data`; may raise SdoAbort.
+        measured: `source` returns a measured value at any time; it never raises and has no side
+            effects.
         watchers: called whenever the value has changed, from the bus or from the inside.
-        takes_commands: what is written is a command, as "save": the guard alone judges it, for the
-            limits are those of what is read.
+        takes_commands: writes are commands such as "save": only the guard checks them, because the
+            limits apply to the value read.
     """
 
     __slots__ = (
@@ -114,7 +114,7 @@ class Entry(Part):
         self.watchers: tuple[OnEntry, ...] = ()
 
     def __repr__(self) -> str:
-        """Name it as a log line would."""
+        """Return its name for a log line."""
         return repr(self.description)
 
     @property
@@ -144,7 +144,7 @@ class Entry(Part):
 
     @property
     def takes_all(self) -> bool:
-        """Whether every value of the right size is taken, and nobody acts on it."""
+        """Whether every value of the right size is accepted, and no callback acts on a write."""
         low, high, kind = self.description.low, self.description.high, self.data_type
         free = low is None and high is None and kind is not DataType.BOOLEAN
         return free and self.guard is None and self.written is None
@@ -165,15 +165,15 @@ class Entry(Part):
         return int.from_bytes(data, "little", signed=self.description.signed)
 
     def watch(self, changed: OnEntry) -> None:
-        """Have `changed` called whenever the value has changed from what it is now."""
-        # The watcher is told of changes from now on, so there must be a value to compare
+        """Call `changed` whenever the value changes from now on."""
+        # The watcher is called for changes from now on, so there must be a value to compare
         # with.
         if self.measured:
             self.data = self.present()
         self.watchers = (*self.watchers, changed)
 
     def unwatch(self, changed: OnEntry) -> None:
-        """Do so no longer."""
+        """Stop calling `changed`."""
         self.watchers = tuple(watcher for watcher in self.watchers if watcher != changed)
 
     def assign(self, data: bytes) -> None:
@@ -190,11 +190,11 @@ class Entry(Part):
             self.written(self)
 
     def present(self) -> bytes:
-        """Return what is to be read now; SdoAbort if its owner has nothing."""
+        """Return the bytes to read now; SdoAbort if the owner has no value."""
         return self.data if self.source is None else self.source(self)
 
     def upload(self) -> bytes:
-        """Read over the bus; SdoAbort if that is not allowed."""
+        """Read over the bus; SdoAbort if access is not allowed."""
         if not self.description.readable:
             raise SdoAbort(AbortCode.WRITE_ONLY)
         return self.present()
@@ -205,7 +205,7 @@ class Entry(Part):
             raise SdoAbort(AbortCode.READ_ONLY)
 
     def check_size(self, size: int) -> None:
-        """Raise SdoAbort if so many bytes cannot be a value."""
+        """Raise SdoAbort if this number of bytes does not fit the type."""
         if size > (self.size or self.description.max_bytes):
             raise SdoAbort(AbortCode.TOO_LONG)
         if size < self.size:
@@ -217,20 +217,20 @@ class Entry(Part):
             self.guard(self, self.data_type.decode(data))
 
     def download(self, data: bytes) -> None:
-        """Write over the bus; SdoAbort if access, size, range or the owner refuses."""
+        """Write over the bus; SdoAbort if access, size, range or the owner forbids it."""
         self.check_writable()
         self.check_size(len(data))
         value = self.data_type.decode(data)
         if self.data_type is DataType.BOOLEAN and value not in _TRUTH:
             raise SdoAbort(AbortCode.VALUE_RANGE)
-        if self.guard is not None:  # what the object itself refuses has a code of its own
+        if self.guard is not None:  # the guard raises its own abort code
             self.guard(self, value)
         if isinstance(value, int | float) and not self.takes_commands:
             self._check_limits(value)
         self.force(data)
 
     def receive(self, data: bytes) -> None:
-        """Write from a PDO: what is refused is not taken, and nobody is notified."""
+        """Write from a PDO: drop a refused value without notifying any callback."""
         try:
             self.download(data)
         except SdoAbort:
@@ -250,11 +250,11 @@ NO_OBJECTS: Final[Mapping[int, ObjectDescription]] = {}
 
 
 class DictionaryDescription(Immutable):
-    """What never changes in the dictionaries of one type of device; all its slaves share it.
+    """The constant part of a dictionary; all slaves of one type share it.
 
     Args:
         entries: in any order; they are kept sorted.
-        objects: names and kinds of arrays and records; a variable is called as its entry.
+        objects: names and kinds of arrays and records; a variable has the name of its entry.
 
     Raises:
         ValueError: two entries have the same index and sub-index.
@@ -262,9 +262,9 @@ class DictionaryDescription(Immutable):
     Attributes:
         entries: sorted by index and sub-index.
         objects: names and kinds by index, sorted.
-        places: place among the entries by index << 8 | sub-index.
-        spans: places of all entries of an object, by index.
-        elements: places of the entries from sub-index 1 on without a gap, by index.
+        places: position among the entries by index << 8 | sub-index.
+        spans: positions of all entries of an object, by index.
+        elements: positions of the entries from sub-index 1 on without a gap, by index.
     """
 
     __slots__ = ("elements", "entries", "objects", "places", "spans")
@@ -292,23 +292,23 @@ class DictionaryDescription(Immutable):
                 self.elements[entry.index] = slice(first, place + 1)
 
     def __iter__(self) -> Iterator[EntryDescription]:
-        """Give all entries, sorted."""
+        """Return all entries, sorted."""
         return iter(self.entries)
 
 
 class Dictionary(Part):
-    """All entries of one slave: values of its own, and a description that it shares.
+    """The entries of one slave: its own values, and a shared description.
 
     Args:
-        entries: in any order; they are kept sorted. Or the description of another dictionary.
-        objects: names and kinds of arrays and records; a variable is called as its entry.
+        entries: in any order, kept sorted; or the description of another dictionary.
+        objects: names and kinds of arrays and records; a variable has the name of its entry.
 
     Raises:
         ValueError: two entries have the same index and sub-index.
 
     Attributes:
         description: names, types, access, limits and defaults.
-        by_multiplexer: readable entries that an SDO has named, by the three bytes that do.
+        by_multiplexer: cache of readable entries, by the three bytes of their multiplexer.
 
     >>> from tickrig.wire.canopen.datatypes import DataType
     >>> from tickrig.wire.canopen.eds.object_table import RW
@@ -335,10 +335,10 @@ class Dictionary(Part):
         self._only: frozenset[int] | None = None
 
     def restrict(self, only: frozenset[int] | None) -> None:
-        """Let SDOs find no other objects than some, as those of a boot loader.
+        """Restrict SDO access to some objects, as in a boot loader.
 
         Args:
-            only: their indices; None for all that there are.
+            only: their indices; None for all objects.
         """
         self._only = only
         self.by_multiplexer.clear()
@@ -353,7 +353,7 @@ class Dictionary(Part):
         return self.description.objects
 
     def __iter__(self) -> Iterator[Entry]:
-        """Give all entries, sorted."""
+        """Return all entries, sorted."""
         return iter(self._entries)
 
     def __len__(self) -> int:
@@ -385,7 +385,7 @@ class Dictionary(Part):
         return None if place is None else self._entries[place]
 
     def look_up(self, multiplexer: bytes) -> Entry:
-        """Look up the entry that an SDO names.
+        """Look up the entry of a multiplexer.
 
         Args:
             multiplexer: three bytes, the index with its low byte first and the sub-index.
@@ -427,7 +427,7 @@ class Dictionary(Part):
             area: indices, such as `range(0x1000, 0x2000)`.
 
         Returns:
-            Those of which there is an object, sorted.
+            The indices that have an object, sorted.
         """
         return [index for index in self.description.spans if index in area]
 
@@ -436,7 +436,7 @@ class Dictionary(Part):
 
         Args:
             index: of the object.
-            most: no more than so many.
+            most: largest number of elements.
 
         Returns:
             Its entries from sub-index 1 on, up to the first gap.
@@ -445,7 +445,7 @@ class Dictionary(Part):
         return [] if places is None else self._entries[places][:most]
 
 
-# What may be written to the COB-ID of a service that is not a PDO.
+# Allowed values for the COB-ID of a service that is not a PDO.
 
 _NOT_SDO: Final = ~(INVALID | FLAG_30 | CAN_ID_MASK)
 _NOT_EMCY: Final = ~(INVALID | CAN_ID_MASK)
@@ -477,9 +477,9 @@ def check_time_cob_id(entry: Entry, value: Value) -> None:
 
 
 def _check(entry: Entry, value: Value, unknown: int, in_use: Callable[[int], bool]) -> None:
-    """Refuse with 0609 0030h what a COB-ID cannot be.
+    """Refuse an invalid COB-ID with 0609 0030h.
 
-    That is: bits that are neither flags nor an 11-bit CAN-ID (29-bit CAN-IDs are not
+    Invalid are: bits that are neither flags nor an 11-bit CAN-ID (29-bit CAN-IDs are not
     emulated), a restricted CAN-ID in use, and another CAN-ID while the old one is in use
     and stays so.
     """

@@ -34,12 +34,12 @@ from tickrig.wire.errors import FramingError
 # EmcyProducer        keeps what is active, 1001h and 1003h, and sends
 # ErrorBehaviour      changes the NMT state afterwards (1029h)
 #
-# An error is a pair of code and five manufacturer-specific bytes, and it is active until
-# the same pair is cleared. `emergency` of an active error does nothing, so whoever sees a
-# cause may raise it in each tick; `emergency_clear` of one that is not active does nothing
-# either. Two RPDOs that are late are two errors, because their numbers are in the bytes.
-# 1001h is the union of the register bits of all that is active, so clearing one error must
-# not clear a bit that another one holds.
+# An error is a pair of code and five manufacturer-specific bytes, and it is active until the same
+# pair is cleared. `emergency` of an active error does nothing, so a service that sees a cause may
+# raise it in each tick; `emergency_clear` of one that is not active does nothing either. Two RPDOs
+# that are late are two errors, because their numbers are in the bytes. 1001h is the union of the
+# register bits of all that is active, so clearing one error must not clear a bit that another one
+# holds.
 #
 # Two messages of one error, raised and gone, with node-ID 5 and the heartbeat of node 7:
 #
@@ -49,7 +49,7 @@ from tickrig.wire.errors import FramingError
 # The register in a message is that of its own moment: `_queue_message` reads it when the
 # message is queued, not when it is sent. Messages wait in Stopped (no EMCY there), in
 # bus-off, and for the inhibit time; 16 at most, and later ones are lost. A reset forgets
-# errors and messages; whoever still sees the cause must raise it again
+# errors and messages; a service that still sees the cause must raise it again
 # (`ErrorStateEmcy.booted` does). It does so one tick later, because the boot-up message has
 # the larger CAN-ID and would leave behind the EMCY.
 #
@@ -76,12 +76,12 @@ class _Behaviour(IntEnum):
 class ErrorBehaviour(Service):
     """Changes the NMT state on a communication error, or on an error of the device.
 
-    Without its sub-index of 1029h a communication error is as with 0, another
-    error changes nothing. It acts after the EMCY producer, so that the EMCY is sent
-    before the slave is Stopped. Values that mean nothing are refused with 0609 0030h.
+    Without its sub-index of 1029h a communication error acts as with 0, and other errors have no
+    effect. It acts after the EMCY producer, so that the EMCY is sent before the slave is Stopped.
+    Undefined values are refused with 0609 0030h.
 
-    Not emulated: sub-indices of other profiles and of manufacturers; an application
-    may write to `node.enter` what it wants.
+    Not emulated: sub-indices of other profiles and of manufacturers; an application may call
+    `node.enter` itself.
     """
 
     def __init__(self, node: CanopenSlave, slot: int) -> None:
@@ -95,16 +95,16 @@ class ErrorBehaviour(Service):
                 self._behaviours[error] = entry
 
     def start(self) -> None:
-        """Know of no error."""
+        """Clear the pending error."""
         self._errors.clear()
 
     def communication_error(self) -> None:
-        """Act in this tick."""
+        """Apply the error behaviour in this tick."""
         self.act(_COMMUNICATION_ERROR)
 
     def act(self, error: int) -> None:
-        """Act in this tick on an error, given by its sub-index."""
-        # Noted, and acted on at its place in the tick: the EMCY of the same error leaves
+        """Apply the behaviour of an error in this tick, given by its sub-index."""
+        # Noted, and applied at its place in the tick: the EMCY of the same error leaves
         # first.
         self._errors.append(error)
         self.schedule(self.node.now_us)
@@ -149,11 +149,10 @@ _QUEUE_LENGTH: Final = 16
 class EmcyProducer(Service):
     """Reports errors, once when they occur and once when they are gone (0000h).
 
-    An error is known by its code and its text. 1001h is the sum of the errors
-    that are there, with the generic bit as long as there is one. Each error that
-    goes is reported, with the register that is left. In Stopped and in bus-off the
-    messages wait; they are sent afterwards. A reset forgets errors and messages:
-    who still sees the cause has to raise it again.
+    An error is known by its code and its text. 1001h is the union of the active errors, with the
+    generic bit while there is one. The end of each error is reported, with the remaining register.
+    In Stopped and in bus-off the messages wait; they are sent afterwards. A reset clears errors and
+    messages; a service whose cause remains must raise the error again.
 
     Not emulated: 29-bit CAN-IDs.
     """
@@ -179,17 +178,17 @@ class EmcyProducer(Service):
         return bits
 
     def power_on(self) -> None:
-        """Take the bus for sound."""
+        """Assume that the bus is working."""
         self._bus_off = False
 
     def start(self) -> None:
-        """Know of no error."""
+        """Clear all errors."""
         self._active.clear()
         self._queue.clear()
         self._free_us = 0
 
     def emergency(self, code: int, register: int, text: bytes) -> None:
-        """Note and report an error that was not there."""
+        """Record and report an error unless it is already active."""
         key = code & 0xFFFF, _padded(text)
         if key not in self._active:
             self._active[key] = register
@@ -197,7 +196,7 @@ class EmcyProducer(Service):
             self._queue_message(*key)
 
     def emergency_clear(self, code: int, text: bytes | None) -> None:
-        """Report that an error is gone, if it was there."""
+        """Report the end of an error if it was active."""
         gone = [
             key
             for key in self._active
@@ -208,18 +207,18 @@ class EmcyProducer(Service):
             self._queue_message(EmcyCode.NO_ERROR, key[1])
 
     def state_changed(self, old: NmtState, new: NmtState) -> None:
-        """Send what had to wait in Stopped."""
+        """Send the messages that waited in Stopped."""
         if self._queue:
             self.schedule(self._free_us)
 
     def bus_state(self, state: ErrorState) -> None:
-        """Wait in bus-off; send afterwards."""
+        """Hold messages in bus-off; send them afterwards."""
         self._bus_off = state is ErrorState.BUS_OFF
         if self._queue:
             self.schedule(self._free_us)
 
     def tick(self, now_us: int) -> None:
-        """Send what the inhibit time lets pass."""
+        """Send the messages that the inhibit time allows."""
         cob_id = self._cob_id
         # Without a valid 1014h nothing will ever be sent: old messages must not come out
         # when it is set.
@@ -248,10 +247,9 @@ class EmcyProducer(Service):
 class _ErrorHistory(Part):
     """Keeps the latest errors, the newest at sub-index 1.
 
-    Sub-index 0 counts them; 0 written to it forgets them all, other values are
-    refused with 0609 0030h. A sub-index without an error is answered with
-    0800 0024h. A field is the error code with the first two manufacturer-specific
-    bytes above it. That an error is gone is not noted.
+    Sub-index 0 counts them; writing 0 clears them all, other values are refused with 0609 0030h.
+    Reading a sub-index without an error returns 0800 0024h. A field is the error code with the
+    first two manufacturer-specific bytes above it. The end of an error is not recorded.
 
     Args:
         dictionary: with or without 1003h.
@@ -266,7 +264,7 @@ class _ErrorHistory(Part):
                 field.source = self._read
 
     def note(self, code: int, text: bytes) -> None:
-        """Put an error at the top; the oldest one falls out when all fields are full."""
+        """Insert an error at the top; drop the oldest one if all fields are full."""
         if self._count is None or not self._fields:
             return
         count = min(self._count.number + 1, len(self._fields))
@@ -301,8 +299,7 @@ _MAX_NODES: Final = 127
 class EmcyConsumer(Service):
     """Consumes the EMCY of other nodes: the sub-index is their node-ID.
 
-    What to do about it is left to the application. An EMCY that has not eight
-    bytes is ignored.
+    The application decides on the reaction. An EMCY without exactly eight bytes is ignored.
 
     Attributes:
         latest: the latest EMCY of each node since the reset.
@@ -323,7 +320,7 @@ class EmcyConsumer(Service):
             entry.watch(self.follow_cob_id)
 
     def start(self) -> None:
-        """Know nothing of others."""
+        """Forget the EMCYs of other nodes."""
         self.latest.clear()
 
     def handlers(self, state: NmtState) -> Iterator[tuple[int, Handler]]:
@@ -334,14 +331,14 @@ class EmcyConsumer(Service):
                     yield entry.number & CAN_ID_MASK, _Producer(self, entry.sub).receive
 
     def take(self, node_id: int, emcy: Emcy) -> None:
-        """Take the EMCY of a node."""
+        """Record the EMCY of a node."""
         self.latest[node_id] = emcy
         for notify in self.on_emcy:
             notify(node_id, emcy)
 
 
 class _Producer(NamedTuple):
-    """Another node, which may send EMCY."""
+    """Receives the EMCY of another node."""
 
     consumer: EmcyConsumer
     node_id: int
@@ -351,17 +348,16 @@ class _Producer(NamedTuple):
             self.consumer.take(self.node_id, Emcy.parse(frame.data))
 
 
-# What a slave does about its CAN controller's fault confinement (CiA 301, emergency object).
+# Reaction of a slave to the fault confinement of its CAN controller (CiA 301, emergency object).
 
 
 class ErrorStateEmcy(Service):
-    """Reports error-passive (8120h) and that bus-off is over (8140h).
+    """Reports error-passive (8120h) and recovery from bus-off (8140h).
 
-    8120h is cleared when the controller is error-active again. Bus-off is a
-    communication error (1029h). 8140h is sent when it is over, and cleared at once:
-    nothing is wrong then.
+    8120h is cleared when the controller is error-active again. Bus-off is a communication error
+    (1029h). 8140h is sent after recovery and cleared at once.
 
-    Not emulated: when and whether a controller recovers is its own business.
+    Not emulated: the recovery of the controller itself.
 
     Attributes:
         state: what the controller reported last.
@@ -372,11 +368,11 @@ class ErrorStateEmcy(Service):
         self.state = ErrorState.ACTIVE
 
     def power_on(self) -> None:
-        """Begin error-active."""
+        """Start error-active."""
         self.state = ErrorState.ACTIVE
 
     def booted(self) -> None:
-        """Report anew, after the boot-up message, what is still so."""
+        """Report error-passive again after the boot-up message if it still applies."""
         if self.state is ErrorState.PASSIVE:
             self.schedule(self.node.now_us + 1)
 
@@ -385,15 +381,14 @@ class ErrorStateEmcy(Service):
         self._report_passive()
 
     def bus_state(self, state: ErrorState) -> None:
-        """Report a change."""
+        """Report a change of state."""
         node, old, self.state = self.node, self.state, state
         if old is state:
             return
         if state is ErrorState.BUS_OFF:
             node.communication_error()
             return
-        # Raised and cleared at once: 8140h says that something is over, and nothing is
-        # wrong any more.
+        # Raised and cleared at once: 8140h reports that bus-off is over.
         if old is ErrorState.BUS_OFF:
             node.emergency(EmcyCode.BUS_OFF_RECOVERED, ErrorRegister.COMMUNICATION)
             node.emergency_clear(EmcyCode.BUS_OFF_RECOVERED)

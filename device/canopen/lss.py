@@ -36,7 +36,7 @@ _MAX_BIT: Final = 31
 _MAX_SUB: Final = 3
 
 _Test = tuple[int, Callable[[int, int], bool]]
-"""A part of the LSS address, and how the number of a message is compared with it."""
+"""A part of the LSS address, and the comparison with the number in a message."""
 
 SELECTIVE: Final[tuple[_Test, ...]] = ((0, eq), (1, eq), (2, eq), (3, eq))
 """Switch state selective: the whole LSS address."""
@@ -46,7 +46,7 @@ _IDENTIFY: Final[tuple[_Test, ...]] = ((0, eq), (1, eq), (2, le), (2, ge), (3, l
 
 
 class MessageSequence(Part):
-    """One request in several messages; a wrong one or a missing one ends it.
+    """One request in several messages; a wrong or missing message ends it.
 
     Args:
         tests: one for each message, in their order.
@@ -56,10 +56,9 @@ class MessageSequence(Part):
         self._tests, self._step = tests, 0
 
     def take(self, step: int, address: LssAddress, number: int) -> bool:
-        """Take a message. Returns: whether it was the last one and all of them fit."""
-        # 40h vendor, 41h product, 42h revision, 43h serial number: the first one begins
-        # anew, and one that does not fit or is out of order spoils the whole until the next
-        # first one.
+        """Take a message; return whether it was the last one and all of them match."""
+        # 40h vendor, 41h product, 42h revision, 43h serial number: the first one starts again, and
+        # one that does not fit or is out of order spoils the whole until the next first one.
         if step == 0:
             self._step = 0
         part, fits = self._tests[step]
@@ -77,13 +76,13 @@ class FastScanner(Part):
         self._sub = 0
 
     def take(self, request: FastScan, address: LssAddress) -> LssMode | None:
-        """Take a request. Returns: the state after it if it is answered, else None."""
+        """Take a request; return the state after it if it is answered, else None."""
         if request.bit_check == FASTSCAN_RESET:
             self._sub = 0
             return LssMode.WAITING
         if request.bit_check > _MAX_BIT or request.sub != self._sub:
             return None
-        # Bits from 31 down to `bit_check` must agree; those below are not asked for yet.
+        # Bits from 31 down to `bit_check` must agree; those below are not compared yet.
         if (address[self._sub] ^ request.id_number) >> request.bit_check:
             return None
         # Bit 0 agrees, so the whole part is known: only then the scan goes on to the next
@@ -93,7 +92,7 @@ class FastScanner(Part):
         return self._advance(request)
 
     def _advance(self, request: FastScan) -> LssMode | None:
-        """Go on to the next part; the part before it means that all were found."""
+        """Go on to the next part; an earlier next part means that all were found."""
         if request.next_sub > _MAX_SUB:
             return None
         self._sub = request.next_sub
@@ -103,12 +102,11 @@ class FastScanner(Part):
 class LssSlave(Service):
     """Obeys the LSS master, in every NMT state.
 
-    A node-ID counts from the next reset; an unconfigured slave boots with it when
-    LSS returns to waiting. It is lost with the power unless it was stored. Any
-    reset returns to waiting. Selective switching and fastscan act in waiting
-    only, fastscan and identify non-configured by a slave that neither has nor was
-    given a node-ID. A bit rate counts when it is activated: the slave is silent for
-    two switch delays and changes in between (`node.on_bit_rate`). Without all of
+    A node-ID takes effect at the next reset; an unconfigured slave boots with it when LSS returns
+    to waiting. Without storing, it is lost at power-off. Any reset returns to waiting. Selective
+    switching and fastscan act in waiting only, fastscan and identify non-configured in a slave that
+    has no active and no pending node-ID. A bit rate takes effect when activated: the slave is
+    silent for two switch delays and switches in between (`node.on_bit_rate`). Without all of
     1018h:01 to 04 there is no LSS.
 
     Not emulated: manufacturer-specific bit timing tables, automatic bit rate
@@ -125,23 +123,23 @@ class LssSlave(Service):
         self._fastscan = FastScanner()
 
     def power_on(self) -> None:
-        """Begin with the stored bit rate."""
+        """Start with the stored bit rate."""
         self._switch_us = NEVER
         self._bit_rate_index = self.node.nonvolatile.bit_rate_index
         self._notify_bit_rate()
 
     def start(self) -> None:
-        """Wait for the LSS master; a bit rate that is on its way still comes."""
+        """Return to waiting; a pending switch of the bit rate still takes place."""
         self._mode = LssMode.WAITING
         self.schedule(self._switch_us)
 
     def handlers(self, state: NmtState) -> Iterator[tuple[int, Handler]]:
-        """Listen to the LSS master, while initialising too."""
+        """Listen to the LSS master, also while initialising."""
         if len(self._identity) == len(LssAddress._fields):
             yield LSS_MASTER_COB_ID, self._receive
 
     def reconfigured_by(self, state: NmtState) -> Iterator[int]:
-        """Name the LSS master: a slave that gets its node-ID boots."""
+        """Return the CAN-ID of the LSS master: a slave that receives its node-ID boots."""
         return (can_id for can_id, _ in self.handlers(state))
 
     def tick(self, now_us: int) -> None:
@@ -243,7 +241,7 @@ class LssSlave(Service):
         self._answer(LssCommand.INQUIRE_NODE_ID, self.node.node_id)
 
     def _notify_bit_rate(self) -> None:
-        """Give the bit rate to the subscribers, if one was ever configured."""
+        """Pass the bit rate to the subscribers, if one was configured."""
         bit_rate = BIT_RATES.get(-1 if self._bit_rate_index is None else self._bit_rate_index)
         if bit_rate is not None:
             for notify in self.node.on_bit_rate:
@@ -273,4 +271,4 @@ _COMMANDS: Final[Mapping[LssMode, Mapping[int, _Command]]] = {
         **{LssCommand.INQUIRE_VENDOR + n: LssSlave._inquire for n in range(len(SELECTIVE))},
     },
 }
-"""What a message does, by its command specifier."""
+"""Handlers of messages, by command specifier."""

@@ -24,7 +24,7 @@ _NEXT_STATE: Final = {
     nmt.NmtCommand.STOP: nmt.NmtState.STOPPED,
     nmt.NmtCommand.ENTER_PRE_OPERATIONAL: nmt.NmtState.PRE_OPERATIONAL,
 }
-"""The same from every state but Initialising (CiA 301, NMT state diagram)."""
+"""Next states, the same from every state but Initialising (CiA 301, NMT state diagram)."""
 
 _NMT_STARTUP: Final = 0x1F80
 _SELF_START_MASK: Final = 0b1101
@@ -34,7 +34,7 @@ _SELF_START: Final = 0b1000
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class NmtSlave(Service):
-    """Follows the NMT master."""
+    """Obeys the NMT master."""
 
     def booted(self) -> None:
         """Send the boot-up message and enter Pre-operational, or Operational by itself."""
@@ -51,16 +51,16 @@ class NmtSlave(Service):
             self.node.enter(nmt.NmtState.OPERATIONAL)
 
     def handlers(self, state: nmt.NmtState) -> Iterator[tuple[int, Handler]]:
-        """Listen to the NMT master; a node without node-ID waits for LSS alone."""
+        """Listen to the NMT master; a node without node-ID listens to LSS only."""
         if self.node.node_id != UNCONFIGURED:
             yield nmt.NMT_COB_ID, self._receive
 
     def reconfigured_by(self, state: nmt.NmtState) -> Iterator[int]:
-        """Name the NMT master: what it listens to follows the state."""
+        """Return the CAN-ID of the NMT master: the state determines the CAN-IDs to listen to."""
         return (can_id for can_id, _ in self.handlers(state))
 
     def _receive(self, frame: CanFrame) -> None:
-        """Obey; what is not a command for this node is ignored."""
+        """Execute a command; ignore frames that are not a command for this node."""
         # 000#8105: command, node-ID; 000#8100: all nodes.
         if len(frame.data) != 2 or frame.data[1] not in (nmt.ALL_NODES, self.node.node_id):
             return
@@ -88,9 +88,8 @@ class NmtSlave(Service):
 class HeartbeatProducer(Service):
     """Sends the NMT state each producer heartbeat time.
 
-    The boot-up message counts as the first heartbeat. A time that is written,
-    over the bus or from the inside, begins anew, so the first one comes after
-    one period.
+    The boot-up message counts as the first heartbeat. Writing the time, over the bus or from the
+    inside, restarts the period, so the first heartbeat follows one period later.
     """
 
     def __init__(self, node: CanopenSlave, slot: int) -> None:
@@ -100,14 +99,14 @@ class HeartbeatProducer(Service):
         self._begins = False
         if self._period is not None:
             self._period.watch(self._changed)
-            self._period.written = self._changed  # the same value, too, begins anew
+            self._period.written = self._changed  # writing the same value restarts the period, too
 
     def booted(self) -> None:
-        """Count from the boot-up message."""
+        """Start the period at the boot-up message."""
         self._begin()
 
     def tick(self, now_us: int) -> None:
-        """Begin to count, or send one heartbeat."""
+        """Start the period, or send one heartbeat."""
         node = self.node
         period_us = 1_000 * self._period.number if self._period is not None else 0
         if self._begins:
@@ -123,7 +122,7 @@ class HeartbeatProducer(Service):
         self._begin()
 
     def _begin(self) -> None:
-        """Count from the next tick on, or from this one; not before the boot-up message."""
+        """Start the period in the next tick or this one; not before the boot-up message."""
         # While the node initialises the values of a reset arrive here, too; `booted` begins
         # then.
         if self.node.state is not nmt.NmtState.INITIALISING:
@@ -139,13 +138,12 @@ _TOGGLE: Final = 0x80
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class NodeGuarding(Service):
-    """Answers guarding requests with the NMT state, and watches that they come.
+    """Answers guarding requests with the NMT state, and supervises that they arrive.
 
-    The toggle bit begins with 0 after a reset and changes with each answer. Life
-    guarding begins with the first request; none within guard time times life time
-    factor is EMCY 8130h and a communication error (1029h), until the next request.
-    Heartbeat has priority: with 1017h set, requests are not answered and nothing
-    is watched. Without 100Ch there is no guarding.
+    The toggle bit starts at 0 after a reset and changes with each answer. Life guarding begins
+    with the first request. If none follows within guard time times life time factor, EMCY 8130h and
+    a communication error (1029h) are raised until the next request. Heartbeat has priority: with
+    1017h set, requests are not answered and not supervised. Without 100Ch there is no guarding.
     """
 
     def __init__(self, node: CanopenSlave, slot: int) -> None:
@@ -170,7 +168,7 @@ class NodeGuarding(Service):
         return self._heartbeat is not None and self._heartbeat.number > 0
 
     def start(self) -> None:
-        """Begin with toggle 0, and wait for the first request."""
+        """Reset the toggle bit to 0, and wait for the first request."""
         self._toggle = 0
 
     def remote_handlers(self, state: nmt.NmtState) -> Iterator[tuple[int, Handler]]:
@@ -179,7 +177,7 @@ class NodeGuarding(Service):
             yield nmt.ERROR_CONTROL_COB_ID + self.node.node_id, self._receive
 
     def tick(self, now_us: int) -> None:
-        """Note that the master does not guard any more."""
+        """Report that the master no longer sends requests."""
         self.node.emergency(EmcyCode.HEARTBEAT, ErrorRegister.COMMUNICATION)
         self.node.communication_error()
 
@@ -195,7 +193,7 @@ class NodeGuarding(Service):
         self.schedule(node.now_us + life_time_us if life_time_us else NEVER)
 
     def _changed(self, entry: Entry) -> None:
-        """Wait for the next request: the times are others now."""
+        """Wait for the next request with the new times."""
         self.node.emergency_clear(EmcyCode.HEARTBEAT, b"")
         self.schedule(NEVER)
 
@@ -208,7 +206,7 @@ _RESERVED: Final = 0xFF00_0000
 
 
 class Watch(Enum):
-    """What is known of a monitored node."""
+    """Monitoring state of a node."""
 
     UNKNOWN = auto()  # no heartbeat yet: nothing is late
     ALIVE = auto()
@@ -216,16 +214,16 @@ class Watch(Enum):
 
 
 class Monitor(Part):
-    """Watches the heartbeat of one node.
+    """Monitors the heartbeat of one node.
 
     Args:
         consumer: the service that it belongs to.
         value: an entry of 1016h: node-ID in bits 16 to 23, time in ms below.
 
     Attributes:
-        node_id: whom it watches.
+        node_id: the monitored node.
         period_us: the consumer heartbeat time.
-        watch: what is known.
+        watch: the monitoring state.
         nmt_state: the NMT state that the node sent last, None before.
         deadline_us: when its heartbeat is late.
     """
@@ -239,7 +237,7 @@ class Monitor(Part):
         self.nmt_state: int | None = None
 
     def receive(self, frame: CanFrame) -> None:
-        """Take a heartbeat."""
+        """Handle a heartbeat."""
         if len(frame.data) != 1:
             return
         self.nmt_state = frame.data[0]
@@ -253,7 +251,7 @@ class Monitor(Part):
             self._consumer.reschedule()
 
     def lose(self) -> None:
-        """Note that the heartbeat is late."""
+        """Report that the heartbeat is late."""
         self.watch, self.deadline_us = Watch.LOST, NEVER
         node = self._consumer.node
         node.emergency(EmcyCode.HEARTBEAT, ErrorRegister.COMMUNICATION, bytes([self.node_id]))
@@ -266,18 +264,16 @@ class Monitor(Part):
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class HeartbeatConsumer(Service):
-    """Watches the heartbeats of other nodes.
+    """Monitors the heartbeats of other nodes.
 
-    Monitoring begins with the first heartbeat; the boot-up message counts as
-    one. A heartbeat that does not come is EMCY 8130h, whose first
-    manufacturer-specific byte is the node-ID, and a communication error (1029h).
-    The error is cleared when a heartbeat comes again, or when its entry is
-    changed. An entry with time 0 or a node-ID that is not 1..127 is not used. A
-    second one for the same node-ID is refused with 0604 0043h, reserved bits with
-    0609 0030h.
+    Monitoring begins with the first heartbeat; the boot-up message counts as one. A missing
+    heartbeat raises EMCY 8130h, whose first manufacturer-specific byte is the node-ID, and a
+    communication error (1029h). The error is cleared when a heartbeat arrives again, or when its
+    entry is changed. An entry with time 0 or a node-ID that is not 1..127 is not used. A second one
+    for the same node-ID is refused with 0604 0043h, reserved bits with 0609 0030h.
 
     Attributes:
-        monitors: the entries that are used.
+        monitors: the entries in use.
     """
 
     def __init__(self, node: CanopenSlave, slot: int) -> None:
@@ -289,7 +285,7 @@ class HeartbeatConsumer(Service):
             entry.watch(self._changed)
 
     def start(self) -> None:
-        """Watch the nodes of the power-on values."""
+        """Monitor the nodes of the power-on values."""
         for entry in self._entries:
             self._watch(entry)
 
@@ -300,14 +296,14 @@ class HeartbeatConsumer(Service):
                 yield nmt.ERROR_CONTROL_COB_ID + monitor.node_id, monitor.receive
 
     def tick(self, now_us: int) -> None:
-        """See which heartbeats are late."""
+        """Check for late heartbeats."""
         for monitor in self.monitors.values():
             if monitor.deadline_us <= now_us:
                 monitor.lose()
         self.reschedule()
 
     def reschedule(self) -> None:
-        """Wait for the earliest deadline."""
+        """Schedule the earliest deadline."""
         deadlines = (monitor.deadline_us for monitor in self.monitors.values())
         self.schedule(min(deadlines, default=NEVER))
 

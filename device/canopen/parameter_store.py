@@ -1,4 +1,4 @@
-"""Program download: a boot loader beside the program of the device (CiA 302-3)."""
+"""Stored parameters (CiA 301) and program download with a boot loader (CiA 302-3)."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ SAVE: Final = int.from_bytes(b"save", "little")
 LOAD: Final = int.from_bytes(b"load", "little")
 
 _ON_COMMAND: Final = b"\x01"
-"""What both objects read unless the device has a default: bit 0, on command."""
+"""Value of both objects unless the device has a default: bit 0, on command."""
 
 ALL, COMMUNICATION, APPLICATION = 1, 2, 3
 """Sub-indices."""
@@ -37,22 +37,21 @@ _AREAS: Final = {
 _MANUFACTURER_AREA: Final = range(0x2000, 0x6000)
 
 _VOLATILE: Final = frozenset((0x1003, 0x1010, 0x1011, 0x1013))
-"""Communication objects that may be written but are no parameters."""
+"""Communication objects that are writable but are not parameters."""
 
 
 class ParameterStore(Service):
-    """Stores parameters on "save", forgets them on "load".
+    """Stores parameters on "save", restores the defaults on "load".
 
-    Sub-index 1 stands for all, 2 for 1000h to 1FFFh, 3 for 6000h to 9FFFh, 4 and
-    above for 2000h to 5FFFh, where CiA 301 leaves the choice. A parameter is what
-    the bus may read and write, but no domain and no process output (an object for
-    RPDOs alone). What has its default value is not kept, so that COB-IDs go on
-    following the node-ID. "load" acts with the next reset, of the node or, for
-    1000h to 1FFFh, of communication. Another signature is refused with 0800 0020h.
-    It works in every NMT state that has SDOs, and whatever the objects say of it when they are
-    read: that is their default.
+    Sub-index 1 stands for all, 2 for 1000h to 1FFFh, 3 for 6000h to 9FFFh, 4 and above for 2000h to
+    5FFFh, where CiA 301 leaves the choice. A parameter is an object that the bus may read and
+    write, except domains and process outputs (objects for RPDOs only). Default values are not
+    stored, so that COB-IDs continue to follow the node-ID. "load" acts with the next reset, of the
+    node or, for 1000h to 1FFFh, of communication. Another signature is refused with 0800 0020h.
+    Storing works in every NMT state with SDOs, whatever value the objects have when read: that is
+    their default.
 
-    Not emulated: the time that it takes, a failing memory, saving by itself.
+    Not emulated: the time it takes, failing memory, automatic saving.
 
     Attributes:
         volatile: indices that are never stored; a device profile may add to them.
@@ -68,11 +67,11 @@ class ParameterStore(Service):
         ]
         for entry in self._entries:
             entry.guard, entry.written = _check_signature, self._act
-            # "save" is 65766173h, beyond any limits of what the object reads as.
+            # "save" is 65766173h, outside any limits of the value that the object reads as.
             entry.takes_commands = True
 
     def start(self) -> None:
-        """Show what it can."""
+        """Set the values that the objects read as."""
         for entry in self._entries:
             _show_capability(entry)
 
@@ -110,7 +109,7 @@ class ParameterStore(Service):
 
 
 def _show_capability(entry: Entry) -> None:
-    """Put back what is read there; the signature was only a command."""
+    """Restore the value to read; the signature was only a command."""
     given = entry.description
     entry.assign(given.default if given.has_default else _ON_COMMAND.ljust(entry.size, b"\0"))
 
@@ -133,14 +132,14 @@ _OBJECTS: Final = frozenset(
         *(_DATA, _CONTROL, _IDENTIFICATION, _FLASH_STATUS),
     )
 )
-"""All that there is while the program does not run."""
+"""Objects that exist while the program does not run."""
 
 FLASHING_US: Final = 200_000
-"""How long the flash is busy, whatever is written."""
+"""Time for which the flash is busy after each write."""
 
 
 class ProgramCommand(IntEnum):
-    """What is written to 1F51h."""
+    """Commands written to 1F51h."""
 
     STOP = 0
     START = 1
@@ -159,18 +158,17 @@ class FlashError(IntEnum):
 class BootLoader(Part):
     """Stops, clears, takes and starts the program of a device.
 
-    A device whose program is stopped resets, and boots with the objects of the boot
-    loader alone: all others do not exist, and NMT start is not obeyed. It does so at
-    power-on too while there is no program. The program that is downloaded is kept, and
-    told by its CRC-32 (1F56h); nothing is made of it: the device does as before when it
-    runs. A command that does not fit the state is refused with 0800 0022h.
+    A device whose program is stopped resets, and boots with the objects of the boot loader only: no
+    others exist, and NMT start is ignored. The same happens at power-on if there is no program. A
+    downloaded program is stored and identified by its CRC-32 (1F56h) but not executed: a running
+    device behaves as before. A command that does not fit the state is refused with 0800 0022h.
 
-    Not emulated: verification of what is downloaded, several programs, 1F52h to 1F55h
+    Not emulated: verification of the download, several programs, 1F52h to 1F55h
     and 1F58h, writing by blocks of the flash.
 
     Args:
         node: its slave, with the objects of `add_program_objects`.
-        built_in: the program that it is made with.
+        built_in: the program of a new device.
     """
 
     def __init__(self, node: CanopenSlave, built_in: bytes = b"") -> None:
@@ -186,7 +184,7 @@ class BootLoader(Part):
 
     @property
     def program(self) -> bytes:
-        """What is in the flash."""
+        """The program in the flash."""
         kept = self._node.nonvolatile.program
         return self._built_in if kept is None else kept
 
@@ -197,7 +195,7 @@ class BootLoader(Part):
         self.run(runs=bool(self.program))
 
     def run(self, *, runs: bool) -> None:
-        """Let the program run, or the boot loader alone."""
+        """Enable the program, or the boot loader only."""
         self.runs = runs
         self._node.dictionary.restrict(None if runs else _OBJECTS)
 
@@ -205,7 +203,7 @@ class BootLoader(Part):
         return self.runs or command is not NmtCommand.START
 
     def _check(self, entry: Entry, value: Value) -> None:
-        """Refuse what is no command, or does not fit the state."""
+        """Refuse an unknown command, or one that does not fit the state."""
         if value not in ProgramCommand.__members__.values():
             raise SdoAbort(AbortCode.VALUE_RANGE)
         starts = value in (ProgramCommand.START, ProgramCommand.RESET)

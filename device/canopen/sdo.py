@@ -78,7 +78,7 @@ if TYPE_CHECKING:
 #
 # - A value is taken or given whole: an upload gives the value of the moment of its first
 #   request, a download changes the object with its last frame or not at all. Watchers and
-#   RPDOs may change the object in between; nobody sees a half-written one.
+#   RPDOs may change the object in between; a half-written one is never visible.
 # - Refusals are exceptions: whatever raises SdoAbort while a request is worked on (entry,
 #   guard, size check, transfer) ends the transfer in `receive`, with the multiplexer of the
 #   transfer or 0.
@@ -93,9 +93,9 @@ if TYPE_CHECKING:
 # - What comes is counted against the announced size, the object and the memory while it
 #   comes (`_DownloadSize`), so that a client cannot fill the memory before it is refused.
 #
-# `_without_transfer` answers the commonest request itself: reading up to four bytes that
-# nobody makes on demand. It must answer exactly as `initiate` would; `by_multiplexer` holds
-# readable entries only, for that reason.
+# `_without_transfer` answers the commonest request itself: reading up to four bytes without a
+# `source`. It must answer exactly as `initiate` would; `by_multiplexer` holds readable entries
+# only, for that reason.
 #
 # Other ends of this dialogue: `wire/canopen/sdo_frame.py` has the command bytes, the client
 # is `host/canopen`. A change of the rules has to be made with the rules of `canmon` and the
@@ -117,19 +117,19 @@ _TAKEN: Final = {
 
 
 class _DownloadSize(Part):
-    """Judges the size that a client announces, and that of what comes.
+    """Checks the size that a client announces, and the size of the received data.
 
     Args:
-        server: has the memory of the slave.
-        entry: what is written.
-        announced: bytes that the client is going to send, None if it does not say.
+        server: the server, with the memory limit of the slave.
+        entry: the object to write.
+        announced: bytes that the client is going to send, None if not indicated.
 
     Raises:
-        SdoAbort: the entry cannot be written, or what is announced does not fit.
+        SdoAbort: the entry is not writable, or the announced size does not fit.
 
     Attributes:
         announced: as given.
-        most: bytes that may come; with more `check` says what is wrong.
+        most: largest number of bytes; above it `check` raises the reason.
     """
 
     def __init__(self, server: SdoServer, entry: Entry, announced: int | None) -> None:
@@ -144,7 +144,7 @@ class _DownloadSize(Part):
         self.most = min(self._long, self._free)
 
     def check(self, size: int) -> None:
-        """Raise SdoAbort if so many bytes are more than was announced, or than fits."""
+        """Raise SdoAbort if the size exceeds the announced one, or does not fit."""
         if size > self._long:
             raise SdoAbort(AbortCode.TOO_LONG)
         if size > self._free:
@@ -152,7 +152,7 @@ class _DownloadSize(Part):
 
 
 class _SegmentedUpload(Part):
-    """Gives a value as it was when the client asked for it."""
+    """Uploads a value in segments, as it was at the first request."""
 
     def __init__(self, server: SdoServer, data: bytes) -> None:
         self._server, self._data = server, data
@@ -161,7 +161,7 @@ class _SegmentedUpload(Part):
         server.wait(self._segment)
 
     def _segment(self, request: bytes) -> None:
-        """Give the next segment."""
+        """Send the next segment."""
         command, toggle, at = request[0], self._toggle, self._at
         if command & _REQUESTED != _UPLOAD_SEGMENT | toggle:
             self._server.go_on_otherwise(request, _UPLOAD_SEGMENT)
@@ -181,7 +181,7 @@ class _SegmentedUpload(Part):
 
 
 class SegmentedDownload(Part):
-    """Collects a value; the object changes when the last segment has come."""
+    """Downloads a value in segments; the object changes with the last segment."""
 
     def __init__(self, server: SdoServer, entry: Entry, request: bytes) -> None:
         self._server, self._entry = server, entry
@@ -194,7 +194,7 @@ class SegmentedDownload(Part):
         server.wait(self._segment)
 
     def _segment(self, request: bytes) -> None:
-        """Take the next segment."""
+        """Handle the next segment."""
         command, toggle, data = request[0], self._toggle, self._data
         if command & _REQUESTED != _DOWNLOAD_SEGMENT | toggle:
             self._server.go_on_otherwise(request, _DOWNLOAD_SEGMENT)
@@ -214,7 +214,7 @@ class SegmentedDownload(Part):
             self._server.go_on()
 
     def _commit(self) -> None:
-        """Write all that came; SdoAbort if it is too little, or the object refuses."""
+        """Write the received data; SdoAbort if there is too little, or the object refuses it."""
         if len(self._data) < (self._size.announced or 0):
             raise SdoAbort(AbortCode.TOO_SHORT)
         self._entry.download(bytes(self._data))
@@ -223,17 +223,16 @@ class SegmentedDownload(Part):
 # Block transfer of one object (CiA 301, SDO block download and SDO block upload).
 
 _END_MASK: Final = 0xE1
-"""Command specifier and subcommand of the end; n is between them."""
+"""Command specifier and subcommand of the end request; n is between them."""
 
 
 class _BlockDownload(Part):
-    """Collects a value in blocks; the object changes when the client has ended the transfer.
+    """Downloads a value in blocks; the object changes when the client has ended the transfer.
 
-    A segment out of sequence is dropped, and the block acknowledged at its end
-    with the last one in sequence. If the end itself is lost, the client must
-    notice, or the transfer times out: a client may be slow inside a block. The
-    size is judged before the CRC. Inside a block every frame but an abort is a
-    segment.
+    A segment out of sequence is dropped, and the end of the block is acknowledged with the last one
+    in sequence. If the end itself is lost, the client must notice, or the transfer times out: a
+    client may be slow inside a block. The size is checked before the CRC. Inside a block every
+    frame but an abort is a segment.
     """
 
     def __init__(self, server: SdoServer, entry: Entry, request: bytes) -> None:
@@ -250,7 +249,7 @@ class _BlockDownload(Part):
         server.wait(self._segment)
 
     def _segment(self, request: bytes) -> None:
-        """Take a segment of the running block."""
+        """Handle a segment of the running block."""
         head, due = request[0], self._in_sequence + 1
         if head == due and due < self._block_size:  # most are: in sequence, and not the last
             self._in_sequence = due
@@ -263,7 +262,7 @@ class _BlockDownload(Part):
             self._end_block(head, request)
 
     def _end_block(self, head: int, request: bytes) -> None:
-        """Take the last segment of a block, or drop one that is out of sequence."""
+        """Handle the last segment of a block, or drop one that is out of sequence."""
         seqno = head & BLOCK_SEQNO
         if seqno == self._in_sequence + 1:
             self._in_sequence = seqno
@@ -275,8 +274,8 @@ class _BlockDownload(Part):
             self._server.go_on()
 
     def _acknowledge(self) -> None:
-        """Say how far the block was received, and begin the next."""
-        # How much of the last segment is data is said at the end only: seven bytes may be
+        """Acknowledge the received part of the block, and start the next."""
+        # The number of data bytes in the last segment comes only at the end: seven bytes may be
         # fill.
         self._size.check(len(self._data) - SEGMENT_BYTES)
         self._block_size = self._server.block_size
@@ -287,7 +286,7 @@ class _BlockDownload(Part):
         self._server.wait(self._end if self._finished else self._segment)
 
     def _end(self, request: bytes) -> None:
-        """Judge the whole, and write it."""
+        """Check the whole value, and write it."""
         if request[0] & _END_MASK != BLOCK_END:
             self._server.initiate(request)
             return
@@ -305,13 +304,12 @@ class _BlockDownload(Part):
 
 
 class _BlockUpload(Part):
-    """Gives a value as it was when the client asked for it, a block in one tick.
+    """Uploads a value in blocks, one block in a tick, as it was at the first request.
 
-    A value no longer than the client's protocol switch threshold is given by
-    expedited or segmented upload. A lost segment is sent again from there on,
-    in a new block. The block size of the last acknowledgement is not looked at.
-    The server says that it can do the CRC to clients that can: there are clients
-    that check it whenever the server can.
+    A value no longer than the client's protocol switch threshold is sent by expedited or segmented
+    upload. After a lost segment, sending continues from it in a new block. The block size of the
+    last acknowledgement is ignored. The server indicates CRC support only to clients with CRC
+    support: some clients check the CRC whenever the server supports it.
     """
 
     def __init__(self, server: SdoServer, data: bytes, request: bytes) -> None:
@@ -337,7 +335,7 @@ class _BlockUpload(Part):
         self._block_size = block_size
 
     def _start(self, request: bytes) -> None:
-        """Wait until the client is ready."""
+        """Handle the request that starts the upload."""
         if request[0] == BLOCK_START:
             self._send_block()
         else:
@@ -355,7 +353,7 @@ class _BlockUpload(Part):
         self._server.wait(self._acknowledge)
 
     def _acknowledge(self, request: bytes) -> None:
-        """Go on after the last segment that the client has received."""
+        """Continue after the last segment that the client has received."""
         if request[0] != BLOCK_ACKNOWLEDGE:
             self._server.initiate(request)
             return
@@ -376,7 +374,7 @@ class _BlockUpload(Part):
         self._server.wait(self._end)
 
     def _end(self, request: bytes) -> None:
-        """Wait until the client has checked what it has."""
+        """Handle the end of the transfer, after the client has checked the data."""
         if request[0] == BLOCK_ENDED:
             self._server.end()
         else:
@@ -391,12 +389,12 @@ _MEMORY_BYTES: Final = 64 << 20
 
 @dataclass(frozen=True, slots=True)
 class SdoLimits(Immutable):
-    """What CiA 301 leaves to the device.
+    """SDO server limits that CiA 301 leaves to the device.
 
     Attributes:
         timeout_us: silence of the client after which a transfer is aborted, at least 1.
-        memory_bytes: what all strings and domains of the slave hold together; what an
-            object itself may hold stands in its description.
+        memory_bytes: memory of all strings and domains of the slave together; the limit of a single
+            object is in its description.
     """
 
     timeout_us: int = _TIMEOUT_US
@@ -413,7 +411,7 @@ USUAL: Final = SdoLimits()
 
 
 State = Callable[[bytes], None]
-"""What the next request means; a transfer is in one of these at a time."""
+"""The state of the server: the method that handles the next request."""
 
 _NO_MULTIPLEXER: Final = bytes(3)
 _INITIATE: Final[dict[int, int]] = {
@@ -428,24 +426,23 @@ _EXPEDITED: Final = tuple(
     bytes([ServerCommand.UPLOAD | EXPEDITED | SIZE_INDICATED | EXPEDITED_BYTES - size << 2])
     for size in range(EXPEDITED_BYTES + 1)
 )
-"""First byte of an expedited answer, by the number of bytes."""
+"""First byte of an expedited response, by the number of bytes."""
 _FILL: Final = tuple(bytes(EXPEDITED_BYTES - size) for size in range(EXPEDITED_BYTES + 1))
 
 
 class SdoServer(Part):
-    """Serves one client: one transfer at a time, every kind of CiA 301.
+    """Serves one client: one transfer at a time, all kinds of CiA 301.
 
-    Where CiA 301 leaves it open: requests that do not have 8 bytes are ignored.
-    A new initiate request ends a running transfer silently. What is no request
-    in the present state is aborted with 0504 0001h, with multiplexer 0 if no
-    transfer runs. Reserved bits are not looked at.
+    In cases that CiA 301 leaves open: requests without exactly 8 bytes are ignored. A new initiate
+    request ends a running transfer silently. An invalid request in the present state is aborted
+    with 0504 0001h, with multiplexer 0 if no transfer runs. Reserved bits are ignored.
 
     Not emulated: network indication, the time that a real server needs.
 
     Args:
         node: the slave.
-        wake: asks for a look at `due_us` at that time.
-        limits: what CiA 301 leaves to the device.
+        wake: schedules a check of `due_us`.
+        limits: limits that CiA 301 leaves to the device.
 
     Attributes:
         request_id: CAN-ID from client to server.
@@ -467,11 +464,11 @@ class SdoServer(Part):
         self.due_us: int
 
     def limit(self, limits: SdoLimits) -> None:
-        """Put up with other limits, from the next request on."""
+        """Apply other limits from the next request on."""
         self._memory_bytes, self._timeout_us = limits.memory_bytes, limits.timeout_us
 
     def receive(self, frame: CanFrame) -> None:
-        """Take a request, or the next segment."""
+        """Handle a request or the next segment."""
         request = frame[1]
         if len(request) == FRAME_BYTES:
             try:
@@ -480,7 +477,7 @@ class SdoServer(Part):
                 self.abort(refused.code)
 
     def respond(self, response: bytes) -> None:
-        """Send to the client."""
+        """Send a frame to the client."""
         self.node.send(self.response_id, response)
 
     def confirm(self, command: int, rest: bytes = bytes(4)) -> None:
@@ -488,23 +485,23 @@ class SdoServer(Part):
         self.respond(bytes([command]) + self._multiplexer + rest)
 
     def wait(self, state: State) -> None:
-        """Let the transfer wait for a request, but not for ever."""
+        """Wait for the next request of the transfer, with the time-out."""
         self._state = state
         self.go_on()
         self._wake(self.due_us)
 
     def go_on(self) -> None:
-        """Let the transfer wait for the next request of the same meaning, as long again."""
+        """Wait for the next request of the same kind, and restart the time-out."""
         self.due_us = self.node.now_us + self._timeout_us
 
     def go_on_otherwise(self, request: bytes, specifier: int) -> None:
-        """Take what is not the segment that was due: SdoAbort if only its toggle bit is wrong."""
+        """Handle a request that is not the expected segment; SdoAbort on a wrong toggle bit."""
         if request[0] & SPECIFIER == specifier:
             raise SdoAbort(AbortCode.TOGGLE_BIT)
         self.initiate(request)
 
     def free_bytes(self, entry: Entry) -> int:
-        """Return what a string or domain may hold beside all others."""
+        """Return the memory left for a string or domain beside all others."""
         others = (one for one in self.node.dictionary if not one.size and one is not entry)
         return self._memory_bytes - sum(len(one.data) for one in others)
 
@@ -513,12 +510,12 @@ class SdoServer(Part):
         self._state, self._multiplexer, self.due_us = self._idle, _NO_MULTIPLEXER, NEVER
 
     def abort(self, code: AbortCode) -> None:
-        """End the transfer; the client gets the reason."""
+        """End the transfer with an abort to the client."""
         self.confirm(ServerCommand.ABORT, code.to_bytes(4, "little"))
         self.end()
 
     def initiate(self, request: bytes) -> None:
-        """Take a request that does not go on with a transfer: it begins one, or ends it."""
+        """Handle a request that does not continue a transfer: it starts one or ends it."""
         command = request[0]
         if command == ClientCommand.ABORT:
             self.end()
@@ -539,7 +536,7 @@ class SdoServer(Part):
                 _BlockDownload(self, entry, request)
 
     def upload(self, data: bytes) -> None:
-        """Give a value in one answer, or begin to give it in segments."""
+        """Upload a value in one response, or start a segmented upload."""
         size = len(data)
         if 0 < size <= EXPEDITED_BYTES:
             self.respond(_EXPEDITED[size] + self._multiplexer + data + _FILL[size])
@@ -548,7 +545,7 @@ class SdoServer(Part):
             _SegmentedUpload(self, data)
 
     def _without_transfer(self, request: bytes) -> None:
-        """Take a request while no transfer runs; reading a small value is the short way."""
+        """Handle a request while no transfer runs, with a short path for reading a small value."""
         if request[0] == _UPLOAD:
             multiplexer = request[1:4]
             entry = self._entries.get(multiplexer)
@@ -562,9 +559,9 @@ class SdoServer(Part):
         self.initiate(request)
 
     def _begin_download(self, entry: Entry, request: bytes) -> None:
-        """Write at once, or begin to take segments.
+        """Download a value at once, or start a segmented download.
 
-        Expedited data without a size fills the object: the bytes beyond are not looked at.
+        Expedited data without a size fills the object; further bytes are ignored.
         """
         command = request[0]
         if not command & EXPEDITED:
@@ -589,7 +586,7 @@ _SERVER_TO_CLIENT: Final = 2
 
 
 class _Additional(NamedTuple):
-    """A server with the two COB-IDs that rule it."""
+    """A server with its two COB-IDs."""
 
     server: SdoServer
     request: Entry
@@ -600,7 +597,7 @@ class _Additional(NamedTuple):
         return is_valid(self.request.number) and is_valid(self.response.number)
 
     def configure(self) -> None:
-        """Take over the CAN-IDs; a server that has been switched off ends its transfer."""
+        """Apply the CAN-IDs; a server that is switched off ends its transfer."""
         if self.exists:
             self.server.request_id = self.request.number & CAN_ID_MASK
             self.server.response_id = self.response.number & CAN_ID_MASK
@@ -610,17 +607,16 @@ class _Additional(NamedTuple):
 class SdoServers(Service):
     """The default server and the additional ones.
 
-    The default server is there without 1200h too; 1200h, where it is, always
-    tells the truth and cannot be written. An additional server serves as soon
-    as both its COB-IDs are valid; a CAN-ID changes only while its own COB-ID is
-    invalid. Bit 30 (dynamic) is kept and has no effect. Transfers end silently
-    when the slave leaves Pre-operational and Operational.
+    The default server exists even without 1200h; 1200h, if present, always shows its COB-IDs and is
+    read-only. An additional server is active as soon as both its COB-IDs are valid; a CAN-ID
+    changes only while its own COB-ID is invalid. Bit 30 (dynamic) is kept and has no effect.
+    Transfers end silently when the slave leaves Pre-operational and Operational.
 
     Not emulated: 29-bit CAN-IDs, a check of two servers on one CAN-ID.
 
     Attributes:
         default: the server of 1200h.
-        limits: what all its servers put up with.
+        limits: limits of all its servers.
     """
 
     def __init__(self, node: CanopenSlave, slot: int, limits: SdoLimits = USUAL) -> None:
@@ -640,7 +636,7 @@ class SdoServers(Service):
         self.servers = [self.default, *(additional.server for additional in self._additional)]
 
     def limit(self, limits: SdoLimits) -> None:
-        """Put up with other limits, from the next request on.
+        """Apply other limits from the next request on.
 
         Args:
             limits: the new ones.
@@ -650,7 +646,7 @@ class SdoServers(Service):
             server.limit(limits)
 
     def start(self) -> None:
-        """Take the power-on values into service."""
+        """Apply the power-on values."""
         self._due_us = NEVER
         self._end_all()
         self.default.request_id = REQUEST_COB_ID + self.node.node_id
@@ -677,16 +673,16 @@ class SdoServers(Service):
                     yield additional.server.request_id, additional.server.receive
 
     def reconfigured_by(self, state: NmtState) -> Iterator[int]:
-        """Name the clients: they write COB-IDs, heartbeat consumers, mappings."""
+        """Return the CAN-IDs of the clients, which can write COB-IDs, consumers and mappings."""
         return (can_id for can_id, _ in self.handlers(state))
 
     def state_changed(self, old: NmtState, new: NmtState) -> None:
-        """Drop transfers with the state that served them."""
+        """Drop transfers when leaving the states with SDO."""
         if new not in ALIVE:
             self._end_all()
 
     def tick(self, now_us: int) -> None:
-        """Look for clients that have been silent too long."""
+        """Check for clients that have been silent too long."""
         for server in self.servers:
             if server.due_us <= now_us:
                 server.abort(AbortCode.TIMEOUT)
@@ -694,17 +690,17 @@ class SdoServers(Service):
         self.schedule(self._due_us)
 
     def _wake(self, due_us: int) -> None:
-        """See that no server's time passes; waking too early does no harm."""
+        """Schedule the earliest time-out; waking too early does no harm."""
         if due_us < self._due_us:
             self._due_us = due_us
             self.schedule(due_us)
 
     def _configure(self, entry: Entry) -> None:
-        """Follow a COB-ID that the bus has changed."""
+        """Apply a COB-ID that the bus has changed."""
         for additional in self._additional:
             additional.configure()
-            # The CAN-IDs stay in the server until it is valid again; nothing listens to
-            # them meanwhile.
+            # The CAN-IDs stay in the server until it is valid again; until then nothing listens to
+            # them.
             if not additional.exists:
                 additional.server.end()
         self.node.rewire()

@@ -39,7 +39,7 @@ from tickrig.wire.instant import NEVER
 # Then the frames of the tick leave, sorted by CAN-ID, those of one CAN-ID in the order in
 # which they were made. So nothing may depend on the order in which services call `send`.
 #
-# `handlers(state)` is asked only in `rewire`. Whoever changes what it would answer (a
+# `handlers(state)` is asked only in `rewire`. Code that changes its result (a
 # COB-ID, a transmission type, the state) must call `rewire`, or the slave listens to the
 # old CAN-IDs. It also sets `accepts`, by which the bus does not even deliver the other
 # frames. A frame in the middle of a tick may change `accepts`; the bus has filtered the
@@ -92,7 +92,7 @@ class Nonvolatile:
     program: bytes | None = None
 
     def changed(self) -> None:
-        """Note that something was stored or erased."""
+        """Count a change after storing or erasing."""
         self.version += 1
 
 
@@ -108,14 +108,13 @@ ALWAYS = (NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL, NmtState.STOPPED)
 class Service(Copyable):
     """One communication service: SDO server, PDOs, SYNC, ...
 
-    A service finds its objects in the dictionary when it is made and hangs its
-    rules onto them (`Entry.guard`, `written`, `source`). An object that is not
-    there switches the service off.
+    A service finds its objects in the dictionary when it is made and attaches its callbacks to them
+    (`Entry.guard`, `written`, `source`). A missing object disables the service.
 
     Attributes:
         node: the slave that it belongs to.
         slot: its place in the order of a tick.
-        asked_us: when it wants its `tick`, `NEVER` for not at all; `schedule` sets it.
+        asked_us: when its `tick` is due, `NEVER` for not at all; `schedule` sets it.
     """
 
     __slots__ = ("asked_us", "node", "slot")
@@ -139,43 +138,43 @@ class Service(Copyable):
         return next(service for service in node.services if isinstance(service, cls))
 
     def power_on(self) -> None:
-        """Forget what only a power cut makes it forget."""
+        """Reset the state that only a power cut resets."""
 
     def start(self) -> None:
-        """Begin anew after Reset communication: the dictionary holds power-on values."""
+        """Restart after Reset communication; the dictionary holds power-on values."""
 
     def booted(self) -> None:
         """Act at the end of Initialising, in a slave that has a node-ID."""
 
     def handlers(self, state: NmtState) -> Iterator[tuple[int, Handler]]:
-        """Give the CAN-IDs of data frames that it wants.
+        """Yield the CAN-IDs of the data frames to receive, with their handlers.
 
         Args:
-            state: in this NMT state.
+            state: the NMT state.
 
         Yields:
-            CAN-IDs, each with what handles its frames.
+            CAN-IDs, each with the handler of its frames.
         """
         return iter(())
 
     def remote_handlers(self, state: NmtState) -> Iterator[tuple[int, Handler]]:
-        """Give the CAN-IDs of remote frames that it wants.
+        """Yield the CAN-IDs of the remote frames to receive, with their handlers.
 
         Args:
-            state: in this NMT state.
+            state: the NMT state.
 
         Yields:
-            CAN-IDs, each with what handles its frames.
+            CAN-IDs, each with the handler of its frames.
         """
         return iter(())
 
     def reconfigured_by(self, state: NmtState) -> Iterator[int]:
-        """Give those of the CAN-IDs whose frames may change what the node listens to.
+        """Yield the CAN-IDs whose frames may change the CAN-IDs that the node listens to.
 
-        An acceptance filter lets everything pass behind such a frame.
+        An acceptance filter passes all frames after such a frame.
 
         Args:
-            state: in this NMT state.
+            state: the NMT state.
 
         Yields:
             CAN-IDs.
@@ -183,7 +182,7 @@ class Service(Copyable):
         return iter(())
 
     def state_changed(self, old: NmtState, new: NmtState) -> None:
-        """React to a change of the NMT state, after it was made.
+        """React to a change of the NMT state, after it has happened.
 
         Args:
             old: the state before.
@@ -218,14 +217,14 @@ class Service(Copyable):
         """
 
     def tick(self, now_us: int) -> None:
-        """Do what is due; called in the tick for which it was scheduled.
+        """Do the work that is due; called in the tick for which it was scheduled.
 
         Args:
             now_us: time of the tick.
         """
 
     def follow_cob_id(self, entry: Entry) -> None:
-        """Listen to another CAN-ID, as a watcher of a COB-ID does.
+        """Listen to another CAN-ID; a watcher of a COB-ID.
 
         Args:
             entry: the COB-ID, which has changed.
@@ -233,7 +232,7 @@ class Service(Copyable):
         self.node.rewire()
 
     def schedule(self, due_us: int) -> None:
-        """Ask for `tick`, instead of what was asked for before.
+        """Request a call of `tick`; it replaces the previous request.
 
         Args:
             due_us: when; `NEVER` for not at all.
@@ -246,7 +245,7 @@ class Service(Copyable):
 _REMOTE: Final = 0x2000_0000
 
 _shared: Final[Callable[[frozenset[int]], frozenset[int]]] = lru_cache(frozenset)
-"""Returns the set that all slaves have which name the same; it then stays in the cache."""
+"""Return the one set shared by all slaves with the same CAN-IDs; it stays in the cache."""
 
 
 def _frame_handlers(services: Iterable[Service], state: NmtState) -> dict[int, Handler]:
@@ -283,7 +282,7 @@ COMMUNICATION_AREA: Final = range(0x1000, 0x2000)
 
 _slot = attrgetter("slot")
 _priority = itemgetter(0)
-"""Priority of a data frame: its CAN-ID. Frames of one tick leave sorted by it, as out of the
+"""Priority of a data frame: its CAN-ID. Frames of one tick leave sorted by it, as from the
 mailboxes of a CAN controller; on the wire `emulators/can/arbitration.py` decides."""
 
 ServiceMaker = Callable[["CanopenSlave", int], Service]
@@ -300,20 +299,20 @@ class CanopenSlave(Copyable):
     Not emulated: the time that a real slave's processor needs.
 
     Args:
-        dictionary: the objects; services follow what is in it.
+        dictionary: the objects; they determine the services.
         node_id: 1..127, or `UNCONFIGURED`; LSS may have stored another.
-        services: what makes the services, in the order of a tick.
-        nonvolatile: what survives a power cycle.
+        services: factories of the services, in the order of a tick.
+        nonvolatile: the memory that survives a power cycle.
 
     Raises:
-        ValueError: an impossible node-ID.
+        ValueError: invalid node-ID.
 
     Attributes:
         dictionary: its objects.
         services: its services, in the order of a tick.
         node_id: the active node-ID.
         configured_id: the node-ID it was made with.
-        pending_id: the node-ID that counts from the next reset on (CiA 305).
+        pending_id: the node-ID that takes effect at the next reset (CiA 305).
         state: NMT state.
         now_us: time of the latest tick.
         due_us: when the next service is due.
@@ -322,17 +321,17 @@ class CanopenSlave(Copyable):
         reconfigured_by: CAN-IDs of the frames that may change `accepts` when handled.
         on_accepts: called when these two have changed.
         time_of_day: the latest TIME stamp that was received, None before the first.
-        silent_until_us: nothing is sent before; LSS switches the bit rate.
+        silent_until_us: nothing is sent before this time, while LSS switches the bit rate.
         on_state: called with the old and the new state on each change of the NMT state.
         on_sync: called with the counter of each SYNC, 0 if it has none.
         on_bit_rate: called with the bit rate in bit/s that LSS has switched to.
-        sync_handlers: the same as `on_sync`, for what belongs to the slave: RPDOs, TPDOs, then
+        sync_handlers: the same as `on_sync`, for parts of the slave: RPDOs, TPDOs, then
             the application.
-        horizon: how far its application may work ahead; None, without a rig, for tick by tick.
-        model: the ready-made model that it is, empty if it is none; for traces.
+        horizon: how far its application may compute ahead; None, without a rig, for tick by tick.
+        model: name of its model, empty without one; for traces.
         boots: returns at the end of Initialising whether the node boots or stays there.
         admits: returns before each NMT command whether it is carried out.
-        entered: called as `on_state`, before it; what belongs to the slave.
+        entered: called like `on_state`, but before it; for parts of the slave.
     """
 
     __slots__ = (  # each slave's attributes lie in one place then, for 1,016 of them 5 %
@@ -420,7 +419,7 @@ class CanopenSlave(Copyable):
         return out if len(out) == 1 else tuple(sorted(out, key=_priority))
 
     def send(self, can_id: int, data: bytes) -> None:
-        """Put a data frame into this tick's traffic.
+        """Send a data frame in this tick.
 
         Args:
             can_id: 11-bit CAN-ID, 0x000..0x7FF.
@@ -429,7 +428,7 @@ class CanopenSlave(Copyable):
         self._out += (data_frame(can_id, data),)
 
     def put(self, frame: CanFrame) -> None:
-        """Put a frame into this tick's traffic that was made before.
+        """Send an existing frame in this tick.
 
         Args:
             frame: a data frame.
@@ -437,11 +436,11 @@ class CanopenSlave(Copyable):
         self._out += (frame,)
 
     def emergency(self, code: int, register: int, text: bytes = b"") -> None:
-        """Raise an error: it is active until it is cleared, and raising it again is none.
+        """Raise an error: it is active until it is cleared; raising it again has no effect.
 
         Args:
             code: emergency error code; see `EmcyCode`.
-            register: bits of the error register 1001h; the generic bit comes by itself.
+            register: bits of the error register 1001h; the generic bit is set automatically.
             text: manufacturer-specific bytes, up to 5; errors of one code may differ in them.
         """
         if self._powered:
@@ -449,22 +448,22 @@ class CanopenSlave(Copyable):
                 service.emergency(code, register, text)
 
     def emergency_clear(self, code: int, text: bytes | None = None) -> None:
-        """Clear an error; one that is not active is no error.
+        """Clear an error; an error that is not active is ignored.
 
         Args:
             code: emergency error code, as it was raised.
-            text: the bytes with which it was raised; without them all of this code are cleared.
+            text: the bytes with which it was raised; None clears all errors of this code.
         """
         for service in self.services:
             service.emergency_clear(code, text)
 
     def communication_error(self) -> None:
-        """Let the error behaviour for communication errors act (1029h:01)."""
+        """Apply the error behaviour for communication errors (1029h:01)."""
         for service in self.services:
             service.communication_error()
 
     def bus_state(self, state: ErrorState) -> None:
-        """Take what the CAN controller reports; for the one that owns the controller.
+        """Apply a state of the CAN controller; called by the owner of the controller.
 
         Args:
             state: error active, error passive or bus-off.
@@ -479,7 +478,7 @@ class CanopenSlave(Copyable):
         self.emergency_clear(EmcyCode.CAN_OVERRUN)
 
     def schedule(self, slot: int, due_us: int) -> None:
-        """Enter when a service wants its `tick`.
+        """Schedule the `tick` of a service by its slot.
 
         Args:
             slot: the place of the service.
@@ -488,7 +487,7 @@ class CanopenSlave(Copyable):
         self.await_tick(self.services[slot], due_us)
 
     def await_tick(self, service: Service, due_us: int) -> None:
-        """Enter when a service wants its `tick`; `schedule` names it by its place.
+        """Schedule the `tick` of a service; `schedule` does so by its slot.
 
         Args:
             service: one of the slave.
@@ -499,12 +498,12 @@ class CanopenSlave(Copyable):
             self._asking = tuple(sorted((*self._asking, service), key=_slot))
         if due_us < self.due_us:
             self.due_us = due_us
-        # Only if this service was the earliest is there something to work out anew.
+        # Only if this service was the earliest is there something to compute again.
         elif before == self.due_us and self._powered:
             self.due_us = self._first_due()
 
     def rewire(self) -> None:
-        """Collect anew which CAN-IDs the services listen to: a COB-ID or the state changed."""
+        """Collect the CAN-IDs of all services again after a change of a COB-ID or the state."""
         services, state = self.services, self.state
         self._handlers = handlers = _frame_handlers(services, state)
         found = (can_id for service in services for can_id in service.reconfigured_by(state))
@@ -520,7 +519,7 @@ class CanopenSlave(Copyable):
         """Change the NMT state; services and application are notified.
 
         Args:
-            state: the new state; the same one changes nothing.
+            state: the new state; the present state has no effect.
         """
         old, self.state = self.state, state
         if old is state:
@@ -534,7 +533,7 @@ class CanopenSlave(Copyable):
             notify(old, state)
 
     def reset_node(self) -> None:
-        """Reset application and communication: every object has its power-on value again."""
+        """Reset application and communication: restore the power-on values of all objects."""
         self._reset(range(0x1_0000))
 
     def reset_communication(self) -> None:
@@ -558,13 +557,13 @@ class CanopenSlave(Copyable):
                 data = stored.get(entry.key)
                 if data is None:
                     data = entry.description.power_on_data(self.node_id)
-                # `assign`, not `force`: nobody has written it over the bus, so `written`
+                # `assign`, not `force`: it was not written over the bus, so `written`
                 # does not act.
                 entry.assign(data)
         self._boot()
 
     def _boot(self) -> None:
-        """Go through Initialising; a slave without node-ID stays there, for LSS alone."""
+        """Pass through Initialising; a slave without a node-ID stays there, with LSS only."""
         self.enter(NmtState.INITIALISING)
         for slot, service in enumerate(self.services):
             self.schedule(slot, NEVER)
@@ -575,13 +574,13 @@ class CanopenSlave(Copyable):
                 service.booted()
 
     def _receive_special(self, frame: CanFrame) -> None:
-        """Handle a remote frame; 29-bit frames are for nobody here."""
+        """Handle a remote frame; 29-bit frames are ignored."""
         handler = self._handlers.get(_REMOTE | frame.can_id)
         if frame.remote and not frame.extended and handler is not None:
             handler(frame)
 
     def _run_due(self, now_us: int, first: int = 0) -> None:
-        """Let the services act that are due, in their order; most have never asked for a tick."""
+        """Run the due services in their order; most have never requested a tick."""
         asking = self._asking
         for service in asking:
             if service.asked_us <= now_us and service.slot >= first:
@@ -594,7 +593,7 @@ class CanopenSlave(Copyable):
             self.due_us = self._first_due()
 
     def _first_due(self) -> int:
-        """Return when the first of the services is due that have ever asked for a tick."""
+        """Return when the first service is due, among those that have ever requested a tick."""
         first_us = NEVER
         for service in self._asking:
             first_us = min(first_us, service.asked_us)
@@ -602,32 +601,31 @@ class CanopenSlave(Copyable):
 
 
 def _boots() -> bool:
-    """Boot, as CiA 301 has it."""
+    """Boot as in CiA 301."""
     return True
 
 
 def _admits(command: NmtCommand) -> bool:
-    """Carry out each command, as CiA 301 has it."""
+    """Execute each command as in CiA 301."""
     return True
 
 
-# What a device does with its objects, at its place in the tick.
+# The application of a device, at its place in the tick.
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class Application(Service):
     """Works on the objects after the RPDOs and SDOs of a tick, before its TPDOs.
 
-    By itself it does nothing. A device profile overrides `on_execute`, which is
-    called in the ticks that it asks for: by `request`, by `schedule`, when one
-    of its watched objects has changed, and when a physical input was set. It
-    reacts to NMT states (`state_changed`), to resets (`start`), to lost masters
-    (`communication_error`) and, if it enters itself in `node.sync_handlers`, of each
-    SYNC; it reports errors by `node.emergency`.
+    By itself it does nothing. A device profile overrides `on_execute`, which is called in the ticks
+    that it requests: by `request`, by `schedule`, when one of its watched objects has changed, and
+    when a physical input was set. It reacts to NMT states (`state_changed`), to resets (`start`),
+    to lost masters (`communication_error`) and, if it enters itself in `node.sync_handlers`, to
+    each SYNC; it reports errors by `node.emergency`.
 
     Attributes:
-        inputs: what the world does to the device: `has_inputs` makes them.
-        outputs: what the world sees of it; `read` gives the values.
+        inputs: physical inputs of the device; `has_inputs` makes them.
+        outputs: its physical outputs; `read` returns their values.
     """
 
     def __init__(self, node: CanopenSlave, slot: int) -> None:
@@ -638,7 +636,7 @@ class Application(Service):
     def has_inputs(
         self, table: Iterable[InputSignal], groups: Mapping[str, tuple[str, ...]] | None = None
     ) -> None:
-        """Give it physical inputs; setting one asks for `on_execute`.
+        """Add physical inputs; setting one requests `on_execute`.
 
         Args:
             table: the inputs.
@@ -647,7 +645,7 @@ class Application(Service):
         self.inputs = QuantityBank(table, groups, self.request)
 
     def read(self, name: str) -> int | float | str:
-        """Look at a physical output.
+        """Return the present value of a physical output.
 
         Args:
             name: one of `outputs`.
@@ -656,7 +654,7 @@ class Application(Service):
             Its present value.
 
         Raises:
-            KeyError: there is none of that name.
+            KeyError: there is no output of that name.
         """
         raise KeyError(name)
 
@@ -668,7 +666,7 @@ class Application(Service):
         """
 
     def without_power(self, now_us: int) -> int:
-        """Let time pass while the supply is cut: what moves coasts.
+        """Advance the time while the supply is cut: moving parts coast.
 
         Called in the first tick without power, and when a physical input was set.
 
@@ -676,16 +674,16 @@ class Application(Service):
             now_us: time of the tick.
 
         Returns:
-            When it wants to be called again, `NEVER` if nothing will change by itself.
+            The time of the next call, `NEVER` if nothing changes by itself.
         """
         return NEVER
 
     def request(self) -> None:
-        """Ask for `on_execute` in this tick; between two ticks, in the next one."""
+        """Request `on_execute` in this tick; between two ticks, in the next one."""
         self.schedule(self.node.now_us)
 
     def watch(self, entries: Iterable[Entry]) -> None:
-        """Call `on_execute` whenever one of some objects has changed.
+        """Request `on_execute` whenever one of these objects has changed.
 
         Args:
             entries: the objects.
@@ -698,7 +696,7 @@ class Application(Service):
         self.request()
 
     def tick(self, now_us: int) -> None:
-        """Execute; `on_execute` says what."""
+        """Run `on_execute`."""
         self.on_execute(now_us)
 
 

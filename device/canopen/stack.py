@@ -62,15 +62,15 @@ def make_slave(
     Args:
         dictionary: the objects, with default values.
         node_id: 1..127, or 255 for a slave that waits for LSS.
-        nonvolatile: what it kept from an earlier life.
-        application: what the device does with its objects: a device profile, or nothing.
-        sdo: what its SDO servers put up with.
+        nonvolatile: memory kept from an earlier run.
+        application: factory of the application, such as a device profile; None for no application.
+        sdo: limits of its SDO servers.
 
     Returns:
         A slave that boots in its first tick; put it on a `CanWire` in a `Station`.
 
     Raises:
-        ValueError: an impossible node-ID.
+        ValueError: invalid node-ID.
     """
     own: dict[ServiceMaker, ServiceMaker] = {
         Application: application,

@@ -1,4 +1,4 @@
-"""TIME consumer and producer (CiA 301, time stamp object; object 1012h)."""
+"""SYNC and TIME: consumers and producers (CiA 301)."""
 
 from __future__ import annotations
 
@@ -28,16 +28,15 @@ _NOT_IN_A_CAN_ID: Final = nmt.EXTENDED | 0x1FFF_F800
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class Sync(Service):
-    """Consumes SYNC, and produces it if bit 30 of 1005h and 1006h say so.
+    """Consumes SYNC, and produces it if bit 30 of 1005h is set and 1006h is not 0.
 
-    `node.on_sync` is called for each SYNC, for the own one too, at its place
-    between the frames of a tick. A SYNC of another length than 1019h says is
-    none: EMCY 8240h, which is cleared by the next good one. The first own SYNC
-    comes one period after 1005h, 1006h or 1019h was written or the node left
-    Initialising or Stopped, and counts from 1.
+    `node.on_sync` is called for each SYNC, also for the slave's own, in order among the frames of a
+    tick. A SYNC whose length does not fit 1019h is ignored and raises EMCY 8240h, which the next
+    valid one clears. The first own SYNC comes one period after 1005h, 1006h or 1019h was written or
+    the node left Initialising or Stopped, and counts from 1.
 
-    Not emulated: 29-bit CAN-IDs; periods below the tick, of which one SYNC a
-    tick is left; the EMCY of a SYNC that stays away, which CiA 301 leaves open.
+    Not emulated: 29-bit CAN-IDs; periods below the tick, which give one SYNC per tick; an EMCY for
+    a missing SYNC, which CiA 301 leaves open.
     """
 
     __slots__ = (
@@ -80,11 +79,11 @@ class Sync(Service):
         return self._cob_id is not None and bool(self._cob_id.number & nmt.FLAG_30)
 
     def start(self) -> None:
-        """Know of no error."""
+        """Clear the length error."""
         self._length_error = False
 
     def state_changed(self, old: nmt.NmtState, new: nmt.NmtState) -> None:
-        """Begin to produce, or stop."""
+        """Start or stop producing."""
         if (old in ALIVE) is not (new in ALIVE):
             self._begin()
 
@@ -95,7 +94,7 @@ class Sync(Service):
             yield self.can_id, self._receive
 
     def tick(self, now_us: int) -> None:
-        """Send SYNC and act on it, or begin to count the period."""
+        """Send SYNC and act on it, or start the period."""
         if self._due_us == NEVER:
             self._due_us = now_us + self.period_us
             self.schedule(self._due_us)
@@ -132,19 +131,19 @@ class Sync(Service):
             notify(counter)
 
     def _changed(self, entry: Entry) -> None:
-        """Follow another COB-ID, period or overflow value."""
+        """Apply another COB-ID, period or overflow value."""
         if self.node.state in ALIVE:
             self.node.rewire()
             self._begin()
 
     def _begin(self) -> None:
-        """Produce from now on, with the counter at 1, or do not."""
+        """Start producing with the counter at 1, or stop."""
         self._counter, self._due_us = 0, NEVER
         running = self._produces and self.period_us and self.node.state in ALIVE
         self.schedule(self.node.now_us if running else NEVER)
 
     def _check_cob_id(self, entry: Entry, value: Value) -> None:
-        """Refuse what is no CAN-ID for it, and another one while it produces."""
+        """Refuse an invalid CAN-ID, and any change while it produces."""
         cob_id = whole_number(value)
         can_id, producer = cob_id & nmt.CAN_ID_MASK, bool(cob_id & nmt.FLAG_30)
         if cob_id & _NOT_IN_A_CAN_ID or nmt.is_restricted(can_id):
@@ -155,7 +154,7 @@ class Sync(Service):
             raise SdoAbort(AbortCode.VALUE_RANGE)
 
     def _check_overflow(self, entry: Entry, value: Value) -> None:
-        """Refuse an impossible counter, and any while a period is set."""
+        """Refuse an invalid overflow value, and any change while a period is set."""
         if value not in _COUNTER_OVERFLOWS:
             raise SdoAbort(AbortCode.VALUE_RANGE)
         if self.period_us:
@@ -170,9 +169,9 @@ _PRODUCES: Final = nmt.FLAG_30
 class TimeStamp(Service):
     """Keeps the time of day.
 
-    Bit 31 of 1012h makes it consume TIME; `node.time_of_day` is the latest time
-    stamp as it came, `now` the clock that goes on from there. Bit 30 lets the
-    application send TIME by `produce`. What is no time of day is ignored.
+    Bit 31 of 1012h makes it consume TIME; `node.time_of_day` is the latest received time stamp,
+    `now` the clock that runs on from it. Bit 30 allows the application to send TIME by `produce`.
+    Invalid times of day are ignored.
 
     Not emulated: the error of a real clock; high resolution time stamps (1013h).
     """
@@ -187,7 +186,7 @@ class TimeStamp(Service):
 
     @property
     def now(self) -> TimeOfDay | None:
-        """The time of day, None before it was set."""
+        """The time of day, None until it is set."""
         latest = self.node.time_of_day
         return None if latest is None else latest.after(self.node.now_us - self._set_us)
 
@@ -201,13 +200,13 @@ class TimeStamp(Service):
         """Set the clock in the next tick, and send TIME then if 1012h and NMT state allow it.
 
         Raises:
-            FieldError: there is no such time.
+            FieldError: invalid time.
         """
         self._ordered = time.checked()
         self.schedule(self.node.now_us)
 
     def tick(self, now_us: int) -> None:
-        """Send what was ordered."""
+        """Set the clock, and send TIME if requested."""
         self._set(self._ordered)
         cob_id = self._number
         if self.node.state in ALIVE and cob_id & _PRODUCES:

@@ -61,7 +61,7 @@ _HALF: Final = 2.0**63
 
 
 class Ground(Part):
-    """Takes the turning of two wheels for a way over the ground, on exact arcs.
+    """Converts the turning of two wheels into motion over the ground, on exact arcs.
 
     Not emulated: castors, slopes, walls; a slipping wheel turns as easily as before.
 
@@ -86,7 +86,7 @@ class Ground(Part):
 
     @property
     def pose(self) -> Pose:
-        """Where the middle of the axle is; it may be put elsewhere."""
+        """Pose of the middle of the axle; it may be set."""
         return Pose(*self._place)
 
     @pose.setter
@@ -95,14 +95,14 @@ class Ground(Part):
 
     @property
     def resting(self) -> bool:
-        """Whether a step without turning would change nothing."""
+        """Whether a step without turning leaves everything unchanged."""
         return not (self.speed_m_s or self.turn_rad_s or self.left.slip_m_s or self.right.slip_m_s)
 
     def roll(self, lefts: Sequence[float], rights: Sequence[float]) -> None:
-        """Let milliseconds pass.
+        """Advance by some milliseconds.
 
         Args:
-            lefts: by how many counts the left wheel turned in each.
+            lefts: counts by which the left wheel turned in each.
             rights: the same of the right wheel.
         """
         left, right, tread_m, place = self.left, self.right, self._tread_m, self._place
@@ -124,7 +124,7 @@ class Ground(Part):
         self.turn_rad_s = (right_m - left_m) / tread_m / _STEP_S
 
     def _roughened(self, way_m: float) -> float:
-        """Return a way with the noise of the ground: uniform, from one step to the next anew."""
+        """Return a distance with the noise of the ground: uniform and independent in each step."""
         if not way_m:
             return 0.0
         return way_m * (1 + self._noise * (self._chance.draw() / _HALF - 1))
@@ -134,7 +134,7 @@ _Pair = tuple[float, float]
 
 
 class BaseState(NamedTuple):
-    """A base, as the world saw it; pairs are left and right unless said otherwise.
+    """Observable state of a base; pairs are left and right unless stated otherwise.
 
     Attributes:
         pose: of the middle of the axle.
@@ -171,33 +171,32 @@ _READ: Final[Mapping[str, Callable[[BaseState], float]]] = {
     "served": lambda state: state.frames[0],
     "garbled": lambda state: state.frames[1],
 }
-"""By the names in `driver.OUTPUTS`."""
+"""Functions for the outputs, by their names in `driver.OUTPUTS`."""
 
 
 _TICK_US: Final = 1_000
 
 LOOK_US: Final = 10_000
-"""How often the world looks at it."""
+"""Period at which outputs are updated."""
 
 
 class Rh3Base(Copyable):
     """The base of Reference Hardware 3 as a Modbus RTU slave; a `Device[bytes]`.
 
-    The real one speaks an unpublished protocol; rh3-control proposes Modbus RTU in its
-    place, with the register map of `register_map`. In each millisecond: bytes from the
-    line, targets, watchdog and faults, servo, ground. Nobody need tick it for that: what
-    has passed since is made up for. `read` gives what was to be seen at the latest
-    multiple of `LOOK_US`.
+    The real one speaks an unpublished protocol; rh3-control proposes Modbus RTU in its place, with
+    the register map of `register_map`. In each millisecond: bytes from the line, targets, watchdog
+    and faults, servo, ground. It need not be ticked in each of them: it computes the milliseconds
+    since the latest tick. `read` returns the outputs at the latest multiple of `LOOK_US`.
 
     Not emulated: the library libsvm, battery, heat, the outline of the robot.
 
     Args:
-        parameters: what it is like.
+        parameters: of the base.
 
     Attributes:
-        type_name: what its device type is called, for traces.
-        inputs: what the world does to it, see `driver.INPUTS`.
-        ground: where it is; its pose may be set.
+        type_name: name of its device type, for traces.
+        inputs: its physical inputs, see `driver.INPUTS`.
+        ground: its motion over the ground; its pose may be set.
         sides: left and right wheel with their loops.
         slave: its end of the line.
     """
@@ -222,7 +221,7 @@ class Rh3Base(Copyable):
 
     @property
     def due_us(self) -> int:
-        """When anything would happen without input."""
+        """The time of the next event without input."""
         if self.inputs.changed or self._restarted:
             return 0
         due_us = self.slave.due_us
@@ -232,20 +231,20 @@ class Rh3Base(Copyable):
 
     @property
     def outputs(self) -> Mapping[str, OutputSignal]:
-        """What `read` knows."""
+        """The outputs that `read` accepts."""
         return _OUTPUTS
 
     @property
     def status(self) -> int:
-        """What the driver says of itself; nothing without supply."""
+        """Status register of the driver; 0 without supply."""
         return self._driver.status if self._on else 0
 
     def reset(self) -> None:
-        """Begin as after power-up, where it stands."""
+        """Restore the state after power-up, at the present pose."""
         self._restarted = True
 
     def read(self, name: str, /) -> int | float:
-        """Look at an output, as it was left by the latest tick.
+        """Return an output as the latest tick left it.
 
         Args:
             name: one of `outputs`.
@@ -254,12 +253,12 @@ class Rh3Base(Copyable):
             Its value.
 
         Raises:
-            KeyError: there is none of that name.
+            KeyError: there is no output of that name.
         """
         return _READ[name](self._seen)
 
     def tick(self, now_us: int, rx: bytes, /) -> bytes:
-        """Let time pass up to now.
+        """Advance to now.
 
         Args:
             now_us: time since the rig was started, a multiple of `tick_us`.
@@ -269,7 +268,7 @@ class Rh3Base(Copyable):
             The bytes that it sends in this tick.
         """
         heard, before_us = self.slave.due_us <= now_us, now_us - _TICK_US
-        # What happens in this tick must find the base as the millisecond before now has
+        # Events of this tick must find the base as the millisecond before now has
         # left it.
         happens = heard or self.inputs.changed or self._restarted
         made = self._catch_up(before_us if happens else now_us) and not happens
@@ -306,7 +305,7 @@ class Rh3Base(Copyable):
         )
 
     def _catch_up(self, until_us: int) -> bool:
-        """Make the milliseconds up to a time, while it moves; return whether all are made."""
+        """Run the milliseconds up to a time while it moves; return whether all were run."""
         driver = self._driver
         while self._moving and driver.now_us < until_us:
             driver.now_us += _TICK_US
@@ -319,7 +318,7 @@ class Rh3Base(Copyable):
         self._on = self.inputs.changed = True
 
     def _pass_to(self, until_us: int) -> None:
-        """Let the present millisecond pass, and some behind it as far as they are like it."""
+        """Run the present millisecond, and those after it that are alike."""
         driver, ground = self._driver, self.ground
         if self._on:
             lefts, rights = driver.step(self.slave.last_request_us, until_us)

@@ -1,4 +1,4 @@
-"""The motor driver: what a master told it, and what its two wheels do."""
+"""The motor driver: its registers, and its control of two wheels."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ TABLE: Final = (
 )
 
 
-# The physical side of a base: what the world does to it, and what can be seen of it.
+# Physical inputs and outputs of a base.
 
 _SIDES: Final = ("left", "right")
 
@@ -137,32 +137,32 @@ OUTPUTS: Final = (
 
 _TARGETS: Final = frozenset(f"target_{what}_{s}" for what in ("speed", "position") for s in _SIDES)
 ENABLED, MOVING, FAULT, WATCHDOG, CLIPPED, EMERGENCY_STOP, BUMPER = (int(bit) for bit in Status)
-"""Plain numbers: a flag takes ten times as long."""
+"""Plain numbers, because a flag takes ten times as long."""
 
 _STEP_US: Final = 1_000
 
 _Pair = tuple[list[float], list[float]]
-"""Left and right, of each millisecond."""
+"""Speeds of the left and right wheel in each millisecond."""
 
 _DELAYED: Final = _TARGETS | {"mode", "command"}
-"""What takes effect after the delay."""
+"""An order that takes effect after the delay."""
 
 
 class Driver(Part):
-    """Runs two wheels as its registers say (rh3-control, drive protocol, register map A).
+    """Controls two wheels by its registers (rh3-control, drive protocol, register map A).
 
-    A fault of one wheel takes the power from both and shorts the motors; it stays until
-    it is cleared and its cause is gone. A master that is silent for `watchdog_ms` while
-    the base moves stops it on the ramp; a new target starts it again. An order to enable
-    that cannot be followed is passed over; the status tells.
+    A fault of one wheel switches both off and shorts the motors; it stays until it is cleared and
+    its cause is gone. A master that is silent for `watchdog_ms` while the base moves stops it on
+    the ramp; a new target starts it again. An order to enable that cannot be executed is ignored;
+    the status shows it.
 
     Args:
         parameters: of the base.
-        inputs: what the world does to it.
+        inputs: its physical inputs.
 
     Attributes:
-        now_us: the present time, set before anything is asked of it.
-        registers: what a master sees.
+        now_us: the present time, set before any other call.
+        registers: the registers of the master.
         sides: left and right wheel with their loops.
     """
 
@@ -179,7 +179,7 @@ class Driver(Part):
         self.power_up()
 
     def power_up(self) -> None:
-        """Begin anew; what turns goes on turning."""
+        """Restart; turning wheels keep turning."""
         self._start_us = self.now_us
         self.registers.reset()
         self._waiting: deque[tuple[int, Mapping[str, int]]] = deque()
@@ -191,7 +191,7 @@ class Driver(Part):
 
     @property
     def status(self) -> int:
-        """What the driver says of itself."""
+        """Status register."""
         left, right = self.sides
         status = ENABLED * self._enabled | FAULT * self._faulty | WATCHDOG * self._tripped
         if left.wheel.speed or right.wheel.speed:
@@ -206,23 +206,23 @@ class Driver(Part):
 
     @property
     def resting(self) -> bool:
-        """Whether a step would change nothing."""
+        """Whether a step leaves everything unchanged."""
         left, right = self.sides
         return not self._waiting and left.resting and right.resting
 
     def written(self, values: Mapping[str, int]) -> None:
-        """Take what a master wrote, at once or after the delay."""
+        """Apply a write of the master, at once or after the delay."""
         if values.keys() - _DELAYED:
             self._configure()
         if values.keys() & _DELAYED:
             self._waiting.append((self.now_us + self._delay_us, values))
 
     def step(self, last_request_us: int, until_us: int) -> _Pair:
-        """Let the millisecond of `now_us` pass, and those behind it in which nothing happens.
+        """Run the millisecond of `now_us`, and the uneventful ones after it.
 
         Args:
-            last_request_us: when the master was heard last.
-            until_us: the last of them; `now_us` becomes the one that was made last.
+            last_request_us: time of the latest request.
+            until_us: the last millisecond; `now_us` becomes the last one that was run.
 
         Returns:
             The speeds of the wheels in each, counts/ms.
@@ -253,12 +253,12 @@ class Driver(Part):
         )
 
     def coast(self) -> _Pair:
-        """Let a millisecond pass without supply: a relay shorts the motors."""
+        """Run a millisecond without supply: a relay shorts the motors."""
         left, right = self.sides
         return left.coast(shorted=True), right.coast(shorted=True)
 
     def _alike(self, last_request_us: int, until_us: int) -> int:
-        """Return how many milliseconds are like the present one, with it: the master is silent."""
+        """Return how many milliseconds are alike from the present one on, with a silent master."""
         left, right = self.sides
         if left.stalling or right.stalling:
             return 1
@@ -277,7 +277,7 @@ class Driver(Part):
         return (self.now_us - self._start_us) // 1_000 & 0xFFFF
 
     def find_faults(self) -> None:
-        """Look for faults, and take the power from both wheels if there is one."""
+        """Check for faults, and switch both wheels off if there is one."""
         for side in self.sides:
             side.find_faults(self._inputs, powered=self._powered)
         self._faulty = any(side.fault for side in self.sides)
@@ -298,7 +298,7 @@ class Driver(Part):
         self._mode = Mode(values.get("mode", self._mode))
         match values.get("command"):
             case Command.ENABLE:
-                # Enabling while a fault is there is passed over; bit 0 of the status shows
+                # Enabling while a fault is present is ignored; bit 0 of the status shows
                 # that (map A has no answer for it).
                 self._enabled = not self._faulty
             case Command.DISABLE:
@@ -324,7 +324,7 @@ class Driver(Part):
             side.stop(quick=quick)
 
     def _watch(self) -> None:
-        """Stop: the master is silent."""
+        """Stop because the master is silent."""
         if self._powered and not self._stopped and not self.resting:
             self._stop(quick=False)
             self._tripped = True
@@ -336,7 +336,7 @@ class Driver(Part):
             side.configure()
 
     def _switch(self, *, powered: bool) -> bool:
-        """Give or take power; return whether the wheels have it, as a fault may take it."""
+        """Switch the power on or off; return whether it is on, which a fault may prevent."""
         self._powered = powered
         for side in self.sides:
             side.take_over()

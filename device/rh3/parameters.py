@@ -1,4 +1,4 @@
-"""What a base is like; the source and the reason of each number."""
+"""Parameters of a base, each with its source and reason."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from tickrig.device.twin import Immutable
 from tickrig.wire.modbus import ADDRESSES
 
 _GEAR_RATIO: Final = 74.91
-"""Turns of the motor for one of the wheel (RH3 functional specification, RefHardRh3)."""
+"""Turns of the motor per turn of the wheel (RH3 functional specification, RefHardRh3)."""
 ENCODER_COUNTS: Final = 2_000
-"""Counts in a turn of the motor (the same)."""
+"""Counts per turn of the motor (same source)."""
 COUNTS_PER_RAD: Final = _GEAR_RATIO * ENCODER_COUNTS / tau
-"""Counts in a radian of the wheel: 23 844.6."""
+"""Counts per radian of the wheel: 23 844.6."""
 
 _DEFAULT_GAIN: Final = 10
-"""gain_VP, at which the speed loop has its time constant."""
+"""gain_VP for which the speed loop has its time constant."""
 PER_MILLE: Final = 1_000.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BaseParameters(Immutable):
-    """A base and the ground it stands on.
+    """Parameters of a base and the ground it stands on.
 
     Attributes:
         address: of the driver on the line, 1..247.
@@ -36,12 +36,12 @@ class BaseParameters(Immutable):
         delay_ms: from a command's arrival to its effect.
         rated_nm: torque at a wheel at 1000 per mille; a choice.
         rated_ma: current at that torque; a choice.
-        friction_nm: of a motor with its gear; the driver makes up for it while it moves.
+        friction_nm: of a motor with its gear; the driver compensates it while it moves.
         noise: spread of a wheel's way over the ground, as a share of it.
         seed: of the noise.
 
     Raises:
-        ValueError: a number that cannot be.
+        ValueError: a number out of range.
     """
 
     address: int = 1
@@ -59,7 +59,7 @@ class BaseParameters(Immutable):
     seed: int = 0
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be."""
+        """Raise ValueError if a number is out of range."""
         if self.address not in ADDRESSES:
             raise ValueError(f"address {self.address} is not in 1..{ADDRESSES[-1]}")
         for name in ("radius_left_m", "radius_right_m", "tread_m", "rated_nm"):

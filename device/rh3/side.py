@@ -15,14 +15,14 @@ from tickrig.wire.modbus import Fault
 # A wheel with its motor, gear and encoder.
 
 _SLOW: Final = 0.5
-"""Counts/ms below which friction can hold a wheel."""
+"""Speed in counts/ms below which friction can hold a wheel."""
 
 _BRAKE: Final = 500.0
-"""Per mille of torque with which the shorted motor brakes; a choice."""
+"""Braking torque of the shorted motor, per mille; a choice."""
 
 
 class _Wheel(Part):
-    """Turns by torque against friction and load, a millisecond a step.
+    """A wheel turned by torque against friction and load, in steps of a millisecond.
 
     Not emulated: inductance and back-EMF of the motor, play and stiffness of the gear,
     heat.
@@ -47,15 +47,15 @@ class _Wheel(Part):
 
     @property
     def counts(self) -> int:
-        """What the encoder has counted."""
+        """Count of the encoder."""
         return floor(self.travel)
 
     def held(self, torque: float) -> bool:
-        """Whether it stands and stays so under a torque."""
+        """Return whether it stands and a torque would not move it."""
         return not self.speed and (self.jammed or abs(torque - self.load) <= self.friction)
 
     def step(self, torque: float) -> None:
-        """Turn for a millisecond with a torque in per mille."""
+        """Run a millisecond with a torque in per mille."""
         speed, friction, net = self.speed, self.friction, torque - self.load
         if self.jammed or (-_SLOW < speed < _SLOW and -friction <= net <= friction):
             self.speed = 0.0
@@ -65,17 +65,17 @@ class _Wheel(Part):
         self.travel += speed
 
     def brake(self) -> None:
-        """Turn for a millisecond with the motor shorted."""
+        """Run a millisecond with the motor shorted."""
         # Never more than stops the wheel in this millisecond: a brake does not drive
         # backward.
         most = min(_BRAKE, abs(self.speed) / self.agility)
         self.step(-copysign(most, self.speed) if self.speed else 0.0)
 
 
-# The servo of a wheel: ramp and PID loop of its speed, and the way to a position.
+# The servo of a wheel: ramp and PID loop of its speed, and motion to a position.
 
 _DEADBAND: Final = 1
-"""Counts that are near enough."""
+"""Distance in counts that counts as reached."""
 
 
 class _PositionLoop(Part):
@@ -90,11 +90,11 @@ class _PositionLoop(Part):
         self.begin()
 
     def begin(self) -> None:
-        """Begin anew."""
+        """Restart the loop."""
         self._sum, self._before = 0, 0
 
     def step(self, error: int) -> float:
-        """Return the speed to have for the next millisecond.
+        """Return the speed for the next millisecond.
 
         Args:
             error: counts to go.
@@ -117,14 +117,14 @@ class _PositionLoop(Part):
 
 
 _INTEGRAL_LIMIT: Final = 10_000.0
-"""Counts that the integral holds at most; a choice."""
+"""Limit of the integral in counts; a choice."""
 
 
 class _SpeedLoop(Part):
     """A PID loop on the counts of each millisecond (rh3-control, wheel servo).
 
     Torque in per mille = VP e + VI sum(e) + VD delta(e), with e in counts/ms, cut to the
-    rated torque; friction is made up for while the target moves.
+    rated torque; friction is compensated while the target moves.
 
     Args:
         registers: where its gains and limits are.
@@ -134,7 +134,7 @@ class _SpeedLoop(Part):
         torque: of the latest millisecond, per mille.
         limit: the highest speed, counts/ms.
         counted: counts of the latest millisecond.
-        stalled_ms: for how long full torque has turned nothing.
+        stalled_ms: for how long full torque has not moved the wheel.
     """
 
     def __init__(self, registers: Registers) -> None:
@@ -143,28 +143,28 @@ class _SpeedLoop(Part):
         self.take_over(0.0)
 
     def configure(self, registers: Registers) -> None:
-        """Take over gains and limits."""
+        """Read gains and limits from the registers."""
         self._vp, self._vi, self._vd = (registers[f"gain_v{gain}"] for gain in "pid")
         self._ramp = registers["acceleration_limit"] / 1e6
         self.limit = registers["speed_limit"] / 1e3
 
     def take_over(self, speed: float) -> None:
-        """Begin anew at a speed, so that nothing jerks."""
+        """Restart at a speed, so that the motion has no jerk."""
         self.reference, self.torque = speed, 0.0
         self._sum = self._error = self._change = 0.0
 
     @property
     def settled(self) -> bool:
-        """Whether a step towards standstill, with nothing counted, would change nothing."""
+        """Whether a step towards standstill without counts leaves everything unchanged."""
         return not (self.reference or self._error or self._change or self.counted)
 
     def drive(self, wheel: _Wheel, target: float, steps: int) -> list[float]:
-        """Turn a wheel for some milliseconds; return its speed in each, counts/ms.
+        """Run a wheel for some milliseconds; return its speed in each, counts/ms.
 
         Args:
-            wheel: with what the world does to it.
+            wheel: with its load and faults.
             target: counts/ms.
-            steps: how many milliseconds.
+            steps: number of milliseconds.
         """
         # one loop over locals takes half the time of a call for each part
         vp, vi, vd, ramp = self._vp, self._vi, self._vd, self._ramp
@@ -208,7 +208,7 @@ class _SpeedLoop(Part):
 
 
 STALL_MS: Final = 500
-"""How long full torque may turn nothing; a choice."""
+"""How long full torque may leave the wheel unmoved; a choice."""
 
 _INT32: Final = 2**32
 
@@ -225,9 +225,9 @@ class Side(Part):
     Attributes:
         name: which side it is.
         wheel: the mechanics.
-        fault: why it has no power.
+        fault: the reason for switching it off.
         clipped: its target was above the speed limit.
-        stalled: full torque has turned nothing for long, and nobody has looked yet.
+        stalled: full torque has not moved it for too long, not yet handled.
     """
 
     def __init__(
@@ -241,7 +241,7 @@ class Side(Part):
         self.power_up()
 
     def power_up(self) -> None:
-        """Count from 0, without a fault."""
+        """Restart at count 0, without a fault."""
         self.fault, self.clipped, self.stalled = Fault(0), False, False
         self._speed_loop.counted = self._speed_loop.stalled_ms = 0
         self._speed, self._goal = 0.0, 0
@@ -250,28 +250,28 @@ class Side(Part):
         self.zero()
 
     def configure(self) -> None:
-        """Take over gains and limits."""
+        """Read gains and limits from the registers."""
         self._backward = self._registers["direction"] >> self._backward_bit & 1
         self._speed_loop.configure(self._registers)
 
     def zero(self) -> None:
-        """Count from 0 on."""
+        """Set the count to 0."""
         self._zero = self.wheel.counts
 
     def take_over(self) -> None:
-        """Take power at the speed that the wheel has."""
+        """Switch on at the present speed of the wheel."""
         self._speed_loop.take_over(self.wheel.speed)
         self._position_loop.begin()
 
     def obey(self, values: Mapping[str, int]) -> None:
-        """Take new targets."""
+        """Apply new targets."""
         if (speed := values.get(f"target_speed_{self.name}")) is not None:
             self._speed = self._signed(speed) / 1e3
         if (goal := values.get(f"target_position_{self.name}")) is not None:
             self._goal = self._signed(goal)
 
     def stop(self, *, quick: bool) -> None:
-        """Want standstill, with or without a ramp."""
+        """Set the target to standstill, with or without a ramp."""
         # The register follows, so that a master reads the target that is in force.
         self._speed, self._registers[f"target_speed_{self.name}"] = 0.0, 0
         if quick:
@@ -279,7 +279,7 @@ class Side(Part):
 
     @property
     def measured(self) -> dict[str, Callable[[], int]]:
-        """What a master reads of it."""
+        """The measured values that a master reads."""
         return {
             f"fault_{self.name}": self._fault_bits,
             f"position_{self.name}": self._position,
@@ -306,22 +306,22 @@ class Side(Part):
 
     @property
     def resting(self) -> bool:
-        """Whether a step with the same target would change nothing."""
+        """Whether a step with the same target leaves everything unchanged."""
         loop, wheel = self._speed_loop, self.wheel
         return not (wheel.speed or loop.stalled_ms) and loop.settled and wheel.held(loop.torque)
 
     @property
     def stalling(self) -> bool:
-        """Whether full torque turns nothing."""
+        """Whether full torque leaves the wheel unmoved."""
         return self._speed_loop.stalled_ms > 0
 
     def inputs_changed(self, inputs: QuantityBank) -> None:
-        """Take over what the world does to the wheel."""
+        """Apply the physical inputs to the wheel."""
         self.wheel.load = self._per_mille(inputs[f"load_{self.name}_nm"])
         self.wheel.jammed = bool(inputs[f"jam_{self.name}"])
 
     def find_faults(self, inputs: QuantityBank, *, powered: bool) -> None:
-        """Look at what the electronics see."""
+        """Check for faults that the electronics detect."""
         if inputs["emergency_stop"]:
             self.fault |= Fault.EMERGENCY_STOP
         if inputs[f"encoder_unplugged_{self.name}"]:
@@ -333,10 +333,10 @@ class Side(Part):
             self.stalled = False
 
     def drive(self, steps: int, *, stop: bool, to_position: bool) -> list[float]:
-        """Turn as the targets say; return the speed in each millisecond, counts/ms.
+        """Run towards the targets; return the speed in each millisecond, counts/ms.
 
         Args:
-            steps: how many milliseconds; 1 towards a position, or while it is `stalling`.
+            steps: number of milliseconds; 1 towards a position, or while it is `stalling`.
             stop: the target is standstill.
             to_position: the target is a position, else a speed.
         """
@@ -355,7 +355,7 @@ class Side(Part):
         return speeds
 
     def coast(self, *, shorted: bool) -> list[float]:
-        """Turn for a millisecond without power, or with the motor shorted; return the speed."""
+        """Run a millisecond without power, or with the motor shorted; return the speed."""
         loop, wheel = self._speed_loop, self.wheel
         # Without power the loop holds nothing; `take_over` gives it the speed of the wheel
         # when power comes back, so that nothing jerks.
@@ -369,7 +369,7 @@ class Side(Part):
         return [wheel.speed]
 
     def _signed(self, value: int) -> int:
-        """Turn a number round where the wheel is said to run backward; cut it to 32 bits."""
+        """Negate a number if the wheel is configured to run backward; wrap it to 32 bits."""
         # The one place for direction bits (002Bh), for targets on their way in and measured
         # values on their way out. Cut to 32 bits: the position register wraps, as the
         # counter of a driver does.

@@ -1,1 +1,1 @@
-"""RRC: the Robotic Relay Communicator between a VR2 joystick and its power module."""
+"""The RRC, the Robotic Relay Communicator between a VR2 joystick and its power module."""

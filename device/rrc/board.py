@@ -12,7 +12,7 @@ from tickrig.wire.instant import NEVER
 from tickrig.wire.rrc import message
 from tickrig.wire.rrc.replies import RrcEvent
 
-# The physical side of the RRC and of the VR2 around it.
+# Physical inputs and outputs of the RRC and of the VR2 around it.
 
 _BUTTON: Final = SignalType.BUTTON
 _FAULT: Final = SignalType.FAULT
@@ -43,7 +43,7 @@ _RUNNING_FAULTS: Final = {
     "vr2_fault": RrcEvent.BY_SYSTEM_ERROR,
     "bus_unplugged": RrcEvent.BY_NO_COMMUNICATION,
 }
-"""What each fault is called once it has lasted (condition 8, DECISION R25)."""
+"""Event names of faults that have lasted (condition 8, DECISION R25)."""
 
 _POWER_ON_FAULTS: Final = {
     "bus_noise": RrcEvent.POWER_ON_ERROR1,
@@ -51,7 +51,7 @@ _POWER_ON_FAULTS: Final = {
     "power_module_fault": RrcEvent.POWER_ON_ERROR2,
     "vr2_fault": RrcEvent.POWER_ON_ERROR2,
 }
-"""What each fault does to a power-on. The manual names two causes without saying which."""
+"""Effect of each fault on a power-on. The manual gives two causes without assigning them."""
 
 OUTPUTS: Final = {
     output.name: output
@@ -81,28 +81,28 @@ OUTPUTS: Final = {
 
 
 def new_inputs() -> InputBank:
-    """Return the inputs of a fresh RRC: supplied, everything at rest, battery full."""
+    """Return the inputs of a new RRC: supplied, everything at rest, battery full."""
     return InputBank(INPUTS, groups={"stick": ("stick_v_pct", "stick_w_pct")})
 
 
-# How much work the RRC has, and when it is too much (DECISION R27).
+# The work load of the RRC, and its overload (DECISION R27).
 
 _SHOWN_PERIODS: Final = 10
-"""`load_pct` is the mean of so many periods."""
+"""Number of periods in the mean `load_pct`."""
 
 
 @dataclass(slots=True)
 class LoadAccount:
     """Work left over from past periods, in per cent of a period.
 
-    Each line feed that arrives costs, whatever becomes of its line, and so does what an overflow
-    throws away. Two commands and a status line fit exactly, and then nothing drains; with two OK
-    lines they run 30 over, and VR2 stops in the tenth such tick.
+    Each received line feed costs work, whatever happens to its line, and so do bytes that an
+    overflow discards. Two commands and a status line fill a period exactly, so the backlog stays;
+    with two OK lines they exceed it by 30, and VR2 stops in the tenth such tick.
 
     Attributes:
         backlog_pct: work that is left over.
-        extra_pct: work that the world adds, in per cent of a period.
-        settled: whether a period without traffic changes nothing here.
+        extra_pct: work that a physical input adds, in per cent of a period.
+        settled: whether a period without traffic leaves everything unchanged.
     """
 
     backlog_pct: int = 0
@@ -112,13 +112,13 @@ class LoadAccount:
 
     @property
     def load_pct(self) -> int:
-        """Mean work of the latest 100 ms; what is above 100 becomes backlog."""
+        """Mean work of the latest 100 ms; the part above 100 becomes backlog."""
         costs_pct: int = sum(self._costs_pct)
         return costs_pct // _SHOWN_PERIODS
 
     @property
     def too_far_behind(self) -> bool:
-        """Whether the work has piled up so far that the RRC gives up."""
+        """Whether the backlog is so large that the RRC stops VR2."""
         return self.backlog_pct >= message.TOO_FAR_BEHIND_PCT
 
     def spend(
@@ -127,11 +127,11 @@ class LoadAccount:
         """Account for one period in which VR2 runs.
 
         Args:
-            line_feeds: that arrived.
-            overflows: of the receive buffer, and each 256 bytes more that one threw away.
-            replies: lines sent, without those that tell of an overflow and the status line.
+            line_feeds: received line feeds.
+            overflows: of the receive buffer, plus one for each 256 further bytes discarded.
+            replies: lines sent, except overflow errors and the status line.
             status: whether a status line was sent.
-            extra_pct: work that the world adds, in per cent of a period.
+            extra_pct: work that a physical input adds, in per cent of a period.
         """
         self.extra_pct = extra_pct
         idle_pct = message.BASE_PCT + extra_pct + (message.STATUS_PCT if status else 0)
@@ -147,12 +147,12 @@ class LoadAccount:
 # The RRC's buzzer: patterns of the host, and the automatic alarm below them.
 
 _ALARM_TICKS: Final = 50
-"""The automatic alarm sounds and rests this long by turns (DECISION R18)."""
+"""Duration of each sound and each pause of the automatic alarm (DECISION R18)."""
 
 
 @dataclass(slots=True)
 class Buzzer:
-    """What the buzzer does in each tick.
+    """The buzzer, tick by tick.
 
     Attributes:
         sounding: whether it sounded in the latest tick.
@@ -164,7 +164,7 @@ class Buzzer:
     _phases: deque[tuple[int, bool]] = field(default_factory=deque, init=False)  # (end, on)
 
     def play(self, tick: int, times: tuple[int, ...]) -> None:
-        """Play on and off times in ticks, from the next tick on, instead of what plays now.
+        """Play on and off times in ticks from the next tick on, and drop the present pattern.
 
         A zero time skips its phase; all zero is silence (DECISION R24).
         """
@@ -187,7 +187,7 @@ class Buzzer:
 
         Args:
             tick: number of the tick.
-            alarm_since: tick at which the automatic alarm began, None without one.
+            alarm_since: tick at which the automatic alarm started, None without one.
         """
         while self._phases and tick >= self._phases[0][0]:
             self._phases.popleft()
@@ -202,11 +202,11 @@ class Buzzer:
             self.sounding, self.changes_at = False, None
 
 
-# The way through power-on and power-off: button, faults and time, but no commands.
+# The power sequence: button, faults and time, but no commands.
 
 
 class Step(NamedTuple):
-    """What a tick brings: an event to send, a move to make."""
+    """Result of a tick: an event to send, a transition to make."""
 
     event: str | None = None
     move: Move | None = None
@@ -229,13 +229,13 @@ class PowerSequence:
     _faults: dict[str, int] = field(default_factory=dict, init=False)  # present since
 
     def enter(self, state: RrcState, tick: int) -> None:
-        """Begin the wait of a state; the power button begins that of the others."""
+        """Start the wait of a state; in other states the power button starts it."""
         timed = state in (RrcState.INITIALIZE, RrcState.POWER_OFF_BY_BUTTON)
         self._since = tick if timed else None
         self._faults.clear()
 
     def step(self, state: RrcState, tick: int, inputs: InputBank) -> Step:
-        """Look at the physical side, once a tick; Initialize does not see the button yet."""
+        """Check the physical inputs, once a tick; Initialize does not see the button yet."""
         if state is RrcState.INITIALIZE and self._since is not None:
             return self._waiting(state, tick - self._since, inputs)
         # An edge, not a level: a button that is held from one state into the next acts
@@ -274,7 +274,7 @@ class PowerSequence:
         return _NOTHING
 
     def _begin(self, state: RrcState, tick: int) -> Step:
-        """Start what the power button starts: power-on, or the end of a forced stop."""
+        """Start power-on, or the end of a forced stop, after the power button."""
         self._since = tick
         return Step(self.config.power_on_event) if state is RrcState.WAIT_POWER_ON else _NOTHING
 

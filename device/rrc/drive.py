@@ -1,4 +1,4 @@
-"""What goes to the power module: the stick, shaped, geared and limited, or the host's values."""
+"""Values for the power module: the shaped, geared and limited stick, or the host's values."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _BUTTON_MODES: Final = {(0, 0): 0, (1, 0): 1, (0, 1): 2, (1, 1): 3}
 
 
 def count_button_edges(inputs: InputBank, settings: Settings) -> bool:
-    """Count button edges and do what speed buttons do.
+    """Count button edges and apply the speed buttons.
 
     A counter is odd while its button is pressed (RRC manual, SA #7 to #9); so a
     counter whose parity differs from the button is the edge itself. Edges count
@@ -57,7 +57,7 @@ def _shift_speed(settings: Settings, step: int) -> None:
 # The reverse modes and the imitated gear change (RRC manual, `joystick` #7 to #10).
 
 _RESET_TICKS: Final = 20
-"""A stick that rests 0.2 s in neutral takes the gear out."""
+"""Time in neutral, 0.2 s, after which the gear is disengaged."""
 
 
 class Gear(Enum):
@@ -70,12 +70,12 @@ class Gear(Enum):
 
 @dataclass(slots=True)
 class Gearbox:
-    """Gear of modes 2 and 3, chosen by where the stick leaves neutral.
+    """Gear of modes 2 and 3, chosen by the direction in which the stick leaves neutral.
 
     Attributes:
         gear: the gear after the latest tick.
         reversed_at: tick at which gear R was chosen; the automatic alarm counts from it.
-        resets_at: tick at which a stick that stays in neutral takes the gear out.
+        resets_at: tick at which the gear is disengaged if the stick stays in neutral.
     """
 
     gear: Gear = Gear.NEUTRAL
@@ -83,7 +83,7 @@ class Gearbox:
     resets_at: int | None = None
 
     def reset(self) -> None:
-        """Take the gear out: limit mode is entered, or the reverse mode changes."""
+        """Disengage the gear when limit mode is entered or the reverse mode changes."""
         self.gear, self.resets_at = Gear.NEUTRAL, None
 
     def drive(
@@ -93,9 +93,9 @@ class Gearbox:
 
         Args:
             tick: number of the tick.
-            mode: reverse mode, #7 or what the buttons chose.
+            mode: reverse mode, from #7 or the buttons.
             stick: translation and rotation as received; they choose the gear.
-            shaped: the same after shaping; they are what is driven (DECISION R18).
+            shaped: the same after shaping; they drive the motors (DECISION R18).
             knobs: #8 to #10.
         """
         v_pct, w_pct = shaped
@@ -120,7 +120,7 @@ class Gearbox:
         return _fade(v_pct, angle, knobs.fade_deg), turn * _fade(w_pct, angle, knobs.fade_deg)
 
     def _rests(self, tick: int, stick: tuple[int, int], neutral_pct: int) -> bool:
-        """Whether the stick is in neutral; it takes the gear out when it stays there."""
+        """Whether the stick is in neutral; the gear is disengaged if it stays there."""
         if stick[0] ** 2 + stick[1] ** 2 > neutral_pct**2:
             self.resets_at = None
             return False
@@ -166,8 +166,8 @@ def shape_table(low_pct: int, high_pct: int, exponent: int) -> tuple[int, ...]:
     result is rounded half up (DECISION R16).
 
     Args:
-        low_pct: what counts as 0, 0..99 %.
-        high_pct: what counts as 100, above `low_pct`, at most 100 %.
+        low_pct: largest value that counts as 0, 0..99 %.
+        high_pct: smallest value that counts as 100, above `low_pct`, at most 100 %.
         exponent: 0..15; the power is 1 + 0.1 * exponent.
     """
     span, power = high_pct - low_pct, 1 + 0.1 * exponent
@@ -190,9 +190,9 @@ def shape(value_pct: int, low_pct: int, high_pct: int, exponent: int) -> int:
 def apply_limits(v_pct: int, w_pct: int, limit: Limit) -> tuple[int, int]:
     """Return translation and rotation within the limits, signs kept (RRC manual, `limit`).
 
-    First each input is cut off at its own limit. Then one common factor, which
-    keeps the direction, is the smallest that sum, product and radius ask for;
-    all is integer and rounds down (DECISION R19).
+    First each input is clamped to its own limit. Then one common factor, which keeps the direction,
+    is the smallest that sum, product and radius require; all is integer and rounds down (DECISION
+    R19).
 
     >>> apply_limits(-100, -100, Limit(70, 100, 120, 30, 90))
     (-45, -65)
@@ -227,18 +227,18 @@ class Drive:
 
     @property
     def alarm_since(self) -> int | None:
-        """The tick at which the automatic alarm of the backward gear began."""
+        """The tick at which the automatic alarm of the backward gear started."""
         in_reverse = self.by_stick and self.gearbox.gear is Gear.REVERSE
         return self.gearbox.reversed_at if in_reverse else None
 
     @property
     def changes_at(self) -> int | None:
-        """The tick at which a resting stick takes the gear out."""
+        """The tick at which a stick in neutral disengages the gear."""
         engaged = self.by_stick and self.gearbox.gear is not Gear.NEUTRAL
         return self.gearbox.resets_at if engaged else None
 
     def step(self, tick: int, state: RrcState, settings: Settings, inputs: InputBank) -> None:
-        """Decide what the motors get in this tick."""
+        """Compute the values for the motors in this tick."""
         mode = _driving_mode(state, settings)
         self.by_stick = mode is not None
         if mode is not None:
@@ -253,7 +253,7 @@ class Drive:
     def _steer(
         self, tick: int, mode: int, settings: Settings, inputs: InputBank
     ) -> tuple[int, int]:
-        """Shape the stick and imitate the gear change."""
+        """Shape the stick and apply the imitated gear."""
         knobs = settings.joystick
         stick = inputs["stick_v_pct"], inputs["stick_w_pct"]
         shaped = (

@@ -1,4 +1,4 @@
-"""The RRC: what it does in each period of 10 ms."""
+"""The RRC: its work in each period of 10 ms."""
 
 from __future__ import annotations
 
@@ -75,20 +75,20 @@ from tickrig.wire.rrc.replies import StatusA as Status
 # in the reference page of the device; hosts pace themselves by the same constants in
 # `tickrig.wire.rrc.message`.
 
-# What comes over the line: bytes that wait, lines, commands and refusals.
+# Input from the line: waiting bytes, lines, commands and refusals.
 
 
 @dataclass(slots=True)
 class ReceiveBuffer:
-    """Bytes that wait to be worked on, cut into lines (DECISION R27).
+    """Received bytes that wait to be processed, split into lines (DECISION R27).
 
-    The byte that does not fit drops all that waits; it and what follows are
-    thrown away up to the next LF.
+    A byte that does not fit drops all waiting bytes; it and the following ones are discarded up to
+    the next LF.
 
     Attributes:
-        size: bytes it holds, line ends included.
-        overflows: how often it has overflowed.
-        thrown_blocks: how often `size` bytes more of such a line were thrown away.
+        size: capacity in bytes, line ends included.
+        overflows: number of overflows.
+        thrown_blocks: number of further blocks of `size` bytes discarded from such a line.
     """
 
     size: int
@@ -104,7 +104,7 @@ class ReceiveBuffer:
         return bool(self._lines)
 
     def push(self, data: bytes) -> None:
-        """Take bytes from the line."""
+        """Receive bytes from the line."""
         *lines, tail = data.split(b"\n")
         for line in lines:
             self._push(line, 1)
@@ -138,7 +138,7 @@ class ReceiveBuffer:
 
 
 def _read_line(line: bytes, *, check_wanted: bool) -> Command | replies.Refusal | None:
-    """Return what a line without LF asks for, its refusal (DECISION R11), or None if empty."""
+    """Return the command of a line without LF, its refusal (DECISION R11), or None if empty."""
     # One CR before the LF is taken off: terminals send CR LF (R11). An empty line is what a
     # person who presses Enter sends; it has no reply.
     message = line.removesuffix(b"\r")
@@ -168,15 +168,15 @@ _MOVES: Final[dict[type[cmd.Command], Move]] = {
 class Rrc(Copyable):
     """The Robotic Relay Communicator with the VR2 wheelchair around it; a `Device[bytes]`.
 
-    The vehicle is there if `config.vehicle` says so; its numbers are ours (vehicle.py).
+    There is a vehicle if `config.vehicle` is set; its numbers are ours (vehicle.py).
     Not emulated: the traffic on the VR2 bus itself, what the alarm button's horn
     sounds like, the USB serial driver.
 
     Attributes:
-        type_name: what its device type is called, for traces.
+        type_name: name of its device type, for traces.
         config: durations, names and sizes.
-        inputs: what the world does to it, see `board.INPUTS`.
-        state: where it is in the manual's state diagram.
+        inputs: its physical inputs, see `board.INPUTS`.
+        state: state in the manual's state diagram.
     """
 
     type_name: ClassVar[str] = "rrc"
@@ -198,7 +198,7 @@ class Rrc(Copyable):
     _replies: int = field(default=0, init=False)
 
     def __post_init__(self) -> None:
-        """Begin without power."""
+        """Start without power."""
         self.reset()
 
     @property
@@ -208,29 +208,29 @@ class Rrc(Copyable):
 
     @property
     def due_us(self) -> int:
-        """When anything would happen without a command."""
+        """The time of the next event without a command."""
         return 0 if self.inputs.changed else self._due_us
 
     @property
     def outputs(self) -> dict[str, OutputSignal]:
-        """What `read` knows."""
+        """The outputs that `read` accepts."""
         return OUTPUTS
 
     def reset(self) -> None:
-        """Forget everything but configuration and physical inputs; the vehicle stands again."""
+        """Reset everything but configuration and physical inputs; the vehicle is at rest again."""
         self._vehicle = Vehicle(self.config.battery_wh)
         self._lose_power()
         self._due_us = 0
 
     def _lose_power(self) -> None:
-        """Forget what a power cut of the RRC takes; the vehicle rolls on."""
+        """Reset the state that a power cut of the RRC erases; the vehicle keeps rolling."""
         self.state = RrcState.OFF
         self._buffer = ReceiveBuffer(self.config.buffer_bytes)
         self._power, self._load = PowerSequence(self.config), LoadAccount()
         self._wipe()
 
     def read(self, name: str, /) -> int | str:
-        """Look at an output, as it was left by the latest tick.
+        """Return an output as the latest tick left it.
 
         Args:
             name: one of `outputs`.
@@ -239,7 +239,7 @@ class Rrc(Copyable):
             Its value.
 
         Raises:
-            KeyError: there is none of that name.
+            KeyError: there is no output of that name.
         """
         return _READERS[name](self)
 
@@ -284,12 +284,12 @@ class Rrc(Copyable):
         return b"".join(self._sent)
 
     def _boot(self, tick: int) -> None:
-        """Make transition 1 in the tick before, so that this one ends Initialize."""
+        """Make transition 1 in the previous tick, so that this one ends Initialize."""
         self.state = RrcState.INITIALIZE
         self._power.enter(self.state, tick - 1)
 
     def _receive(self, rx: bytes) -> int:
-        """Take bytes; return how often the load account has to pay for an overflow."""
+        """Receive bytes; return how many overflows the load account must charge."""
         buffer = self._buffer
         overflows, thrown = buffer.overflows, buffer.thrown_blocks
         buffer.push(rx)
@@ -298,7 +298,7 @@ class Rrc(Copyable):
         return overflows + thrown
 
     def _read_inputs(self, tick: int) -> None:
-        """Take notice of buttons, faults and time."""
+        """Process buttons, faults and time."""
         if self.state in POWERED_ON and count_button_edges(self.inputs, self._settings):
             self._choose_drive()
         event, move = self._power.step(self.state, tick, self.inputs)
@@ -308,14 +308,14 @@ class Rrc(Copyable):
             self._move(move, tick)
 
     def _choose_drive(self) -> None:
-        """Let the stick drive in Standby as the held buttons say (DECISION R8)."""
+        """Set the reverse mode in Standby by the held buttons (DECISION R8)."""
         mode = chosen_mode(self.inputs)
         if self.state is RrcState.STANDBY and mode != self._settings.button_mode:
             self._settings.button_mode = mode
             self._drive.gearbox.reset()
 
     def _work(self, tick: int) -> None:
-        """Work on as many lines as the period allows."""
+        """Process as many lines as the period allows."""
         # "About 1 command per 20 ms" without VR2: one in each even tick (R27). The quota is
         # fixed before the first line, so `poweroff` as the first line still lets a second
         # one through.
@@ -325,7 +325,7 @@ class Rrc(Copyable):
             self._answer(self._buffer.pop(), tick)
 
     def _answer(self, line: bytes, tick: int) -> None:
-        """Do what a line asks for; the reply keeps to the mode it came in (DECISION R21)."""
+        """Execute a line; the reply uses the mode in which the line arrived (DECISION R21)."""
         # Read before the command acts: `stablemode1` gets its OK, `stablemode0` with CHECK
         # none (R21).
         stable = self._settings.stable
@@ -347,7 +347,7 @@ class Rrc(Copyable):
             self._reply(replies.Refusal(request.name.decode()))
 
     def _obey(self, command: cmd.Command, tick: int) -> bool:
-        """Carry out a command; False if it is not allowed in this state (DECISION R10)."""
+        """Execute a command; return False if this state does not allow it (DECISION R10)."""
         move = _MOVES.get(type(command))
         if move is not None and not self._move(move, tick):
             return False
@@ -363,7 +363,7 @@ class Rrc(Copyable):
         return isinstance(command, cmd.Joystick) and command.reverse_mode != now
 
     def _follow_up(self, command: cmd.Command) -> None:
-        """Send what follows the OK line (DECISION R12, R26)."""
+        """Send the lines after the OK line (DECISION R12, R26)."""
         match command:
             case cmd.DeviceName():
                 self._reply(replies.Text(self.config.device_name))
@@ -388,18 +388,18 @@ class Rrc(Copyable):
 
     @property
     def _rolls(self) -> bool:
-        """Whether the vehicle changes in each tick: it moves, or VR2 uses the battery."""
+        """Whether the vehicle changes in each tick: it moves, or VR2 drains the battery."""
         return self.config.vehicle and (self.state in POWERED_ON or self._vehicle.moving)
 
     def _roll(self) -> None:
-        """Move the vehicle, if there is one."""
+        """Advance the vehicle, if there is one."""
         if self.config.vehicle:
             self._vehicle.set_gauge(self.inputs["gauge"])
             running = self.state in POWERED_ON
             self._vehicle.step(self._drive.out_pct, self._settings.speed_mode, running=running)
 
     def _report_and_account(self, tick: int, line_feeds: int, overflows: int) -> None:
-        """Send the SA line, then see whether the period was long enough for it all."""
+        """Send the SA line, then check whether the work fitted into the period."""
         load, status = self._load, self._settings.status
         if self.state in POWERED_ON:
             if status:
@@ -430,7 +430,7 @@ class Rrc(Copyable):
         self._sent.append(reply.encode())
 
     def _move(self, move: Move, tick: int) -> bool:
-        """Change the state; False if there is no such transition."""
+        """Change the state; return False if there is no such transition."""
         state = NEXT_STATE.get((self.state, move))
         if state is None:
             return False
@@ -441,8 +441,8 @@ class Rrc(Copyable):
             self._load = LoadAccount()
         if state is RrcState.STANDBY:
             self._renewed = tick
-        # Leaving counts as well as entering: Initialize may last several ticks, and the
-        # commands that come meanwhile are obeyed (R10) but do not outlive it.
+        # Leaving counts as well as entering: Initialize may last several ticks, and the commands
+        # that arrive in it are executed (R10) but their effects end with it.
         if RrcState.INITIALIZE in (self.state, state):  # what commands set in there goes, too
             self._wipe()
         self.state, self._moved = state, tick
@@ -451,7 +451,7 @@ class Rrc(Copyable):
         return True
 
     def _wipe(self) -> None:
-        """Reset what Initialize resets (RRC manual, state description; DECISION R5)."""
+        """Reset the values that Initialize resets (RRC manual, state description; DECISION R5)."""
         self._settings = Settings()
         self._drive, self._buzzer = Drive(), Buzzer()
 
@@ -491,4 +491,4 @@ _READERS: Final[dict[str, Callable[[Rrc], int | str]]] = {
     "heading_mrad": lambda rrc: round(rrc._vehicle.heading_mrad),
     "battery_permille": lambda rrc: round(rrc._vehicle.charge * 1_000),
 }
-"""What `Rrc.read` returns for each of `outputs`; only the signal that is read is computed."""
+"""Functions of `Rrc.read` for each of `outputs`; only the requested signal is computed."""

@@ -1,4 +1,4 @@
-"""What an RRC is configured with and told, and the states that it has."""
+"""Configuration and settings of an RRC, and its states."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class RrcState(Enum):
 
 
 class Move(Enum):
-    """What makes the RRC change its state."""
+    """Events that change the state of the RRC."""
 
     INITIALIZED = auto()
     POWER_ON_FAILED = auto()
@@ -68,11 +68,11 @@ NEXT_STATE: Final[dict[tuple[RrcState, Move], RrcState]] = {
 }
 
 
-# What differs from one RRC to another, and what the manual leaves open.
+# Configuration: differences between RRCs, and points that the manual leaves open.
 
 
 class FailTarget(Enum):
-    """Where a failed power-on leads (DECISION R3)."""
+    """Next state after a failed power-on (DECISION R3)."""
 
     WAIT = "wait"  # wait for the button again, settings kept
     INITIALIZE = "initialize"  # through Initialize, settings wiped
@@ -88,7 +88,7 @@ class RrcConfig(Immutable):
         date: answer of `date`.
         power_on_event: `PowerOnTrigger` as in the field, or `PowerOn` as in the
             manual's event table (DECISION R7).
-        power_on_fail_target: where transition 3 leads (DECISION R3).
+        power_on_fail_target: target of transition 3 (DECISION R3).
         initialize_ticks: length of Initialize (DECISION R6).
         power_on_ticks: from the power button to the result (DECISION R6).
         power_on_timeout_ticks: from the power button to `PowerOnTimeout` (DECISION R6).
@@ -98,10 +98,10 @@ class RrcConfig(Immutable):
         buffer_bytes: size of the receive buffer (DECISION R27).
         overtime: whether too much work stops VR2 (DECISION R27).
         vehicle: whether there is a vehicle behind VR2, with speed, way and battery.
-        battery_wh: what its battery holds, Wh.
+        battery_wh: capacity of its battery, Wh.
 
     Raises:
-        ValueError: a time, size or battery below 1, or an event name the manual does not know.
+        ValueError: a time, size or battery below 1, or an event name that is not in the manual.
     """
 
     device_name: str = "RRC"
@@ -121,10 +121,10 @@ class RrcConfig(Immutable):
     battery_wh: int = 1_200
 
     def __post_init__(self) -> None:
-        """Refuse what no RRC could be."""
+        """Raise ValueError if a value is out of range."""
         names = (POWER_ON_TRIGGER, RrcEvent.POWER_ON.value)
         if self.power_on_event not in names:
-            raise ValueError(f"power-on event {self.power_on_event!r} is none of {names}")
+            raise ValueError(f"power-on event {self.power_on_event!r} is not one of {names}")
         for name in (
             *("initialize_ticks", "power_on_ticks", "power_on_timeout_ticks"),
             *("button_off_ticks", "forced_off_ticks", "fault_hold_ticks", "buffer_bytes"),
@@ -134,7 +134,7 @@ class RrcConfig(Immutable):
                 raise ValueError(f"{name} is {getattr(self, name)}, at least 1 is needed")
 
 
-# What Initialize wipes: all that commands and buttons have set.
+# The settings that Initialize wipes: those of commands and buttons.
 
 _NO_LIMIT_YET: Final = Limit(0, 0, 0, 0, 0)
 _NO_OUTPUT_YET: Final = Output(0, 0)
@@ -146,8 +146,8 @@ class Settings:
     """Settings of the RRC, fresh at each pass through Initialize (RRC manual, notes).
 
     Attributes:
-        stable: stablemode: CHECK wanted, OK left out.
-        status: SA lines wanted.
+        stable: stablemode: CHECK is required, OK is omitted.
+        status: SA lines are sent.
         watchdog_ticks: time without a correct command that stops VR2, 0 for never.
         speed_mode: 1 (slowest) to 5.
         speed_locked: the controller's speed buttons have no effect.
@@ -175,7 +175,7 @@ class Settings:
     alarm_count: int = 0
 
     def store(self, command: Command) -> None:
-        """Take over what a command sets."""
+        """Apply the settings of a command."""
         match command:
             case Limit():
                 self.limit = command

@@ -1,4 +1,4 @@
-"""The vehicle behind VR2: what its speed and its battery make of the output.
+"""The vehicle behind VR2: speed and battery as a result of the output.
 
 The manual has no numbers of the vehicle. All values here are ours: those of a common electric
 wheelchair with a top speed of 6 km/h.
@@ -13,7 +13,7 @@ _TOP_MM_S: Final = (333.0, 667.0, 1_000.0, 1_333.0, 1_667.0)
 """Forward speed at an output of 100 %, by speed mode."""
 
 _BACKING: Final = 0.5
-"""Part of it that is left when it backs."""
+"""Share of the speed when driving backward."""
 
 _TURN_MRAD_S: Final = (300.0, 600.0, 900.0, 1_200.0, 1_500.0)
 """Turning speed at an output of 100 %, by speed mode."""
@@ -21,7 +21,7 @@ _TURN_MRAD_S: Final = (300.0, 600.0, 900.0, 1_200.0, 1_500.0)
 _SPEEDING_MM_S2: Final = 800.0
 _SLOWING_MM_S2: Final = 1_200.0
 _BRAKING_MM_S2: Final = 3_000.0
-"""VR2 that is off lets the brakes fall in."""
+"""Deceleration by the brakes, which are applied while VR2 is off."""
 
 _TURN_PER_SPEED: Final = 3.0
 """mrad/s² of turning for each mm/s² of translation."""
@@ -42,15 +42,15 @@ class Vehicle:
     """Speed, way and battery of the vehicle, period by period.
 
     Args:
-        battery_wh: what the battery holds.
+        battery_wh: capacity of the battery.
 
     Attributes:
-        gauge: how full the battery was set to be, 1..10.
+        gauge: charge that the input has set, 1..10.
         speed_mm_s: true speed, forward positive.
         turn_mrad_s: true turning speed, to the right positive.
         distance_mm: way along its path; backing counts negative.
         heading_mrad: how far it has turned to the right.
-        charge: how full the battery is, 0..1.
+        charge: charge of the battery, 0..1.
     """
 
     battery_wh: int
@@ -63,16 +63,16 @@ class Vehicle:
 
     @property
     def moving(self) -> bool:
-        """Whether it has not come to rest yet."""
+        """Whether it is still moving."""
         return self.speed_mm_s != 0.0 or self.turn_mrad_s != 0.0
 
     @property
     def shown_gauge(self) -> int:
-        """What the voltage gauge shows of the battery, 1..10."""
+        """The voltage gauge of the battery, 1..10."""
         return max(1, -int(-self.charge * _GAUGE_TOP // 1))
 
     def set_gauge(self, gauge: int) -> None:
-        """Charge or discharge the battery, if the input is another one than before."""
+        """Charge or discharge the battery if the input has changed."""
         if gauge != self.gauge:
             self.gauge, self.charge = gauge, gauge / _GAUGE_TOP
 
@@ -80,9 +80,9 @@ class Vehicle:
         """Move for one period of 10 ms.
 
         Args:
-            out_pct: translation and rotation that the motors get.
+            out_pct: translation and rotation for the motors.
             speed_mode: 1..5.
-            running: whether VR2 is on; the brakes are on otherwise.
+            running: whether VR2 is on; otherwise the brakes are on.
         """
         v_pct, w_pct = out_pct if self.charge > 0.0 else (0, 0)
         top_mm_s = _TOP_MM_S[speed_mode - 1] * (_BACKING if v_pct < 0 else 1.0)
@@ -101,7 +101,7 @@ class Vehicle:
             self._use(abs(before_mm_s) / 1_000)
 
     def _use(self, before_m_s: float) -> None:
-        """Take from the battery what this period needs."""
+        """Drain the battery by the energy of this period."""
         speed_m_s = abs(self.speed_mm_s) / 1_000
         pushing_n = max(0.0, speed_m_s - before_m_s) / _STEP_S * _MASS_KG
         wheels_w = (_ROLLING_N + pushing_n) * speed_m_s
@@ -111,7 +111,7 @@ class Vehicle:
 
 
 def _toward(value: float, wanted: float, speeding: float, slowing: float) -> float:
-    """Return a speed one period later: it passes zero before it turns round.
+    """Return the speed one period later; it passes zero before the direction reverses.
 
     >>> _toward(0.0, 100.0, 800.0, 1_200.0), _toward(5.0, -100.0, 800.0, 1_200.0)
     (8.0, 0.0)

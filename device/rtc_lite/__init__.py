@@ -1,1 +1,1 @@
-"""RTC-Lite: a component on a device too small for middleware, behind its proxy."""
+"""RTC-Lite: components on devices too small for middleware, controlled by a proxy."""

@@ -1,8 +1,8 @@
-r"""What a developer writes: the ports of a component, and what it does in each state.
+r"""Base classes for components on small devices: ports, and callbacks for each state.
 
-Data ports of a component on a small device: a buffer of one place each.
+Each data port of a component on a small device is a buffer of one value.
 
-A new value overwrites the one before; reading it makes it old (RTno's NullBuffer).
+A new value overwrites the previous one; reading it makes it old (RTno's NullBuffer).
 
 >>> from tickrig.wire.rtc_lite.values import LONG
 >>> inlet = LiteInPort("in", LONG)
@@ -27,16 +27,15 @@ T = TypeVar("T")
 
 
 class LitePort(Generic[T]):
-    """What both kinds of ports have.
+    """Base of both kinds of ports.
 
     Args:
         name: 1 to 15 printable ASCII characters.
         port_type: type of its values.
-        most: the largest number of elements of a sequence; as many as fit
-            into a frame unless given.
+        most: the largest number of elements of a sequence; by default as many as fit into a frame.
 
     Attributes:
-        is_new: whether the value was not read yet.
+        is_new: whether the value has not been read yet.
         value: the latest value.
 
     Raises:
@@ -58,7 +57,7 @@ class LitePort(Generic[T]):
         self.is_new, self.value = False, port_type.initial
 
     def fits(self, data: bytes) -> bool:
-        """Whether so many bytes are a value that this port has room for."""
+        """Return whether a number of bytes is a value that fits into the port."""
         try:
             self.port_type.check_size(data)
         except FieldError:
@@ -67,15 +66,15 @@ class LitePort(Generic[T]):
 
 
 class LiteInPort(LitePort[T]):
-    """Where the proxy writes and the component reads."""
+    """A port that the proxy writes and the component reads."""
 
     def read(self) -> T:
-        """Return the latest value; it is not new any more."""
+        """Return the latest value, which is then no longer new."""
         self.is_new = False
         return self.value
 
     def accept(self, data: bytes) -> bool:
-        """Take what came from the wire; False, and nothing changes, if it is no value."""
+        """Store a value from the wire; return False without a change if it is invalid."""
         if not self.fits(data):
             return False
         self.value, self.is_new = self.port_type.decode(data), True
@@ -83,13 +82,13 @@ class LiteInPort(LitePort[T]):
 
 
 class LiteOutPort(LitePort[T]):
-    """Where the component writes; what is new goes to the proxy."""
+    """A port that the component writes; new values go to the proxy."""
 
     def write(self, value: T) -> bool:
-        """Put a value into the buffer; False, and nothing changes, if there is no room for it.
+        """Store a value; return False without a change if it does not fit.
 
         Raises:
-            ValueError: the type has no such value.
+            ValueError: the value is not one of the port's type.
         """
         data = self.port_type.encode(value)
         if not self.fits(data):
@@ -98,17 +97,17 @@ class LiteOutPort(LitePort[T]):
         return True
 
     def take(self) -> bytes:
-        """Return the value as it goes to the wire; it is not new any more."""
+        """Return the value as sent on the wire; it is then no longer new."""
         self.is_new = False
         return self.port_type.encode(self.value)
 
 
 _MAX_PORTS: Final = 8
-"""In-ports, and out-ports, that a small device has room for (RTno has as many)."""
+"""Largest number of in-ports and of out-ports on a small device (as in RTno)."""
 
 
 class LiteComponent(DeviceComponent):
-    """A component on a small device; a subclass says what it is and does.
+    """A component on a small device; a subclass defines its properties and callbacks.
 
     Callbacks are those of the paper's Table 1.
 
@@ -118,7 +117,7 @@ class LiteComponent(DeviceComponent):
         out_ports: the out-ports.
 
     Raises:
-        ValueError: no type name, an input that takes fractions, or what a PIC has no room for.
+        ValueError: missing type name, an input with fractions, or more than fits into a PIC.
 
     >>> from tickrig.wire.rtc_lite.values import LONG
     >>> class Doubler(LiteComponent):
@@ -149,14 +148,14 @@ class LiteComponent(DeviceComponent):
         self.out_ports = {port.name: port for port in ports if isinstance(port, LiteOutPort)}
 
     def on_startup(self) -> Result:
-        """Hear that the execution context of the proxy runs; asked for only if defined."""
+        """Handle the start of the proxy's execution context; called only if defined."""
 
     def on_shutdown(self) -> Result:
-        """Hear that it has stopped; asked for only if defined."""
+        """Handle its stop; called only if defined."""
 
 
 def _check_ports(kind: str, ports: Iterable[LitePort[Any]]) -> None:
-    """Raise ValueError if ports have the same name, or are too many."""
+    """Raise ValueError if two ports have the same name, or there are too many."""
     for word, wanted in (("in-port", True), ("out-port", False)):
         names = [port.name.decode() for port in ports if _is_in(port) is wanted]
         if len(names) > _MAX_PORTS:
@@ -178,7 +177,7 @@ class LiteEcho(LiteComponent):
     outlet = LiteOutPort("out", LONG)
 
     def on_execute(self) -> None:
-        """Hand on what is new."""
+        """Copy new values from the in-port to the out-port."""
         if self.inlet.is_new:
             self.outlet.write(self.inlet.read())
 

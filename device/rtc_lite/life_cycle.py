@@ -12,7 +12,7 @@ from tickrig.wire.rtc_lite.codes import LiteCommand, LiteState, LiteStatus
 
 
 class LiteTransition(NamedTuple):
-    """What a command does: in which state, which callback, and where that leads."""
+    """Effect of a command: allowed state, callback and next state."""
 
     begin: LiteState
     callback: str
@@ -50,13 +50,13 @@ _CONTEXT_CALLBACKS: Final = {
     LiteCommand.STARTUP: "on_startup",
     LiteCommand.SHUTDOWN: "on_shutdown",
 }
-"""They change no state, and are optional: `!` from a component that does not define them."""
+"""Callbacks without a change of state; a component that does not define them answers `!`."""
 
 _NOT_ALIVE: Final = (LiteState.CREATED, LiteState.NONE)
 
 
 class LiteLifeCycle(CallbackRunner[LiteComponent]):
-    """Runs the callbacks of a component, and keeps its state.
+    """Runs the callbacks of a component, and tracks its state.
 
     Attributes:
         state: its state.
@@ -67,7 +67,7 @@ class LiteLifeCycle(CallbackRunner[LiteComponent]):
         self.state = LiteState.CREATED
 
     def obey(self, command: LiteCommand) -> LiteStatus:
-        """Do what a command of the life cycle asks for."""
+        """Execute a life cycle command."""
         if command is LiteCommand.ABORT:
             return self._abort_at_once()
         if command in _CONTEXT_CALLBACKS:
@@ -93,7 +93,7 @@ class LiteLifeCycle(CallbackRunner[LiteComponent]):
         return LiteStatus.OK
 
     def _enter_error(self, *, left: bool = False) -> None:
-        """Run the exit action of Active unless that is what failed, then `on_aborting`."""
+        """Run the exit action of Active unless it has failed, then `on_aborting`."""
         # Exit action of Active first, then on_aborting, as UML orders them (DECISION L3,
         # vectors L04 and L06); what has just failed as on_deactivated is not called twice
         # (L14).

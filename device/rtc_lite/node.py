@@ -1,4 +1,4 @@
-"""A small device with a component: what it does in each tick of 1 ms."""
+"""A small device with a component, in ticks of 1 ms."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ from tickrig.wire.rtc_lite.rtno import RtnoDecoder, encode_packet
 #
 # - 100 ms of silence inside a frame: it is dropped and answered `F K`. Not while bytes wait
 #   in the buffer: those came in time, only the processor was busy.
-# - after `F U` (an unknown command, whose length nobody knows) everything is thrown away
+# - after `F U` (an unknown command, of unknown length) everything is dropped
 #   until 20 ms of silence; then the decoder begins to look for a header again.
 #
 # The frames of a dialogue, proxy to device and back (vectors L01 to L14 of the
@@ -65,13 +65,13 @@ from tickrig.wire.rtc_lite.rtno import RtnoDecoder, encode_packet
 # Numbers: 64 bytes and 100 ms are RTno's, 20 ms is L7's own, the tick a choice; rates go up
 # to 1000 Hz, what a tick of 1 ms can hold.
 
-# Bytes from the line: a buffer of 64, frames out of it, and time-outs (DECISION L7).
+# Bytes from the line: a buffer of 64 bytes, its frames, and time-outs (DECISION L7).
 
 BUFFER_BYTES: Final = 64
 GAP_US: Final = 100_000
-"""Silence inside a frame that drops it."""
+"""Silence inside a frame after which it is dropped."""
 SILENCE_US: Final = 20_000
-"""Silence that a receiver needs after a frame whose length it does not know."""
+"""Silence that a receiver needs after a frame of unknown length."""
 
 
 class RequestDecoder(Protocol):
@@ -81,24 +81,24 @@ class RequestDecoder(Protocol):
 
     @property
     def begun(self) -> bool:
-        """Whether a frame has begun that is not whole."""
+        """Whether an incomplete frame has started."""
         ...
 
     def clear(self) -> None:
         """Look for a header again."""
 
     def push(self, data: bytes, /) -> list[LiteFrame | LiteLinkFault]:
-        """Take bytes in; give frames and faults out."""
+        """Receive bytes; return frames and faults."""
         ...
 
 
 @dataclass(slots=True)
 class LiteReceiver:
-    """What the line brought.
+    """The receiver of the line.
 
     Attributes:
         decoder: reads the frames.
-        dropped: bytes that found the buffer full.
+        dropped: bytes dropped because the buffer was full.
     """
 
     decoder: RequestDecoder
@@ -108,11 +108,11 @@ class LiteReceiver:
 
     @property
     def due_us(self) -> int:
-        """When a frame that has begun is dropped."""
+        """When an incomplete frame is dropped."""
         return self._received_us + GAP_US if self.decoder.begun else NEVER
 
     def push(self, now_us: int, data: bytes) -> None:
-        """Take bytes from the line, as many as there is room for."""
+        """Receive bytes from the line, up to the room in the buffer."""
         if not data:
             return
         # Before the byte is noted: the silence is the time between the last byte and this
@@ -126,14 +126,14 @@ class LiteReceiver:
             self.dropped += max(0, len(data) - room)
 
     def drop_broken_off(self, now_us: int) -> bool:
-        """Drop a frame that was broken off; True if there was one."""
+        """Drop an incomplete frame; return whether there was one."""
         if self._waiting or now_us < self.due_us:
             return False
         self.decoder.clear()
         return True
 
     def pull(self) -> LiteFrame | LiteLinkFault | None:
-        """Return the next frame or fault, and leave what follows it in the buffer."""
+        """Return the next frame or fault, and leave the following bytes in the buffer."""
         for at in range(len(self._waiting)):
             for found in self.decoder.push(self._waiting[at : at + 1]):
                 # After an unknown command the rest of the buffer is noise, too.
@@ -143,7 +143,7 @@ class LiteReceiver:
         return None
 
 
-# The physical side of a node: its supply, its processor, and what can be seen of it.
+# Physical inputs and outputs of a node: supply, processor, ports.
 
 INPUTS: Final = (
     InputSignal("callback_ms", "how long each callback takes", high=10_000, unit="ms"),
@@ -152,7 +152,7 @@ INPUTS: Final = (
         "slow_answer", "the processor is busy elsewhere: each answer is late", SignalType.FAULT
     ),
 )
-"""Every node has these; a component may add its own."""
+"""Inputs of every node; a component may add its own."""
 
 _OUTPUTS: Final = (
     OutputSignal("state", "state of the component: Off, Created, Inactive, Active, Error, None"),
@@ -160,7 +160,7 @@ _OUTPUTS: Final = (
     OutputSignal("executed", "how often on_execute ran"),
     OutputSignal("dropped_bytes", "bytes that found the receive buffer full"),
 )
-"""Every node has these; each port adds its value."""
+"""Outputs of every node; each port adds its value."""
 
 
 def _new_inputs(component: LiteComponent) -> InputBank:
@@ -204,7 +204,7 @@ def _port_text(component: LiteComponent, name: str) -> float | str:
 
 
 TICK_US: Final = 1_000
-"""How often the main loop of the device looks at the line; a choice, the paper names none."""
+"""Period of the main loop of the device; a choice, the paper gives none."""
 
 _TIMED: Final = (LiteState.ACTIVE, LiteState.ERROR)
 """States in which the timer of the device runs."""
@@ -222,15 +222,15 @@ class RtcLiteNode(Copyable):
     framing errors of the UART, a watchdog, sleep.
 
     Args:
-        make: makes the component, at the start and at each power-up.
+        make: factory of the component, called at the start and at each power-up.
         config: framing, execution context, rates.
 
     Attributes:
-        type_name: what its device type is called, for traces.
-        inputs: what the world does to it, see `INPUTS`.
+        type_name: name of its device type, for traces.
+        inputs: its physical inputs, see `INPUTS`.
 
     Raises:
-        ValueError: a component that a PIC has no room for.
+        ValueError: a component that does not fit into a PIC.
     """
 
     type_name: ClassVar[str] = "rtc-lite"
@@ -246,7 +246,7 @@ class RtcLiteNode(Copyable):
     _free_us: int = field(init=False)  # when the processor is free again
 
     def __post_init__(self) -> None:
-        """Begin without power."""
+        """Start without power."""
         self.inputs = _new_inputs(self.make())
         self.reset()
 
@@ -257,7 +257,7 @@ class RtcLiteNode(Copyable):
 
     @property
     def due_us(self) -> int:
-        """When anything would happen without input."""
+        """The time of the next event without input."""
         if self.inputs.changed:
             return 0
         if self._free_us:
@@ -266,16 +266,16 @@ class RtcLiteNode(Copyable):
 
     @property
     def component(self) -> LiteComponent:
-        """The component as it is; a power cut makes a new one."""
+        """The present component; a power cut makes a new one."""
         return self._life.component
 
     @property
     def outputs(self) -> dict[str, OutputSignal]:
-        """What `read` knows."""
+        """The outputs that `read` accepts."""
         return _output_table(self.component)
 
     def reset(self) -> None:
-        """Forget everything but configuration and physical inputs, as a power cut does."""
+        """Reset everything but configuration and physical inputs, as a power cut does."""
         component = self.make()
         component.inputs = self.inputs
         rtno = self.config.framing is Framing.RTNO
@@ -288,7 +288,7 @@ class RtcLiteNode(Copyable):
         self.inputs.changed = True
 
     def read(self, name: str, /) -> float | str:
-        """Look at an output, as it was left by the latest tick.
+        """Return an output as the latest tick left it.
 
         Args:
             name: one of `outputs`.
@@ -297,7 +297,7 @@ class RtcLiteNode(Copyable):
             Its value.
 
         Raises:
-            KeyError: there is none of that name.
+            KeyError: there is no output of that name.
         """
         life = self._life
         own: dict[str, float | str] = {
@@ -338,7 +338,7 @@ class RtcLiteNode(Copyable):
         return sent if self._free_us else sent + self._take()
 
     def _finish(self, now_us: int) -> bytes:
-        """Give out the answer that was due, and look how long the line has been silent."""
+        """Send the answer that is due, and check the time-outs of the line."""
         self._free_us = 0
         sent = self._take()
         if self._receiver.drop_broken_off(now_us):
@@ -350,13 +350,13 @@ class RtcLiteNode(Copyable):
         return sent
 
     def _boot(self) -> None:
-        """Begin with power; RTno initializes by itself, RTC-Lite is told to (DECISION L11)."""
+        """Start with power; RTno initializes itself, RTC-Lite on a command (DECISION L11)."""
         self._on = True
         if self.config.framing is Framing.RTNO:
             self._life.obey(LiteCommand.INITIALIZE)
 
     def _serve(self, now_us: int) -> None:
-        """Answer what is in the buffer while the processor is free."""
+        """Answer the requests in the buffer while the processor is free."""
         while not self._free_us and (found := self._receiver.pull()) is not None:
             calls = self._life.calls
             if isinstance(found, LiteLinkFault):
@@ -373,14 +373,14 @@ class RtcLiteNode(Copyable):
             self._send(now_us, self._server.execute(), self._life.calls - calls)
 
     def _update_timer(self, now_us: int) -> None:
-        """Let the timer run in the states in which it has something to do."""
+        """Run the timer in the states that need it."""
         if self.config.context is LiteContextType.TIMER and self._life.state in _TIMED:
             self._timer.run(now_us)
         else:
             self._timer.stop()
 
     def _send(self, now_us: int, frames: list[LiteFrame], calls: int = 0) -> None:
-        """Send frames, once the processor has done what led to them."""
+        """Send frames when the processor has finished the work for them."""
         if self.config.framing is Framing.RTNO:
             self._unsent += b"".join(map(encode_packet, frames))
         else:

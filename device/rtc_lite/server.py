@@ -1,4 +1,4 @@
-"""What a node answers to each request (DECISION L9 to L12)."""
+"""Answers of a node to each request (DECISION L9 to L12)."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from tickrig.wire.rtc_lite import messages
 from tickrig.wire.rtc_lite.codes import LiteCommand, LiteContextType, LiteState, LiteStatus
 from tickrig.wire.rtc_lite.frame import WITH_FIELDS, Checksum, Framing, LiteFrame
 
-# What differs from one node to another, and what the paper leaves open.
+# Configuration: differences between nodes, and points that the paper leaves open.
 
 _RATE_HZ: Final = range(1, 1_001)
-"""Rates that a tick of 1 ms can hold."""
+"""Rates possible with a tick of 1 ms."""
 DEFAULT_RATE_HZ: Final = 10
 
 
@@ -26,13 +26,13 @@ class LiteConfig(Immutable):
 
     Attributes:
         framing: frames of RTC-Lite, or packets of RTno (bridge mode).
-        checksum: how frames are summed up (DECISION L5); packets of RTno always by `sum8`.
-        context: who makes the component execute.
+        checksum: algorithm of the checksum (DECISION L5); packets of RTno always use `sum8`.
+        context: the execution context.
         rate_hz: rate of the timer, 1..1000 Hz, until the proxy sets another.
-        slow_answer_us: by how much the fault `slow_answer` delays each answer.
+        slow_answer_us: delay of each answer by the fault `slow_answer`.
 
     Raises:
-        ValueError: a rate or a delay that a node cannot have.
+        ValueError: a rate or a delay out of range.
     """
 
     framing: Framing = Framing.LITE
@@ -42,7 +42,7 @@ class LiteConfig(Immutable):
     slow_answer_us: int = 200_000
 
     def __post_init__(self) -> None:
-        """Refuse what no node could be."""
+        """Raise ValueError if a value is out of range."""
         if self.rate_hz not in _RATE_HZ:
             raise ValueError(f"rate_hz is {self.rate_hz}, 1..{_RATE_HZ[-1]} is possible")
         if self.slow_answer_us < 1:
@@ -52,17 +52,17 @@ class LiteConfig(Immutable):
 
 
 _BY_CONTEXT: Final = (LiteCommand.EXECUTE, LiteCommand.ERROR)
-"""What the device's own timer does, so that the proxy may not (type 22h)."""
+"""Commands of the device's own timer, which the proxy may not send (type 22h)."""
 
 
 @dataclass(slots=True)
 class LiteServer:
-    """Answers the requests of the proxy. It knows no time.
+    """Answers the requests of the proxy, without a clock.
 
     Attributes:
         life: the component and its state.
-        context: who makes the component execute.
-        timer: whose rate can be set.
+        context: the execution context.
+        timer: the timer whose rate can be set.
     """
 
     life: LiteLifeCycle
@@ -70,7 +70,7 @@ class LiteServer:
     timer: Timer
 
     def answer(self, request: LiteFrame) -> list[LiteFrame]:
-        """Do what a request asks for, and return the frames to send."""
+        """Execute a request, and return the frames to send."""
         match request.command:
             case LiteCommand.PROFILE:
                 return self._profile()
@@ -91,13 +91,13 @@ class LiteServer:
         return [LiteFrame(request.command, reply.encode())]
 
     def execute(self) -> list[LiteFrame]:
-        """Run one period of the timer, and return the data to push."""
+        """Run one period of the timer, and return the data to send."""
         active = self.life.state is LiteState.ACTIVE
         self.life.obey(LiteCommand.EXECUTE if active else LiteCommand.ERROR)
         return self._fresh_data()
 
     def _live(self, command: LiteCommand) -> list[LiteFrame]:
-        """Let the life cycle go on; data go before the reply (DECISION L12)."""
+        """Execute a life cycle command; data go before the reply (DECISION L12)."""
         if self.context is LiteContextType.TIMER and command in _BY_CONTEXT:
             status = LiteStatus.UNSUPPORTED
         else:
@@ -113,7 +113,7 @@ class LiteServer:
         return [*self._fresh_data(), reply] if executed else [reply]
 
     def _fresh_data(self) -> list[LiteFrame]:
-        """Take what is new out of the out-ports."""
+        """Take new values from the out-ports."""
         return [
             LiteFrame(LiteCommand.DATA, messages.LitePortData(port.name, port.take()).encode())
             for port in self.life.component.out_ports.values()
@@ -134,7 +134,7 @@ class LiteServer:
         ]
 
     def _set_rate(self, rate_hz: int) -> LiteStatus:
-        """Set the rate of the timer; it starts again with it."""
+        """Set the rate of the timer and restart it."""
         if self.context is not LiteContextType.TIMER or rate_hz not in _RATE_HZ:
             return LiteStatus.UNSUPPORTED
         self.timer.rate_hz = rate_hz

@@ -1,4 +1,4 @@
-"""What a motor, its power stage, its gear, its encoders and its loops are made of.
+"""Parameters of motors, power stages, gears, encoders and control loops.
 
 Units are in the names; the presets are in `tickrig.device.servo.parameters`.
 """
@@ -55,9 +55,9 @@ class PowerStage(Immutable):
     """A four-quadrant stage of ideal switches.
 
     Attributes:
-        continuous_a: current that it bears for ever.
+        continuous_a: current that it carries permanently.
         peak_a: current that it never exceeds.
-        peak_s: how long it bears the peak current.
+        peak_s: how long it carries the peak current.
         duty_max: largest part of the supply that reaches the winding.
         supply_v: supply at the start.
         supply_min_v: below this the switches stay open.
@@ -80,11 +80,11 @@ class PowerStage(Immutable):
 
 @dataclass(frozen=True, slots=True)
 class GearParameters(Immutable):
-    """A gear without play, and what is always on its output shaft.
+    """A gear without play, with the inertia and friction of its output shaft.
 
     Attributes:
         ratio: turns of the motor per turn of the output shaft.
-        efficiency: part of the power of an external torque that gets through.
+        efficiency: share of the power of an external torque that it transmits.
         inertia_kg_m2: inertia at the output shaft, the motor's own not counted.
         coulomb_nm: dry friction at the output shaft.
     """
@@ -118,7 +118,7 @@ class Encoders(Immutable):
 
 @dataclass(frozen=True, slots=True)
 class LoopGains(Immutable):
-    """What the loops are tuned to, for the inertia without `load_kg_m2`.
+    """Tuning of the loops, for the inertia without `load_kg_m2`.
 
     Attributes:
         velocity_rad_s: natural frequency of the velocity loop.
@@ -136,7 +136,7 @@ class LoopGains(Immutable):
 
 @dataclass(frozen=True, slots=True)
 class ServoParameters(Immutable):
-    """All that makes a servo."""
+    """All parameters of a servo."""
 
     motor: MotorParameters
     stage: PowerStage
@@ -146,20 +146,20 @@ class ServoParameters(Immutable):
 
     @property
     def inertia_kg_m2(self) -> float:
-        """Inertia at the motor shaft, without what hangs on the output."""
+        """Inertia at the motor shaft, without the load on the output."""
         return self.motor.inertia_kg_m2 + self.gear.inertia_kg_m2 / self.gear.ratio**2
 
     @property
     def coulomb_nm(self) -> float:
-        """Dry friction at the motor shaft, that of the gear in it."""
+        """Dry friction at the motor shaft, including the gear."""
         return self.motor.coulomb_nm + self.gear.coulomb_nm / self.gear.ratio
 
 
 def _require_positive(table: DataclassInstance, zero: tuple[str, ...] = ()) -> None:
-    """Refuse a table with a number that is not above 0; those named in `zero` may be 0.
+    """Check that all numbers of a table are above 0; those named in `zero` may be 0.
 
     Raises:
-        ValueError: such a number.
+        ValueError: a number is out of range.
     """
     for name in (item.name for item in fields(table)):
         value = getattr(table, name)
@@ -168,7 +168,7 @@ def _require_positive(table: DataclassInstance, zero: tuple[str, ...] = ()) -> N
             raise ValueError(f"{name} {value} is not {allowed}")
 
 
-# Servos that are shipped, with where their numbers are from (docs/reference/devices/servo.md).
+# Included servos, with the sources of their numbers (docs/reference/devices/servo.md).
 
 RE_30: Final = MotorParameters(  # maxon catalogue, RE 30, 60 W, 24 V, order number 310007
     resistance_ohm=0.611,
@@ -250,11 +250,11 @@ PRESETS: Final[Mapping[str, ServoParameters]] = MappingProxyType(
 )
 
 
-# Servos of another size than the shipped ones: as large as a joint needs them.
+# Servos scaled to the size that a joint needs.
 
 
 def peak_torque_nm(servo: ServoParameters) -> float:
-    """Return the torque of the peak current at the output shaft, friction not taken off.
+    """Return the torque of the peak current at the output shaft, without friction.
 
     >>> from tickrig.device.servo.parameters import EPOS_WHEEL
     >>> round(peak_torque_nm(EPOS_WHEEL), 2)
@@ -264,7 +264,7 @@ def peak_torque_nm(servo: ServoParameters) -> float:
 
 
 def free_speed_rad_s(servo: ServoParameters) -> float:
-    """Return the speed of the output shaft at which the back-EMF takes the whole voltage.
+    """Return the speed of the output shaft at which the back-EMF equals the supply voltage.
 
     >>> from tickrig.device.servo.parameters import EPOS_WHEEL
     >>> round(free_speed_rad_s(EPOS_WHEEL), 1)
@@ -275,14 +275,14 @@ def free_speed_rad_s(servo: ServoParameters) -> float:
 
 
 def of_size(servo: ServoParameters, size: float) -> ServoParameters:
-    """Return what so many of a servo are, side by side on one shaft.
+    """Return the parameters of several equal servos on one shaft.
 
     Currents, torques, inertias and friction grow with the size, resistances to current and heat
     fall with it; speeds, voltages, temperatures and all time constants stay.
 
     Args:
         servo: one of them.
-        size: above 0; a fraction is a smaller one.
+        size: number of servos, above 0; a fraction gives a smaller servo.
     """
     motor, stage, gear = servo.motor, servo.stage, servo.gear
     return replace(

@@ -59,7 +59,7 @@ class Discretisation(Immutable):
 def discretise(
     motor: MotorParameters, resistance_ohm: float, inertia_kg_m2: float
 ) -> Discretisation:
-    """Work out the step of a motor with its present resistance and inertia."""
+    """Compute the step of a motor with its present resistance and inertia."""
     k, el = motor.torque_constant_nm_a, motor.inductance_h
     dw_di, dw_dw, dw_dm = k / inertia_kg_m2, -motor.viscous_nm_s / inertia_kg_m2, 1 / inertia_kg_m2
     di_di, di_dw = -resistance_ohm / el, -k / el
@@ -139,10 +139,10 @@ class _Losses:
     """Energies since the start.
 
     Attributes:
-        electrical_j: what came out of the power stage.
+        electrical_j: energy from the power stage.
         copper_j: heat of the winding.
         friction_j: heat of friction and gear, and of a shaft that was held.
-        square_a2s: integral of the squared current, from which the drive takes its share.
+        square_a2s: integral of the squared current, used by the drive for heat.
     """
 
     electrical_j: float = 0.0
@@ -157,11 +157,10 @@ BREAKAWAY: Final = 1.02  # static friction by dry friction; it ends a creep, and
 class Plant(Part):
     """The electro-mechanical part of a servo, at the motor shaft.
 
-    Dry friction is a torque within bounds that is as large as it must be to
-    stop the shaft in this step, if the bounds allow (time stepping after
-    Moreau). So there is no chatter, and a shaft at rest is at rest exactly.
-    Not modelled: the ripple of current regulator and PWM, cogging, play and
-    elasticity, the loss of the gear on its inertia.
+    Dry friction is a torque within bounds, just large enough to stop the shaft in this step if the
+    bounds allow (time stepping after Moreau). So there is no chatter, and a shaft at rest has speed
+    exactly 0. Not modelled: the ripple of current regulator and PWM, cogging, play and elasticity,
+    the loss of the gear on its inertia.
 
     Attributes:
         current_a: current in the winding.
@@ -207,27 +206,27 @@ class Plant(Part):
 
     @property
     def rows(self) -> tuple[Row, Row]:
-        """What makes speed and angle after a step in which the current is led."""
+        """Coefficients of speed and angle after a step with led current."""
         return self._step.speed, self._step.angle
 
     @property
     def constants(self) -> tuple[float, float, float, float]:
-        """Torque constant, inductance, viscous friction, counts in a radian."""
+        """Torque constant, inductance, viscous friction, counts per radian."""
         motor = self._motor
         k, el, b = motor.torque_constant_nm_a, motor.inductance_h, motor.viscous_nm_s
         return k, el, b, self._counts_per_rad
 
     def shape(self, inertia_kg_m2: float, resistance_ohm: float) -> None:
-        """Take another inertia or resistance; the speed stays."""
+        """Set another inertia or resistance; the speed is unchanged."""
         self.inertia_kg_m2, self.resistance_ohm = inertia_kg_m2, resistance_ohm
         self._step = discretise(self._motor, resistance_ohm, inertia_kg_m2)
         self._left = exp(-resistance_ohm * STEP_S / self._motor.inductance_h)
 
     def bear(self, load_nm: float, efficiency: float) -> None:
-        """Take an external torque; the gear takes its part as friction.
+        """Set an external torque; the gear's loss acts as friction.
 
-        A torque against the motion costs the motor 1 / efficiency of it, one with
-        the motion brings it only the part that gets through.
+        Against a torque that opposes the motion the motor needs 1 / efficiency of it; from a torque
+        with the motion it gets only the transmitted share.
         """
         # A gear that loses a part of the power acts like friction that depends on the load:
         # the motor pays 1/efficiency against it and gets efficiency of it back.
@@ -237,7 +236,7 @@ class Plant(Part):
         self.friction_nm = (-self._coulomb_nm - forward, self._coulomb_nm + backward)
 
     def hold(self, blocked: bool) -> None:
-        """Hold the shaft, or let it go."""
+        """Hold or release the shaft."""
         if blocked:
             # The energy of the turning shaft goes into what holds it, so that the sum of
             # the losses stays the work that was put in.
@@ -246,7 +245,7 @@ class Plant(Part):
         self.blocked = blocked
 
     def open(self) -> None:
-        """Let one step pass with the winding open; what current there was dies in the diodes."""
+        """Run one step with the winding open; remaining current decays in the diodes."""
         # The energy of the inductance, L i^2 / 2, ends as heat: there is no step in which
         # it decays.
         self.losses.copper_j += self._motor.inductance_h * self.current_a**2 / 2
@@ -259,7 +258,7 @@ class Plant(Part):
         self._turn(speed, a1 * w + a3 * (m + friction), friction)
 
     def drive(self, current_a: float, limit_v: float) -> int:
-        """Let one step pass toward a current; return how the voltage cut it: -1, 0, 1."""
+        """Run one step towards a current; return how the voltage cut it: -1, 0, 1."""
         # Standstill is a case of its own: winding alone, without back-EMF. The general step
         # has one friction for the whole step, which ends at speed 0 but lets the angle
         # creep on the way.
@@ -273,8 +272,8 @@ class Plant(Part):
         slope_v = motor.inductance_h * rise / STEP_S
         if (
             not -limit_v <= r * i + k * w + slope_v <= limit_v
-            # The voltage that leads the current there is looked at at both ends of the
-            # step; between them the current goes straight.
+            # The voltage that leads the current there is checked at both ends of the step; between
+            # them the current goes straight.
             or not -limit_v <= r * current_a + k * speed + slope_v <= limit_v
         ):
             return self._drive_constant(current_a, limit_v, friction)
@@ -285,7 +284,7 @@ class Plant(Part):
         return 0
 
     def _drive_constant(self, current_a: float, limit_v: float, friction: float) -> int:
-        """Let a step pass at the constant voltage that leads to a current, or is nearest."""
+        """Run a step at the constant voltage that leads to a current, or the nearest one."""
         step, i, w, m = self._step, self.current_a, self.speed_rad_s, self.load_nm
         v0, v1, v2, v3 = step.voltage
         u, cut = _within(v0 * i + v1 * w + v2 * current_a + v3 * (m + friction), limit_v)
@@ -302,7 +301,7 @@ class Plant(Part):
         return cut
 
     def _stay(self, current_a: float, limit_v: float) -> int | None:
-        """Let a step pass at standstill; None if the shaft would not stay."""
+        """Run a step at standstill; None if the shaft would not stay at rest."""
         i, r, left = self.current_a, self.resistance_ohm, self._left
         slope_v = self._motor.inductance_h * abs(current_a - i) / STEP_S
         straight, cut, u = r * max(abs(i), abs(current_a)) + slope_v <= limit_v, 0, 0.0
@@ -318,7 +317,7 @@ class Plant(Part):
         return cut
 
     def _approach(self, current_a: float, u: float) -> None:
-        """Take over a current after a step of constant voltage at standstill."""
+        """Store the current after a step of constant voltage at standstill."""
         i, r, el, left = self.current_a, self.resistance_ohm, self._motor.inductance_h, self._left
         charge, end = (u * STEP_S - el * (current_a - i)) / r, u / r
         square = (1 - left * left) * el / (2 * r) * (i - end) ** 2
@@ -331,7 +330,7 @@ class Plant(Part):
         return low * BREAKAWAY <= friction <= high * BREAKAWAY or self.blocked
 
     def _rub(self, free: float, per_nm: float) -> tuple[float, float]:
-        """Return the friction, and the speed after a step that would end at `free` without it."""
+        """Return the friction, and the speed after a step that ends at `free` without friction."""
         low, high = self.friction_nm
         friction = -free / per_nm
         if low * BREAKAWAY <= friction <= high * BREAKAWAY:
@@ -340,7 +339,7 @@ class Plant(Part):
         return friction, free + per_nm * friction
 
     def _lead(self, current_a: float, back_emf_j: float) -> None:
-        """Take over a current that went straight to its demand."""
+        """Store a current that followed a straight line to its demand."""
         i = self.current_a
         square = (i * i + i * current_a + current_a * current_a) / 3 * STEP_S
         magnetic = self._motor.inductance_h * (current_a * current_a - i * i) / 2
@@ -355,7 +354,7 @@ class Plant(Part):
         return (i * w + 2 * (i + current_a) * middle + current_a * speed) * STEP_S / 6
 
     def _carry(self, current_a: float, u: float, way: float, m: float) -> None:
-        """Take over the current after a step of constant voltage."""
+        """Store the current after a step of constant voltage."""
         motor, i, r = self._motor, self.current_a, self.resistance_ohm
         k, b = motor.torque_constant_nm_a, motor.viscous_nm_s
         charge = (u * STEP_S - motor.inductance_h * (current_a - i) - k * way) / r
@@ -367,7 +366,7 @@ class Plant(Part):
         self._pay(current_a, u * charge, square)
 
     def _pay(self, current_a: float, electrical_j: float, square_a2s: float) -> None:
-        """Take over a current, and what it cost."""
+        """Store a current and its losses."""
         losses = self.losses
         losses.electrical_j += electrical_j
         losses.square_a2s += square_a2s
@@ -375,7 +374,7 @@ class Plant(Part):
         self.current_a = current_a
 
     def _turn(self, speed: float, way: float, friction: float) -> None:
-        """Take over speed and angle after a step, and what rubbed."""
+        """Store speed and angle after a step, and the friction losses."""
         w = self.speed_rad_s
         viscous = self._motor.viscous_nm_s * (w * w + w * speed + speed * speed) / 3 * STEP_S
         self.losses.friction_j += viscous - friction * way
@@ -384,7 +383,7 @@ class Plant(Part):
 
 
 def _within(voltage: float, limit_v: float) -> tuple[float, int]:
-    """Return the voltage within a limit, and in which direction it was cut."""
+    """Return the voltage clamped to a limit, and the direction of the cut."""
     if -limit_v <= voltage <= limit_v:
         return voltage, 0
     return (limit_v, 1) if voltage > 0 else (-limit_v, -1)

@@ -1,4 +1,4 @@
-"""What can be read of a servo, its temperatures and settings too."""
+"""Readings of a servo, with its temperatures and settings."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ HOTTEST_C: Final = 1_000.0  # no motor is left beyond this, and no model
 
 
 _Temperatures = tuple[float, float]
-"""Of the winding and the housing of a motor, degC."""
+"""Temperatures of the winding and the housing of a motor, degC."""
 
 
 class ThermalModel(Part):
     """Winding and housing, heated by the current in the winding.
 
-    The heat is R I^2, and R grows with the temperature, which keeps the
-    system linear: its state at any later time is a closed form. Not modelled:
-    heat of friction and iron, the gear, the power stage, air that moves.
+    The heat is R I^2, and R grows with the temperature; the system stays linear, so its state at
+    any later time has a closed form. Not modelled: heat of friction and iron, the gear, the power
+    stage, moving air.
     """
 
     __slots__ = ("_capacities", "_motor")
@@ -49,7 +49,7 @@ class ThermalModel(Part):
         Args:
             start: temperatures now.
             seconds: how much later, 0 or more.
-            square_a2: mean square of the current meanwhile, A^2.
+            square_a2: mean square of the current in this time, A^2.
             ambient_c: temperature of the air.
         """
         motor, (winding, housing), (winding_c, housing_c) = self._motor, self._capacities, start
@@ -82,7 +82,7 @@ def _span(rate: float, seconds: float) -> float:
     return expm1(min(rate * seconds, 50.0)) / rate if rate else seconds
 
 
-# How warm and how overloaded a servo is, and what current that leaves.
+# Temperature and overload of a servo, and the remaining current limit.
 
 
 class I2t(Part):
@@ -93,7 +93,7 @@ class I2t(Part):
     the continuous current is allowed, until the budget is empty again.
 
     Attributes:
-        filled_a2s: how much of the budget is used.
+        filled_a2s: used part of the budget.
         reduced: only the continuous current is allowed.
     """
 
@@ -107,11 +107,11 @@ class I2t(Part):
 
     @property
     def limit_a(self) -> float:
-        """Current that is allowed now."""
+        """Current allowed now."""
         return self._stage.continuous_a if self.reduced else self._stage.peak_a
 
     def pass_time(self, seconds: float, square_a2s: float) -> None:
-        """Let time pass with an integral of the squared current."""
+        """Advance the time with an integral of the squared current."""
         filled = self.filled_a2s + square_a2s - self._continuous_a2 * seconds
         self.filled_a2s = min(max(filled, 0.0), self._budget_a2s)
         # Both ends are met exactly, because `min` and `max` put the value there.
@@ -121,7 +121,7 @@ class I2t(Part):
             self.reduced = True
 
     def settled(self, current_a: float) -> bool:
-        """Return whether a constant current changes nothing any more."""
+        """Return whether a constant current no longer changes the state."""
         rate = current_a**2 - self._continuous_a2
         if rate < 0.0:
             return self.filled_a2s == 0.0 and not self.reduced
@@ -134,7 +134,7 @@ _DERATING_K: Final = 15.0  # the limit falls to 0 over these last kelvins below 
 
 
 def _derated_a(limit_a: float, winding_c: float, winding_max_c: float) -> float:
-    """Return what is left of a current limit at a temperature of the winding.
+    """Return the current limit reduced for a temperature of the winding.
 
     >>> [_derated_a(10.0, winding_c, 125.0) for winding_c in (110.0, 119.0, 125.0)]
     [10.0, 4.0, 0.0]
@@ -150,7 +150,7 @@ class _Heat(Part):
     """Temperatures and I2t budget of a servo, from the squared current.
 
     Attributes:
-        since_us: the instant at which they were worked out.
+        since_us: the instant at which they were computed.
         temperatures: temperatures at that instant.
         ambient_c: temperature of the air since then.
         i2t: the overload of the power stage.
@@ -166,7 +166,7 @@ class _Heat(Part):
 
     @property
     def limit_a(self) -> float:
-        """Current that may flow now."""
+        """Permitted current."""
         return self._limit_at(self.temperatures[0])
 
     @property
@@ -175,7 +175,7 @@ class _Heat(Part):
         return self._thermal.resistance_ohm(self.temperatures[0])
 
     def pass_time(self, now_us: int, square_a2s: float) -> None:
-        """Let time pass with an integral of the squared current, A^2 s."""
+        """Advance the time with an integral of the squared current, A^2 s."""
         seconds = (now_us - self.since_us) / 1_000_000
         if seconds:
             self.i2t.pass_time(seconds, square_a2s)
@@ -183,7 +183,7 @@ class _Heat(Part):
             self.since_us = now_us
 
     def rest(self, now_us: int, current_a: float) -> None:
-        """Let time pass with a constant current; the temperatures are those of `at`, to the bit."""
+        """Advance the time with a constant current, to exactly the temperatures of `at`."""
         seconds = (now_us - self.since_us) / 1_000_000
         self.i2t.pass_time(seconds, current_a**2 * seconds)
         self.temperatures, self.since_us = self.at(now_us, current_a), now_us
@@ -193,7 +193,7 @@ class _Heat(Part):
         return self._after((now_us - self.since_us) / 1_000_000, current_a**2)
 
     def bears(self, current_a: float) -> bool:
-        """Return whether a current may flow for ever and changes no limit."""
+        """Return whether a current may flow permanently without changing a limit."""
         last, _ = self._after(_AGES_S, current_a**2)
         # The limit falls with the temperature, so the hottest of now and of the far future
         # counts.
@@ -207,12 +207,12 @@ class _Heat(Part):
         return _derated_a(self.i2t.limit_a, winding_c, self._winding_max_c)
 
 
-# What the world does to a servo, and what its drive allows.
+# External conditions of a servo, and the limit of its drive.
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class ServoSettings(Copyable):
-    """Attributes whose change has consequences: setting another value calls `changed`."""
+    """Attributes that call `changed` when set to another value."""
 
     __slots__ = (
         *("_ambient_c", "_blocked", "_current_limit_a", "_encoder_unplugged", "_load_kg_m2"),
@@ -225,7 +225,7 @@ class ServoSettings(Copyable):
         self._blocked, self._phase_open, self._current_limit_a = False, False, inf
 
     def changed(self) -> None:
-        """Take the settings into account: one of them is new."""
+        """Apply the settings after one has changed."""
 
     @property
     def supply_v(self) -> float:
@@ -251,7 +251,7 @@ class ServoSettings(Copyable):
 
     @property
     def encoder_unplugged(self) -> bool:
-        """The counts stand still, and are lost."""
+        """Whether the encoder is unplugged: the count is frozen, and motion is lost."""
         return self._encoder_unplugged
 
     @encoder_unplugged.setter
@@ -273,7 +273,7 @@ class ServoSettings(Copyable):
 
     @property
     def load_kg_m2(self) -> float:
-        """Inertia at the output shaft beside what is always there."""
+        """Additional inertia at the output shaft."""
         return self._load_kg_m2
 
     @load_kg_m2.setter
@@ -284,7 +284,7 @@ class ServoSettings(Copyable):
 
     @property
     def blocked(self) -> bool:
-        """The shaft is held."""
+        """Whether the shaft is held."""
         return self._blocked
 
     @blocked.setter
@@ -295,7 +295,7 @@ class ServoSettings(Copyable):
 
     @property
     def phase_open(self) -> bool:
-        """No current can flow."""
+        """Whether a phase is open, so that no current can flow."""
         return self._phase_open
 
     @phase_open.setter
@@ -306,7 +306,7 @@ class ServoSettings(Copyable):
 
     @property
     def current_limit_a(self) -> float:
-        """What the drive allows; the stage may allow less."""
+        """Current limit of the drive; the limit of the stage may be lower."""
         return self._current_limit_a
 
     @current_limit_a.setter
@@ -316,13 +316,13 @@ class ServoSettings(Copyable):
             self.changed()
 
 
-# What a servo shows: to its drive through sensors, and to whoever looks at it.
+# Readings of a servo: for its drive through sensors, and for observers.
 
 
 class Readings(ServoSettings):
-    """The servo as seen; `Servo` says what its attributes are.
+    """Readings of a servo; `Servo` describes its attributes.
 
-    Whole numbers are what the drive measures, fractions what an observer sees.
+    Integers are measurements of the drive, floats are for observers.
     """
 
     __slots__ = (
@@ -370,7 +370,7 @@ class Readings(ServoSettings):
 
     @property
     def spare_mv(self) -> int:
-        """Voltage that the stage has left above the back-EMF; below 0 a load drives the motor."""
+        """Voltage of the stage above the back-EMF; below 0 a load drives the motor."""
         stage, motor = self.parameters.stage, self.parameters.motor
         speed_rad_s = 0.0 if self.encoder_unplugged else abs(self._plant.speed_rad_s)
         back_emf_v = motor.torque_constant_nm_a * speed_rad_s

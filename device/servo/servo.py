@@ -38,7 +38,7 @@ from tickrig.device.twin import Part
 #   cut as they were to the bit; floating point makes that possible because dry friction
 #   stops the shaft at exactly 0.0 (plant.py) and a demand within one count counts as
 #   reached (`_Loops`). While it rests no steps are made, and the temperatures come in closed
-#   form, from one place (`Heat.at`), whoever asks. `_wake` pays for the time of rest before
+#   form, from one place, `Heat.at`. `_wake` pays for the time of rest before
 #   anything else changes.
 # - Several steps in one go are the same steps. `_work_out` repeats `Loops.follow` and
 #   `turn`, `Plant.drive`, `_rub`, `_lead`, `_mean` and `_turn` and the counting of `_step`,
@@ -60,13 +60,12 @@ from tickrig.device.twin import Part
 class _Loops(Part):
     """A position loop around a velocity loop, in control steps of 1 ms.
 
-    Position: proportional, in whole counts; an error below one count counts as
-    none while the demand stands still. Velocity: proportional and integral.
-    Acceleration, viscous and dry friction are fed forward. While the demand
-    of current is cut, the integral does not grow further that way.
+    Position: proportional, in whole counts; an error below one count is ignored while the demand is
+    constant. Velocity: proportional and integral. Acceleration, viscous and dry friction are fed
+    forward. While the current demand is cut, the integral does not grow further in that direction.
 
     Attributes:
-        integral_a: what the integral adds to the current.
+        integral_a: share of the integral in the current.
         cut: direction in which the latest demand was cut: -1, 0, 1.
     """
 
@@ -95,23 +94,23 @@ class _Loops(Part):
 
     @property
     def gains(self) -> tuple[float, float, float, float, float, float]:
-        """For `RunAhead`: rad a count; gains of position, integral, error, speed, friction."""
+        """For `RunAhead`: rad per count; gains of position, integral, error, speed, friction."""
         proportional, viscous, dry = self._proportional, self._viscous, self._dry
         return self._rad, self._position, self._integral, proportional, viscous, dry
 
     def follow(
         self, position: float, counts: int, velocity: float, acceleration: float, speed: float
     ) -> float:
-        """Return the current that a demanded position asks for, A."""
-        # Below one count the encoder cannot tell: without this the integral would push
-        # against friction for ever, and the servo would never rest.
+        """Return the current for a demanded position, A."""
+        # Below one count the encoder cannot tell: without this the integral would push against
+        # friction permanently, and the servo would never rest.
         error = position - counts
         if velocity == 0.0 and -1.0 < error < 1.0:
             error = 0.0
         return self.turn(velocity + self._position * error, acceleration, speed)
 
     def turn(self, velocity: float, acceleration: float, speed: float) -> float:
-        """Return the current that a demanded velocity asks for, A.
+        """Return the current for a demanded velocity, A.
 
         Args:
             velocity: demand, counts/s.
@@ -130,31 +129,31 @@ class _Loops(Part):
         return current + self._accelerate * self._rad * acceleration
 
 
-# Several control steps of a servo in one go: the plain ones, in which nothing happens.
+# Several control steps of a servo in one go, without events.
 
 _Demands = list[tuple[float, float]]
 """Position in counts and velocity in counts/s, for each step."""
 
 _Bounds = tuple[float, float, float, float, float, float]
-"""Where a run ends: before a step that would lead out of these bounds.
+"""Bounds of a run, which ends before a step that would leave them.
 
-Largest current that is demanded, A; largest voltage at the winding, V; lowest and highest
-position, counts; largest distance from the demanded position, counts; velocity, counts/s, up to
-which the motor stands: it may not stand while it is demanded to turn faster.
+Largest current demand, A; largest voltage at the winding, V; lowest and highest position, counts;
+largest distance from the demanded position, counts; velocity, counts/s, up to which the motor
+counts as standing: it may not stand while a higher velocity is demanded.
 """
 
 Four = tuple[float, float, float, float]
 
 
 class RunAhead(Part):
-    """Where a servo is after some steps.
+    """State of a servo after some steps.
 
     Attributes:
-        steps: how many there are.
-        counts: what the encoder says.
+        steps: number of steps.
+        counts: of the encoder.
         motion: position of the motor, counts; its speed, rad/s; current in the winding, A;
             integral of the velocity loop, A.
-        losses: what came out of the power stage, since the start, J; heat of the winding, J;
+        losses: energy from the power stage since the start, J; heat of the winding, J;
             heat of friction, J; integral of the squared current, A^2 s.
     """
 
@@ -167,17 +166,17 @@ class RunAhead(Part):
 def _work_out(  # noqa: PLR0915 - one loop over locals
     plant: Plant, loops: _Loops, encoder: tuple[int, float], demands: _Demands, bounds: _Bounds
 ) -> RunAhead:
-    """Work out what the loops and the plant do in steps with a position demand, to the bit.
+    """Compute steps of loops and plant with a position demand, exactly as single steps do.
 
-    Nothing is changed. The run ends before the first step in which friction stops the shaft
-    or holds it, the demand is cut, or the bounds are left: then `Servo` goes on by single steps.
+    The state does not change. The run ends before the first step in which friction stops or holds
+    the shaft, the demand is cut, or the bounds are left; `Servo` then continues with single steps.
 
     Args:
-        plant: as it is now.
-        loops: as they are now; no demand is cut.
-        encoder: the counts that it says now, and by how many it is off.
+        plant: in its present state.
+        loops: in their present state; no demand is cut.
+        encoder: its present count, and its offset in counts.
         demands: for each step, without acceleration.
-        bounds: where the run ends.
+        bounds: the bounds of the run.
     """
     # one loop over locals takes half the time of calls
     (s0, s1, s2, s3), (a0, a1, a2, a3) = plant.rows
@@ -244,7 +243,7 @@ _RESISTANCE_STEP: Final = 0.005  # how far the resistance may be off before it i
 
 
 class _Demand(Enum):
-    """What the drive wants of the motor."""
+    """Kind of demand on the motor."""
 
     NOTHING = "nothing"
     CURRENT = "current"
@@ -255,11 +254,10 @@ class _Demand(Enum):
 class Servo(Readings):
     """A motor with power stage, gear, load, encoders and loops, in steps of 1 ms.
 
-    Call `step_to(now_us)` first, then set what the world does and what the
-    drive wants: it holds from that instant. A value that was set already
-    changes nothing, so a drive may repeat itself in each tick. While
-    `resting`, nothing moves and time passes at no cost; the temperatures
-    follow in closed form.
+    Call `step_to(now_us)` first, then set external conditions and demands: they apply from that
+    instant. Setting the same value again has no effect, so a drive may repeat itself in each tick.
+    While `resting`, nothing moves and time passes at no cost; the temperatures follow in closed
+    form.
 
     Not emulated: see `Plant`, `ThermalModel` and `_Loops`; the velocity is
     measured without noise, the supply gives and takes any current.
@@ -267,15 +265,15 @@ class Servo(Readings):
     Attributes:
         supply_v: supply of the power stage.
         load_nm: external torque at the output shaft; positive drives it forward.
-        load_kg_m2: inertia at the output shaft beside what is always there.
+        load_kg_m2: additional inertia at the output shaft.
         blocked: the shaft is held.
-        encoder_unplugged: the counts stand still, and are lost.
+        encoder_unplugged: the count is frozen, and motion is lost.
         phase_open: no current can flow.
         ambient_c: temperature of the air.
-        current_limit_a: what the drive allows; the stage may allow less.
+        current_limit_a: limit of the drive; the limit of the stage may be lower.
         counts: position of the motor.
         current_limited: limit or voltage cut the demand in the latest step.
-        resting: without a new demand or input nothing would change.
+        resting: nothing changes without a new demand or input.
         now_us: time of the latest control step.
     """
 
@@ -302,27 +300,27 @@ class Servo(Readings):
         self._want(_Demand.NOTHING, (0.0, 0.0, 0.0))
 
     def drive_current(self, current_a: float) -> None:
-        """Impose a current."""
+        """Drive a current."""
         self._want(_Demand.CURRENT, (current_a, 0.0, 0.0))
 
     def drive_velocity(self, velocity: float, acceleration: float = 0.0) -> None:
-        """Keep a velocity, counts/s; the acceleration, counts/s^2, is fed forward."""
+        """Drive at a velocity, counts/s; the acceleration, counts/s^2, is fed forward."""
         self._want(_Demand.VELOCITY, (0.0, velocity, acceleration))
 
     def drive_position(
         self, position: float, velocity: float = 0.0, acceleration: float = 0.0
     ) -> None:
-        """Keep a position; velocity and acceleration are fed forward.
+        """Drive to a position; velocity and acceleration are fed forward.
 
         Args:
-            position: where the shaft shall be now, counts; fractions are taken.
-            velocity: the velocity that it shall have now, counts/s.
+            position: demanded position now, counts; fractions are accepted.
+            velocity: demanded velocity now, counts/s.
             acceleration: its acceleration in the next millisecond, counts/s^2.
         """
         self._want(_Demand.POSITION, (position, velocity, acceleration))
 
     def _want(self, demand: _Demand, values: tuple[float, float, float]) -> None:
-        """Take a demand, if it is another one."""
+        """Set a demand if it differs."""
         if demand is not self._demand or values != self._values:
             if self.resting:
                 self._wake()
@@ -332,23 +330,23 @@ class Servo(Readings):
 
     @property
     def plain_steps(self) -> int:
-        """How many control steps at most may be plain, so that `run_ahead` can work them out."""
+        """Largest number of plain control steps that `run_ahead` can compute."""
         feed = self._values[2]
         special = self.resting or self._off or self.encoder_unplugged or self._loops.cut
         if special or feed != 0.0 or self._demand is not _Demand.POSITION:
             return 0
-        # The step at whose end heat is looked at is made singly: it may change resistance
+        # The step at whose end heat is updated is made singly: it may change resistance
         # and limit.
         return (_SLOW_US - STEP_US - self.now_us + self._heat.since_us) // STEP_US
 
     def run_ahead(
         self, demands: _Demands, counts: tuple[float, float], error: float, standstill: float
     ) -> RunAhead:
-        """Work out up to `plain_steps` control steps; they are not made.
+        """Compute up to `plain_steps` control steps without applying them.
 
         Args:
-            demands: position and velocity for each of them, the first as it is demanded now.
-            counts: as in `_Bounds`, where the run ends.
+            demands: position and velocity for each step, the first equal to the present demand.
+            counts: as in `_Bounds`.
             error: the same.
             standstill: the same.
         """
@@ -358,7 +356,7 @@ class Servo(Readings):
         return _work_out(self._plant, self._loops, encoder, demands, bounds)
 
     def follow(self, run: RunAhead, position: float, velocity: float) -> None:
-        """Make the steps of a run, then have a position as `drive_position` does."""
+        """Apply the steps of a run, then set a position as `drive_position` does."""
         plant, losses = self._plant, self._plant.losses
         plant.position, plant.speed_rad_s, plant.current_a, self._loops.integral_a = run.motion
         losses.electrical_j, losses.copper_j, losses.friction_j, losses.square_a2s = run.losses
@@ -369,7 +367,7 @@ class Servo(Readings):
     # time
 
     def changed(self) -> None:
-        """Take over what the world does and what the drive allows."""
+        """Apply external conditions and the limit of the drive."""
         if self.resting:
             self._wake()
         plant, parameters = self._plant, self.parameters
@@ -386,13 +384,13 @@ class Servo(Readings):
         self._limit_a = max(min(self.current_limit_a, self._heat.limit_a), 0.0)
 
     def step_to(self, now_us: int) -> None:
-        """Let time pass in control steps until `now_us`."""
+        """Advance in control steps to `now_us`."""
         while not self.resting and now_us - self.now_us >= STEP_US:
             self._step()
         self.now_us += (now_us - self.now_us) // STEP_US * STEP_US
 
     def _step(self) -> None:
-        """Let one control step pass."""
+        """Run one control step."""
         plant, loops = self._plant, self._loops
         position, current = plant.position, plant.current_a
         integral, cut = loops.integral_a, loops.cut
@@ -416,7 +414,7 @@ class Servo(Readings):
             self._rest()
 
     def _push(self, plant: Plant, loops: _Loops) -> int:
-        """Act on the demand; return the direction in which it was cut."""
+        """Apply the demand; return the direction in which it was cut."""
         demand, (value, velocity, acceleration) = self._demand, self._values
         if demand is _Demand.NOTHING or self._off:
             loops.integral_a = 0.0
@@ -439,7 +437,7 @@ class Servo(Readings):
         return plant.drive(current, self._limit_v)
 
     def _update_limit(self) -> None:
-        """Take heat and overload of the latest steps into account."""
+        """Update heat and overload with the latest steps."""
         plant, heat = self._plant, self._heat
         heat.pass_time(self.now_us, plant.losses.square_a2s)
         plant.losses.square_a2s = 0.0
@@ -449,7 +447,7 @@ class Servo(Readings):
         self._limit_a = max(min(self.current_limit_a, heat.limit_a), 0.0)
 
     def _rest(self) -> None:
-        """Rest, unless the current will not stay as it is."""
+        """Enter rest, unless the current will change."""
         self._update_limit()
         current, limit = self._plant.current_a, self._limit_a
         # A current that the voltage limits is U/R, and R follows the temperature: it will
@@ -458,7 +456,7 @@ class Servo(Readings):
         self.resting = not by_voltage and self._heat.bears(current)
 
     def _wake(self) -> None:
-        """Take the time of rest into account."""
+        """Account for the time of rest."""
         # With the current, air and limits of the time of rest: so before the caller changes
         # them.
         self._heat.rest(self.now_us, self._plant.current_a)

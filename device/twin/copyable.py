@@ -1,4 +1,4 @@
-"""What can be copied while it runs, what never changes, and what belongs to its process."""
+"""Base classes: copyable machines, immutable descriptions, and objects bound to their process."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ T = TypeVar("T")
 
 @mypyc_attr(allow_interpreted_subclasses=True, serializable=True)
 class Immutable:
-    """A description that never changes once it is made, as that of a dictionary.
+    """A description that never changes after creation, such as that of a dictionary.
 
-    Copies within the process share it; a pickle has it by value.
+    Copies within the process share it; a pickle contains it by value.
 
     Attributes:
         shared_by_twins: true; a class of wire/ has this attribute instead of this base.
@@ -29,56 +29,55 @@ class Immutable:
         return state_of(self)
 
     def __setstate__(self, state: object) -> None:
-        """Become what was pickled."""
+        """Restore the pickled state."""
         restore(self, state)
 
     def __copy__(self: T) -> T:
-        """Return it itself."""
+        """Return the object itself."""
         return self
 
     def __deepcopy__(self: T, memo: dict[int, Any]) -> T:
-        """Return it itself."""
+        """Return the object itself."""
         return self
 
 
 @mypyc_attr(serializable=True)
 class Part:
-    """What a machine consists of; it is copied with it."""
+    """A part of a machine, copied with it."""
 
     __slots__ = ()
 
 
 @mypyc_attr(allow_interpreted_subclasses=True, serializable=True)
 class Copyable:
-    """A machine whose twin is had by `copy.deepcopy`, `pickle` or `twin`.
+    """A machine that `copy.deepcopy`, `pickle` and `twin` can copy.
 
-    A twin that is fed the same does the same to the byte; fed otherwise it leaves the
-    original untouched.
+    With the same input a twin behaves the same to the byte; other input does not affect the
+    original.
 
     Attributes:
-        _new_in_twins: attributes, and what they are in a twin whatever the original has:
-            callbacks of somebody outside.
+        _new_in_twins: attributes with fixed values in a twin, such as callbacks of outside code.
     """
 
     __slots__ = ()
     _new_in_twins: ClassVar[Mapping[str, object]] = {}
 
     def __getstate__(self) -> object:
-        """Return the state that a twin begins with."""
+        """Return the initial state of a twin."""
         return state_of(self, self._new_in_twins)
 
     def __copy__(self) -> NoReturn:
-        """Refuse: a shallow copy would share its parts with the original."""
+        """Raise TypeError, because a shallow copy would share its parts with the original."""
         raise TypeError(f"{type(self).__name__} cannot be copied by copy.copy: use copy.deepcopy")
 
     def __deepcopy__(self: T, memo: dict[int, Any]) -> T:
-        """Return a twin, which has in common with other twins what the originals have."""
+        """Return a twin; twins of one deepcopy share what their originals share."""
         return twin(self, memo)
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class NonCopyable:
-    """What belongs to its process; `copy.copy`, `deepcopy`, `pickle` and `twin` raise.
+    """An object bound to its process; `copy.copy`, `deepcopy`, `pickle` and `twin` raise.
 
     Attributes:
         why_not_copied: the reason, for people.
@@ -88,11 +87,11 @@ class NonCopyable:
     why_not_copied: ClassVar[str] = "the copy would act on the original; make a new one"
 
     def __reduce_ex__(self, protocol: SupportsIndex, /) -> NoReturn:
-        """Refuse; everything that copies asks here."""
+        """Raise TypeError; all ways of copying call this."""
         name = type(self).__name__
         raise TypeError(f"{name} cannot be copied or pickled: {self.why_not_copied}")
 
 
 def itself(item: T) -> T:
-    """Return what it is given: what `__reduce__` of a listener leaves is what it listens to."""
+    """Return the argument; `__reduce__` of a listener uses it."""
     return item

@@ -1,4 +1,4 @@
-"""Lists and tables that begin empty in a twin."""
+"""Lists and tables that are empty in a twin."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ K = TypeVar("K")
 
 
 class Listeners(list[T]):
-    """Callbacks of somebody outside. A twin begins with none: nobody listens to it yet."""
+    """Callbacks of outside code. A twin starts without callbacks."""
 
     __slots__ = ()
 
     def __reduce_ex__(self, protocol: SupportsIndex, /) -> tuple[type[Listeners[T]], tuple[()]]:
-        """Copy none of them."""
+        """Return an empty list as the copy."""
         return Listeners, ()
 
 
 class Cache(dict[K, T]):
-    """What can be worked out again. A twin begins with nothing."""
+    """A cache of computed values. A twin starts with an empty one."""
 
     __slots__ = ()
 
     def __reduce_ex__(self, protocol: SupportsIndex, /) -> tuple[type[Cache[K, T]], tuple[()]]:
-        """Copy nothing of it."""
+        """Return an empty cache as the copy."""
         return Cache, ()

@@ -1,4 +1,4 @@
-"""Independent copies of machines by pickle; compiled code can make no pickler of its own."""
+"""Independent copies of machines by pickle."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from typing import Any, Final, NoReturn, TypeVar
 #   (`pickle.dumps`) does not come through `_Pickler` and has everything by value.
 # - Listeners and caches begin empty in a twin (listeners.py), attributes named in
 #   `_new_in_twins` begin with what stands there: the callbacks of the original belong to
-#   somebody outside.
+#   outside code.
 # - In a `copy.deepcopy` of something larger, `memo` carries over what was copied before and
 #   takes in what is copied here. Pickler and unpickler number their memos alike, which
 #   gives the pairs of original and copy; two twins of one deepcopy then share what their
@@ -46,15 +46,15 @@ _NOTHING: Final[Mapping[str, object]] = {}
 
 
 def state_of(machine: object, begun: Mapping[str, object] = _NOTHING) -> Any:
-    """Return the state that a twin begins with; for `__getstate__`, of compiled classes too.
+    """Return the initial state of a twin; for `__getstate__`, also of compiled classes.
 
     Args:
-        machine: what is copied.
-        begun: attributes, and what they are in a twin whatever the original has.
+        machine: the machine to copy.
+        begun: attributes with fixed values in a twin.
 
     Returns:
-        Its attributes by name; where some are not in its `__dict__` a pair, of those that are
-        and the others.
+        Its attributes by name; if some are not in its `__dict__`, a pair of those in it and the
+        others.
     """
     state: Any
     compiled = getattr(type(machine), "__mypyc_attrs__", None)
@@ -73,23 +73,23 @@ def state_of(machine: object, begun: Mapping[str, object] = _NOTHING) -> Any:
 
 
 def restore(machine: object, state: Any) -> None:
-    """Give a twin the state that `state_of` returned; for `__setstate__`."""
+    """Set the state that `state_of` returned; for `__setstate__`."""
     attributes, others = state if isinstance(state, tuple) else (state, {})
     for name, value in {**(attributes or {}), **others}.items():
         object.__setattr__(machine, name, value)  # also of what is frozen
 
 
 def twin(machine: T, memo: dict[int, Any] | None = None) -> T:
-    """Return an independent copy of a device, a wire or a rig, as it is now.
+    """Return an independent copy of a device, a wire or a rig in its present state.
 
-    What is `Immutable` in it is shared.
+    `Immutable` parts are shared.
 
     Args:
-        machine: what is copied, with all that it refers to.
-        memo: of a `copy.deepcopy` that this is a part of: what was copied by `id`.
+        machine: the machine to copy, with everything it refers to.
+        memo: of an enclosing `copy.deepcopy`: the copies by `id`.
 
     Raises:
-        TypeError: something in it belongs to its process, or is a closure or a lambda.
+        TypeError: an object in it is bound to its process, or is a closure or a lambda.
     """
     stream = BytesIO()
     pickler = _Pickler(stream, memo or {})
@@ -109,7 +109,7 @@ def twin(machine: T, memo: dict[int, Any] | None = None) -> T:
 
 
 class _Pickler(pickle.Pickler):
-    """Writes places in `shared` instead of what twins share."""
+    """Writes positions in `shared` instead of objects that twins share."""
 
     def __init__(self, stream: BytesIO, known: dict[int, Any]) -> None:
         super().__init__(stream, pickle.HIGHEST_PROTOCOL)
@@ -129,7 +129,7 @@ class _Pickler(pickle.Pickler):
 
 
 class _Unpickler(pickle.Unpickler):
-    """Finds what twins share where `_Pickler` has put it."""
+    """Resolves shared objects from the list of `_Pickler`."""
 
     def __init__(self, stream: BytesIO, shared: list[object]) -> None:
         super().__init__(stream)
@@ -140,5 +140,5 @@ class _Unpickler(pickle.Unpickler):
 
 
 def _shared(place: int) -> NoReturn:
-    """Stand in a stream for the list that only the process has which wrote it."""
+    """Placeholder in a stream for the shared objects, which only the writing process has."""
     raise TypeError(f"item {place} of a twin was shared within its process")

@@ -1,4 +1,4 @@
-"""Machines put back in place to what they were: many runs from one state."""
+"""Snapshots that restore machines in place: many runs from one state."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ from tickrig.device.twin.copyable import NonCopyable
 # A snapshot walks over everything that machines refer to, once for each object (`_seen`, by
 # id, which also keeps the objects alive so that no id is used twice), and notes for each
 # what puts it back. It makes no copies of objects: the same ones get their old contents
-# again, so whoever holds one of them need not be told. Kinds of objects, in the order in
+# again, so references to them stay valid. Kinds of objects, in the order in
 # which they are tried:
 #
 # has `way_back`             asked, not looked into
@@ -50,7 +50,7 @@ from tickrig.device.twin.copyable import NonCopyable
 # containers                 contents, then attributes of their subclasses
 # all others                 attributes, in `__dict__` and in slots
 #
-# Whatever keeps state in C and is none of these is refused with TypeError (`_is_plain`): a
+# Anything else that keeps state in C is refused with TypeError (`_is_plain`): a
 # file or a socket would silently not be put back. So a new kind of state needs a line here
 # or a `way_back` of its own, and the error names its class and its owner.
 #
@@ -59,7 +59,7 @@ from tickrig.device.twin.copyable import NonCopyable
 # but only in interpreted classes: compiled ones cannot lose an attribute.
 
 _PutBack = Callable[[], object]
-"""Makes one object what it was."""
+"""Restores one object."""
 
 _LEFT: Final = (
     *(int, str, bytes, float, complex, type(None), range, slice, type(...)),
@@ -67,36 +67,36 @@ _LEFT: Final = (
     *(operator.attrgetter, operator.itemgetter, operator.methodcaller, property),
     *(weakref.ref, FrameType),
 )
-"""What never changes, or is of the process: it is left as it is."""
+"""Types that never change, or belong to the process: not restored."""
 
 _NEVER_CHANGES: Final[tuple[type, ...]] = (
     *(tuple, frozenset, MethodType, BuiltinFunctionType, MethodWrapperType, partial),
     *(MappingProxyType, type({}.keys()), type({}.values()), type({}.items())),
 )
-"""What never changes itself, but refers to what does."""
+"""Types that never change themselves, but refer to objects that do."""
 
 _LEFT_MODULES: Final = {"_thread", "datetime", "logging"}
-"""Modules whose objects are left as they are: locks, times, loggers."""
+"""Modules whose objects are not restored: locks, times, loggers."""
 
 _HEAP_TYPE: Final = 1 << 9
-"""Flag of a class that is written in Python."""
+"""Type flag of a class written in Python."""
 
 
 class MachineSnapshot:
-    """What machines are at a moment; `restore` makes the same objects so again.
+    """The state of machines at one moment; `restore` restores the same objects to it.
 
-    Where a twin is another machine, this is the same one: whoever has it, or an end of its wire,
-    need not be told. It costs a fraction of a copy. What was made since is left alone, and nobody
-    in here knows it any more; so listeners that came since are gone.
+    A twin is another machine; a restored machine is the same object, so references to it and to its
+    wire stay valid. A snapshot costs a fraction of a copy. Objects made since are left alone, and
+    no restored object refers to them; so later listeners are removed.
 
-    What has a method `way_back` is asked for what puts it back, and not looked into. Left as they
-    are: classes, modules, functions but for what they enclose, loggers, locks.
+    An object with a method `way_back` supplies its own restore function, and its contents are not
+    visited. Not restored: classes, modules, functions except their closures, loggers, locks.
 
     Args:
-        machines: devices, wires, rigs, hosts, with all that they refer to.
+        machines: devices, wires, rigs, hosts, with everything they refer to.
 
     Raises:
-        TypeError: something in it cannot be put back, as a file or a port of this machine.
+        TypeError: an object in it cannot be restored, such as a file or a port of this machine.
 
     >>> numbers = {"of": [1, 2]}
     >>> snapshot = MachineSnapshot(numbers)
@@ -110,24 +110,24 @@ class MachineSnapshot:
         self._put_back: tuple[_PutBack, ...] = tuple(_Walk().through(machines))
 
     def restore(self) -> None:
-        """Make all of it what it was; as often as wanted.
+        """Restore the state; may be called repeatedly.
 
         Raises:
-            TypeError: a generator has gone on since, which nobody can undo.
+            TypeError: a generator has advanced since, which cannot be undone.
         """
         for put_back in self._put_back:
             put_back()
 
 
 class _Walk:
-    """Goes through all that machines refer to, each once."""
+    """Visits each object that machines refer to once."""
 
     def __init__(self) -> None:
         self._seen: dict[int, object] = {}
         self._found: list[tuple[object, str]] = []
 
     def through(self, machines: tuple[object, ...]) -> Iterator[_PutBack]:
-        """Give what puts each of it back."""
+        """Yield the restore function of each object."""
         self._found = [(machine, "a snapshot") for machine in machines]
         while self._found:
             item, owner = self._found.pop()
@@ -161,7 +161,7 @@ class _Walk:
             yield from self._attributes(item)
 
     def _contents(self, item: Any, owner: str) -> Iterator[_PutBack]:
-        """Give what puts back what a container holds; TypeError for what nobody can put back."""
+        """Yield the restore function of a container; TypeError if it cannot be restored."""
         if isinstance(item, dict):
             kept = dict(item)
             self._find(item, (*kept, *kept.values()))
@@ -184,7 +184,7 @@ class _Walk:
             raise TypeError(f"{name} cannot be put back, and {owner} has one")
 
     def _attributes(self, item: Any) -> Iterator[_PutBack]:
-        """Give what puts attributes back; a frozen dataclass has none to be put back."""
+        """Yield the restore function of attributes; a frozen dataclass needs none."""
         kind, own = type(item), getattr(item, "__dict__", {})
         kept = dict(own)
         slots = [name for name in _slots_of(kind) if name != "__dict__"]
@@ -213,7 +213,7 @@ def _slots_of(kind: type) -> list[str]:
 
 
 def _is_plain(kind: type) -> bool:
-    """Say whether all that objects of a class have are attributes: nothing is hidden in C."""
+    """Return whether objects of a class have attributes only, without hidden state in C."""
     made = ((base, base.__new__) for base in kind.__mro__)
     solid = next(
         base
@@ -237,7 +237,7 @@ def _forget(item: object, name: str) -> None:
 
 
 def _content_of(cell: CellType) -> object:
-    """Return what a cell has; the cell itself if that is nothing yet."""
+    """Return the content of a cell; the cell itself if it is empty."""
     try:
         content: object = cell.cell_contents
     except ValueError:
@@ -246,7 +246,7 @@ def _content_of(cell: CellType) -> object:
 
 
 def _place_of(item: Any) -> int:
-    """Return where a generator or coroutine stands, -2 if it has ended."""
+    """Return the position of a generator or coroutine, -2 if it has ended."""
     frame = item.gi_frame if isinstance(item, GeneratorType) else item.cr_frame
     return -2 if frame is None else int(frame.f_lasti)
 

@@ -1,1 +1,1 @@
-"""A scanning range finder of the kind URG-04LX, and the world that it sees."""
+"""A scanning range finder like the URG-04LX, and the world that it sees."""

@@ -12,7 +12,7 @@ from tickrig.device.urg.world import BIT_RATE, LAST_STEP, View
 from tickrig.wire import scip as status
 from tickrig.wire.scip import ERROR, FARTHEST_MM, SCIP1_OK, SWITCH, encode_distances, encode_reply
 
-# What a URG-04LX tells of itself (URG network, status information).
+# Identification of a URG-04LX (URG network, status information).
 
 BY_DEFAULT: Final = "<-Default setting by user"
 
@@ -21,11 +21,11 @@ CONDITION: Final[Mapping[str, str]] = {
     status.LASER_TROUBLE: "Laser trouble.",
     status.MOTOR_TROUBLE: "Motor trouble.",
 }
-"""By the status of what is broken; the texts of the troubles are ours."""
+"""Texts by status; those of troubles are ours."""
 
 
 def _first_version(serial: str) -> Mapping[str, str]:
-    """Return what V tells in SCIP 1.1 (HokuyoAIST; a recording in regilo)."""
+    """Return the answer to V in SCIP 1.1 (HokuyoAIST; a recording in regilo)."""
     return {
         "VEND": "Hokuyo Automatic Co.,Ltd.",
         "PROD": "SOKUIKI Sensor URG-04LX",
@@ -36,7 +36,7 @@ def _first_version(serial: str) -> Mapping[str, str]:
 
 
 def version(serial: str) -> Mapping[str, str]:
-    """Return what VV tells."""
+    """Return the answer to VV."""
     return {
         "VEND": "Hokuyo Automatic Co.,Ltd.",
         "PROD": "SOKUIKI Sensor URG-04LX",
@@ -46,17 +46,17 @@ def version(serial: str) -> Mapping[str, str]:
     }
 
 
-# What SS and HS set (SCIP 2.0, sensor commands).
+# Settings of SS and HS (SCIP 2.0, sensor commands).
 
 _BIT_RATES: Final = (19_200, 38_400, 57_600, 115_200, 250_000, 500_000, 750_000)
 
 
 @dataclass(slots=True)
 class Settings:
-    """Bit rate and sensitivity; the sensitivity is told, and changes nothing that is emulated.
+    """Bit rate and sensitivity; the sensitivity is reported, without effect on the emulation.
 
     Attributes:
-        rate: bit rate of RS-232C in bit/s; on USB it is told, and changes nothing.
+        rate: bit rate of RS-232C in bit/s; on USB it is reported, without effect.
         sensitive: whether it measures in the sensitive mode.
         first_rate: bit rate after power-up.
     """
@@ -67,12 +67,12 @@ class Settings:
 
     @property
     def mode(self) -> str:
-        """How it measures, as II tells it."""
+        """Measuring mode, as reported by II."""
         return f"Measuring by {'Sensitive' if self.sensitive else 'Normal'} Mode"
 
     @property
     def rate_text(self) -> str:
-        """The bit rate, as II tells it."""
+        """The bit rate, as reported by II."""
         return f"{self.rate}[bps]{BY_DEFAULT if self.rate == self.first_rate else ''}"
 
     def set_rate(self, text: str) -> str:
@@ -98,13 +98,13 @@ class Settings:
         return status.OK
 
 
-# The sensor's side of SCIP 1.1: what a URG-04LX understands until it is switched.
+# The sensor's side of SCIP 1.1: the commands of a URG-04LX until it is switched.
 
 _RATE_KEPT: Final = "03"
 
 
 class Sensor(Protocol):
-    """What the commands act on: the server of SCIP 2.0."""
+    """The sensor that the commands act on: the server of SCIP 2.0."""
 
     @property
     def serial(self) -> str:
@@ -117,17 +117,17 @@ class Sensor(Protocol):
         ...
 
     def light(self, now_us: int) -> bool:
-        """Switch the laser on, unless there is trouble; return whether it is on."""
+        """Switch the laser on unless there is a fault; return whether it is on."""
         ...
 
     def stop(self) -> None:
         """Switch the laser off."""
 
     def switch(self) -> None:
-        """Go on in SCIP 2.0."""
+        """Switch to SCIP 2.0."""
 
     def measure(self, capture: Capture) -> bytes | None:
-        """Answer with the latest scan, later with the first one; None if there will be none."""
+        """Answer with the latest scan, or later with the first one; None if there will be none."""
         ...
 
 
@@ -148,19 +148,19 @@ class Capture(Immutable):
     cluster: int
 
     def answer(self, view: View) -> bytes:
-        """Return a scan as it was asked for."""
+        """Return a scan in the requested form."""
         # Two characters carry 4095 at most (SCIP 1.1), and what is farther reads so.
         numbers = view.distances(self.first, self.last, self.cluster)
         lines = encode_distances([min(number, FARTHEST_MM) for number in numbers])
         return encode_reply(self.line, SCIP1_OK, lines)
 
     def refuse(self, code: str) -> bytes:
-        """Return that there will be no scan."""
+        """Return the answer that there will be no scan."""
         return encode_reply(self.line, ERROR)
 
 
 def obey(sensor: Sensor, now_us: int, line: bytes) -> bytes:
-    """Return what is answered to a line at once."""
+    """Return the immediate answer to a line."""
     for form, work in _COMMANDS.items():
         if match := form.fullmatch(line):
             return work(sensor, now_us, match)

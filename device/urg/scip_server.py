@@ -1,4 +1,4 @@
-"""The sensor's side of SCIP 2.0: what each command does, and what is answered."""
+"""The sensor's side of SCIP 2.0: commands and their answers."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from tickrig.wire.instant import NEVER
 #
 # Two clocks and three memories make the behaviour; the rest is texts.
 #
-# The clocks. `_Rotation` counts whole turns of the mirror from `began_us`, without drift:
-# scans end at multiples of its period from there, whoever asks for them. `_timer` counts
-# milliseconds from `_zero_us`, modulo 2^24, and stamps each scan with the time of its
-# beginning (decision U2 in the reference page). CR starts the turn anew, TM and the laser
-# do not; RS and power-up start both clocks anew. `due_us` is the end of the scan that is
-# being measured, `NEVER` while the laser is off: nothing else here happens by itself.
+# The clocks. `_Rotation` counts whole turns of the mirror from `began_us`, without drift: scans end
+# at multiples of its period from there. `_timer` counts milliseconds from `_zero_us`, modulo 2^24,
+# and stamps each scan with the time of its beginning (decision U2 in the reference page). CR
+# restarts the turn, TM and the laser do not; RS and power-up restart both clocks. `due_us` is the
+# end of the scan that is being measured, `NEVER` while the laser is off: nothing else here happens
+# by itself.
 #
 # The memories. `_waiting` is one GD, GS or G that came before the first scan was ready;
 # `_running` is the one MD or MS; `_latest` is the latest scan. Rules:
@@ -37,7 +37,7 @@ from tickrig.wire.instant import NEVER
 #   interval and count work from there. After the last one the laser goes off.
 # - `stop` forgets all three and switches the laser off. QT, TM0, TM2, RS, trouble and the
 #   end of MD end here, so no reply can come from a measurement that was stopped.
-# - Trouble (`fail`) answers whoever waits with its status before it forgets him.
+# - A fault (`fail`) answers waiting requests with its status before it drops them.
 #
 # The order in a tick is that of `Urg.tick`: power and inputs, the end of a scan, then
 # commands. So a GD that arrives in the tick in which a scan ends gets that scan.
@@ -58,14 +58,14 @@ from tickrig.wire.instant import NEVER
 # (HokuyoAIST, urg_library, hokuyolx) decide where it is silent, each case with its U
 # number.
 
-# Why a command is refused (SCIP 2.0, sensor commands and response to invalid commands).
+# Reasons to refuse a command (SCIP 2.0, sensor commands and response to invalid commands).
 
 _NOT_A_NUMBER = ("01", "02", "03", "06", "07")
 """Starting step, end step, cluster count, scan interval, number of scans."""
 
 
 def _refusal(command: scip.Command, *, adjusting: bool) -> str:
-    """Return the status for what is no command, or not now; empty if nothing is wrong."""
+    """Return the status for an invalid or untimely command; empty if it is valid."""
     if command.symbol not in scip.SIZES:
         return status.UNKNOWN
     # The semicolon is part of `string`, the 16 letters of SCIP 2.0 come behind it.
@@ -93,19 +93,19 @@ def _flaw(command: scip.Command) -> str:
     return "05" if last < first else ""
 
 
-# The mirror that turns: when scans begin and end.
+# The rotating mirror: start and end of scans.
 
 _TURN_US_RPM = 60_000_000
 
 
 @dataclass(slots=True)
 class _Rotation:
-    """One scan a turn, without drift.
+    """The rotation: one scan per turn, without drift.
 
     Attributes:
-        speed_rpm: turns a minute.
-        level: of CR, 0..10; each takes 1 % off the speed.
-        began_us: when the first scan at this speed began.
+        speed_rpm: turns per minute.
+        level: of CR, 0..10; each reduces the speed by 1 %.
+        began_us: start of the first scan at this speed.
     """
 
     speed_rpm: int
@@ -114,36 +114,36 @@ class _Rotation:
 
     @property
     def present_rpm(self) -> int:
-        """Turns a minute at the level."""
+        """Turns per minute at the level."""
         return self.speed_rpm * (100 - self.level) // 100
 
     @property
     def period_us(self) -> int:
-        """How long a turn takes."""
+        """Duration of a turn."""
         return _TURN_US_RPM // self.present_rpm
 
     @property
     def text(self) -> str:
-        """The speed, as II tells it."""
+        """The speed, as reported by II."""
         speed = f"{self.present_rpm}[rpm]"
         return speed if self.level else f"Initial({speed}){BY_DEFAULT}"
 
     def whole_end_us(self, now_us: int) -> int:
-        """Return when the first scan ends that begins now or later."""
+        """Return the end of the first scan that starts now or later."""
         period_us = self.period_us
-        # Rounded up: the scan that is running at `now_us` has begun before it, and is not
+        # Rounded up: the scan that is running at `now_us` started before it, and is not
         # whole.
         return self.began_us + (-(-(now_us - self.began_us) // period_us) + 1) * period_us
 
     def change(self, now_us: int, level: int) -> None:
-        """Turn at another level from now on."""
+        """Set another level from now on."""
         self.level, self.began_us = level, now_us
 
 
-# What a sensor was asked to measure: one scan, or one after the other.
+# Requested measurements: one scan, or continuous scans.
 
 _WIDEST = {2: 0xFFF, 3: 0x3_FFFF}
-"""The most that so many characters carry; what is farther reads so."""
+"""Largest distance by number of characters; larger distances read as this."""
 
 
 @dataclass(slots=True)
@@ -151,10 +151,10 @@ class Stream:
     """A command that measures.
 
     Attributes:
-        command: as it came, without flaw.
-        begins_us: ends of scans before that are not for it.
-        left: scans that remain, 0 if they have no end.
-        skipped: scans that are still left out.
+        command: as received, valid.
+        begins_us: earlier scan ends do not count for it.
+        left: remaining scans, 0 if endless.
+        skipped: scans still to be skipped.
     """
 
     command: scip.Command
@@ -164,11 +164,11 @@ class Stream:
 
     @property
     def endless(self) -> bool:
-        """Whether it goes on until it is told to stop."""
+        """Whether it continues until it is stopped."""
         return self.command.fields[-1] == "00"
 
     def reply(self, view: View, code: str, echo: bytes) -> bytes:
-        """Return a scan as it was asked for."""
+        """Return a scan in the requested form."""
         first, last, cluster = (int(text) for text in self.command.fields[:3])
         width = scip.WIDTHS[self.command.symbol[1]]
         numbers, widest = view.distances(first, last, cluster), _WIDEST[width]
@@ -181,11 +181,11 @@ class Stream:
         return self.reply(view, status.OK, self.command.echo)
 
     def refuse(self, code: str) -> bytes:
-        """Return why there will be no scan."""
+        """Return the answer with the reason why there will be no scan."""
         return scip.Reply(self.command.echo, code).encode()
 
     def take(self, ended_us: int, view: View) -> bytes:
-        """Return what is sent of a scan of MD or MS."""
+        """Return the answer for a scan of MD or MS."""
         # `begins_us` holds the end of the first whole scan, and scans are known by their
         # end.
         if ended_us < self.begins_us:
@@ -201,13 +201,13 @@ class Stream:
 
     @property
     def echo(self) -> bytes:
-        """The command with the scans that remain."""
+        """The command with the number of remaining scans."""
         head, command = self.command.parameters[:-2], self.command
         return scip.Command(command.symbol, f"{head}{self.left:02}", command.string).echo
 
 
 _TIMER: Final = 2**24
-"""Milliseconds after which the timer begins again."""
+"""Milliseconds after which the timer wraps."""
 
 _LEVELS: Final = range(11)
 _DEFAULT_LEVEL: Final = 99
@@ -217,12 +217,11 @@ _Answer = tuple[str, tuple[bytes, ...]]
 
 
 class ScipServer(Part):
-    """Obeys commands and gives scans out (SCIP 2.0, sensor commands).
+    """Executes commands and sends scans (SCIP 2.0, sensor commands).
 
-    Until it is switched it obeys those of SCIP 1.1 (`first_protocol`).
+    Until it is switched, it executes those of SCIP 1.1 (`first_protocol`).
 
-    Not emulated: DB, the firmware update mode, the statuses 21..49 and 98 of a sensor that
-    checks itself.
+    Not emulated: DB, the firmware update mode, the statuses 21..49 and 98 of a self-test.
 
     Args:
         parameters: of the sensor.
@@ -231,10 +230,10 @@ class ScipServer(Part):
         laser: whether it is on.
         settings: bit rate and sensitivity.
         rotation: of the mirror.
-        trouble: status of what is broken, empty if nothing is.
+        trouble: status of the fault, empty if there is none.
         served: commands that were answered.
-        scans: scans that were measured.
-        due_us: when the scan ends that is measured.
+        scans: number of measured scans.
+        due_us: end of the present scan.
     """
 
     def __init__(self, parameters: UrgParameters) -> None:
@@ -255,7 +254,7 @@ class ScipServer(Part):
         self.power_up(0)
 
     def power_up(self, now_us: int) -> None:
-        """Begin as after power-up."""
+        """Restore the state after power-up."""
         self.served = self.scans = 0
         self._switched = self.parameters.scip == "2.0"
         self._begin(now_us)
@@ -272,15 +271,15 @@ class ScipServer(Part):
         self.stop()
 
     def stop(self) -> None:
-        """Switch the laser off and forget what was asked for."""
+        """Switch the laser off and drop all requests."""
         self.laser, self.due_us = False, NEVER
-        self._classic = False  # nobody has asked for anything since power-up
+        self._classic = False  # nothing has been requested since power-up
         self._running: Stream | None = None
         self._waiting: Stream | Capture | None = None
         self._latest: View | None = None
 
     def obey(self, now_us: int, line: bytes) -> bytes:
-        """Return what is answered to a line at once."""
+        """Return the immediate answer to a line."""
         self.served += 1
         if not self._switched:
             return first_protocol.obey(self, now_us, line)
@@ -294,14 +293,14 @@ class ScipServer(Part):
         return scip.Reply(command.echo, code, lines).encode()
 
     def fail(self, code: str) -> bytes:
-        """Stop for trouble; tell whoever waits for a scan."""
+        """Stop because of a fault; answer waiting requests with its status."""
         self.trouble = code
         waiting = [stream for stream in (self._waiting, self._running) if stream]
         self.stop()
         return b"".join(stream.refuse(code) for stream in waiting)
 
     def end_scan(self, pose: Pose, world: World) -> bytes:
-        """End the scan that was measured; return what is sent of it."""
+        """End the present scan; return the answers for it."""
         ended_us, period_us = self.due_us, self.rotation.period_us
         self.due_us += period_us
         time_ms = self._timer(ended_us - period_us)
@@ -322,17 +321,17 @@ class ScipServer(Part):
         return self.parameters.serial
 
     def light(self, now_us: int) -> bool:
-        """Switch the laser on, unless there is trouble; return whether it is on."""
+        """Switch the laser on unless there is a fault; return whether it is on."""
         if not self.laser and not self.trouble:
             self.laser, self.due_us = True, self.rotation.whole_end_us(now_us)
         return self.laser
 
     def switch(self) -> None:
-        """Go on in SCIP 2.0; nothing else changes."""
+        """Switch to SCIP 2.0; nothing else changes."""
         self._switched = True
 
     def measure(self, capture: Stream | Capture) -> bytes | None:
-        """Answer with the latest scan, later with the first one; None if there will be none."""
+        """Answer with the latest scan, or later with the first one; None if there will be none."""
         if not self.laser or self._waiting is not None:
             return None
         if self._latest is not None:
@@ -437,7 +436,7 @@ class ScipServer(Part):
 
     @property
     def _mode(self) -> str:
-        """How it measures, as II tells it."""
+        """Measuring mode, as reported by II."""
         if not self.laser:
             return "IDLE"
         return "CLASSIC" if self._classic else self.settings.mode

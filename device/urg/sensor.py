@@ -1,4 +1,4 @@
-"""A scanning range finder on its serial line."""
+"""A scanning range finder on a serial line."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tickrig.wire import scip as status
 from tickrig.wire.lines import LineSplitter
 from tickrig.wire.uart import UartSetting
 
-# The physical side of a sensor: where it is, who steps in its way, and what breaks.
+# Physical inputs and outputs of a sensor: place, an obstacle and faults.
 
 _FAR_M: Final = 10_000
 
@@ -28,10 +28,10 @@ INPUTS: Final = (
     _place("x_m", "place of the sensor"),
     _place("y_m", "place of the sensor, to the left of x"),
     InputSignal("heading_rad", "where it looks", low=-1e6, high=1e6, unit="rad", real=True),
-    _place("post_x_m", "place of somebody who stands there"),
-    _place("post_y_m", "place of somebody, to the left of x"),
+    _place("post_x_m", "place of a person in front of the sensor"),
+    _place("post_y_m", "place of the person, to the left of x"),
     InputSignal(
-        "post_radius_m", "how wide; 0 if nobody is there", high=_FAR_M, unit="m", real=True
+        "post_radius_m", "width of the person; 0 if there is none", high=_FAR_M, unit="m", real=True
     ),
     InputSignal("laser_broken", "the laser gives no light", SignalType.FAULT),
     InputSignal("motor_jammed", "something holds the mirror", SignalType.FAULT),
@@ -58,22 +58,22 @@ _TICK_US: Final = 1_000
 class Urg(Copyable):
     """A URG-04LX on USB or RS-232C; a `UartDevice`.
 
-    In each tick: what the world does to it, the end of a scan, commands. A scan is seen
-    from where the sensor is when the scan ends; the time stamp is that of its beginning.
+    In each tick: physical inputs, the end of a scan, commands. A scan is taken from the pose of the
+    sensor at its end; the time stamp is that of its start.
 
-    On RS-232C the reply to SS still has the old bit rate, and all behind it the new one; RS and a
-    power cut lead back to the first one.
+    On RS-232C the reply to SS still has the old bit rate, and everything after it the new one; RS
+    and a power cut restore the first one.
 
-    Not emulated: warming up, current, the LED; see `View` for what is not there of optics and
-    `ScipServer` for what is not there of the protocol.
+    Not emulated: warming up, current, the LED; see `View` for missing optics and `ScipServer` for
+    missing parts of the protocol.
 
     Args:
-        parameters: what it is like.
-        world: what is around it.
+        parameters: of the sensor.
+        world: its surroundings.
 
     Attributes:
-        type_name: what its device type is called, for traces.
-        inputs: what the world does to it, see `INPUTS`.
+        type_name: name of its device type, for traces.
+        inputs: its physical inputs, see `INPUTS`.
         world: it may be changed; the next scan sees it.
     """
 
@@ -88,12 +88,12 @@ class Urg(Copyable):
 
     @property
     def tick_us(self) -> int:
-        """How finely it keeps time."""
+        """Resolution of its time."""
         return _TICK_US
 
     @property
     def due_us(self) -> int:
-        """When anything would happen without input."""
+        """The time of the next event without input."""
         if self._restarted or self._switched:
             return 0
         return self._server.due_us
@@ -107,32 +107,32 @@ class Urg(Copyable):
 
     @property
     def outputs(self) -> Mapping[str, OutputSignal]:
-        """What `read` knows."""
+        """The outputs that `read` accepts."""
         return _OUTPUTS
 
     @property
     def pose(self) -> Pose:
-        """Where it is."""
+        """Pose of the sensor."""
         return Pose(*(self.inputs[name] for name in _GROUPS["pose"]))
 
     @property
     def surroundings(self) -> World:
-        """The world, with whoever stands there."""
+        """The world, with the person in it."""
         x_m, y_m, radius_m = (self.inputs[name] for name in _GROUPS["post"])
         return self.world.with_posts(Post(x_m, y_m, radius_m)) if radius_m else self.world
 
     @property
     def _switches(self) -> tuple[float, ...]:
-        """The inputs that act at once; places count when a scan ends."""
+        """The inputs that act at once; poses are read when a scan ends."""
         inputs = self.inputs
         return inputs["power_cut"], inputs["laser_broken"], inputs["motor_jammed"]
 
     def reset(self) -> None:
-        """Begin as after power-up."""
+        """Restore the state after power-up."""
         self._restarted = True
 
     def read(self, name: str, /) -> int | float:
-        """Look at an output, as it was left by the latest tick.
+        """Return an output as the latest tick left it.
 
         Args:
             name: one of `outputs`.
@@ -141,12 +141,12 @@ class Urg(Copyable):
             Its value.
 
         Raises:
-            KeyError: there is none of that name.
+            KeyError: there is no output of that name.
         """
         return _READ[name](self)
 
     def tick(self, now_us: int, rx: bytes, /) -> bytes:
-        """Take what arrived, and go on to now.
+        """Receive the bytes that arrived, and advance to now.
 
         Args:
             now_us: time since the rig was started, a multiple of `tick_us`.

@@ -1,4 +1,4 @@
-"""What a range finder sees: its parameters, the world around it, rays and the view."""
+"""Parameters of a range finder, the world around it, rays and views."""
 
 from __future__ import annotations
 
@@ -14,27 +14,27 @@ from tickrig.device.chance import Chance
 from tickrig.device.twin import Immutable, Part
 from tickrig.wire.scip import Specification
 
-# What a sensor is like: a URG-04LX unless said otherwise.
+# Parameters of a sensor; the defaults are a URG-04LX.
 
 URG_04LX: Final = Specification(
     "URG-04LX(Hokuyo Automatic Co.,Ltd.)", 20, 5_600, 1_024, 44, 725, 384, 600
 )
-"""As one tells of itself (URG network, status information)."""
+"""Limits as reported by the sensor (URG network, status information)."""
 
 LAST_STEP: Final = 768
-"""The highest step that may be asked for (SCIP 2.0, measurement direction and points)."""
+"""The highest step in a request (SCIP 2.0, measurement direction and points)."""
 
 BIT_RATE: Final = 19_200
 """Of RS-232C after power-up; on USB it means nothing."""
 
 
 _PROTOCOLS: Final = ("1.1", "2.0")
-"""What sensors speak after power-up."""
+"""Protocols after power-up."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UrgParameters(Immutable):
-    """A sensor.
+    """Parameters of a sensor.
 
     Attributes:
         serial: its serial number, letters and digits.
@@ -45,7 +45,7 @@ class UrgParameters(Immutable):
         rs232_baud: bit rate of its RS-232C line after power-up, in bit/s; None on USB.
 
     Raises:
-        ValueError: a value that cannot be.
+        ValueError: a value out of range.
     """
 
     serial: str = "H0614967"
@@ -55,7 +55,7 @@ class UrgParameters(Immutable):
     rs232_baud: int | None = None
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be."""
+        """Raise ValueError if a value is out of range."""
         if not (self.serial.isascii() and self.serial.isalnum()):
             raise ValueError(f"serial {self.serial!r} is not letters and digits")
         if not 0 <= self.noise <= 1:
@@ -66,14 +66,14 @@ class UrgParameters(Immutable):
             raise ValueError(f"rs232_baud {self.rs232_baud} bit/s is below 1")
 
 
-# A flat world of walls and round posts, and how far a ray goes in it.
+# A flat world of walls and round posts, and the length of rays in it.
 
 _Rays = Sequence[tuple[float, float]]
 """Directions, each a vector of length 1."""
 
 
 def rays_of(angles_rad: Sequence[float]) -> _Rays:
-    """Return where angles point."""
+    """Return the directions of angles."""
     return tuple(zip(map(cos, angles_rad), map(sin, angles_rad), strict=True))
 
 
@@ -87,13 +87,13 @@ class Wall(Immutable):
     y2_m: float
 
     def __post_init__(self) -> None:
-        """Refuse what is no wall."""
+        """Raise ValueError if it is not a wall."""
         ends = (self.x1_m, self.y1_m, self.x2_m, self.y2_m)
         if not all(map(isfinite, ends)) or ends[:2] == ends[2:]:
             raise ValueError(f"a wall has two places that are not the same, got {ends}")
 
     def distances_m(self, x_m: float, y_m: float, rays: _Rays) -> list[float]:
-        """Return how far each ray goes until it meets the wall, infinity if it does not."""
+        """Return the distance along each ray to the wall, infinity if it does not meet the wall."""
         wall_x, wall_y = self.x2_m - self.x1_m, self.y2_m - self.y1_m
         off_x, off_y = self.x1_m - x_m, self.y1_m - y_m
         area = off_x * wall_y - off_y * wall_x
@@ -109,20 +109,20 @@ class Wall(Immutable):
 
 @dataclass(frozen=True, slots=True)
 class Post(Immutable):
-    """A round post; with a radius of 0 it is not there."""
+    """A round post; a radius of 0 means no post."""
 
     x_m: float
     y_m: float
     radius_m: float
 
     def __post_init__(self) -> None:
-        """Refuse what is no post."""
+        """Raise ValueError if it is not a post."""
         numbers = (self.x_m, self.y_m, self.radius_m)
         if not all(map(isfinite, numbers)) or self.radius_m < 0:
             raise ValueError(f"a post has a place and a radius of 0 or more, got {numbers}")
 
     def distances_m(self, x_m: float, y_m: float, rays: _Rays) -> list[float]:
-        """Return how far each ray goes until it meets the post, infinity if it does not."""
+        """Return the distance along each ray to the post, infinity if it does not meet the post."""
         # d = (off . ray) is the way to the nearest point of the axis, (off x ray) the
         # distance there.
         off_x, off_y, most = self.x_m - x_m, self.y_m - y_m, self.radius_m**2
@@ -136,13 +136,13 @@ class Post(Immutable):
 
 @dataclass(frozen=True, slots=True)
 class World(Immutable):
-    """All that a ray can meet. Not there: glass, mirrors, slopes, anything with a height."""
+    """Everything that a ray can meet. Not emulated: glass, mirrors, slopes, heights."""
 
     walls: tuple[Wall, ...] = ()
     posts: tuple[Post, ...] = ()
 
     def distances_m(self, x_m: float, y_m: float, angles_rad: Iterable[float]) -> list[float]:
-        """Return how far it is from a place to the first thing in each direction.
+        """Return the distance from a position to the first object in each direction.
 
         >>> World((Wall(2.0, -1.0, 2.0, 1.0),)).distances_m(0.5, 0.0, [0.0])
         [1.5]
@@ -154,22 +154,22 @@ class World(Immutable):
         return [min(column) for column in zip(nothing, *ways, strict=True)]
 
     def distance_m(self, x_m: float, y_m: float, angle_rad: float) -> float:
-        """Return how far it is from a place to the first thing in one direction."""
+        """Return the distance from a position to the first object in one direction."""
         return self.distances_m(x_m, y_m, [angle_rad])[0]
 
     def with_posts(self, *posts: Post) -> World:
-        """Return a world with more posts."""
+        """Return a world with additional posts."""
         return World(self.walls, (*self.posts, *posts))
 
     def clearance_m(self, x_m: float, y_m: float) -> float:
-        """Return how far the nearest thing is from a place, infinity in an empty world."""
+        """Return the distance from a position to the nearest object, infinity in an empty world."""
         posts = (hypot(p.x_m - x_m, p.y_m - y_m) - p.radius_m for p in self.posts if p.radius_m)
         walls = (_off_wall_m(wall, x_m, y_m) for wall in self.walls)
         return min((*posts, *walls), default=inf)
 
 
 def room(width_m: float, depth_m: float) -> World:
-    """Return four walls around the origin; ValueError for a size that is no size."""
+    """Return four walls around the origin; ValueError if a size is not above 0."""
     if not (width_m > 0 and depth_m > 0):
         raise ValueError(f"a room has a width and a depth above 0, got {width_m}, {depth_m}")
     x_m, y_m = width_m / 2, depth_m / 2
@@ -178,7 +178,7 @@ def room(width_m: float, depth_m: float) -> World:
 
 
 def _first_m(along_m: float, half_m: float) -> float:
-    """Return where a ray enters a post; where it leaves it, if it begins within."""
+    """Return where a ray enters a post, or where it leaves it if it starts within."""
     if along_m >= half_m:
         return along_m - half_m
     return along_m + half_m if along_m >= -half_m else inf
@@ -191,27 +191,27 @@ def _off_wall_m(wall: Wall, x_m: float, y_m: float) -> float:
     return hypot(wall.x1_m + share * along_x - x_m, wall.y1_m + share * along_y - y_m)
 
 
-# All beams of a scan at once: each thing is asked only for the beams that can meet it.
+# All beams of a scan at once: each object is computed only for the beams that can meet it.
 #
-# Numbers are those of `World.distances_m` to the bit: a thing tells from its outline which beams
+# Numbers are those of `World.distances_m` to the bit: the outline of an object tells which beams
 # meet it for certain and which may, and both are computed as there.
 
 _BLUR: Final = 1e-6
-"""From nearer than so much of its size a thing is asked for all beams: its angles are vague."""
+"""Distance, relative to its size, below which an object is computed for all beams."""
 
 _Span = tuple[int, int]
-"""The first beam and the one behind the last."""
+"""The first beam and the one after the last."""
 
 
 class Beams(Part):
-    """Beams from a place, evenly spaced to the left.
+    """Beams from a position, evenly spaced to the left.
 
     Args:
         x_m: of the place.
         y_m: of the place.
-        rays: where they go, each `tau / turn` beyond the one before.
-        first_rad: where the first goes; within 2e6.
-        turn: how many there are in a whole turn; there are no more here.
+        rays: their directions, each `tau / turn` after the previous one.
+        first_rad: direction of the first; within 2e6.
+        turn: number of beams in a full turn; there are no more here.
     """
 
     def __init__(self, x_m: float, y_m: float, rays: _Rays, first_rad: float, turn: int) -> None:
@@ -220,7 +220,7 @@ class Beams(Part):
         self._ways_m = [inf] * len(self._rays)
 
     def cast_m(self, world: World) -> list[float]:
-        """Return how far each goes until it meets something, infinity if it does not."""
+        """Return the distance of each to the first object, infinity if there is none."""
         self._ways_m = [inf] * len(self._rays)
         for wall in world.walls:
             self._meet_wall(wall)
@@ -268,12 +268,12 @@ class Beams(Part):
         self._measure_some(post, (ceil(first - 1), floor(last + 1) + 1))
 
     def _places(self, right_rad: float, width_rad: float) -> tuple[float, float]:
-        """Return where an angle begins and ends, counted in beams."""
+        """Return start and end of an angle, counted in beams."""
         first = (right_rad - self._first_rad) % tau / tau * self._turn
         return first, first + width_rad / tau * self._turn
 
     def _here(self, span: _Span) -> Iterator[_Span]:
-        """Yield which of ours a span is, wherever in which turn it was counted."""
+        """Yield the parts of a span within our beams, in whichever turn it was counted."""
         # A span is counted from the first beam, modulo a turn, and may begin before or end
         # behind ours.
         for turns in (-self._turn, 0, self._turn):
@@ -290,20 +290,20 @@ class Beams(Part):
         self._put(begin, end, thing.distances_m(self._x_m, self._y_m, self._rays[begin:end]))
 
     def _put(self, begin: int, end: int, ways_m: list[float]) -> None:
-        """Keep what is nearer."""
+        """Keep the nearer distances."""
         before = self._ways_m[begin:end]
         if before.count(inf) < len(before):
             ways_m = list(map(min, before, ways_m))
         self._ways_m[begin:end] = ways_m
 
 
-# What a sensor sees in one scan.
+# The view of a sensor in one scan.
 
 _HALF: Final = 2.0**63
 
 
 class _NoDistance(IntEnum):
-    """Numbers below DMIN that are no distances (SCIP 2.0, error codes)."""
+    """Numbers below DMIN that are codes, not distances (SCIP 2.0, error codes)."""
 
     WEAK = 1
     OTHER = 6
@@ -312,10 +312,10 @@ class _NoDistance(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class View(Immutable):
-    """A scan; rays are cast when somebody asks for their distances.
+    """A scan; rays are cast when their distances are requested.
 
-    Not emulated: the way that the sensor goes during a scan; angle of incidence, colour and
-    gloss of what it sees; a beam that is wider than a line.
+    Not emulated: motion of the sensor during a scan; angle of incidence, colour and gloss of
+    objects; beams wider than a line.
 
     Attributes:
         number: of the scan since power-up.
@@ -336,8 +336,8 @@ class View(Immutable):
     def distances(self, first: int, last: int, cluster: int) -> tuple[int, ...]:
         """Return a number for each whole `cluster` of steps: the least distance in mm.
 
-        Where none has a distance, it is the code of the first. Steps behind the last whole
-        cluster have no number (DECISION U11).
+        If none has a distance, it is the code of the first. Steps after the last whole cluster have
+        no number (DECISION U11).
         """
         kind, ways_m = self.kind, self._ways_m(range(first, last + 1))
         measurable = kind.first <= first and last <= kind.last
@@ -364,7 +364,7 @@ class View(Immutable):
         return min(good, default=numbers[0])
 
     def _ways_m(self, steps: range) -> list[float]:
-        """Return how far it is in the direction of each step, with the noise of the sensor."""
+        """Return the distance in the direction of each step, with the noise of the sensor."""
         kind, pose = self.kind, self.pose
         rays, first_rad = _rays(kind, steps, pose.heading_rad)
         ways_m = Beams(pose.x_m, pose.y_m, rays, first_rad, kind.resolution).cast_m(self.world)
@@ -385,7 +385,7 @@ class View(Immutable):
         ]
 
     def _error_mm(self, step: int, distance_m: float) -> float:
-        """Return the noise of a step: uniform, and the same whoever asks."""
+        """Return the noise of a step: uniform, and the same for each call."""
         most_mm = self.parameters.noise * max(10.0, distance_m * 10)
         chance = Chance(self.parameters.seed, f"{self.number} {step}")
         return most_mm * (chance.draw() / _HALF - 1)
@@ -393,13 +393,13 @@ class View(Immutable):
 
 @lru_cache(maxsize=8)
 def _off_rad(kind: Specification, steps: range) -> tuple[float, ...]:
-    """Return the directions of steps from straight ahead; each scan asks for the same."""
+    """Return the cached directions of steps from straight ahead; each scan needs the same."""
     return tuple((step - kind.front) * tau / kind.resolution for step in steps)
 
 
 @lru_cache(maxsize=8)  # a robot that stands or goes straight: a third of the time of a scan
 def _rays(kind: Specification, steps: range, heading_rad: float) -> tuple[_Rays, float]:
-    """Return where the beams of steps go, and the angle of the first."""
+    """Return the directions of the beams of steps, and the angle of the first."""
     angles_rad = [heading_rad + off_rad for off_rad in _off_rad(kind, steps)]
     return rays_of(angles_rad), angles_rad[0] if angles_rad else 0.0
 

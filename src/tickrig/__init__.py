@@ -1,4 +1,4 @@
-"""A rig on your desk for robot electronics you do not have."""
+"""Deterministic emulators of robot electronics, and tools for CAN, CANopen and serial hosts."""
 
 from tickrig._lazy import lazy, tell_pyserial
 

@@ -1,4 +1,4 @@
-"""Whether this installation is compiled (docs/howto/compiled.md); what tells mypyc of a class."""
+"""Whether this installation is compiled (docs/howto/compiled.md), and markers for mypyc."""
 
 from importlib import import_module
 
@@ -8,7 +8,7 @@ if TYPE_CHECKING:
 else:
 
     def mypyc_attr(*names, **settings):
-        """Mark a class for mypyc; in Python it changes nothing, and needs no package."""
+        """Mark a class for mypyc; in plain Python it has no effect and needs no package."""
         return lambda marked: marked
 
 

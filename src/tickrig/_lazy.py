@@ -1,10 +1,10 @@
-"""What an import of tickrig does: names are imported when somebody asks for them (PEP 562)."""
+"""Lazy imports: names are imported at their first use (PEP 562)."""
 
 from __future__ import annotations
 
 import sys
 
-TYPE_CHECKING = False  # as typing has it: importing typing would take longer than all else here
+TYPE_CHECKING = False  # as typing has it: importing typing takes longer than the rest here
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
@@ -12,14 +12,14 @@ if TYPE_CHECKING:
 def lazy(
     package: str, names: Mapping[str, tuple[str, ...]]
 ) -> tuple[list[str], Callable[[str], object], Callable[[], list[str]]]:
-    """Make a package offer names of modules that are not imported yet.
+    """Make a package export names of modules that are not imported yet.
 
     Args:
-        package: its name, for the message about a name that it has not.
-        names: what it offers of each module.
+        package: its name, for the message about an unknown name.
+        names: the exported names of each module.
 
     Returns:
-        Its `__all__`, `__getattr__` and `__dir__`; `__version__` is found, and is in no list.
+        Its `__all__`, `__getattr__` and `__dir__`; `__version__` is found, but not listed.
     """
     modules = {name: module for module, offered in names.items() for name in offered}
 
@@ -39,7 +39,7 @@ def lazy(
 
 
 class LazyModule:
-    """Stands at the top of a module for another that is imported when it is first used.
+    """A placeholder for a module that is imported at its first use.
 
     Type checkers see the import that it replaces:
 
@@ -56,7 +56,7 @@ class LazyModule:
         self._name = name
 
     def __getattr__(self, name: str) -> object:
-        """Return what the module has under this name."""
+        """Return the attribute of the module."""
         from importlib import import_module  # noqa: PLC0415 - not before it is needed
 
         found: object = getattr(import_module(self._name), name)
@@ -64,9 +64,9 @@ class LazyModule:
 
 
 def tell_pyserial() -> None:
-    """Let pyserial find the handler of `tickrig://`, if it is loaded already.
+    """Register the handler of `tickrig://` with pyserial if it is loaded already.
 
-    Else that is done when the first line is offered under a name; so an import costs nothing.
+    Otherwise this happens when the first line gets a name; so an import costs nothing.
     """
     packages = getattr(sys.modules.get("serial"), "protocol_handler_packages", None)
     if packages is not None and "tickrig.emulators.serial.outside" not in packages:

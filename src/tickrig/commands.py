@@ -1,13 +1,13 @@
-"""The console commands; what each needs is imported when it is called.
+"""The console commands; each imports its modules when it is called.
 
-Ctrl-C must end them from the first moment: this module imports nothing before that is so.
+Ctrl-C must end them from the first moment: this module imports nothing before it has set that up.
 """
 
 from _signal import SIG_DFL, SIG_IGN, SIGINT, default_int_handler, getsignal, signal  # type: ignore[import-not-found] # signal itself takes milliseconds
 
 
 def _start(name: str, module: str) -> None:
-    if getsignal(SIGINT) in (default_int_handler, SIG_IGN):  # ignored: a script has begun it by `&`
+    if getsignal(SIGINT) in (default_int_handler, SIG_IGN):  # ignored: a script started it by `&`
         signal(SIGINT, SIG_DFL)
     from tickrig.host.cli.start import start  # noqa: PLC0415
 

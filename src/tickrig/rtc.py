@@ -1,4 +1,4 @@
-"""RT components after OMG RTC 1.0 and OpenRTM-aist 1.x, in one process, which is given the time."""
+"""RT components (OMG RTC 1.0, OpenRTM-aist 1.x) in one process with a given time."""
 
 from tickrig._lazy import lazy
 

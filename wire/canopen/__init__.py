@@ -1,1 +1,1 @@
-"""CANopen on the wire: values and codes of CiA 301 and CiA 305."""
+"""CANopen codecs: values and codes of CiA 301 and CiA 305."""

@@ -18,11 +18,11 @@ from typing import Final, NamedTuple
 from tickrig.wire.errors import FieldError, FramingError
 
 Value = bool | int | float | str | bytes
-"""What an object holds, for people: strings are str, octet strings and domains bytes."""
+"""The value of an object: strings are str, octet strings and domains are bytes."""
 
 
 class DataType(IntEnum):
-    """Data type by its index in the dictionary, as an EDS gives it."""
+    """Data type by its index in the dictionary, as in an EDS."""
 
     BOOLEAN = 0x01
     INTEGER8 = 0x02
@@ -54,12 +54,12 @@ class DataType(IntEnum):
 
     @property
     def bits(self) -> int:
-        """Size in bits, 0 where it varies."""
+        """Size in bits, 0 if it varies."""
         return _BITS.get(self, 0)
 
     @property
     def size(self) -> int:
-        """Size in bytes, 0 where it varies."""
+        """Size in bytes, 0 if it varies."""
         return (self.bits + 7) // 8
 
     @property
@@ -82,10 +82,10 @@ class DataType(IntEnum):
         """Return the bytes of a value, little endian (CiA 301, 7.1.4).
 
         Args:
-            value: a number of the range of this type, a text, or bytes.
+            value: a number in the range of this type, a text, or bytes.
 
         Raises:
-            FieldError: it does not fit.
+            FieldError: the value does not fit.
         """
         try:
             return _encode(self, value)
@@ -96,10 +96,10 @@ class DataType(IntEnum):
         """Return the value of bytes.
 
         Args:
-            data: as an SDO or a PDO carries it.
+            data: as in an SDO or a PDO.
 
         Raises:
-            FieldError: their number is not that of this type.
+            FieldError: the number of bytes does not fit this type.
         """
         size, decode = _DECODERS[self]
         if size and len(data) != size:
@@ -165,7 +165,7 @@ _DECODE: Final[dict[DataType, Callable[[bytes], Value]]] = {
 }
 
 _DECODERS: Final = {kind: (kind.size, _DECODE.get(kind, bytes)) for kind in DataType}
-"""Size in bytes and what reads them, by data type: one look-up each time."""
+"""Size in bytes and reader, by data type, for a single look-up."""
 
 
 def _encode(kind: DataType, value: Value) -> bytes:
@@ -206,14 +206,14 @@ class TimeOfDay(NamedTuple):
 
     @classmethod
     def parse(cls, data: bytes) -> TimeOfDay:
-        """Read a TIME stamp; FramingError if it has not 6 bytes, FieldError if it is no time."""
+        """Read a TIME stamp; FramingError unless it has 6 bytes, FieldError for an invalid time."""
         if len(data) != _LAYOUT.size:
             raise FramingError(f"a TIME stamp of {len(data)} bytes, it has {_LAYOUT.size}")
         ms, days = _LAYOUT.unpack(data)
         return cls(ms & _MS_MASK, days).checked()
 
     def checked(self) -> TimeOfDay:
-        """Return the time; FieldError if there is no such time."""
+        """Return the time itself; FieldError if it is invalid."""
         if not 0 <= self.ms < DAY_MS:
             raise FieldError(f"{self.ms} ms after midnight, a day has {DAY_MS}")
         if not 0 <= self.days <= _MAX_DAYS:
@@ -221,11 +221,11 @@ class TimeOfDay(NamedTuple):
         return self
 
     def encode(self) -> bytes:
-        """Return the six bytes; FieldError if there is no such time."""
+        """Return the six bytes; FieldError if the time is invalid."""
         return _LAYOUT.pack(*self.checked())
 
     def after(self, elapsed_us: int) -> TimeOfDay:
-        """Return the time so many microseconds later; the days begin anew after 65 535.
+        """Return the time some microseconds later; the days wrap after 65 535.
 
         >>> TimeOfDay(DAY_MS - 1, 7).after(1_500)
         TimeOfDay(ms=0, days=8)

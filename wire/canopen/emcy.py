@@ -1,4 +1,4 @@
-r"""EMCY on the wire: error codes, error register, message (CiA 301, emergency object).
+r"""EMCY codec: error codes, error register, message (CiA 301, emergency object).
 
 >>> Emcy.parse(bytes.fromhex("3081110700000000"))
 Emcy(code=33072, register=17, text=b'\x07\x00\x00\x00\x00')
@@ -34,7 +34,7 @@ class ErrorRegister(IntFlag):
 
 
 class EmcyCode(IntEnum):
-    """Emergency error codes; those that end in 00h stand for their class."""
+    """Emergency error codes; those that end in 00h denote a class."""
 
     NO_ERROR = 0x0000
     GENERIC = 0x1000
@@ -113,7 +113,7 @@ _TEXTS: Final[dict[int, str]] = {
 
 
 def describe(code: int) -> str:
-    """Return the text of an emergency error code, of its class if it has none of its own.
+    """Return the text of an emergency error code, or of its class.
 
     >>> describe(0xFF01), describe(0x4711), describe(0x0001)
     ('CANopen device specific, generic error', 'temperature, generic error', 'unknown')
@@ -131,7 +131,7 @@ class Emcy(NamedTuple):
     """An EMCY message.
 
     Attributes:
-        code: emergency error code, 0x0000 for an error that is gone.
+        code: emergency error code, 0x0000 for the end of an error.
         register: the error register after it.
         text: five manufacturer-specific bytes.
     """
@@ -148,5 +148,5 @@ class Emcy(NamedTuple):
         return cls(*_LAYOUT.unpack(data))
 
     def encode(self) -> bytes:
-        """Return the eight bytes; a text is cut or filled up with 00h."""
+        """Return the eight bytes; the text is truncated or padded with 00h."""
         return _LAYOUT.pack(self.code, self.register, self.text)

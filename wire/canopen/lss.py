@@ -1,4 +1,4 @@
-"""LSS on the wire: node-ID and bit timing over the bus (CiA 305, LSS services).
+"""LSS codec: node-ID and bit timing over the bus (CiA 305, LSS services).
 
 >>> message(LssCommand.CONFIGURE_NODE_ID, 16).hex()
 '1110000000000000'
@@ -36,7 +36,7 @@ BIT_RATES: Final = {
 """Bit rate in bit/s by index of the standard table; 5 is reserved, 9 is automatic detection."""
 
 FASTSCAN_RESET: Final = 0x80
-"""Bit Check that begins a fastscan."""
+"""Bit Check that starts a fastscan."""
 
 # cs, four bytes with the low one first, three reserved: 40 9A 02 00 00 00 00 00.
 _NUMBER: Final = struct.Struct("<xI3x")
@@ -76,21 +76,21 @@ class LssCommand(IntEnum):
 
 
 class LssMode(IntEnum):
-    """State of an LSS slave, as Switch State Global carries it."""
+    """State of an LSS slave, as in Switch State Global."""
 
     WAITING = 0
     CONFIGURATION = 1
 
 
 class LssError(IntEnum):
-    """Error code of an answer to a Configure or Store command."""
+    """Error code in the response to a Configure or Store command."""
 
     NONE = 0
     OUT_OF_RANGE = 1
 
 
 class LssAddress(NamedTuple):
-    """What distinguishes a device from all others: the identity object 1018h."""
+    """LSS address: the identity object 1018h, unique for each device."""
 
     vendor: int
     product: int
@@ -102,10 +102,10 @@ class FastScan(NamedTuple):
     """A fastscan request.
 
     Attributes:
-        id_number: the part of the LSS address that is asked for.
-        bit_check: the lowest bit that is compared, 0x80 to begin anew.
-        sub: which part, 0 vendor-ID to 3 serial number.
-        next_sub: the part that comes next.
+        id_number: the requested part of the LSS address.
+        bit_check: the lowest compared bit, 0x80 to restart.
+        sub: number of the part, 0 vendor-ID to 3 serial number.
+        next_sub: the next part.
     """
 
     id_number: int
@@ -115,7 +115,7 @@ class FastScan(NamedTuple):
 
     @classmethod
     def parse(cls, data: bytes) -> FastScan:
-        """Read the eight bytes of a message whose command specifier was looked at."""
+        """Read the eight bytes of a message whose command specifier is already known."""
         return cls(*_FASTSCAN.unpack(data)[1:])
 
     def encode(self) -> bytes:
@@ -124,7 +124,7 @@ class FastScan(NamedTuple):
 
 
 def message(command: LssCommand, number: int = 0) -> bytes:
-    """Return a message with a number of up to 32 bits behind its command specifier."""
+    """Return a message with a number of up to 32 bits after its command specifier."""
     return _MESSAGE.pack(command, number)
 
 

@@ -1,4 +1,4 @@
-"""Network management: commands, states, heartbeat, and the COB-IDs of a node ID."""
+"""Network management: commands, states, heartbeat, and the COB-IDs of a node-ID."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from enum import IntEnum
 from typing import Final
 
-# COB-ID entries of the dictionary: a CAN-ID with flag bits, and the CAN-IDs that are taken.
+# COB-ID entries of the dictionary: a CAN-ID with flag bits, and the restricted CAN-IDs.
 
 INVALID: Final = 1 << 31
 """Bit 31: the object does not exist or is not valid (PDO, EMCY, SDO); SYNC and TIME differ."""
@@ -45,13 +45,13 @@ def is_restricted(can_id: int) -> bool:
 
 NMT_COB_ID: Final = 0x000
 ERROR_CONTROL_COB_ID: Final = 0x700
-"""Boot-up, heartbeat and guarding of node n are on this plus n."""
+"""CAN-ID of boot-up, heartbeat and guarding, plus the node-ID."""
 
 ALL_NODES: Final = 0
 
 
 class NmtState(IntEnum):
-    """NMT state as a heartbeat carries it."""
+    """NMT state as in a heartbeat."""
 
     INITIALISING = 0x00
     STOPPED = 0x04
@@ -74,4 +74,4 @@ COMMANDED: Final[Mapping[int, NmtState]] = {
     NmtCommand.STOP: NmtState.STOPPED,
     NmtCommand.ENTER_PRE_OPERATIONAL: NmtState.PRE_OPERATIONAL,
 }
-"""The state to which a command leads, from each state but Initialising."""
+"""Next state by command, from each state but Initialising."""

@@ -1,4 +1,4 @@
-"""PDOs on the wire: what they carry, mapping entries, bits in a frame, MPDOs (CiA 301, PDO).
+"""PDO codec: mapping entries, values packed as bits, MPDOs (CiA 301, PDO).
 
 >>> MappedObject.parse(0x6200_0108)
 MappedObject(index=25088, sub=1, bits=8)
@@ -63,7 +63,7 @@ class MappedObject:
 
 
 def fields(mapping: Iterable[int]) -> Iterator[tuple[MappedObject, int]]:
-    """Give the objects of a mapping, whose entries are as 6040 0010h, and the bits before each."""
+    """Yield the objects of a mapping (entries such as 6040 0010h), and the bits before each."""
     shift = 0
     for value in mapping:
         mapped = MappedObject.parse(value)
@@ -114,7 +114,7 @@ class Scanned:
     Attributes:
         index: of the objects that a SAM-MPDO producer may send.
         sub: the first of them.
-        block: how many follow each other.
+        block: number of consecutive sub-indices.
     """
 
     index: int
@@ -142,7 +142,7 @@ class Dispatched:
         producer_sub: the first sub-index there.
         index: of the object here.
         sub: the first sub-index here.
-        block: how many follow each other.
+        block: number of consecutive sub-indices.
     """
 
     node_id: int
@@ -175,7 +175,8 @@ class Mpdo:
     """A multiplexed PDO (CiA 301, MPDO protocol).
 
     Attributes:
-        destination: destination address mode: the rest names the consumer, else the producer.
+        destination: True in destination address mode, where the other fields name the consumer;
+            else they name the producer.
         node_id: 0 in destination address mode: all nodes.
         index: of the object, there.
         sub: of the object, there.
@@ -217,10 +218,10 @@ class Mpdo:
 
 
 def pack_bits(fields: Iterable[tuple[int, int]]) -> bytes:
-    """Return values behind each other, lowest bit first, filled up to whole bytes.
+    """Pack values, lowest bit first, padded to whole bytes.
 
     Args:
-        fields: value and number of bits each; what does not fit is cut off.
+        fields: pairs of value and number of bits; excess bits are dropped.
     """
     number = position = 0
     for value, bits in fields:
@@ -230,7 +231,7 @@ def pack_bits(fields: Iterable[tuple[int, int]]) -> bytes:
 
 
 def unpack_bits(data: bytes, widths: Iterable[int]) -> tuple[int, ...]:
-    """Return the values that lie behind each other; bits that are missing are 0."""
+    """Unpack values; missing bits are 0."""
     number = int.from_bytes(data, "little")
     values = []
     for bits in widths:

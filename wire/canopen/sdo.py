@@ -1,8 +1,8 @@
 r"""SDO frames as values: expedited and segmented transfer, abort (CiA 301, SDO protocols).
 
-The first byte means one thing from a client and another from a server, so each
-side has its parser. A segment of a block transfer looks like anything else:
-only who knows that a block is running can read it, by `BlockSegment.parse`.
+The first byte means one thing from a client and another from a server, so each side has its parser.
+A segment of a block transfer looks like any other frame: use `BlockSegment.parse` while a block is
+running.
 
 >>> parse_request(bytes.fromhex("2F002000A5000000"))
 DownloadInitiateRequest(index=8192, sub=0, data=b'\xa5', size=1)
@@ -54,7 +54,7 @@ class Abort:
     """Abort SDO transfer, from either side.
 
     Attributes:
-        code: an AbortCode, or the number as it came if it is none.
+        code: an AbortCode, or the received number if it is unknown.
     """
 
     index: int
@@ -74,11 +74,11 @@ class Abort:
 
 @dataclass(frozen=True, slots=True)
 class _Initiate:
-    """Begin of a transfer that carries the data or says how much follows.
+    """Initiate frame of a transfer, with the data or its size.
 
     Attributes:
         data: 1 to 4 bytes of an expedited transfer, None if segments follow.
-        size: number of bytes, None if it is not indicated; expedited data has 4 bytes then.
+        size: number of bytes, None if it is not indicated; expedited data then has 4 bytes.
     """
 
     COMMAND: ClassVar[int]
@@ -92,7 +92,7 @@ class _Initiate:
         if self.data is not None and not 1 <= len(self.data) <= EXPEDITED_BYTES:
             raise FieldError(f"{len(self.data)} bytes expedited, 1 to 4 fit")
         if self.data is not None and (self.size or EXPEDITED_BYTES) != len(self.data):
-            raise FieldError(f"size {self.size} is said of {len(self.data)} bytes")
+            raise FieldError(f"size {self.size} does not match {len(self.data)} bytes")
 
     def encode(self) -> bytes:
         """Return the 8 bytes."""
@@ -109,7 +109,7 @@ class _Initiate:
         indicated = bool(command & SIZE_INDICATED)
         if not command & EXPEDITED:
             return cls(*at, size=int.from_bytes(frame[4:], "little") if indicated else None)
-        # 22h: no size is said, so all four bytes are data as far as the frame goes.
+        # 22h: no size is indicated, so all four bytes count as data.
         size = EXPEDITED_BYTES - (command >> 2 & 3) if indicated else EXPEDITED_BYTES
         return cls(*at, frame[4 : 4 + size], size if indicated else None)
 
@@ -122,7 +122,7 @@ class DownloadInitiateRequest(_Initiate):
 
 
 class UploadInitiateResponse(_Initiate):
-    """Answer to `UploadInitiateRequest`."""
+    """Response to `UploadInitiateRequest`."""
 
     __slots__ = ()
     COMMAND = ServerCommand.UPLOAD
@@ -130,7 +130,7 @@ class UploadInitiateResponse(_Initiate):
 
 @dataclass(frozen=True, slots=True)
 class _Named:
-    """A frame with an index and sub-index and nothing else."""
+    """A frame with an index and sub-index only."""
 
     COMMAND: ClassVar[int]
 
@@ -155,7 +155,7 @@ class UploadInitiateRequest(_Named):
 
 
 class DownloadInitiateResponse(_Named):
-    """Answer to `DownloadInitiateRequest`: expedited data is written, or segments may come."""
+    """Response to `DownloadInitiateRequest`: expedited data is written, or segments may follow."""
 
     __slots__ = ()
     COMMAND = ServerCommand.DOWNLOAD
@@ -163,7 +163,7 @@ class DownloadInitiateResponse(_Named):
 
 @dataclass(frozen=True, slots=True)
 class Segment:
-    """Up to 7 bytes of a segmented transfer, either way.
+    """Up to 7 bytes of a segmented transfer, in either direction.
 
     Attributes:
         last: no more segments follow.
@@ -192,7 +192,7 @@ class Segment:
 
 @dataclass(frozen=True, slots=True)
 class _Toggled:
-    """A frame with a toggle bit and nothing else."""
+    """A frame with a toggle bit only."""
 
     COMMAND: ClassVar[int]
 
@@ -209,14 +209,14 @@ class _Toggled:
 
 
 class UploadSegmentRequest(_Toggled):
-    """Ask for the next segment."""
+    """Request for the next segment."""
 
     __slots__ = ()
     COMMAND = ClientCommand.UPLOAD_SEGMENT
 
 
 class DownloadSegmentResponse(_Toggled):
-    """Answer to a `Segment` of a download."""
+    """Response to a `Segment` of a download."""
 
     __slots__ = ()
     COMMAND = ServerCommand.DOWNLOAD_SEGMENT
@@ -235,7 +235,7 @@ Request = (
     | BlockEnd
     | BlockEnded
 )
-"""What a client sends, but for the segments of a block download."""
+"""Frames of a client, except the segments of a block download."""
 
 Response = (
     Abort
@@ -249,7 +249,7 @@ Response = (
     | BlockEnd
     | BlockEnded
 )
-"""What a server sends, but for the segments of a block upload."""
+"""Frames of a server, except the segments of a block upload."""
 
 _REQUESTS: Final[dict[int, Callable[[bytes], Request]]] = {
     ClientCommand.DOWNLOAD_SEGMENT: Segment.parse,
@@ -287,11 +287,11 @@ _BLOCK_RESPONSES: Final[dict[int, tuple[Callable[[bytes], Response] | None, ...]
     ),
     ServerCommand.BLOCK_UPLOAD: (BlockUploadInitiateResponse.parse, BlockEnd.parse) * 2,
 }
-"""By the subcommand: in a block upload it has two bits, of which the size bit is one."""
+"""Frames by subcommand: in a block upload it has two bits, including the size bit."""
 
 
 def parse_request(frame: bytes) -> Request:
-    """Read what a client sent; FramingError if it is no command."""
+    """Read a frame of a client; FramingError if it is not a command."""
     check_frame(frame)
     specifier = frame[0] & SPECIFIER
     choice = _BLOCK_REQUESTS.get(specifier)
@@ -302,7 +302,7 @@ def parse_request(frame: bytes) -> Request:
 
 
 def parse_response(frame: bytes) -> Response:
-    """Read what a server sent; FramingError if it is no command."""
+    """Read a frame of a server; FramingError if it is not a command."""
     check_frame(frame)
     specifier = frame[0] & SPECIFIER
     choice = _BLOCK_RESPONSES.get(specifier)

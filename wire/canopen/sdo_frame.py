@@ -58,7 +58,7 @@ from tickrig.wire.errors import FieldError, FramingError
 
 
 class AbortCode(IntEnum):
-    """Why an SDO transfer was aborted."""
+    """Reason for the abort of an SDO transfer."""
 
     TOGGLE_BIT = 0x0503_0000
     TIMEOUT = 0x0504_0000
@@ -133,11 +133,11 @@ def describe_abort(code: int) -> str:
     return f"{_TEXTS.get(code, 'unknown')} ({code:08X}h)"
 
 
-# Command bytes of SDO frames, and where things are in their 8 bytes (CiA 301, SDO protocols).
+# Command bytes of SDO frames, and the layout of their 8 bytes (CiA 301, SDO protocols).
 
 REQUEST_COB_ID: Final = 0x600
 RESPONSE_COB_ID: Final = 0x580
-"""The default SDO server of node n listens and answers on these plus n."""
+"""CAN-IDs of requests and responses of the default SDO server, plus the node-ID."""
 
 FRAME_BYTES: Final = 8
 EXPEDITED_BYTES: Final = 4
@@ -200,9 +200,9 @@ BLOCK_ENDED: Final = 0xA1
 BLOCK_ACKNOWLEDGE: Final = 0xA2
 BLOCK_START: Final = 0xA3
 BLOCK_END: Final = 0xC1
-"""Block transfer: these four are the same whoever sends them; an end has n in bits 4 to 2."""
+"""Block transfer: these four are the same from client and server; an end has n in bits 4 to 2."""
 BLOCK_SUBCOMMAND: Final = 0x03
-"""Bits of the subcommand where block upload is meant, and of an acknowledgement."""
+"""Bits of the subcommand in a block upload and in an acknowledgement."""
 
 
 _FRAME: Final = Struct("<BHB4s")
@@ -236,10 +236,10 @@ def check_frame(frame: bytes) -> None:
 
 @dataclass(frozen=True, slots=True)
 class BlockSegment:
-    """7 bytes of a block, either way; the fill of the last one is said at the end.
+    """7 bytes of a block, in either direction; the end frame has the fill of the last one.
 
     Attributes:
-        seqno: 1..127, its place in the block.
+        seqno: 1..127, its position in the block.
         last: no more segments follow.
     """
 
@@ -264,10 +264,10 @@ class BlockSegment:
 
 @dataclass(frozen=True, slots=True)
 class _BlockInitiate:
-    """Begin of a transfer whose sender says the size.
+    """Initiate frame of a block transfer from the sender of the data.
 
     Attributes:
-        crc: the sender can do the CRC.
+        crc: the sender supports the CRC.
         size: number of bytes, None if it is not indicated.
     """
 
@@ -299,17 +299,17 @@ class BlockDownloadInitiateRequest(_BlockInitiate):
 
 
 class BlockUploadInitiateResponse(_BlockInitiate):
-    """Answer to `BlockUploadInitiateRequest`."""
+    """Response to `BlockUploadInitiateRequest`."""
 
     __slots__ = ()
 
 
 @dataclass(frozen=True, slots=True)
 class BlockDownloadInitiateResponse:
-    """Answer to `BlockDownloadInitiateRequest`.
+    """Response to `BlockDownloadInitiateRequest`.
 
     Attributes:
-        crc: the server can do the CRC.
+        crc: the server supports the CRC.
         block_size: segments in the first block, 1..127.
     """
 
@@ -334,7 +334,7 @@ class BlockUploadInitiateRequest:
     """Initiate SDO block upload.
 
     Attributes:
-        crc: the client can do the CRC.
+        crc: the client supports the CRC.
         block_size: segments in the first block, 1..127.
         threshold: protocol switch threshold, 0 to forbid the switch to another upload.
     """
@@ -358,7 +358,7 @@ class BlockUploadInitiateRequest:
 
 @dataclass(frozen=True, slots=True)
 class BlockStart:
-    """The client of a block upload is ready for segments."""
+    """The client of a block upload requests the segments."""
 
     def encode(self) -> bytes:
         """Return the 8 bytes."""
@@ -372,10 +372,10 @@ class BlockStart:
 
 @dataclass(frozen=True, slots=True)
 class BlockAcknowledge:
-    """Receipt of a block, either way.
+    """Acknowledgement of a block, in either direction.
 
     Attributes:
-        ackseq: the last segment that came in sequence, 0 for none.
+        ackseq: the last segment received in sequence, 0 for none.
         block_size: segments in the next block, 1..127.
     """
 
@@ -394,11 +394,11 @@ class BlockAcknowledge:
 
 @dataclass(frozen=True, slots=True)
 class BlockEnd:
-    """All segments are received: what the sender says of them, either way.
+    """End of a block transfer from the sender of the data, in either direction.
 
     Attributes:
-        fill: bytes of the last segment that are no data, 0..7.
-        crc: 0 if one side cannot do it.
+        fill: unused bytes of the last segment, 0..7.
+        crc: 0 if one side does not support it.
     """
 
     fill: int
@@ -417,7 +417,7 @@ class BlockEnd:
 
 @dataclass(frozen=True, slots=True)
 class BlockEnded:
-    """Answer to `BlockEnd`, either way."""
+    """Response to `BlockEnd`, in either direction."""
 
     def encode(self) -> bytes:
         """Return the 8 bytes."""

@@ -19,13 +19,13 @@ from tickrig.wire.rrc.message import all_digits, check_digit, read_hex, read_sig
 
 
 class Parameter:
-    """One parameter of a command: how many digits, and which values are allowed.
+    """One parameter of a command: number of digits, and allowed values.
 
     Attributes:
         width: number of hex digits, 1 or 2.
         low: smallest value; below 0 for two's complement.
         high: largest value.
-        values: value by digits, in either case, for all that is allowed.
+        values: all allowed values by their digits, in either case.
     """
 
     __slots__ = ("high", "low", "values", "width")
@@ -44,7 +44,7 @@ class Parameter:
         return value
 
     def write(self, value: int) -> bytes:
-        """Write the parameter in lower case, as the manual's samples do."""
+        """Write the parameter in lower case, as in the samples of the manual."""
         return b"%0*x" % (self.width, value & 0xFF)
 
     def checked(self, value: int) -> int:
@@ -65,7 +65,7 @@ _REVERSE_MODE: Final = Parameter(1, 0, 3)
 
 
 class UnknownCommand(FramingError):  # noqa: N818 - the manual's word: CommandUnknown
-    """No command begins like this."""
+    """No command has this name."""
 
 
 class BadParameters(FieldError):  # noqa: N818 - what came
@@ -90,12 +90,12 @@ class Command:
     size: ClassVar[int] = 0  # characters behind the name
 
     def __init_subclass__(cls) -> None:
-        """Count what stands behind the name."""
+        """Compute the length of the parameters."""
         widths: int = sum(p.width for p in cls.parameters)
         cls.size = len(cls.literal) + widths
 
     def __post_init__(self) -> None:
-        """Refuse values that do not fit; BadParameters says which."""
+        """Raise BadParameters for the first value that does not fit."""
         values = self.values()
         if len(values) != len(self.parameters):
             raise BadParameters(self.name, f"{len(values)} values, not {len(self.parameters)}")
@@ -111,7 +111,7 @@ class Command:
         return tuple([getattr(self, name) for name in names])
 
     def encode(self, *, check: bool = False) -> bytes:
-        """Write the line with its LF, and with CHECK where stablemode wants it."""
+        """Write the line with its LF, and with CHECK if stablemode requires it."""
         digits = [p.write(v) for p, v in zip(self.parameters, self.values(), strict=True)]
         message = self.name + self.literal + b"".join(digits)
         return message + (check_digit(message) if check else b"") + b"\n"
@@ -119,7 +119,7 @@ class Command:
 
 @dataclass(frozen=True, slots=True)
 class Limit(Command):
-    """Let the stick drive, within limits.
+    """Drive by the stick, within limits.
 
     Attributes:
         v_pct: #1, translation input limit, 0..100 %.
@@ -141,7 +141,7 @@ class Limit(Command):
 
 @dataclass(frozen=True, slots=True)
 class Output(Command):
-    """Let the host drive: translation (forward) and rotation (right), -100..100 %."""
+    """Drive by the host: translation (forward) and rotation (right), -100..100 %."""
 
     name = b"output"
     parameters = (_SIGNED_PERCENT, _SIGNED_PERCENT)
@@ -152,21 +152,21 @@ class Output(Command):
 
 @dataclass(frozen=True, slots=True)
 class DeviceName(Command):
-    """Ask for the device name."""
+    """Request the device name."""
 
     name = b"device"
 
 
 @dataclass(frozen=True, slots=True)
 class Version(Command):
-    """Ask for the version."""
+    """Request the version."""
 
     name = b"version"
 
 
 @dataclass(frozen=True, slots=True)
 class Date(Command):
-    """Ask for the date and time of compilation."""
+    """Request the date and time of compilation."""
 
     name = b"date"
 
@@ -193,11 +193,12 @@ class Joystick(Command):
         w_high_pct: #4, rotation that counts as 100.
         v_exponent: #5, 0..15: output = input ^ (1 + 0.1 * #5).
         w_exponent: #6, 0..15.
-        reverse_mode: #7, 0 plain, 1 no backing, 2 gear change, 3 gear change turned round.
+        reverse_mode: #7, 0 plain, 1 no backing, 2 gear change, 3 gear change reversed.
         neutral_pct: #8, neutral radius, 0..100 %; with #7 at 0 or 1 any byte (DECISION R14).
         switch_deg: #9, threshold between backward and forward gear, 0..90 from straight back;
             likewise.
-        fade_deg: #10, where the backward gear begins to fade, 0..90 from straight back; likewise.
+        fade_deg: #10, angle at which the backward gear starts to fade, 0..90 from straight back;
+            likewise.
     """
 
     name = b"joystick"
@@ -220,7 +221,7 @@ class Joystick(Command):
     fade_deg: int = 45
 
     def __post_init__(self) -> None:
-        """Refuse a dead zone that is upside down, and #8 to #10 that no gear change could use."""
+        """Refuse a reversed dead zone, and #8 to #10 that no gear change can use."""
         Command.__post_init__(self)
         try:
             for number, parameter in enumerate(self.gear_parameters, 8):
@@ -232,10 +233,10 @@ class Joystick(Command):
             raise BadParameters(self.name, "lower dead zone is not below the upper one")
 
     def after(self, former: Joystick) -> Joystick:
-        """Return what holds after this command: #8 to #10 out of range leave the former ones.
+        """Return the settings after this command: #8 to #10 out of range keep the former values.
 
         Args:
-            former: what held before (DECISION R14).
+            former: the settings before (DECISION R14).
 
         >>> Joystick(neutral_pct=255, switch_deg=20).after(Joystick(neutral_pct=7)).values()[7:]
         (7, 20, 45)
@@ -261,7 +262,7 @@ class Watchdog(Command):
 
 @dataclass(frozen=True, slots=True)
 class StableMode(Command):
-    """Switch stablemode: CHECK wanted on each line, and no OK lines."""
+    """Switch stablemode: each line needs CHECK, and there are no OK lines."""
 
     name = b"stablemode"
     parameters = (_FLAG,)
@@ -282,7 +283,7 @@ class Status(Command):
 
 @dataclass(frozen=True, slots=True)
 class PowerOff(Command):
-    """Stop VR2 by force."""
+    """Force VR2 to stop."""
 
     name = b"poweroff"
 
@@ -316,21 +317,21 @@ def parse_command(message: bytes) -> Command:
     """Read a command without line end and CHECK.
 
     Raises:
-        UnknownCommand: no command has this name; names are lower case.
+        UnknownCommand: unknown name; names are lower case.
         BadParameters: wrong number of digits, a bad digit, a value out of range.
     """
     # The name decides first, then the count of characters, then digits, then ranges (R11):
     # so `limit 6464ffffff` is ER:limit and `Limit6464ffffff` is ER:CommandUnknown.
     match = _NAME.match(message)
     if match is None:
-        raise UnknownCommand(f"{message!r} is none of {', '.join(n.decode() for n in COMMANDS)}")
+        raise UnknownCommand(f"{message!r} is not one of {', '.join(n.decode() for n in COMMANDS)}")
     kind = COMMANDS[match[0]]
     values = _read_parameters(kind, message[match.end() :])
     return Beep(values) if kind is Beep else kind(*values)
 
 
 def _read_parameters(kind: type[Command], text: bytes) -> tuple[int, ...]:
-    """Cut the text behind the name into parameters; BadParameters if it does not fit."""
+    """Split the text after the name into parameters; BadParameters if it does not fit."""
     at = len(kind.literal)
     size = kind.size
     if len(text) != size or not text.startswith(kind.literal):

@@ -1,4 +1,4 @@
-"""What commands and replies are made of: hex numbers, the CHECK digit, and what traffic costs."""
+"""Parts of commands and replies: hex numbers, the CHECK digit, and the cost of traffic."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _HEX_DIGITS: Final = frozenset(bytes([code]) for code in b"0123456789ABCDEFabcde
 
 
 def all_digits(width: int) -> list[bytes]:
-    """Return all numbers of so many hex digits, in every mixture of cases."""
+    """Return all numbers with this many hex digits, in every mixture of cases."""
     return [b"".join(digits) for digits in product(sorted(_HEX_DIGITS), repeat=width)]
 
 
@@ -69,7 +69,7 @@ def strip_check(line: bytes) -> bytes:
     return message
 
 
-# What traffic costs the RRC, and how much of it a host may send (DECISION R27).
+# Cost of traffic for the RRC, and how much a host may send (DECISION R27).
 #
 # Costs are in per cent of the RRC's period of 10 ms. Above 100 % it falls behind, and 300 % behind
 # stops VR2. At exactly 100 % nothing drains: a host whose clock is 0.1 % fast stops VR2 after 60 s,
@@ -88,17 +88,17 @@ PERIOD_US: Final = 10_000
 PERIODS_A_SECOND: Final = 100
 
 LINES_A_PERIOD: Final = 2
-"""Lines worked on in a period while VR2 runs; elsewhere one in two periods."""
+"""Lines processed in a period while VR2 runs; otherwise one in two periods."""
 
 PACE_WITHOUT_VR2: Final = PERIODS_A_SECOND // 2 * SAFE_PCT // PERIOD_PCT
-"""Lines a second that a host may send while VR2 does not run."""
+"""Lines per second that a host may send while VR2 does not run."""
 
 
 def pace_lines_s(*, stable: bool, status: bool, extra_pct: int = 0) -> int:
-    """Return how many lines a second a host may send while VR2 runs.
+    """Return the number of lines per second that a host may send while VR2 runs.
 
     Args:
-        stable: whether OK lines are left out (stablemode).
+        stable: whether OK lines are omitted (stablemode).
         status: whether a status line is sent in each period.
         extra_pct: other work of the RRC, in per cent of a period.
 

@@ -43,12 +43,12 @@ class RrcEvent(StrEnum):
 
 
 POWER_ON_TRIGGER: Final = "PowerOnTrigger"
-"""What devices in the field send for `PowerOn` (DECISION R7)."""
+"""Event that devices in the field send for `PowerOn` (DECISION R7)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Ok:
-    """`OK:name`: the command was carried out."""
+    """`OK:name`: the command was executed."""
 
     name: str
 
@@ -59,7 +59,7 @@ class Ok:
 
 @dataclass(frozen=True, slots=True)
 class Refusal:
-    """`ER:reason`: a command's name, or what was wrong with the line."""
+    """`ER:reason`: the name of a command, or the fault of the line."""
 
     reason: str
 
@@ -70,13 +70,13 @@ class Refusal:
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """`EV:name`: the state of RRC or VR2 changed. The name may be a newer firmware's."""
+    """`EV:name`: the state of RRC or VR2 changed. Newer firmware may send other names."""
 
     name: str
 
     @property
     def kind(self) -> RrcEvent | None:
-        """Which of the manual's events this is; None for one it does not list."""
+        """The event of the manual; None if the manual does not list it."""
         if self.name == POWER_ON_TRIGGER:
             return RrcEvent.POWER_ON
         try:
@@ -96,8 +96,8 @@ class StatusA:
     Attributes:
         in_v_pct: #1, translation of the stick, -100..100 %.
         in_w_pct: #2, rotation of the stick.
-        out_v_pct: #3, translation that goes to the power module.
-        out_w_pct: #4, rotation that goes to the power module.
+        out_v_pct: #3, translation sent to the power module.
+        out_w_pct: #4, rotation sent to the power module.
         gauge: #5, voltage gauge, 1..10.
         speed_mode: #6, 1..5.
         speed_up_count: #7, 0..15; odd while the button is pressed.
@@ -130,7 +130,7 @@ class StatusA:
 
 @dataclass(frozen=True, slots=True)
 class Text:
-    """Any other line: the answer of `device`, `version`, `date`, or a newer firmware's."""
+    """Any other line: the answer to `device`, `version`, `date`, or one of newer firmware."""
 
     text: str
 
@@ -152,7 +152,7 @@ def parse_reply(line: bytes) -> Reply:
     """Read a line without its LF.
 
     Raises:
-        FramingError: an SA line of a wrong length.
+        FramingError: an SA line with a wrong length.
         ChecksumError: an SA line whose CHECK does not match.
         FieldError: an SA line with a bad digit or a value out of range.
     """

@@ -1,8 +1,7 @@
 """The letters of RTC-Lite: commands, status, states, execution contexts, link faults.
 
-The paper (Suzuki et al., RTComponent-Lite-0.4.0, RSJ 2007) names two command
-bytes and no values. The letters are those of RTno wherever it has one
-(DECISION L9).
+The paper (Suzuki et al., RTComponent-Lite-0.4.0, RSJ 2007) defines two command bytes without
+values. The letters are those of RTno where it has one (DECISION L9).
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ from typing import Final
 
 
 class LiteCommand(Enum):
-    """Cmnd0 selects the RTC object, Cmnd1 what it does; request and reply carry the same two."""
+    """Commands: Cmnd0 selects the RTC object, Cmnd1 its operation; the reply repeats both."""
 
     INITIALIZE = b"CI"
     PROFILE = b"CZ"
@@ -40,7 +39,7 @@ class LiteCommand(Enum):
 
 
 class LiteLinkFault(IntEnum):
-    """What a receiver says of bytes that are no request (DECISION L7)."""
+    """Faults that a receiver reports for bytes that are not a request (DECISION L7)."""
 
     TIMEOUT = 1
     CHECKSUM = 3
@@ -52,7 +51,7 @@ FAULT_COMMANDS: Final = {
     LiteLinkFault.CHECKSUM: LiteCommand.CHECKSUM_FAULT,
     LiteLinkFault.UNKNOWN: LiteCommand.UNKNOWN_FAULT,
 }
-"""The frame in which each fault is told."""
+"""The frame that reports each fault."""
 
 
 class LiteStatus(IntEnum):
@@ -78,7 +77,7 @@ class LiteState(IntEnum):
 
 
 class LiteContextType(IntEnum):
-    """Who makes the component execute."""
+    """Kind of execution context."""
 
     PROXY = 0x21  # the proxy's execution context, one AE a period
     TIMER = 0x22  # a timer of the device

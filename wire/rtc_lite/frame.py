@@ -5,11 +5,10 @@ r"""Frames of RTC-Lite: header, Cmnd0, Cmnd1, data, checksum (paper, Fig. 2).
 >>> LiteFrame(LiteCommand.STATE, b"@C").encode(Checksum.XOR8).hex(" ")
 '0a 43 58 40 43 18'
 
-How long the data of a frame is.
+The length of the data of a frame.
 
-There is no length byte: data delimits itself (DECISION L6). A layout says how
-many bytes the data has as far as the bytes read so far can tell; the data is
-whole when it has that many.
+There is no length byte: data delimits itself (DECISION L6). A layout computes the minimum length of
+the data from the bytes read so far; the data is complete at that length.
 
 >>> REQUESTS[LiteCommand.WRITE](b""), REQUESTS[LiteCommand.WRITE](b"\x02\x04in")
 (2, 8)
@@ -39,13 +38,13 @@ from tickrig.wire.errors import FieldError
 from tickrig.wire.rtc_lite.codes import FAULT_COMMANDS, LiteCommand, LiteLinkFault, LiteStatus
 
 MAX_DATA_BYTES: Final = 60
-"""The largest data; with header, commands and checksum it fills a buffer of 64 bytes."""
+"""Largest size of the data; with header, commands and checksum it fills a buffer of 64 bytes."""
 
 Layout = Callable[[bytes | bytearray], int]
-"""Tells from the data so far how long it is, at least."""
+"""Returns the minimum length of the data from the data so far."""
 
 WITH_FIELDS: Final = (LiteStatus.OK, LiteStatus.ERROR, LiteStatus.WRONG_STATE)
-"""After any other status the reply ends."""
+"""Statuses with fields; after any other status the reply ends."""
 
 
 def _fixed(size: int, data: bytes | bytearray) -> int:
@@ -62,7 +61,7 @@ def _port_data(data: bytes | bytearray) -> int:
 
 
 def _reply(size: int, data: bytes | bytearray) -> int:
-    """A status, and fields of a fixed size where the status lets them follow."""
+    """A status, followed by fields of a fixed size for some statuses."""
     return 1 + size if data and data[0] in WITH_FIELDS else 1
 
 
@@ -84,10 +83,10 @@ WITH_STATE: Final = (
     *(LiteCommand.ACTIVATE, LiteCommand.DEACTIVATE, LiteCommand.EXECUTE, LiteCommand.ABORT),
     *(LiteCommand.ERROR, LiteCommand.RESET, LiteCommand.STARTUP, LiteCommand.SHUTDOWN),
 )
-"""Commands of the life cycle: no arguments, and the state in the reply."""
+"""Commands of the life cycle: without arguments, with the state in the reply."""
 
 _FAULTS: Final = (LiteCommand.CHECKSUM_FAULT, LiteCommand.TIMEOUT_FAULT, LiteCommand.UNKNOWN_FAULT)
-"""What a device says of bytes that are no frame for it."""
+"""Fault reports of a device for bytes that are not a valid frame."""
 
 REQUESTS: Final[Mapping[LiteCommand, Layout]] = {
     **dict.fromkeys((*WITH_STATE, LiteCommand.PROFILE, LiteCommand.CONTEXT), partial(_fixed, 0)),
@@ -96,7 +95,7 @@ REQUESTS: Final[Mapping[LiteCommand, Layout]] = {
     LiteCommand.WRITE: _port_data,
     LiteCommand.POLL: _counted,
 }
-"""What a proxy sends."""
+"""Frames of a proxy."""
 
 REPLIES: Final[Mapping[LiteCommand, Layout]] = {
     **dict.fromkeys((*WITH_STATE, LiteCommand.PING, LiteCommand.CONTEXT), partial(_reply, 1)),
@@ -110,34 +109,34 @@ REPLIES: Final[Mapping[LiteCommand, Layout]] = {
     LiteCommand.DATA: _port_data,
     LiteCommand.POLL: _polled,
 }
-"""What a device sends."""
+"""Frames of a device."""
 
 
 class Framing(StrEnum):
-    """Frames, or the packets of a relative."""
+    """Framing: frames of RTC-Lite, or packets of RTno."""
 
     LITE = "lite"  # the frames of RTC-Lite
     RTNO = "rtno"  # bridge mode: packets of RTno
 
 
 HEADER: Final = b"\n"
-"""0x0A (DECISION L4). It may occur in data: only the parser's position tells."""
+"""0x0A (DECISION L4). It may occur in data; only the position distinguishes it."""
 
 
 class Checksum(StrEnum):
-    """How Cmnd0, Cmnd1 and data are summed up (DECISION L5)."""
+    """Checksum algorithm over Cmnd0, Cmnd1 and data (DECISION L5)."""
 
     SUM8 = "sum8"  # the figure's word: Checksum
     XOR8 = "xor8"  # the legend's word: Parity
 
     def of(self, body: bytes | bytearray) -> int:
-        """Return the last byte of a frame from all between it and the header."""
+        """Return the last byte of a frame, computed from the bytes after the header."""
         return sum(body) & 0xFF if self is Checksum.SUM8 else reduce(xor, body, 0)
 
 
 @dataclass(frozen=True, slots=True)
 class LiteFrame:
-    """A frame, of either direction.
+    """A frame in either direction.
 
     Attributes:
         command: Cmnd0 and Cmnd1.
@@ -148,13 +147,13 @@ class LiteFrame:
     data: bytes = b""
 
     def __post_init__(self) -> None:
-        """Refuse what no device could hold."""
+        """Raise FieldError if the data are too long for a device."""
         if len(self.data) > MAX_DATA_BYTES:
             raise FieldError(f"{len(self.data)} data bytes, at most {MAX_DATA_BYTES} fit")
 
     @property
     def body(self) -> bytes:
-        """What the checksum is made of."""
+        """The bytes covered by the checksum."""
         return self.command.value + self.data
 
     def encode(self, checksum: Checksum = Checksum.SUM8) -> bytes:
@@ -163,7 +162,7 @@ class LiteFrame:
 
 
 def fault_frame(fault: LiteLinkFault) -> LiteFrame:
-    """Return the frame that tells of bytes that were no request."""
+    """Return the frame that reports bytes that are not a request."""
     return LiteFrame(FAULT_COMMANDS[fault], bytes([fault]))
 
 
@@ -174,17 +173,16 @@ _COMMANDS: Final = {command.value: command for command in LiteCommand}
 class LiteDecoder:
     """Reads the frames of one direction (DECISION L6, L7).
 
-    It knows no time. Whoever owns it watches the line and calls `clear` after
-    100 ms without a byte while a frame has `begun`, and after 20 ms without a
-    byte while it is `lost`.
+    It has no clock. Its owner watches the line and calls `clear` after 100 ms without a byte while
+    a frame has `begun`, and after 20 ms without a byte while it is `lost`.
 
     Args:
         layouts: `REQUESTS` at the device, `REPLIES` at the proxy.
-        checksum: how frames are summed up.
+        checksum: algorithm of the checksum.
 
     Attributes:
-        lost: an unknown command came, or more data than fit: nobody knows where
-            the next frame begins, and all is thrown away until `clear`.
+        lost: an unknown command or too much data arrived: the start of the next frame is unknown,
+            and all bytes are discarded until `clear`.
     """
 
     layouts: Mapping[LiteCommand, Layout]
@@ -194,16 +192,16 @@ class LiteDecoder:
 
     @property
     def begun(self) -> bool:
-        """Whether a frame has begun that is not whole."""
+        """Whether an incomplete frame has started."""
         return bool(self._frame)
 
     def clear(self) -> None:
-        """Forget a frame that has only begun, and look for a header again."""
+        """Discard an incomplete frame, and search for a header again."""
         self.lost = False
         self._frame.clear()
 
     def push(self, data: bytes) -> list[LiteFrame | LiteLinkFault]:
-        """Take bytes in; give whole frames out, and what was wrong with others."""
+        """Add received bytes; return completed frames, and the faults of others."""
         out = []
         for code in data:
             if not self.lost and (self._frame or code == HEADER[0]):
@@ -215,7 +213,7 @@ class LiteDecoder:
         return out
 
     def _parse(self) -> LiteFrame | LiteLinkFault | None:
-        """Return what the latest byte completed."""
+        """Return the frame or fault completed by the latest byte."""
         frame = self._frame
         if len(frame) < 3:
             return None

@@ -1,4 +1,4 @@
-r"""What the data of frames means, beside a single byte.
+r"""Contents of frames with more than a single byte of data.
 
 >>> LitePortData(b"in", b"\x2a\x00\x00\x00").encode().hex(" ")
 '02 04 69 6e 2a 00 00 00'
@@ -17,7 +17,7 @@ from tickrig.wire.rtc_lite.codes import LiteStatus
 from tickrig.wire.rtc_lite.frame import MAX_DATA_BYTES, REPLIES, LiteFrame
 
 PORT_COUNTS_BYTES: Final = 2
-"""Length of the name and length of the data stand before them."""
+"""The lengths of name and data precede them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +25,7 @@ class LitePortData:
     """Data on its way to an in-port (PS) or from an out-port (QV).
 
     Attributes:
-        name: of the port, as it was on the wire.
+        name: of the port, as on the wire.
         data: the marshalled value.
     """
 
@@ -33,7 +33,7 @@ class LitePortData:
     data: bytes
 
     def __post_init__(self) -> None:
-        """Refuse what does not fit into a frame."""
+        """Raise FieldError if it does not fit into a frame."""
         size = PORT_COUNTS_BYTES + len(self.name) + len(self.data)
         if size > MAX_DATA_BYTES:
             raise FieldError(f"name and data make {size} data bytes, {MAX_DATA_BYTES} fit")
@@ -48,7 +48,7 @@ class LitePortProfile:
     """A port as the device describes it (PP, QQ).
 
     Attributes:
-        code: letter of its type; it may be one that nobody knows.
+        code: letter of its type; it may be unknown.
         name: of the port.
     """
 
@@ -62,11 +62,11 @@ class LitePortProfile:
 
 @dataclass(frozen=True, slots=True)
 class LiteComponentProfile:
-    """What follows the ports: how many there were, and the type of the component (CZ).
+    """The message after the ports: their numbers, and the type of the component (CZ).
 
     Attributes:
-        in_ports: how many PP frames were sent.
-        out_ports: how many QQ frames were sent.
+        in_ports: number of PP frames sent.
+        out_ports: number of QQ frames sent.
         type_name: the type of the component.
     """
 
@@ -81,11 +81,11 @@ class LiteComponentProfile:
 
 @dataclass(frozen=True, slots=True)
 class LiteReply:
-    """What a device answers.
+    """The reply of a device.
 
     Attributes:
-        status: a `LiteStatus`, or a number that nobody knows.
-        fields: what follows it: state, sequence number, context type.
+        status: a `LiteStatus`, or an unknown number.
+        fields: the bytes after it: state, sequence number, context type.
     """
 
     status: int
@@ -93,7 +93,7 @@ class LiteReply:
 
     @property
     def ok(self) -> bool:
-        """Whether the device did what it was asked for."""
+        """Whether the device executed the request."""
         return self.status == LiteStatus.OK
 
     def encode(self) -> bytes:
@@ -128,7 +128,7 @@ def parse_reply(frame: LiteFrame) -> LiteReply:
     """Read the data of a reply.
 
     Raises:
-        FramingError: a frame that is no reply, or whose length does not fit.
+        FramingError: a frame that is not a reply, or has a wrong length.
     """
     data, layout = frame.data, REPLIES[frame.command]
     if not data or layout(data) != len(data):

@@ -1,8 +1,8 @@
 r"""Packets of RTno, for the bridge mode: header 0x0A 0x0A, letter, length, data, sum.
 
-RTno (Yuki Suga, 2010 to 2014) is the nearest living relative of RTC-Lite. Its
-packets carry one letter and a length; replies carry the status alone, or the
-state alone. What RTno has no letter for cannot be sent in bridge mode.
+RTno (Yuki Suga, 2010 to 2014) is the closest relative of RTC-Lite. Its packets have one letter and
+a length; replies have only the status, or only the state. Commands without a letter in RTno cannot
+be sent in bridge mode.
 
 >>> RtnoDecoder().push(bytes.fromhex("0a 0a 58 00 58"))
 [LiteFrame(command=<LiteCommand.STATE: b'CX'>, data=b'')]
@@ -41,7 +41,7 @@ LETTERS: Final[Mapping[LiteCommand, bytes]] = MappingProxyType(
         **dict.fromkeys(FAULT_COMMANDS.values(), b"F"),
     }
 )
-"""RTno's letter of each command that it has."""
+"""RTno's letter of each command."""
 
 _REQUESTS: Final = {LETTERS[command]: command for command in REQUESTS if command in LETTERS}
 _WITHOUT_STATUS: Final = (LiteCommand.STATE, LiteCommand.CONTEXT)
@@ -49,7 +49,7 @@ _PROFILES: Final = (LiteCommand.IN_PROFILE, LiteCommand.OUT_PROFILE)
 
 
 _TYPE_NAME: Final = b"RTno"
-"""Stands for the type of a component, which a device of RTno does not tell."""
+"""Placeholder for the type of a component, which RTno devices do not send."""
 
 _FAULT: Final = LETTERS[LiteCommand.CHECKSUM_FAULT]
 _COMMANDS: Final = {
@@ -62,7 +62,7 @@ _STATES: Final = {
     LiteCommand.ERROR: b"E",
     LiteCommand.RESET: b"I",
 }
-"""The state after a command that was obeyed."""
+"""The state after an executed command."""
 
 
 def encode_request(frame: LiteFrame) -> bytes:
@@ -71,18 +71,18 @@ def encode_request(frame: LiteFrame) -> bytes:
 
 
 def encode_packet(frame: LiteFrame) -> bytes:
-    """Write a frame of the device as RTno would; KeyError if RTno has no letter for it."""
+    """Write a frame of the device as a packet; KeyError if RTno has no letter for it."""
     return pack(LETTERS[frame.command], _packet_data(frame))
 
 
 def pack(letter: bytes, data: bytes) -> bytes:
-    """Write a packet of either direction."""
+    """Write a packet in either direction."""
     body = letter + bytes([len(data)]) + data
     return HEADER + body + bytes([sum(body) & 0xFF])
 
 
 def _packet_data(frame: LiteFrame) -> bytes:
-    """Return what RTno sends of the data."""
+    """Return the part of the data that RTno sends."""
     if frame.command in _WITHOUT_STATUS or frame.command in _PROFILES:
         return frame.data[1:]
     if frame.command in FAULT_COMMANDS.values():
@@ -92,7 +92,7 @@ def _packet_data(frame: LiteFrame) -> bytes:
 
 
 class RtnoPacket(NamedTuple):
-    """A packet of either direction."""
+    """A packet in either direction."""
 
     letter: bytes
     data: bytes
@@ -100,10 +100,10 @@ class RtnoPacket(NamedTuple):
 
 @dataclass(slots=True)
 class RtnoPacketDecoder:
-    """Reads packets of either direction out of a byte stream.
+    """Reads packets in either direction from a byte stream.
 
     Attributes:
-        lost: more data than fit were announced: all is thrown away until `clear`.
+        lost: too much data was announced: all bytes are discarded until `clear`.
     """
 
     lost: bool = field(default=False, init=False)
@@ -111,16 +111,16 @@ class RtnoPacketDecoder:
 
     @property
     def begun(self) -> bool:
-        """Whether a packet has begun that is not whole."""
+        """Whether an incomplete packet has started."""
         return bool(self._packet)
 
     def clear(self) -> None:
-        """Forget a packet that has only begun, and look for a header again."""
+        """Discard an incomplete packet, and search for a header again."""
         self.lost = False
         self._packet.clear()
 
     def packets(self, data: bytes) -> list[RtnoPacket | LiteLinkFault]:
-        """Take bytes in; give whole packets out, and what was wrong with others."""
+        """Add received bytes; return completed packets, and the faults of others."""
         out = []
         for code in data:
             if self.lost:
@@ -138,7 +138,7 @@ class RtnoPacketDecoder:
         return out
 
     def _parse(self) -> RtnoPacket | LiteLinkFault | None:
-        """Return what the latest byte completed."""
+        """Return the packet or fault completed by the latest byte."""
         packet = self._packet
         if len(packet) < _EMPTY_PACKET_BYTES:
             return None
@@ -156,11 +156,11 @@ class RtnoPacketDecoder:
 class RtnoDecoder(RtnoPacketDecoder):
     """Reads the packets of a proxy as frames; used as `LiteDecoder` is.
 
-    An unknown letter has the same effect as more data than fit.
+    An unknown letter has the same effect as too much data.
     """
 
     def push(self, data: bytes) -> list[LiteFrame | LiteLinkFault]:
-        """Take bytes in; give whole packets out as frames, and what was wrong with others."""
+        """Add received bytes; return completed packets as frames, and the faults of others."""
         out = []
         for found in self.packets(data):
             out.append(found if isinstance(found, LiteLinkFault) else _frame_of(found))
@@ -182,9 +182,9 @@ def _frame_of(packet: RtnoPacket) -> LiteFrame | LiteLinkFault:
 class RtnoReplies(RtnoPacketDecoder):
     r"""Reads the packets of a device as frames; used as `Decoder(REPLIES)` is.
 
-    RTno leaves out what a frame has: the status of a state, the state after a
-    command, the numbers and the type of a profile. They are put in where they
-    follow from the rest; the state after a refusal is `?`, which is none.
+    RTno omits parts of a frame: the status of a state, the state after a command, the numbers and
+    the type of a profile. They are added if they follow from the rest; the state after a refusal is
+    `?`, which is not a state.
 
     >>> RtnoReplies().push(bytes.fromhex("0a 0a 58 01 49 a2"))
     [LiteFrame(command=<LiteCommand.STATE: b'CX'>, data=b'@I')]
@@ -195,7 +195,7 @@ class RtnoReplies(RtnoPacketDecoder):
     )  # since the last profile
 
     def push(self, data: bytes) -> list[LiteFrame | LiteLinkFault]:
-        """Take bytes in; give whole packets out as frames, and what was wrong with others."""
+        """Add received bytes; return completed packets as frames, and the faults of others."""
         return [
             found if isinstance(found, LiteLinkFault) else self._frame_of(found)
             for found in self.packets(data)
@@ -213,7 +213,7 @@ class RtnoReplies(RtnoPacketDecoder):
         return LiteFrame(command, data)
 
     def _complete(self, command: LiteCommand, data: bytes) -> bytes:
-        """Put in what RTno leaves out."""
+        """Add the parts that RTno omits."""
         if command in {LiteCommand.STATE, LiteCommand.CONTEXT}:
             return bytes([LiteStatus.OK]) + data
         if command in _PROFILES:
@@ -232,12 +232,12 @@ class RtnoReplies(RtnoPacketDecoder):
 
 
 def _state_after(status: int) -> bytes:
-    """Return the state after a command that failed or was refused."""
+    """Return the state after a failed or refused command."""
     return b"E" if status == LiteStatus.ERROR else b"?"
 
 
 def _fault_of(data: bytes) -> LiteFrame | LiteLinkFault:
-    """Read a fault, which RTno tells with its code negated."""
+    """Read a fault, whose code RTno negates."""
     try:
         return fault_frame(LiteLinkFault(-data[0] & 0xFF))
     except (IndexError, ValueError):

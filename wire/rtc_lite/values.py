@@ -1,8 +1,7 @@
-r"""The data types of ports and their bytes (DECISION L8, L10).
+r"""The data types of ports and their encoding (DECISION L8, L10).
 
-Little-endian; the time of a Timed type is not on the wire. A double has 4
-bytes, as on AVR: values lose precision. A sequence is its elements; their
-number follows from the size.
+Little-endian; the time of a Timed type is not on the wire. A double has 4 bytes, as on AVR: values
+lose precision. A sequence is the series of its elements; their number follows from the size.
 
 >>> LONG.encode(-2), LONG.decode(b"\x2a\x00\x00\x00")
 (b'\xfe\xff\xff\xff', 42)
@@ -39,7 +38,7 @@ def encode_name(name: str) -> bytes:
 T = TypeVar("T")
 
 _TEXT: Final = "latin-1"
-"""In place of a format of `struct`: characters."""
+"""Format of characters, in place of a `struct` format."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,10 +47,10 @@ class LitePortType(Generic[T]):
 
     Attributes:
         code: its letter; upper case for a sequence.
-        name: the type of the port at the proxy, as `TimedLong`.
-        size: bytes of a value, of an element in a sequence.
-        format: of an element, as `struct` has it; `_TEXT` for characters.
-        initial: the value before any was written.
+        name: the type of the port at the proxy, such as `TimedLong`.
+        size: bytes of a value, or of an element in a sequence.
+        format: `struct` format of an element; `_TEXT` for characters.
+        initial: the value before the first write.
     """
 
     code: str
@@ -62,11 +61,11 @@ class LitePortType(Generic[T]):
 
     @property
     def sequence(self) -> bool:
-        """Whether a value is any number of elements."""
+        """Whether a value has any number of elements."""
         return self.code.isupper()
 
     def encode(self, value: T) -> bytes:
-        """Write a value; FieldError if the type does not have it."""
+        """Write a value; FieldError if it is not of this type."""
         if self.format == _TEXT:
             return self._encode_text(cast(str, value))
         values: Any = value if self.sequence else (value,)
@@ -84,7 +83,7 @@ class LitePortType(Generic[T]):
         return cast(T, values if self.sequence else values[0])
 
     def check_size(self, data: bytes) -> None:
-        """Raise FieldError unless so many bytes can be a value."""
+        """Raise FieldError unless a value can have this number of bytes."""
         whole = len(data) % self.size == 0 if self.sequence else len(data) == self.size
         if not whole:
             unit = "bytes each" if self.sequence else "bytes"

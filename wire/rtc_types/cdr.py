@@ -1,4 +1,4 @@
-"""Structs to CDR and back.
+"""Encode structs as CDR and decode them.
 
 >>> from tickrig.wire.rtc_types.rtc import Time, TimedShort
 >>> encode(TimedShort(Time(1, 2), -3)).hex()
@@ -68,7 +68,7 @@ def encode(value: Struct, endian: Endian = Endian.LITTLE) -> bytes:
 
 
 def decode(kind: type[S], data: bytes, endian: Endian = Endian.LITTLE) -> S:
-    """Return the struct that the bytes hold; FieldError if they hold none, or more."""
+    """Return the struct in the bytes; FieldError if they are not one struct."""
     try:
         value, end = _codec(kind, endian)[1](data)
     except UnicodeError as error:
@@ -97,14 +97,14 @@ _NUMBERS: Final[Mapping[Primitive, str]] = {
     Primitive.FLOAT: "f",
     Primitive.DOUBLE: "d",
 }
-"""Letters of the struct module."""
+"""Formats of the struct module."""
 
 _COUNT: Final = "I"
-"""What counts and enumerators are written as."""
+"""Format of counts and enumerators."""
 
 
 class _Codec:
-    """Writes the source of an encoder and of a decoder in one walk through a struct."""
+    """Generates the source of encoder and decoder in one walk through a struct."""
 
     def __init__(self, kind: type[Struct], mark: str) -> None:
         self._kind, self._mark = kind, mark
@@ -131,7 +131,7 @@ class _Codec:
         return self._scope["encode"], self._scope["decode"]
 
     def _field(self, hint: Any, path: str) -> str:
-        """Write what one field needs.
+        """Generate the code of one field.
 
         Args:
             hint: its annotation.
@@ -156,7 +156,7 @@ class _Codec:
         raise TypeError(f"{hint} is no IDL type")
 
     def _made(self, kind: type[Struct], parts: list[str]) -> str:
-        """Have a struct made of its parts: a third faster than by a call of its class."""
+        """Build a struct from its parts: a third faster than by a call of its class."""
         made = self._name()
         self._making.append(f"{made} = new({self._constant(kind)})")
         for name, part in zip(kind.__match_args__, parts, strict=True):
@@ -180,7 +180,7 @@ class _Codec:
                 return self._number(_NUMBERS[kind], path)
 
     def _number(self, letter: str, value: str, name: str = "") -> str:
-        """Add a number to the run; begin a new run where its alignment is not known."""
+        """Add a number to the run; start a new run if its alignment is not known."""
         name = name or self._name()
         size = struct.calcsize(f"={letter}")
         if self._aligned < size:
@@ -199,7 +199,7 @@ class _Codec:
         self._aligned, self._phase = size, 0
 
     def _flush(self) -> None:
-        """Write the run."""
+        """Generate the code of the run."""
         if self._targets:
             run = self._constant(layout := struct.Struct(self._mark + self._format))
             ends, size = self._constant(_ends(self._format)), layout.size
@@ -210,7 +210,7 @@ class _Codec:
         self._format, self._values, self._targets = "", [], []
 
     def _count(self, value: str, letter: str = _COUNT) -> str:
-        """Write how many elements a sequence has, and read it; as a name of both."""
+        """Generate the code of a sequence length, and return its variable."""
         name = self._name()
         self._write(f"{name} = len({value})")
         self._number(letter, name, name)
@@ -218,7 +218,7 @@ class _Codec:
         return name
 
     def _bytes(self, value: str, letter: str = _COUNT) -> str:
-        """Write bytes behind their count."""
+        """Generate the code of bytes after their count."""
         data = self._name()
         self._write(f"{data} = {value}")
         count = self._count(data, letter)
@@ -251,7 +251,7 @@ class _Codec:
         return made
 
     def _numbers(self, letter: str, path: str, count: str, made: str) -> None:
-        """Write all numbers of a sequence at once."""
+        """Generate the code of all numbers of a sequence at once."""
         layout, length = f"f'{self._mark}{{{count}}}{letter}'", self._name()
         self._write(f"out += pack({layout}, *{path})")
         self._take(f"{length} = {count} * {struct.calcsize(f'={letter}')}")
@@ -260,7 +260,7 @@ class _Codec:
         self._take(f"at += {length}")
 
     def _structs(self, hint: Any, path: str, count: str, made: str) -> None:
-        """Write structs of numbers: one run for each, which is 2 to 4 times as fast as a loop."""
+        """Generate one run for each struct of numbers: 2 to 4 times as fast as a loop."""
         element, end = self._name(), self._name()
         outer, self._making = self._making, []
         value = self._field(hint, element)  # only adds to the run, for its size is fixed
@@ -277,7 +277,7 @@ class _Codec:
         self._format, self._values, self._targets, self._making = "", [], [], outer
 
     def _loop(self, hint: Any, path: str, count: str) -> str:
-        """Write elements one by one."""
+        """Generate a loop over the elements."""
         made, element = self._name(), self._name()
         self._write(f"for {element} in {path}:")
         self._take(f"{made} = []")
@@ -307,7 +307,7 @@ class _Codec:
         self._decoder.append(self._indent + line)
 
     def _read(self, expression: str) -> str:
-        """Have the decoder look at a value at once, so that it reports the first fault."""
+        """Make the decoder check a value at once, so that it reports the first fault."""
         name = self._name()
         self._take(f"{name} = {expression}")
         return name
@@ -323,7 +323,7 @@ class _Codec:
 
 
 def _letters(hint: Any) -> str:
-    """Return the letters of all numbers in an element, nothing if there is something else."""
+    """Return the formats of all numbers in an element, nothing if it has other parts."""
     if get_origin(hint) is Annotated:
         return _NUMBERS.get(get_args(hint)[1], "")
     if not (isinstance(hint, type) and issubclass(hint, Struct)):
@@ -334,7 +334,7 @@ def _letters(hint: Any) -> str:
 
 
 def _is_tight(letters: str) -> bool:
-    """Tell whether elements follow each other without padding, wherever the first one begins."""
+    """Return whether elements follow each other without padding from any position."""
     sizes = [struct.calcsize(f"={letter}") for letter in letters]
     end = 0
     for size in sizes:
@@ -349,13 +349,13 @@ def _ends(layout: str) -> tuple[int, ...]:
     )
 
 
-# What the functions call: refusals, and what is no number.
+# Helpers of the functions: refusals, strings and characters.
 
 _UTF16: Final = "utf-16-be"
 
 
 def _too_short(at: int, size: int, ends: tuple[int, ...]) -> None:
-    """Refuse a run, or runs that follow each other, by the first number that is not there."""
+    """Raise FieldError for a run, or several runs, at the first missing number."""
     at += max(size - at, 0) // ends[-1] * ends[-1]
     needed = next(at + end for end in ends if at + end > size)
     raise FieldError(f"{size} bytes, at least {needed} are needed")

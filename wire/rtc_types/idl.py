@@ -18,7 +18,7 @@ from typing import Annotated, Any, ClassVar, cast, dataclass_transform
 
 
 class Primitive(Enum):
-    """IDL types that are no struct, sequence or enum."""
+    """IDL types other than struct, sequence and enum."""
 
     BOOLEAN = "boolean"
     CHAR = "char"
@@ -56,7 +56,7 @@ OctetSeq = Annotated[bytes, Primitive.OCTET_SEQ]
 
 @dataclass_transform(frozen_default=True)
 class _StructType(type):
-    """Makes a value type with slots of each struct.
+    """Turns each struct into a value type with slots.
 
     `dataclass(frozen=True, slots=True)` takes five times as long for a class, which counts where
     a command loads 140 of them. Here it only enters the fields, for `dataclasses.replace`.
@@ -77,7 +77,7 @@ class _StructType(type):
 
 
 def _define_methods(kind: Any) -> None:
-    """Define what depends on the fields: `__init__`, and `_values`, which the other methods use."""
+    """Define the methods that depend on the fields: `__init__`, and `_values` for the others."""
     scope: dict[str, Any] = {}
     for name, zero in kind._zeros.items():
         scope[f"put_{name}"], scope[f"_{name}"] = getattr(kind, name).__set__, zero
@@ -90,11 +90,11 @@ def _define_methods(kind: Any) -> None:
 
 
 def define(source: str, scope: dict[str, Any]) -> None:
-    """Define functions whose source was written for the fields of a struct.
+    """Define functions from source generated for the fields of a struct.
 
     Args:
-        source: of no other names than those of fields and of `scope`.
-        scope: what the functions know; takes them by their names.
+        source: uses only names of fields and of `scope`.
+        scope: globals of the functions; receives them by name.
     """
     exec(source, scope)
 

@@ -11,7 +11,7 @@ from tickrig.device.canopen.ds401 import families
 from tickrig.device.physical import InputSignal, OutputSignal
 from tickrig.device.twin import Immutable, Part
 
-# What an analogue channel is in the physical world: range, unit and steps.
+# Range, unit and steps of an analogue channel in the physical world.
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,14 +25,14 @@ class Converter(Immutable):
     Not emulated: offset and gain errors, noise, the conversion time.
 
     Attributes:
-        suffix: ends the name of a channel: `ai1_v`.
+        suffix: end of the channel's name: `ai1_v`.
         unit: for people.
         low: smallest quantity.
         high: largest quantity.
         high_raw: steps at `high`.
         low_raw: steps at `low`.
-        shift: places by which a step stands left in the object, as CiA 401 wants it.
-        width: bits of the object that the counts are meant for.
+        shift: number of bits by which the counts are left-shifted in the object (CiA 401).
+        width: bits of the object with the counts.
 
     Raises:
         ValueError: an empty range, or counts that the object cannot hold.
@@ -56,11 +56,11 @@ class Converter(Immutable):
 
     @property
     def span(self) -> tuple[int, int, int]:
-        """What the object holds for `low` and for `high`, and a step between."""
+        """The counts of the object for `low` and for `high`, and of one step."""
         return self.low_raw << self.shift, self.high_raw << self.shift, 1 << self.shift
 
     def counts(self, quantity: float) -> int:
-        """Return what the object holds for a quantity, which is limited to the range."""
+        """Return the counts for a quantity, limited to the range."""
         part = (min(max(quantity, self.low), self.high) - self.low) / (self.high - self.low)
         # Half up; the shift is that of CiA 401, which wants counts left-justified.
         return floor(self.low_raw + part * (self.high_raw - self.low_raw) + 0.5) << self.shift
@@ -71,7 +71,7 @@ class Converter(Immutable):
         return self.low + min(max(part, 0.0), 1.0) * (self.high - self.low)
 
 
-# What an analogue input and an analogue output have in common.
+# Common parts of analogue inputs and outputs.
 
 _REAL32_MAX: Final = (2 - 2.0**-23) * 2.0**127
 
@@ -83,7 +83,7 @@ def _quantity(entry: Entry | None, default: float = 0) -> float:
 
 
 def _factor(entry: Entry | None) -> float:
-    """Return a scaling; many an EDS leaves it at 0, which is taken as 1."""
+    """Return a scaling; 0 counts as 1, because many EDS files leave it so."""
     return _quantity(entry, 1) or 1
 
 
@@ -99,9 +99,9 @@ def _show(entry: Entry, value: float) -> None:
 class _AnalogueChannel(Part):
     """One channel: its objects, its converter, its scaling.
 
-    The widest integer object has the counts; narrower ones have their upper bits.
-    A REAL32 object has the physical quantity if there is a converter, or else the
-    counts, or else what the world sets. Scaled value = value x scaling + offset.
+    The widest integer object has the counts; narrower ones have their upper bits. A REAL32 object
+    has the physical quantity if there is a converter, else the counts, else the value that the
+    world sets. Scaled value = value x scaling + offset.
 
     Args:
         prefix: `ai` or `ao`.
@@ -167,7 +167,8 @@ class _AnalogueChannel(Part):
         return value * _factor(self._real_scaling) + _quantity(self._real_offset)
 
 
-# One analogue input, what of it is an event, and which were one (CiA 401, 6400h to 642Dh).
+# One analogue input, its event conditions, and the interrupt source objects (CiA 401, 6400h to
+# 642Dh).
 
 
 class _EventRule(Part):
@@ -183,14 +184,14 @@ class _EventRule(Part):
     | 3   | it is below what was sent last by more than the negative delta |
     | 4   | it is above what was sent last by more than the positive delta |
 
-    A limit is an event when it is crossed, not as long as it is exceeded. A limit
-    that the device has no object for is none, a delta is 0.
+    A limit is an event when it is crossed, not as long as it is exceeded. Without an object there
+    is no limit, and a delta is 0.
 
     Args:
         dictionary: the objects of the device.
         number: of the channel.
         index: of the upper limit; the other four follow.
-        entry: the value that is judged.
+        entry: the value to check.
 
     Attributes:
         there: whether the device has one of the five objects for the channel.
@@ -204,7 +205,7 @@ class _EventRule(Part):
         self._sent = self._seen = _quantity(entry)
 
     def begin(self) -> None:
-        """Take the value as sent."""
+        """Count the present value as sent."""
         self._sent = self._seen = _quantity(self._entry)
 
     def sent(self) -> None:
@@ -261,7 +262,7 @@ def _read(entry: Entry) -> bytes:
 
 
 class AnalogueInput(Part):
-    """Converts, scales and judges one channel.
+    """Converts and scales one channel and detects its events.
 
     Integer limits and deltas are right-aligned: in the unit of the widest integer
     object. Those of REAL32 are in the unit of 6403h. Without any of them each
@@ -270,7 +271,7 @@ class AnalogueInput(Part):
     Attributes:
         number: 1..254.
         channel: its objects.
-        entries: those that show its value.
+        entries: those with its value.
     """
 
     def __init__(self, dictionary: Dictionary, number: int, converter: Converter | None) -> None:
@@ -292,7 +293,7 @@ class AnalogueInput(Part):
 
     @property
     def name(self) -> str:
-        """What the physical input is called."""
+        """Name of the physical input."""
         return self.channel.name
 
     @property
@@ -314,13 +315,13 @@ class AnalogueInput(Part):
         )
 
     def objects(self) -> list[Entry]:
-        """Return the objects that change what is read or what is an event."""
+        """Return the objects that influence the value or the event conditions."""
         trigger = [self._trigger] if self._trigger is not None else []
         judged = [entry for rule in self._rules for entry in rule.settings]
         return [*self.channel.scalings(), *trigger, *judged]
 
     def begin(self, physical: float) -> None:
-        """Take the present value as sent."""
+        """Count the present value as sent."""
         self._judged = None
         self._convert(physical)
         for rule in self._rules:
@@ -332,7 +333,7 @@ class AnalogueInput(Part):
             rule.sent()
 
     def update(self, physical: float, *, enabled: bool) -> bool:
-        """Read the channel. Returns: whether that is an event, as far as events are enabled."""
+        """Read the channel; return whether the change is an event and events are enabled."""
         if self._judged == (physical, enabled):
             return False
         self._judged = physical, enabled
@@ -374,17 +375,17 @@ def _justified(counts: int, from_bits: int, to_bits: int) -> int:
 
 
 class AnalogueOutput(Part):
-    """Puts one channel out.
+    """Drives one output channel.
 
     Integer error values are right-aligned: in the unit of the object, and limited
     to it. If several objects name the channel, the one that changed last counts;
-    the others do not follow. A REAL32 that is no number leaves the output as it is.
+    the others do not follow. A NaN or infinity leaves the output unchanged.
 
     Attributes:
         number: 1..254.
         channel: its objects.
         level: the physical value.
-        failed: its error value counts instead of what was written.
+        failed: the error value is output instead of the written value.
     """
 
     def __init__(self, dictionary: Dictionary, number: int, converter: Converter | None) -> None:
@@ -407,18 +408,18 @@ class AnalogueOutput(Part):
         return OutputSignal(self.channel.name, f"analogue output {self.number}", self.channel.unit)
 
     def objects(self) -> list[Entry]:
-        """Return the objects that change what is put out."""
+        """Return the objects that influence the output."""
         found = (self._mode, self._error, self._real_error)
         settings = [entry for entry in found if entry is not None]
         return [*self._written, *self.channel.scalings(), *settings]
 
     def power_on(self) -> None:
-        """Begin at 0, or at what the converter has instead."""
+        """Start at 0, limited to the range of the converter."""
         converter = self.channel.converter
         self.level = converter.quantity(converter.counts(0.0)) if converter is not None else 0.0
 
     def update(self) -> None:
-        """Put out."""
+        """Update the output."""
         error = self.failed and _quantity(self._mode, 1) != 0
         put = self._real if self._latest is self.channel.real else self._whole
         level = put(error=error)

@@ -41,16 +41,16 @@ class _View(NamedTuple):
     shift: int
 
     def into(self, bits: int) -> int:
-        """Return the bits with those of the element in their place."""
+        """Return the bits with those of the element replaced."""
         return bits & ~self.lines | self.entry.number << self.shift & self.lines
 
     def out_of(self, bits: int) -> bytes:
-        """Return what the element holds if these are the bits."""
+        """Return the value of the element for these bits."""
         return ((bits & self.lines) >> self.shift).to_bytes(self.entry.size, "little")
 
 
 class _Bits(Part):
-    """What one family of objects says of all lines; line 1 is the lowest bit.
+    """The value of one family of objects for all lines; line 1 is the lowest bit.
 
     If objects of several widths name a line, a change of one changes the others.
     Where their power-on values differ, the object of the highest index counts.
@@ -58,7 +58,7 @@ class _Bits(Part):
     Args:
         dictionary: the objects of the device.
         family: which of them.
-        default: 0 or -1, for lines that no object names.
+        default: 0 or -1, for lines without an object.
 
     Attributes:
         value: the bits.
@@ -77,7 +77,7 @@ class _Bits(Part):
 
     @property
     def lines(self) -> int:
-        """How many lines there are, up to the last one that an object names."""
+        """Number of lines, up to the last one with an object."""
         return max((view.lines.bit_length() for view in self.views), default=0)
 
     def assign(self, value: int) -> None:
@@ -87,7 +87,7 @@ class _Bits(Part):
             view.entry.assign(view.out_of(value))
 
     def entries(self, lines: int) -> list[Entry]:
-        """Return the elements that show one of these lines."""
+        """Return the elements that contain one of these lines."""
         return [view.entry for view in self.views if view.lines & lines]
 
     def _follow(self, entry: Entry) -> None:
@@ -114,7 +114,7 @@ def _view(entry: Entry, width: int, shift: int) -> _View:
 
 
 FILTER_US: Final = 10_000
-"""How long a filtered line must be stable; the profile leaves it to the device."""
+"""Time for which a filtered line must be stable; the profile leaves it to the device."""
 
 
 class DigitalInputs(Part):
@@ -122,7 +122,7 @@ class DigitalInputs(Part):
 
     Attributes:
         value: what the bus reads.
-        lines: how many there are.
+        lines: number of lines.
     """
 
     def __init__(self, dictionary: Dictionary) -> None:
@@ -139,20 +139,20 @@ class DigitalInputs(Part):
 
     @property
     def due_us(self) -> int:
-        """When the filter lets the next line through."""
+        """The time at which the filter next accepts a line."""
         return min(self._waits.values(), default=NEVER)
 
     def settings(self) -> list[Entry]:
-        """Return the objects that change what is read."""
+        """Return the objects that influence the value read."""
         return [view.entry for bits in (self._polarity, self._filter) for view in bits.views]
 
     def power_on(self, level: int) -> None:
-        """Take the lines as they are."""
+        """Accept the lines as they are."""
         self._level = self._passed = level
         self._waits.clear()
 
     def update(self, level: int, now_us: int) -> list[Entry]:
-        """Read the lines; return the objects whose change is an interrupt."""
+        """Read the lines; return the objects whose change causes an interrupt."""
         self._pass(level, now_us)
         before = self.value.value
         value = (self._passed ^ self._polarity.value) & self._all
@@ -163,7 +163,7 @@ class DigitalInputs(Part):
         return self.value.entries(events)
 
     def _pass(self, level: int, now_us: int) -> None:
-        """Let unfiltered lines through at once, filtered ones when they have been stable."""
+        """Accept unfiltered lines at once, and filtered ones when they have been stable."""
         changed, self._level = level ^ self._level, level
         differing = level ^ self._passed
         for line in _ones(changed & differing):
@@ -176,7 +176,7 @@ class DigitalInputs(Part):
 
 
 def _ones(bits: int) -> Iterator[int]:
-    """Give the bits that are set, each as a number of its own."""
+    """Yield the bits that are set, each as a separate number."""
     while bits:
         lowest = bits & -bits
         yield lowest
@@ -186,11 +186,11 @@ def _ones(bits: int) -> Iterator[int]:
 class DigitalOutputs(Part):
     """All digital outputs of a module; line 1 is the lowest bit.
 
-    The filter mask holds lines as they are.
+    Lines in the filter mask keep their level.
 
     Attributes:
         value: what the bus writes.
-        lines: how many there are.
+        lines: number of lines.
         level: the physical lines.
     """
 
@@ -206,20 +206,20 @@ class DigitalOutputs(Part):
         self.value.changed = self._written
 
     def objects(self) -> list[Entry]:
-        """Return the objects that change what is put out."""
+        """Return the objects that influence the outputs."""
         families = (self.value, self._polarity, self._error_mode, self._error_value, self._mask)
         return [view.entry for bits in families for view in bits.views]
 
     def power_on(self) -> None:
-        """Begin with all lines low."""
+        """Start with all lines low."""
         self.level = 0
 
     def fail(self, *, failed: bool) -> None:
-        """Put error values out, or what was written."""
+        """Output the error values, or the written values."""
         self._failed = self._all if failed else 0
 
     def update(self) -> None:
-        """Put out."""
+        """Update the outputs."""
         wrong = self._failed & self._error_mode.value
         value = self.value.value & ~wrong | self._error_value.value & wrong
         value ^= self._polarity.value

@@ -1,6 +1,6 @@
-"""Which objects are of one family, by width (CiA 401, object dictionary).
+"""Families of objects for the same lines or channels, by width (CiA 401, object dictionary).
 
-Objects of several widths name the same physical lines: 6100h:01 shows what 6000h:01
+Objects of several widths refer to the same physical lines: 6100h:01 shows what 6000h:01
 and 6000h:02 show. Indices as two public profile tables have them (CanFestival,
 DS-401.prf; tonyrog/canopen, DS-401.def), the meaning of single ones as in the
 manuals of Turck BL20, WAGO 750 and VIPA 300V.
@@ -16,7 +16,7 @@ from tickrig.wire.canopen.datatypes import DataType
 
 
 class DigitalObjects(NamedTuple):
-    """The index of what is said of each line, by lines in an element.
+    """The index of a property of lines, by lines in an element.
 
     Single lines have eight indices in a row, each of up to 128 lines.
     """
@@ -104,11 +104,11 @@ DEFAULTS: Final[dict[int, int]] = {
         for index in (objects.real_scaling, objects.integer_scaling)
     },
 }
-"""Of each element by index, -1 for all bits; 0 where nothing is said (CiA 401, default values)."""
+"""Of each element by index, -1 for all bits; 0 if not listed (CiA 401, default values)."""
 
 
 def elements(dictionary: Dictionary, index: int) -> Iterator[tuple[int, Entry]]:
-    """Give the numbers that an object holds, each with its sub-index; it may have gaps."""
+    """Yield the numbers in an object, each with its sub-index; there may be gaps."""
     for entry in dictionary.object(index):
         if 1 <= entry.sub <= 254 and _is_number(entry):
             yield entry.sub, entry

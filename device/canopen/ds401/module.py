@@ -47,7 +47,7 @@ from tickrig.wire.canopen.nmt import NmtState
 # count from what was sent last, by whatever TPDO and for whatever reason, so the producer
 # reports each transmission.
 #
-# `power_on` sets these lists anew and does not append: it runs at each power-on of the same
+# `power_on` sets these lists again and does not append: it runs at each power-on of the same
 # objects.
 #
 # Outputs have two masters, the objects and the error mode. Stopped, a communication error
@@ -60,10 +60,10 @@ from tickrig.wire.canopen.nmt import NmtState
 # its tables); where an object is missing, digital events are on (6005h), analogue ones too
 # (6423h), and a scaling of 0 counts as 1, because many EDS files leave it so.
 
-# What a module finds wrong with itself, and what it reports.
+# Faults that a module detects in itself and reports.
 
 _NO_BEHAVIOUR: Final = 0
-"""1029h says nothing about it."""
+"""1029h does not apply."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,11 +72,11 @@ class _DeviceFault(Immutable):
 
     Attributes:
         name: of the physical input.
-        text: what it is, for people.
+        text: description for people.
         code: emergency error code.
         register: bits of the error register.
-        behaviour: sub-index of 1029h that decides about the NMT state.
-        stops_outputs: whether error values are put out.
+        behaviour: sub-index of 1029h that determines the NMT state.
+        stops_outputs: whether outputs go to their error values.
     """
 
     name: str
@@ -119,7 +119,7 @@ _INTERNAL_FAILURE: Final = _DeviceFault(
 
 
 class _FaultDetector(Part):
-    """Sees faults come and go: EMCY, and what 1029h says.
+    """Detects faults and their end: sends EMCY, and applies 1029h.
 
     Args:
         node: where it is reported.
@@ -135,18 +135,18 @@ class _FaultDetector(Part):
 
     @property
     def stops_outputs(self) -> bool:
-        """Whether a fault is there that lets no output be."""
+        """Whether a present fault stops the outputs."""
         return any(fault.stops_outputs for fault in self._present)
 
     def forget(self) -> None:
-        """Find what is there anew."""
+        """Detect the present faults again."""
         self._present.clear()
 
     def look(self, inputs: QuantityBank) -> bool:
-        """Report what has come and gone.
+        """Report new faults, and those that have ended.
 
         Returns:
-            Whether outputs have to stop for what has come.
+            Whether a new fault stops the outputs.
         """
         before = self._present
         self._present = [fault for fault in self.faults if inputs[fault.name]]
@@ -173,7 +173,7 @@ class _DigitalTerminal(NamedTuple):
 
     @property
     def level(self) -> int:
-        """The lines as a number."""
+        """The lines as one number."""
         return self.outputs.level >> self.shift & self.mask
 
 
@@ -181,12 +181,12 @@ _Terminal = _DigitalTerminal | AnalogueOutput
 
 
 def _digital_input_names(lines: int) -> tuple[str, ...]:
-    """Return `di1` to the last one."""
+    """Return the names `di1` to the last one."""
     return tuple(f"di{line}" for line in range(1, lines + 1))
 
 
 def digital_inputs(names: Sequence[str]) -> Iterator[InputSignal]:
-    """Give the digital inputs; 1 is high."""
+    """Yield the digital inputs; 1 is high."""
     for line, name in enumerate(names, 1):
         yield InputSignal(name, f"digital input {line}")
 
@@ -217,18 +217,17 @@ def _outputs_by_name(
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class Ds401(Application):
-    """Digital and analogue inputs and outputs, as the dictionary has them.
+    """Digital and analogue inputs and outputs, as described in the dictionary.
 
-    Events are judged once a tick. A change of an input is an event for TPDOs only
-    if the interrupt masks, or the trigger with its limits and deltas, say so (see
-    `EventRule`). Stop, a communication error and a failure of the device put the
-    error values out; an output leaves its error value when the node becomes
-    Operational or when it is written with another value.
+    Events are detected once a tick. A change of an input is an event for TPDOs only if the
+    interrupt masks, or the trigger with its limits and deltas, allow it (see `EventRule`). Stop, a
+    communication error and a failure of the device output the error values; an output leaves its
+    error value when the node becomes Operational or when it is written with another value.
 
     Without 6005h digital events are on, without 6423h analogue ones.
 
     Not emulated: joysticks; objects of the manufacturer (6404h, 6414h); SI units
-    (6430h, 6450h are kept and mean nothing); the conversion time.
+    (6430h, 6450h are kept without effect); the conversion time.
 
     Args:
         node: the slave.
@@ -268,7 +267,7 @@ class Ds401(Application):
         self._watch_objects()
 
     def power_on(self) -> None:
-        """Take inputs as they are, begin with outputs at rest."""
+        """Accept the inputs as they are, and set the outputs to their resting values."""
         producer = PdoProducer.of(self.node)
         producer.on_sent = [self._sent]
         producer.quiet |= {view.entry.key for view in self._digital_inputs.value.views}
@@ -279,25 +278,25 @@ class Ds401(Application):
             output.power_on()
 
     def start(self) -> None:
-        """Judge what is an event from now on; look for faults anew."""
+        """Update which changes are events, and detect faults again."""
         self._faults.forget()
         self._fail(failed=False)
         for channel in self.analogue_inputs:
             channel.begin(self.inputs[channel.name])
 
     def state_changed(self, old: NmtState, new: NmtState) -> None:
-        """Leave error values in Operational, put them out in Stopped."""
+        """End the error values in Operational, output them in Stopped."""
         if new is NmtState.OPERATIONAL:
             self._fail(failed=self._faults.stops_outputs)
         elif new is NmtState.STOPPED:
             self._fail(failed=True)
 
     def communication_error(self) -> None:
-        """Put error values out."""
+        """Output the error values."""
         self._fail(failed=True)
 
     def read(self, name: str) -> int | float:
-        """Look at an output, as it was left by the latest tick.
+        """Return an output as the latest tick left it.
 
         Args:
             name: one of `outputs`.
@@ -306,12 +305,12 @@ class Ds401(Application):
             Its value.
 
         Raises:
-            KeyError: there is none of that name.
+            KeyError: there is no output of that name.
         """
         return self._terminals[name].level
 
     def on_execute(self, now_us: int) -> None:
-        """Look for faults, read inputs, cause events, put outputs out."""
+        """Detect faults, read inputs, cause events, update outputs."""
         if self._faults.look(self.inputs):
             self._fail(failed=True)
         digital = self._digital_inputs.update(self._level, now_us)
@@ -325,7 +324,7 @@ class Ds401(Application):
 
     @property
     def _level(self) -> int:
-        """The digital inputs as the world sets them; line 1 is the lowest bit."""
+        """The physical digital inputs; line 1 is the lowest bit."""
         return sum(1 << bit for bit, name in enumerate(self._lines) if self.inputs[name])
 
     def _read_analogue(self) -> None:

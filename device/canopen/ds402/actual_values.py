@@ -1,4 +1,4 @@
-"""Actual values: what the objects of a drive show from the end of a tick on (CiA 402-2)."""
+"""Actual values: objects with the measurements of a drive, valid after a tick (CiA 402-2)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 Measure = Callable[["Ds402"], int]
 
 _STATE_BITS: Final = {state: int(state | Statusword.REMOTE) for state in DriveState}
-"""What the statusword shows of a state, and that the bus is in control."""
+"""Bits of the statusword by state, and the bit for control over the bus."""
 
 _VOLTAGE_ENABLED: Final = int(Statusword.VOLTAGE_ENABLED)
 _WARNING: Final = int(Statusword.WARNING)
@@ -26,7 +26,7 @@ _FOLLOWING_ERROR: Final = int(Statusword.MODE_13)
 
 
 def statusword_of(drive: Ds402) -> int:
-    """Return what 6041h of a drive shows now."""
+    """Return the present statusword 6041h of a drive."""
     supervision, state = drive.supervision, drive.automaton.state
     status = _STATE_BITS[state]
     if supervision.has_supply:
@@ -67,21 +67,21 @@ MEASURES: Final[Mapping[int, Measure]] = {
     indices.POSITION_DEMAND_INTERNAL: lambda drive: round(drive.axis.reference.position),
     indices.DIGITAL_INPUTS: lambda drive: drive.switches.word,
 }
-"""What the objects show, by index."""
+"""Functions for the actual values, by index."""
 
 
 class ActualValues(Part):
-    """What those of the objects show that the device has, as the latest tick left it.
+    """The actual values of the objects that the device has, as the latest tick left them.
 
-    They are worked out when somebody asks, those with watchers in each tick: a bus reads two
-    of thirteen each 10 ms (1.5 times as many drives).
+    They are computed when read, those with watchers in each tick: a bus reads two of thirteen each
+    10 ms (1.5 times as many drives).
 
     Args:
-        drive: what is measured; its `measures` say how.
-        dictionary: with the objects.
+        drive: the drive; its `measures` compute the values.
+        dictionary: contains the objects.
 
     Attributes:
-        watched: somebody is told of each change.
+        watched: objects with watchers, which are called on each change.
     """
 
     def __init__(self, drive: Ds402, dictionary: Dictionary) -> None:
@@ -93,18 +93,18 @@ class ActualValues(Part):
         self._kept, self.watched = True, False
 
     def keep(self) -> None:
-        """Write all of them before something changes: they are shown up to the end of the tick."""
+        """Write all values before something changes; they hold up to the end of the tick."""
         if not self._kept:
             for entry in self._entries:
                 entry.assign(self._encoded(entry))
             self._kept = True
 
     def begin(self) -> None:
-        """Show what is written, while the drive works."""
+        """Show the written values while the drive works."""
         self._kept = True
 
     def renew(self) -> None:
-        """Show what the drive has come to; watchers are told."""
+        """Show the new values of the drive, and call the watchers."""
         self._kept = self.watched = False
         for entry in self._entries:
             if entry.watchers:
@@ -115,7 +115,7 @@ class ActualValues(Part):
         return entry.data if self._kept else self._encoded(entry)
 
     def _encoded(self, entry: Entry) -> bytes:
-        """Return a value as bytes; one out of the range of its object is cut."""
+        """Return a value as bytes; a value outside the range of its object is truncated."""
         size, signed = entry.size, entry.description.signed
         value = self._drive.measures[entry.index](self._drive)
         try:

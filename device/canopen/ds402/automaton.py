@@ -57,7 +57,7 @@ class DriveState(IntEnum):
 
 
 class Command(Enum):
-    """What a controlword asks for; switch on also means disable operation."""
+    """Commands of a controlword; switch on also means disable operation."""
 
     SHUTDOWN = auto()
     SWITCH_ON = auto()
@@ -73,7 +73,7 @@ _COMMANDS: Final = (
     (0x82, 0x00, Command.DISABLE_VOLTAGE),
     (0x86, 0x02, Command.QUICK_STOP),
 )
-"""Mask, value, command."""
+"""Mask, value and command of a controlword."""
 
 _SOD: Final = DriveState.SWITCH_ON_DISABLED
 _READY: Final = DriveState.READY_TO_SWITCH_ON
@@ -111,7 +111,7 @@ _RAMPS: Final = {
 
 
 def command_of(controlword: int) -> Command | None:
-    """Return what a controlword asks for, None if it asks for nothing.
+    """Return the command of a controlword, None if there is none.
 
     >>> command_of(0x0006), command_of(0x0080)
     (<Command.SHUTDOWN: 1>, None)
@@ -123,10 +123,10 @@ def command_of(controlword: int) -> Command | None:
 
 
 class Automaton(Part):
-    """Transitions 5 and 8 are made when the motor stands, if their option says so.
+    """Brakes before transitions 5 and 8 if their option codes ask for it.
 
     Args:
-        stopping: brakes as the option codes say.
+        stopping: brakes according to the option codes.
         begin_mode: begins the chosen mode of operation.
 
     Attributes:
@@ -146,15 +146,15 @@ class Automaton(Part):
 
     @property
     def operating(self) -> bool:
-        """Whether the mode of operation is at work, and is not being left."""
+        """Whether the mode of operation is active, and is not being left."""
         return self.state is DriveState.OPERATION_ENABLED and self._leaving is None
 
     def restart(self) -> None:
-        """Be as after power-on."""
+        """Restore the state after power-on."""
         self.state, self._leaving = DriveState.NOT_READY_TO_SWITCH_ON, None
 
     def obey(self, command: Command) -> None:
-        """Make the transition that a controlword asks for, if there is one."""
+        """Make the transition of a controlword, if there is one."""
         if self.state is DriveState.OPERATION_ENABLED:
             self._leaving = None
         following = NEXT_STATE.get((self.state, command))
@@ -181,7 +181,7 @@ class Automaton(Part):
             self.enter(DriveState.FAULT_REACTION_ACTIVE)
 
     def run(self, operate: Callable[[int], bool], now_us: int) -> bool:
-        """Run one control period of the present state.
+        """Run one control period in the present state.
 
         Args:
             operate: runs one control period of the mode of operation.
@@ -204,7 +204,7 @@ class Automaton(Part):
         return True
 
     def _must_finish(self, following: DriveState) -> bool:
-        """Return whether a quick stop cannot be left for Operation enabled: transition 16."""
+        """Return whether the option code forbids transition 16: quick stop to Operation enabled."""
         return (
             self.state is DriveState.QUICK_STOP_ACTIVE
             and following is DriveState.OPERATION_ENABLED
@@ -231,7 +231,7 @@ class Automaton(Part):
         return stands
 
 
-# What a drive watches: its supply, its motor, and whether the motor follows.
+# Supervision of a drive: its supply, its motor and the following error.
 
 _OPEN_PHASE_SHARE: Final = 0.05
 """Below this share of the current limit no current flows."""
@@ -239,13 +239,13 @@ _OPEN_PHASE_SHARE: Final = 0.05
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bounds(Immutable):
-    """What a drive takes for sound.
+    """Limits within which a drive reports no fault.
 
     Attributes:
         supply_mv: lowest and highest supply.
         winding_dc: highest temperature of the winding, in tenths of a degree Celsius.
-        winding_warning_dc: from here on it warns.
-        stall_us: how long the motor may stand at a limit although it shall turn.
+        winding_warning_dc: temperature from which it warns.
+        stall_us: how long the motor may stand at a limit although motion is demanded.
     """
 
     supply_mv: tuple[int, int] = (9_000, 36_000)
@@ -255,14 +255,14 @@ class Bounds(Immutable):
 
 
 class Supervision(Part):
-    """Finds faults by what the drive measures.
+    """Detects faults from the measurements of the drive.
 
     Args:
-        axis: what is watched.
-        bounds: what is sound.
+        axis: the supervised axis.
+        bounds: limits without a fault.
 
     Attributes:
-        wired: faults that the electronics see, as their inputs are now.
+        wired: faults that the electronics detect from the present inputs.
         has_supply: the supply is not too low (bit 4 of the statusword).
         waiting: a time-out runs.
         not_following: the following error is larger than 6065h.
@@ -281,7 +281,7 @@ class Supervision(Part):
         return self._axis.motor.winding_dc >= self.bounds.winding_warning_dc
 
     def present(self, *, powered: bool) -> list[ErrorCode]:
-        """Return the faults whose cause is there now; a short circuit needs power to be seen."""
+        """Return the faults whose cause is present; a short circuit needs power to be seen."""
         motor, bounds = self._axis.motor, self.bounds
         supply_mv, (lowest_mv, highest_mv) = motor.supply_mv, bounds.supply_mv
         found = [code for code in self.wired if powered or code is not ErrorCode.OVER_CURRENT]
@@ -294,10 +294,10 @@ class Supervision(Part):
         return found
 
     def step(self, now_us: int, *, powered: bool) -> list[ErrorCode]:
-        """Watch for one tick.
+        """Check for one tick.
 
         Returns:
-            The faults that are there, and those that a motion with power shows.
+            The present faults, and those that show only in motion with power.
         """
         found, self.waiting = self.present(powered=powered), False
         self.has_supply = ErrorCode.UNDER_VOLTAGE not in found
@@ -312,7 +312,7 @@ class Supervision(Part):
         return found
 
     def skip(self, now_us: int) -> None:
-        """Go on as after ticks up to `now_us` in which the motor followed."""
+        """Continue as after ticks up to `now_us` in which the motor followed."""
         self._error_us = self._stall_us = now_us
 
     def _loses_reference(self, now_us: int) -> bool:
@@ -327,7 +327,7 @@ class Supervision(Part):
         return now_us - self._error_us >= axis.settings.following_error_us
 
     def _stalls(self, now_us: int) -> bool:
-        """Return whether the motor has stood for too long although it shall turn."""
+        """Return whether the motor has stood for too long although motion is demanded."""
         axis = self._axis
         shall_turn = axis.motor.current_limited or axis.is_fast(axis.reference.velocity)
         if axis.control is Control.CURRENT or not (shall_turn and axis.stands):

@@ -11,14 +11,14 @@ from tickrig.device.canopen.ds402.settings import ErrorCode, Parameters, Setting
 from tickrig.device.physical import InputSignal, QuantityBank
 from tickrig.device.twin import Part
 
-# What the drive demands of its motor at this instant.
+# The present demand of the drive on its motor.
 
 STEP_S: Final = 0.001
 """Period of the control, in seconds: one tick."""
 
 
 class Control(Enum):
-    """Which loop of the motor a mode works with."""
+    """The control loop of the motor that a mode uses."""
 
     POSITION = auto()
     VELOCITY = auto()
@@ -26,11 +26,10 @@ class Control(Enum):
 
 
 class Reference(Part):
-    """The demanded motion; it belongs to the drive and outlives a change of the mode.
+    """The demanded motion; it belongs to the drive and survives a change of mode.
 
-    What a mode does not control follows the motor: the position in velocity modes,
-    position and velocity in torque modes. So each mode finds a reference from
-    which it can go on without a jump.
+    Quantities that a mode does not control follow the motor: the position in velocity modes,
+    position and velocity in torque modes. So each mode starts from a reference without a jump.
 
     Attributes:
         position: counts of the motor's encoder.
@@ -45,7 +44,7 @@ class Reference(Part):
         self.position = self.velocity = self.acceleration = self.current_a = 0.0
 
     def ramp(self, velocity: float, acceleration: float, deceleration: float) -> bool:
-        """Make a step towards a velocity. Returns: whether it is reached.
+        """Make a step towards a velocity; return whether it is reached.
 
         Args:
             velocity: counts per second.
@@ -69,11 +68,11 @@ class Reference(Part):
         self.position += (before + velocity) / 2 * STEP_S
 
     def place(self, position: float, velocity: float = 0.0, acceleration: float = 0.0) -> None:
-        """Be somewhere, as a generator of positions says."""
+        """Set the motion from a position generator."""
         self.position, self.velocity, self.acceleration = position, velocity, acceleration
 
 
-# What a drive needs of its motor, and a motor without physics.
+# The interface of a motor to its drive, and a motor without physics.
 
 
 class Motor(Protocol):
@@ -87,15 +86,15 @@ class Motor(Protocol):
 
     @property
     def counts_per_turn(self) -> int:
-        """Counts of the encoder in a turn of the motor."""
+        """Counts of the encoder per turn of the motor."""
 
     @property
     def counts(self) -> int:
-        """What the encoder says."""
+        """Position of the encoder, in counts."""
 
     @property
     def velocity_counts_s(self) -> int:
-        """Its rate, in counts per second."""
+        """Velocity of the encoder, in counts per second."""
 
     @property
     def current_ma(self) -> int:
@@ -119,37 +118,37 @@ class Motor(Protocol):
 
     @property
     def shaft_deg_s(self) -> float:
-        """Its speed."""
+        """Speed of the output shaft."""
 
     @property
     def resting(self) -> bool:
-        """Whether nothing would change without a new command or input."""
+        """Whether the state stays the same without a new command or input."""
 
     def release(self) -> None:
         """Switch the power stage off."""
 
     def drive_current(self, current_a: float) -> None:
-        """Have this current."""
+        """Drive this current."""
 
     def drive_velocity(self, velocity: float, acceleration: float = 0.0) -> None:
-        """Have this velocity, in counts per second."""
+        """Drive at this velocity, in counts per second."""
 
     def drive_position(
         self, position: float, velocity: float = 0.0, acceleration: float = 0.0
     ) -> None:
-        """Be at this position, in counts."""
+        """Drive to this position, in counts."""
 
     def step_to(self, now_us: int) -> None:
-        """Let time pass."""
+        """Advance the time."""
 
 
 _COUNTS_S2_PER_A: Final = 1_000.0
 
 
 class IdealMotor(Part):
-    """A motor that is at once where it shall be, and as fast as it shall be.
+    """A motor that reaches each demanded position and velocity at once.
 
-    It stands still at once when it is released. A current turns it as a mass without
+    It stops at once when it is released. A current turns it as a mass without
     friction: 1 A gives 1000 counts per second per second.
 
     Not emulated: load, temperature, limits of current and voltage.
@@ -178,7 +177,7 @@ class IdealMotor(Part):
 
     @property
     def shaft_deg(self) -> float:
-        """The same in degrees."""
+        """The position in degrees."""
         return self._position / self.counts_per_turn * 360
 
     @property
@@ -188,35 +187,35 @@ class IdealMotor(Part):
 
     @property
     def current_ma(self) -> int:
-        """The current that it was given."""
+        """The demanded current."""
         return round(self._current_a * 1_000)
 
     @property
     def resting(self) -> bool:
-        """Whether it stands, and no current turns it."""
+        """Whether it stands and no current accelerates it."""
         return self._velocity == 0 and self._current_a == 0
 
     def release(self) -> None:
-        """Stand still."""
+        """Stop."""
         self._velocity = self._current_a = 0.0
 
     def drive_current(self, current_a: float) -> None:
-        """Turn faster and faster."""
+        """Accelerate with the current."""
         self._current_a, self._moves_by_itself = current_a, True
 
     def drive_velocity(self, velocity: float, acceleration: float = 0.0) -> None:
-        """Turn."""
+        """Turn at this velocity."""
         self._velocity, self._current_a, self._moves_by_itself = velocity, 0.0, True
 
     def drive_position(
         self, position: float, velocity: float = 0.0, acceleration: float = 0.0
     ) -> None:
-        """Be there."""
+        """Move to this position."""
         self._position, self._velocity, self._current_a = position, velocity, 0.0
         self._moves_by_itself = False
 
     def step_to(self, now_us: int) -> None:
-        """Turn on, unless its position is given."""
+        """Advance the position, unless a position is demanded."""
         passed_s, self._now_us = (now_us - self._now_us) / 1_000_000, now_us
         if self._moves_by_itself:
             before = self._velocity
@@ -224,19 +223,19 @@ class IdealMotor(Part):
             self._position += (before + self._velocity) / 2 * passed_s
 
 
-# The moved axis: its motor, where its zero is, and where it may go.
+# The moved axis: its motor, its zero and its range.
 
 _STANDSTILL_TURNS_S: Final = 0.5
-"""A motor that turns more slowly stands: its encoder resolves no better within a tick."""
+"""Below this speed the motor counts as standing: the encoder cannot resolve less in a tick."""
 
 
 class Axis(Part):
     """Positions of the user are INTEGER32 and wrap at the ends of 607Bh.
 
     Attributes:
-        motor: what moves.
-        reference: what the motor is demanded to do, in counts.
-        control: the loop that the motor works with in this tick.
+        motor: the motor.
+        reference: the demanded motion, in counts.
+        control: the control loop used in this tick.
         settings: the present configuration.
         zero: counts of the encoder at position 0 of the user.
         homed: whether a homing has set it.
@@ -265,7 +264,7 @@ class Axis(Part):
 
     @property
     def ends(self) -> tuple[float, float]:
-        """Software limits in counts, the lower one first; infinite if there are none."""
+        """Software limits in counts, the lower one first; infinite without limits."""
         low, high = self.settings.software_limits
         return low + self.zero, high + self.zero
 
@@ -284,7 +283,7 @@ class Axis(Part):
 
     @property
     def standstill(self) -> float:
-        """Velocity up to which the motor stands, in counts per second."""
+        """Velocity up to which the motor counts as standing, in counts per second."""
         return _STANDSTILL_TURNS_S * self.motor.counts_per_turn
 
     def is_fast(self, velocity: float) -> bool:
@@ -302,7 +301,7 @@ class Axis(Part):
         return self.zero + position * self.settings.units.per_position
 
     def counts_near(self, position: int) -> float:
-        """Return the counts at a position, on the shorter way from the reference."""
+        """Return the counts at a position, on the shorter path from the reference."""
         low, high = self.settings.position_range
         span = high - low + 1
         unit = self.settings.units.per_position
@@ -310,7 +309,7 @@ class Axis(Part):
         return self.reference.position + ((away + span / 2) % span - span / 2) * unit
 
     def per_mille_of(self, current_a: float) -> int:
-        """Return a current in thousandths of the rated one; the user's sign."""
+        """Return a current in thousandths of the rated current, with the user's sign."""
         return round(1_000 * current_a / self.settings.rated_current_a) * self.forward
 
     def wrap(self) -> None:
@@ -321,12 +320,12 @@ class Axis(Part):
         self.zero += turns * (high - low + 1) * unit
 
     def place_home(self, position: int, counts: int) -> None:
-        """Take a place for a position of the user: homing is attained."""
+        """Define counts as a position of the user: homing is attained."""
         self.zero = counts - position * self.settings.units.per_position
         self.homed = True
 
     def command(self) -> None:
-        """Have the motor do what the reference says; what is not controlled follows it."""
+        """Command the motor with the reference; uncontrolled quantities follow the motor."""
         motor, reference, control = self.motor, self.reference, self.control
         if control is not Control.CURRENT:
             reference.current_a = motor.current_ma / 1_000
@@ -346,21 +345,21 @@ class Axis(Part):
         self.reference.current_a = 0.0
 
     def configure(self, settings: Settings) -> None:
-        """Follow another configuration."""
+        """Apply another configuration."""
         self.settings = settings
         self.motor.current_limit_a = min(settings.max_current_a, *settings.limits_a)
 
 
-# How a drive comes to a standstill: the option codes 605Ah to 605Eh (CiA 402-2).
+# Stopping a drive: the option codes 605Ah to 605Eh (CiA 402-2).
 
 
 class Ramp(IntEnum):
-    """How the motor is slowed down."""
+    """Ways to slow the motor down."""
 
     NONE = 0  # the power stage is switched off, the shaft coasts
     SLOW_DOWN = 1  # with the deceleration of the profile, 6084h
     QUICK_STOP = 2  # with the quick stop deceleration, 6085h
-    CURRENT_LIMIT = 3  # as hard as the current limit lets it
+    CURRENT_LIMIT = 3  # as hard as the current limit allows
 
 
 _STAYING: Final = 4
@@ -373,8 +372,8 @@ class Stopping(Part):
     Not emulated: options 4 and 8, the voltage limit; options of a manufacturer.
 
     Args:
-        axis: whose reference it is.
-        parameters: have the option codes.
+        axis: the axis to slow down.
+        parameters: objects with the option codes.
     """
 
     def __init__(self, axis: Axis, parameters: Parameters) -> None:
@@ -386,18 +385,18 @@ class Stopping(Part):
         return self._parameters.number(indices.QUICK_STOP_OPTION) > _STAYING
 
     def quick_stop(self) -> bool:
-        """Make a step as 605Ah says. Returns: whether the motor stands."""
+        """Make a step according to 605Ah; return whether the motor stands."""
         return self.brake(self._parameters.number(indices.QUICK_STOP_OPTION) % _STAYING)
 
     def by(self, index: int) -> bool:
-        """Make a step as another option code says. Returns: whether the motor stands."""
+        """Make a step according to another option code; return whether the motor stands."""
         return self.brake(self._parameters.number(index))
 
     def brake(self, ramp: int) -> bool:
         """Make a step of a ramp.
 
         Returns:
-            True if the motor stands, or has not to be slowed down.
+            True if the motor stands, or need not be slowed down.
         """
         axis, settings = self._axis, self._axis.settings
         if ramp == Ramp.NONE:
@@ -414,7 +413,7 @@ class Stopping(Part):
 # Limit switches and home switch of an axis (CiA 402-2, 60FDh).
 
 FAR_DEG: Final = 1e9
-"""An angle that no shaft ever reaches."""
+"""An angle that no shaft reaches."""
 
 _NEGATIVE_LIMIT: Final = 0x01
 _POSITIVE_LIMIT: Final = 0x02
@@ -438,13 +437,13 @@ INPUTS: Final[tuple[InputSignal, ...]] = (
 
 
 class Switches(Part):
-    """The switches as the drive sees them: pressed by hand, or by the shaft at an angle.
+    """The switches as the drive sees them, pressed by hand or by the shaft at an angle.
 
-    Negative and positive are directions of the user, as 607Eh makes them.
+    Negative and positive are the user's directions, after the polarity 607Eh.
 
     Attributes:
         word: bits 0 to 2 of 60FDh.
-        by_angle: the shaft presses some of them.
+        by_angle: the shaft presses at least one of them.
     """
 
     def __init__(self) -> None:
@@ -454,7 +453,7 @@ class Switches(Part):
         self.by_angle = False
 
     def set(self, inputs: QuantityBank) -> None:
-        """Follow the physical inputs."""
+        """Update from the physical inputs."""
         hand, angles = INPUTS[:3], INPUTS[3:]
         self._hand = sum(1 << bit for bit, item in enumerate(hand) if inputs[item.name])
         low, high, first, last = (inputs[item.name] for item in angles)
@@ -463,7 +462,7 @@ class Switches(Part):
         self.word = self._hand
 
     def look(self, shaft_deg: float) -> None:
-        """Follow the shaft."""
+        """Update from the angle of the shaft."""
         low, high, first, last = self._angles
         self.word = (
             self._hand
@@ -474,7 +473,7 @@ class Switches(Part):
 
     @property
     def free(self) -> bool:
-        """Whether no limit switch is pressed, nor could be by the shaft."""
+        """Whether no limit switch is pressed, and the shaft cannot press one."""
         return not (self.by_angle or self.word & (_NEGATIVE_LIMIT | _POSITIVE_LIMIT))
 
     @property
@@ -493,17 +492,17 @@ class Switches(Part):
         return bool(self.word & _HOME)
 
 
-# Where a drive may go and how fast: limit switches, software limits, velocity (CiA 402-2).
+# Limits of position and velocity of a drive: limit switches and software limits (CiA 402-2).
 
 Clamped = tuple[float, bool]
-"""A demand, or the limit that is nearest to it, and whether that is another value."""
+"""A demand or the nearest limit, and whether the limit has changed the demand."""
 
 
 class Limits(Part):
-    """What an axis may do.
+    """Limits of an axis.
 
     Args:
-        axis: whose settings count.
+        axis: the axis with the settings.
         switches: its limit switches.
     """
 
@@ -528,9 +527,9 @@ class Limits(Part):
         return _clamp(wanted_a, -min(backward, most), min(forward, most))
 
     def reached(self) -> ErrorCode | None:
-        """Return what ends the way on which the reference leads, None while it is free.
+        """Return the limit that ends the motion of the reference, None while there is none.
 
-        That is a pressed limit switch, or a software limit that could not be kept otherwise.
+        The limit is a pressed limit switch, or a software limit that could otherwise not be kept.
         """
         axis, reference = self._axis, self._axis.reference
         towards = reference.velocity
@@ -547,7 +546,7 @@ class Limits(Part):
         return ErrorCode.SOFTWARE_LIMIT if ends else None
 
     def _room(self, towards: float) -> float:
-        """Return the counts that are left before the motor has to brake for a software limit."""
+        """Return the counts left before the motor must brake for a software limit."""
         axis, reference = self._axis, self._axis.reference
         low, high = axis.ends
         way = high - reference.position if towards > 0 else reference.position - low

@@ -2,21 +2,21 @@
 
 # Theory of operation.
 #
-# A drive is an `Application` of its slave: it works in ticks that somebody asks for. A tick
+# A drive is an `Application` of its slave: it works in the ticks that are requested. A tick
 # (`on_execute`) goes one way: the motor moves up to now (`step_to`), inputs and shaft are read,
 # `Supervision` says which faults there are, `Automaton` runs the state machine and in it one step
-# of the mode of operation, the motor is told its new demand, actual values are shown. What objects
+# of the mode of operation, the motor gets its new demand, actual values are shown. What objects
 # change (controlword, mode, target, configuration) is noted by watchers, which ask for a tick
 # (`request`); a controlword acts at once, before the tick, with the configuration before it.
 #
-# At the end of a tick `_sleep` decides when the next one is due: never while nothing moves and the
-# mode has settled, each second while the winding cools, else in the next millisecond.
+# At the end of a tick `_sleep` schedules the next one: never while nothing moves and the mode has
+# settled, each second while the winding cools, else in the next millisecond.
 #
 # Run-ahead. Between two SYNCs a drive in csp does the same each millisecond. `Stretch.plan`, asked
 # by `_sleep`, works such ticks out in one loop over floats, to the bit as single ticks do. For that
-#   - the rig must say that nobody looks (`Horizon.until_us`), and
+#   - the rig must allow it (`Horizon.until_us`), and
 #   - the next ticks must be plain (`goes_on_plainly`): Operation enabled, no input or configuration
-#     has changed, no fault is waiting, no limit switch is in reach, nobody watches an actual value.
+#     has changed, no fault is waiting, no limit switch is in reach, no actual value is watched.
 # The loop ends before the first tick in which anything else would happen: heat is due, a demand is
 # cut, the following error is too large, the shaft stands or sticks. That tick is an `on_execute`.
 # How many ticks are worth it is what the latest quiet lasted, less one: a SYNC that comes a tick
@@ -24,11 +24,11 @@
 #
 # The result (`RunAhead`) is not the drive's state before time has come there. Who asks earlier gets
 # it: `axis`, `limited`, `read` and the objects call `Stretch.catch_up`, which takes the ticks up to
-# `Horizon.passed_us` and works out the rest anew. What changes the drive calls `_interrupt` first:
+# `Horizon.passed_us` and computes the rest again. What changes the drive calls `_interrupt` first:
 # it catches up, drops what is ahead and writes down the actual values, so that they are those of
 # the tick before. A drive without `horizon` (no rig, dense, couplings, watchers) works tick by
 # tick.
-# Actual values are worked out when somebody reads them (`ActualValues`): `begin` shows what is
+# Actual values are computed when they are read (`ActualValues`): `begin` shows what is
 # written while the drive works, `renew` lets them follow again and writes those that are watched.
 #
 # A second table of limits, homing or a mode belongs to `modes/`; what all modes obey (limits,
@@ -69,7 +69,7 @@ if TYPE_CHECKING:
     from tickrig.device.servo.servo import Servo
 
 
-# Values that objects of a drive take; others are refused with 0609 0030h (CiA 402-2).
+# Values that objects of a drive accept; others are refused with 0609 0030h (CiA 402-2).
 
 _ALLOWED: Final[dict[int, Container[Value]]] = {
     indices.ABORT_CONNECTION: (0, 1, 2, 3),
@@ -82,11 +82,11 @@ _ALLOWED: Final[dict[int, Container[Value]]] = {
     indices.HOMING_METHOD: (0, *METHODS),
     indices.INTERPOLATION_SUBMODE: (0,),
 }
-"""By index; homing method 0 is none."""
+"""Accepted values by index; homing method 0 means no homing."""
 
 
 def _guard_values(dictionary: Dictionary, modes: Iterable[int]) -> None:
-    """Have the objects of a drive with some modes of operation refuse other values."""
+    """Attach guards that refuse values a drive with these modes of operation does not have."""
     for index, allowed in {**_ALLOWED, indices.MODES_OF_OPERATION: tuple(modes)}.items():
         entry = dictionary.find(index)
         if entry is not None:
@@ -108,11 +108,11 @@ _MOVING: Final = (automaton.DriveState.OPERATION_ENABLED, automaton.DriveState.Q
 """States in which a lost connection matters."""
 
 _COOLING_US: Final = 1_000_000
-"""Period in which a drive at rest looks at its temperature."""
+"""Period at which a drive at rest updates its temperature."""
 
 
 class _AbortConnection(IntEnum):
-    """What a lost connection does (6007h); other values do nothing."""
+    """Reactions to a lost connection (6007h); other values have no effect."""
 
     FAULT = 1
     DISABLE_VOLTAGE = 2
@@ -123,12 +123,11 @@ class _AbortConnection(IntEnum):
 class Ds402(Application):
     """A drive of one axis.
 
-    The controlword acts when it changes; from Ready to switch on, Enable operation
-    leads through Switched on at once. A lost connection and NMT Stop act as 6007h
-    says while the motor has power. A mode that the drive has not is refused with
-    0609 0030h. Without a servo, the motor is an ideal one. A pressed limit switch, and a
-    software limit that could not be kept otherwise, stop the motor with the quick stop
-    deceleration; it can be moved back.
+    The controlword acts when it changes; from Ready to switch on, Enable operation leads through
+    Switched on at once. On a lost connection or NMT Stop the drive reacts according to 6007h while
+    the motor has power. A mode that the drive does not have is refused with 0609 0030h. Without a
+    servo, the motor is an ideal motor. A pressed limit switch, or a software limit that could
+    otherwise not be kept, stops the motor with the quick stop deceleration; it can be moved back.
 
     Not emulated: a brake, the velocity mode 2 of frequency converters, touch probes.
 
@@ -136,24 +135,24 @@ class Ds402(Application):
         node: the slave.
         slot: its place in the tick.
         servo: motor, power stage and load.
-        defaults: what counts for objects that its dictionary has not, by (index, sub-index).
+        defaults: values of objects that the dictionary does not have, by (index, sub-index).
 
     Attributes:
         modes: the modes that the drive has, by number.
-        measures: what its objects show, by index.
-        bounds: what it takes for sound.
+        measures: functions for the actual values, by index.
+        bounds: limits without a fault.
         encoder_error: error code of a pulled encoder.
-        limits_are_faults: the end of the way is a fault, not just a stop.
-        more_targets: objects of a maker whose change is a new target.
-        outputs: what the world sees of it; `read` gives the values.
+        limits_are_faults: reaching a limit is a fault, not only a stop.
+        more_targets: manufacturer-specific objects whose change is a new target.
+        outputs: its physical outputs; `read` returns their values.
         parameters: its objects, by index.
-        offered: the modes that it has and that its dictionary lists, by number.
-        limits: of position and velocity, and what they cut.
+        offered: the modes that both the drive and its dictionary have, by number.
+        limits: of position and velocity.
         automaton: the state machine of CiA 402.
         supervision: of supply, temperature, encoder and following error.
         actual_values: the objects that show what is measured.
         switches: limit switches and home switch.
-        mode: the mode of operation at work.
+        mode: the active mode of operation.
         mode_number: its number, as in 6061h.
     """
 
@@ -216,7 +215,7 @@ class Ds402(Application):
 
     @property
     def axis(self) -> Axis:
-        """Motor, reference, settings and zero, as the latest tick left them."""
+        """Motor, reference, settings and zero after the latest tick."""
         self._stretch.catch_up()
         return self._axis
 
@@ -228,7 +227,7 @@ class Ds402(Application):
 
     @property
     def goes_on_plainly(self) -> bool:
-        """Whether its next ticks are those of its mode, and nobody is told of each."""
+        """Whether the next ticks only run the mode, and no callback needs each of them."""
         changes = self._stale or self.inputs.changed or self.actual_values.watched
         waits = self.supervision.waiting or not self.switches.free
         return self.automaton.operating and not (changes or waits)
@@ -244,7 +243,7 @@ class Ds402(Application):
         return self._faults[-1] if self._faults else 0
 
     def read(self, name: str) -> int | float | str:
-        """Look at an output, as it was left by the latest tick.
+        """Return an output as the latest tick left it.
 
         Args:
             name: one of `outputs`.
@@ -253,18 +252,18 @@ class Ds402(Application):
             Its value.
 
         Raises:
-            KeyError: there is none of that name.
+            KeyError: there is no output of that name.
         """
         return terminals.READ[name](self)
 
     def fault(self, code: int) -> None:
-        """Have a fault with an emergency error code; one that is there already is none."""
+        """Set a fault with an emergency error code; a fault that is already present is ignored."""
         if code not in self._faults:
             self._note(code)
             self.node.emergency(code, settings.register_of(code))
 
     def power_on(self) -> None:
-        """Count from 0 on."""
+        """Start counting at 0."""
         self._interrupt()
         axis = self._axis
         axis.motor.release()
@@ -293,21 +292,21 @@ class Ds402(Application):
         self._change_mode()
 
     def emergency(self, code: int, register: int, text: bytes) -> None:
-        """Remember that the connection is lost."""
+        """Note that the connection is lost."""
         if code in settings.COMMUNICATION_ERRORS:
             self._lost.add(code)
 
     def emergency_clear(self, code: int, text: bytes | None) -> None:
-        """Remember that it is there again."""
+        """Note that the connection is restored."""
         self._lost.discard(code)
 
     def state_changed(self, old: NmtState, new: NmtState) -> None:
-        """Take NMT Stop for a lost connection."""
+        """Treat NMT Stop as a lost connection."""
         if new is NmtState.STOPPED:
             self.communication_error()
 
     def communication_error(self) -> None:
-        """Act as 6007h says, while the motor has power."""
+        """React according to 6007h while the motor has power."""
         if self.state not in _MOVING:
             return
         self._interrupt()
@@ -318,12 +317,12 @@ class Ds402(Application):
                 self.automaton.enter(automaton.DriveState.SWITCH_ON_DISABLED)
             case _AbortConnection.QUICK_STOP:
                 self.automaton.enter(automaton.DriveState.QUICK_STOP_ACTIVE)
-            case _:  # no action, or what a manufacturer might mean
+            case _:  # no action, or a manufacturer-specific one
                 return
         self.request()
 
     def on_execute(self, now_us: int) -> None:
-        """Measure, watch, make a step, command the motor, show actual values."""
+        """Measure, supervise, make a step, command the motor, show actual values."""
         self._stretch.drop()
         requested, self._requested = self._requested, False
         self.actual_values.begin()
@@ -347,7 +346,7 @@ class Ds402(Application):
         super().request()
 
     def skip(self, ticks: int, now_us: int, position: float, velocity: float) -> None:
-        """Be as after ticks that a stretch has worked out.
+        """Take over the state after ticks that a stretch has computed.
 
         Args:
             ticks: how many.
@@ -363,12 +362,12 @@ class Ds402(Application):
         self._limited = False
 
     def _interrupt(self) -> None:
-        """Be where the latest tick has led, and show that: something is about to change."""
+        """Catch up with the latest tick and write the actual values before something changes."""
         self._stretch.drop()
         self.actual_values.keep()
 
     def _note(self, code: int) -> None:
-        """Have a fault that the master knows already."""
+        """Set a fault that the master already knows."""
         self._interrupt()
         self._faults.append(code)
         self.parameters.write(indices.ERROR_CODE, code)
@@ -376,7 +375,7 @@ class Ds402(Application):
         self.request()
 
     def _reset_faults(self) -> None:
-        """Leave Fault if no cause is there that has left a code: transition 15."""
+        """Leave Fault if no cause with an error code is present: transition 15."""
         present = self.supervision.present(powered=self.automaton.powered)
         if not self._lost.union(present).isdisjoint(self._faults):
             return
@@ -387,12 +386,12 @@ class Ds402(Application):
         self.automaton.enter(automaton.DriveState.SWITCH_ON_DISABLED)
 
     def _begin_mode(self, *, enabled: bool = False) -> None:
-        """Begin the chosen mode anew."""
+        """Restart the chosen mode."""
         self.mode = self.modes[self.mode_number](self._view)
         self.mode.enter(enabled=enabled)
 
     def _operate(self, now_us: int) -> bool:
-        """Run one control period of the mode, or brake if that leads beyond a limit."""
+        """Run one control period of the mode, or brake if the motion leads beyond a limit."""
         mode, axis = self.mode, self._axis
         axis.control = mode.control
         position, velocity = axis.reference.position, axis.reference.velocity
@@ -408,7 +407,7 @@ class Ds402(Application):
         return self.stopping.brake(Ramp.QUICK_STOP)
 
     def _follow_outside(self) -> None:
-        """Follow configuration, physical inputs and the shaft."""
+        """Apply configuration, physical inputs and the position of the shaft."""
         self._configure()
         self._follow_inputs()
         if self.switches.by_angle:
@@ -437,7 +436,7 @@ class Ds402(Application):
             terminals.load(self._servo, inputs)
 
     def _sleep(self, now_us: int, settled: bool, *, requested: bool) -> None:
-        """Come back when something happens, or each second while the winding cools, or never."""
+        """Schedule the next tick: at an event, each second while the winding cools, or never."""
         motor = self._axis.motor
         if not (settled and motor.resting):
             self.schedule(now_us + TICK_US + self._stretch.plan(now_us, requested=requested))
@@ -448,7 +447,7 @@ class Ds402(Application):
             self.schedule(now_us + _COOLING_US)
 
     def _controlled(self, entry: Entry) -> None:
-        """Obey a new controlword, with what was configured before it."""
+        """Act on a new controlword with the configuration before it."""
         self._interrupt()
         self._configure()
         before = self._view.controlword

@@ -1,4 +1,4 @@
-"""Objects of CiA 402-2 that the drive knows, and what counts where a device has none."""
+"""Objects of CiA 402-2 that the drive uses, and their defaults if a device lacks them."""
 
 from __future__ import annotations
 
@@ -119,4 +119,4 @@ DEFAULTS: Final[dict[tuple[int, int], int]] = {
     (POSITIVE_TORQUE_LIMIT, 0): 0xFFFF,
     (NEGATIVE_TORQUE_LIMIT, 0): 0xFFFF,
 }
-"""By (index, sub-index); 0 where nothing is said."""
+"""Defaults by (index, sub-index); 0 if not listed."""

@@ -1,4 +1,4 @@
-"""What the objects of a drive set: parameters, settings, error codes."""
+"""Configuration of a drive by its objects: parameters, settings, error codes."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tickrig.wire.canopen.emcy import ErrorRegister
 
 
 class ErrorCode(IntEnum):
-    """What a drive can find wrong."""
+    """Error codes of the faults of a drive."""
 
     OVER_CURRENT = 0x2310
     OVER_VOLTAGE = 0x3210
@@ -42,7 +42,8 @@ _CONTROLLABLE: Final = frozenset(
         *(ErrorCode.NEGATIVE_LIMIT, ErrorCode.POSITIVE_LIMIT, ErrorCode.SOFTWARE_LIMIT),
     )
 )
-"""Faults after which the motor can still be slowed down as 605Eh says; others switch it off."""
+"""Faults after which the motor can still be slowed down according to 605Eh; others switch it
+off."""
 
 COMMUNICATION_ERRORS: Final = range(0x8100, 0x8200)
 
@@ -70,15 +71,15 @@ def register_of(code: int) -> ErrorRegister:
     return _REGISTERS.get(code >> 12, ErrorRegister.DEVICE_PROFILE)
 
 
-# The objects of a drive as numbers, whether the device has them or not.
+# The objects of a drive as numbers, with defaults for missing ones.
 
 
 class Parameters(Part):
-    """Reads objects, and writes those that are there.
+    """Reads objects with defaults, and writes those that exist.
 
     Args:
         dictionary: of the slave.
-        defaults: values of objects that the device has not, by (index, sub-index).
+        defaults: values of objects that the device does not have, by (index, sub-index).
     """
 
     def __init__(
@@ -87,12 +88,12 @@ class Parameters(Part):
         self._dictionary, self._defaults = dictionary, defaults
 
     def number(self, index: int, sub: int = 0) -> int:
-        """Return a value; that of the defaults if the device has no such object, or 0."""
+        """Return the value of an object, or its default (0 without one) if it is missing."""
         entry = self._dictionary.find(index, sub)
         return self._defaults.get((index, sub), 0) if entry is None else entry.number
 
     def write(self, index: int, value: int, sub: int = 0) -> None:
-        """Set a value, if the device has such an object; too large a one is cut to its range."""
+        """Set a value if the device has the object; a value out of range is limited."""
         entry = self._dictionary.find(index, sub)
         if entry is not None:
             entry.value = clamped(value, 8 * entry.size, signed=entry.description.signed)
@@ -106,7 +107,7 @@ class Parameters(Part):
 
 
 def clamped(value: int, bits: int, *, signed: bool) -> int:
-    """Return the nearest number that an integer of so many bits holds.
+    """Return the nearest number that an integer of this size can hold.
 
     >>> clamped(40_000, 16, signed=True), clamped(-1, 16, signed=False)
     (32767, 0)
@@ -128,7 +129,7 @@ _PER_MINUTE: Final = 0x47
 """Numerator and denominator of a velocity in an SI unit object (CiA 303-2)."""
 
 _ANGLES: Final = {0x10: tau, 0x41: 360.0, _REVOLUTIONS: 1.0}
-"""How many radians, degrees and revolutions a turn has, by their number there."""
+"""Radians, degrees and revolutions in a turn, by their SI unit number."""
 
 _RPM_DIMENSION: Final = 0xA4
 """Dimension index of revolutions per minute in 608Ch."""
@@ -147,24 +148,23 @@ CONFIGURATION: Final = (
     *(indices.MAX_ACCELERATION, indices.MAX_DECELERATION),
     *(indices.POSITIVE_TORQUE_LIMIT, indices.NEGATIVE_TORQUE_LIMIT),
 )
-"""Objects whose change makes the settings anew."""
+"""Objects whose change updates the settings."""
 
 
 class Units(Part):
     """Converts between objects and the counts of the motor's encoder.
 
-    A position unit is one count, or what 6091h and 6092h make of a revolution of
-    the motor, which has as many counts as 608Fh says; or an angle behind the gear of 6091h
-    if 60A8h says so, with the power of ten that it gives. A velocity unit is a
-    position unit per second, or revolutions of the motor per minute if 60A9h or
-    608Ch says so, with the power of ten that they give; an acceleration unit is a
-    velocity unit per second. 607Eh turns the signs.
+    A position unit is one count, or what 6091h and 6092h make of a revolution of the motor, which
+    has as many counts as 608Fh says; or an angle behind the gear of 6091h if 60A8h selects it, with
+    the power of ten in it. A velocity unit is a position unit per second, or revolutions of the
+    motor per minute if 60A9h or 608Ch selects it, with the power of ten in them; an acceleration
+    unit is a velocity unit per second. 607Eh turns the signs.
 
     Not emulated: 6090h, 6093h to 6097h; other dimensions.
 
     Args:
         parameters: the objects.
-        counts_per_turn: of the motor's encoder, where 608Fh is not there.
+        counts_per_turn: of the motor's encoder, if 608Fh does not exist.
 
     Attributes:
         per_position: counts in a position unit, with its sign.
@@ -294,7 +294,7 @@ def _per_mille(value: int) -> float:
 
 
 def _software_limits(parameters: Parameters, units: Units) -> tuple[float, float]:
-    """Return the limits in counts, lower one first; none if the lower is not below the upper."""
+    """Return the limits in counts, lower one first; no limits unless lower is below upper."""
     lower = parameters.number(indices.SOFTWARE_LIMIT, 1)
     upper = parameters.number(indices.SOFTWARE_LIMIT, 2)
     if lower >= upper:
@@ -305,7 +305,7 @@ def _software_limits(parameters: Parameters, units: Units) -> tuple[float, float
 
 
 def _position_range(parameters: Parameters) -> tuple[int, int]:
-    """Return 607Bh; the whole INTEGER32 if its ends are not apart."""
+    """Return the range 607Bh, or the whole INTEGER32 if its ends are equal."""
     low, high = (parameters.number(indices.POSITION_RANGE, sub) for sub in (1, 2))
     return (low, high) if low < high else (indices.I32_MIN, indices.I32_MAX)
 
@@ -332,7 +332,7 @@ def _counts_per_unit(parameters: Parameters, per_turn: float) -> float:
 
 
 def _angle_unit(parameters: Parameters, per_turn: float) -> float:
-    """Return the counts of a unit that is an angle, 0 if the unit is none."""
+    """Return the counts of an angle unit, 0 if the unit is not an angle."""
     unit = parameters.number(indices.SI_UNIT_POSITION)
     angle = _ANGLES.get(unit >> 16 & 0xFF, 0.0)
     if not angle:
@@ -342,7 +342,7 @@ def _angle_unit(parameters: Parameters, per_turn: float) -> float:
 
 
 def _velocity_unit(parameters: Parameters, per_turn: float) -> float:
-    """Return the counts per second of a unit in rpm, 0 if the unit is another one."""
+    """Return the counts per second of a unit in rpm, 0 if the unit is not rpm."""
     unit = parameters.number(indices.SI_UNIT_VELOCITY)
     if unit >> 8 & 0xFFFF == _REVOLUTIONS << 8 | _PER_MINUTE:
         exponent = unit >> 24

@@ -1,4 +1,4 @@
-"""Ticks that a drive works out in one go, ahead of time."""
+"""Ticks that a drive computes together, ahead of time."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ if TYPE_CHECKING:
     from tickrig.device.servo.servo import Servo
 
 _FEWEST: Final = 2
-"""Ticks that are worth it."""
+"""Smallest number of ticks that is worth the effort."""
 
 
 class Stretch(Part):
     """The ticks ahead of a drive in which nothing but plain motion happens.
 
-    Between two SYNCs a drive in csp does the same each millisecond. Where its rig says that
-    nobody looks, it works out as many such ticks as the latest quiet lasted, and is there when
-    somebody asks, or when the next tick with work comes: as far as time has passed by then. The
-    first tick in which anything else would happen is left to `on_execute`: heat, a cut demand, a
-    following error, standstill, the end of the range. (32 drives in csp: 2.5 times as fast.)
+    Between two SYNCs a drive in csp does the same each millisecond. If its rig allows it, the drive
+    computes as many such ticks as the latest quiet period lasted; when a value is read, or the next
+    tick with work comes, it takes over the ticks that have passed. The first tick in which anything
+    else would happen is left to `on_execute`: heat, a cut demand, a following error, standstill,
+    the end of the range. (32 drives in csp: 2.5 times as fast.)
 
     Args:
-        drive: whose ticks.
+        drive: the drive.
         axis: of the drive.
-        servo: its motor; without one it does nothing.
+        servo: its motor; without one there is no run-ahead.
     """
 
     def __init__(self, drive: Ds402, axis: Axis, servo: Servo | None) -> None:
@@ -41,14 +41,14 @@ class Stretch(Part):
         self._counts = (0.0, 0.0)
 
     def plan(self, now_us: int, *, requested: bool) -> int:
-        """Work out what comes after the tick of this time.
+        """Compute the ticks after the one at this time.
 
         Args:
             now_us: the time.
-            requested: somebody asked for this tick; it was not due by itself.
+            requested: the tick was requested; it was not due by itself.
 
         Returns:
-            For how many microseconds nothing but that happens.
+            The duration of these ticks in microseconds.
         """
         most, servo = self._most_us(now_us, requested=requested) // TICK_US, self._servo
         if most < _FEWEST or servo is None or not self._drive.goes_on_plainly:
@@ -67,7 +67,7 @@ class Stretch(Part):
         return run.steps * TICK_US
 
     def catch_up(self) -> None:
-        """Have the drive be where the ticks up to now have led it."""
+        """Bring the drive to the state after the ticks up to now."""
         run, servo = self._run, self._servo
         if run is None or servo is None:
             return
@@ -84,12 +84,12 @@ class Stretch(Part):
             self._take(servo, self._work_out(servo, steps))
 
     def drop(self) -> None:
-        """Forget what is ahead: something is about to change."""
+        """Discard the computed ticks, because something is about to change."""
         self.catch_up()
         self._run = None
 
     def _most_us(self, now_us: int, *, requested: bool) -> int:
-        """Return for how long nobody looks, as far as the latest quiet tells."""
+        """Return the expected quiet time, estimated from the latest one."""
         horizon = self._drive.node.horizon
         since_us = now_us - self._requested_us
         if requested:
@@ -103,7 +103,7 @@ class Stretch(Part):
         return servo.run_ahead(self._path[:steps], self._counts, self._error, self._standstill)
 
     def _take(self, servo: Servo, run: RunAhead) -> None:
-        """Make the ticks of a run."""
+        """Compute the ticks of a run."""
         position, velocity = self._path[run.steps]
         self._path = self._path[run.steps :]
         self._began_us += run.steps * TICK_US

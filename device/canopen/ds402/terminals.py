@@ -1,4 +1,4 @@
-"""The physical side of a drive: what the world does to it, and what it sees of it."""
+"""The physical inputs and outputs of a drive."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ DRIVE_INPUTS: Final = (
     InputSignal(SHORT_CIRCUIT, "the motor cable has a short circuit", SignalType.FAULT),
     InputSignal(ENCODER_UNPLUGGED, "the encoder cable is pulled", SignalType.FAULT),
 )
-"""Of any drive."""
+"""Inputs of any drive."""
 
 PLANT_INPUTS: Final = (
     InputSignal("supply_v", "supply of the power stage", high=100, unit="V", initial=24, real=True),
@@ -34,7 +34,7 @@ PLANT_INPUTS: Final = (
     InputSignal("shaft_blocked", "the shaft is held", SignalType.FAULT),
     InputSignal("motor_phase_open", "a wire of the motor is broken", SignalType.FAULT),
 )
-"""Of a drive whose motor has physics."""
+"""Inputs of a drive with a simulated motor."""
 
 OUTPUTS: Final = {
     item.name: item
@@ -69,7 +69,7 @@ READ: Final[dict[str, Callable[[Ds402], float | str]]] = {
 
 
 def load(servo: Servo, inputs: QuantityBank) -> None:
-    """Let the world act on a motor."""
+    """Apply the physical inputs to a motor."""
     servo.supply_v, servo.ambient_c = inputs["supply_v"], inputs["ambient_c"]
     servo.load_nm, servo.load_kg_m2 = inputs["load_nm"], inputs["load_kg_m2"]
     servo.blocked = bool(inputs["shaft_blocked"])

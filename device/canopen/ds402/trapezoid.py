@@ -1,4 +1,4 @@
-"""Trapezoidal profiles, and following them."""
+"""Trapezoidal profiles, and a reference that follows them."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from tickrig.device.canopen.ds402.axis import Reference
 from tickrig.device.canopen.slave import TICK_US
 from tickrig.device.twin import Immutable, Part
 
-# Motion profiles: the way to a position or a velocity within limits, in closed form.
+# Motion profiles: the path to a position or a velocity within limits, in closed form.
 #
 # A path is planned when the target or a limit changes, from the motion at that
-# moment, and asked where it is at any later time. So it is exact: it ends on its
+# moment, and evaluated at any later time. So it is exact: it ends on its
 # target, with no drift, whenever the control steps come. Each of its ramps has
 # the shape of 6086h; the way along a ramp is the mean of its two velocities times
 # its duration in every shape, so that one plan serves them all.
@@ -31,7 +31,7 @@ class RampShape(IntEnum):
 
 
 class Motion(NamedTuple):
-    """Where something is and how it moves; unit/s and unit/s^2 for any unit of length."""
+    """Position, velocity and acceleration; unit/s and unit/s^2 for any unit of length."""
 
     position: float
     velocity: float = 0.0
@@ -40,7 +40,7 @@ class Motion(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class PathLimits(Immutable):
-    """What a path may use, all greater than 0.
+    """Limits of a path, all greater than 0.
 
     Attributes:
         velocity: the fastest.
@@ -56,7 +56,7 @@ class PathLimits(Immutable):
 
 
 class _Leg(NamedTuple):
-    """A part of a path: to a velocity in a time."""
+    """A part of a path: a change to a velocity in a time."""
 
     velocity: float
     duration_s: float
@@ -64,7 +64,7 @@ class _Leg(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class _RampLeg(Immutable):
-    """A leg at its place in time and way."""
+    """A leg with its start time and position."""
 
     end_s: float
     duration_s: float
@@ -91,7 +91,7 @@ class _RampLeg(Immutable):
 
 
 class Path(Part):
-    """A planned way; after its end it goes on with its last velocity.
+    """A planned path; after its end it continues at its last velocity.
 
     Attributes:
         began_us: when it was planned.
@@ -109,14 +109,14 @@ class Path(Part):
         shape: RampShape = RampShape.LINEAR,
         target: float | None = None,
     ) -> None:
-        """Lay legs one after the other.
+        """Join legs into a path.
 
         Args:
             now_us: when it begins.
             start: where it begins.
             legs: its parts.
             shape: of the ramps.
-            target: where it ends to the last bit, if that is known.
+            target: exact end position, if known.
         """
         position, velocity, end_s = start.position, start.velocity, 0.0
         ramps = []
@@ -144,7 +144,7 @@ class Path(Part):
 
 
 def to_velocity(now_us: int, start: Motion, velocity: float, limits: PathLimits) -> Path:
-    """Plan a change of velocity; it is not cut to the velocity limit.
+    """Plan a change of velocity; it is not limited to the velocity limit.
 
     A change of direction brakes to standstill first, and accelerates then.
     """
@@ -155,18 +155,18 @@ def to_velocity(now_us: int, start: Motion, velocity: float, limits: PathLimits)
 def to_position(
     now_us: int, start: Motion, target: float, limits: PathLimits, end_velocity: float = 0.0
 ) -> Path:
-    """Plan the fastest way to a position.
+    """Plan the fastest path to a position.
 
-    What moves away from the target, or too fast to stop there, brakes to
-    standstill and comes back; what is faster than the limit brakes to it first.
+    A motion away from the target, or too fast to stop there, brakes to standstill and returns; a
+    motion above the velocity limit brakes to it first.
 
     Args:
         now_us: when it begins.
         start: position and velocity at that time.
-        target: where to.
-        limits: what the way may use.
-        end_velocity: speed at the target in the direction of the way, at least 0. If the way
-            is too short for it, the speed there is as near as the limits let it be.
+        target: end position.
+        limits: limits of the path.
+        end_velocity: speed at the target in the direction of motion, at least 0. If the path is too
+            short, the speed there is as near as the limits allow.
     """
     distance = target - start.position
     legs = _legs(start.velocity, distance, _effective(limits), min(end_velocity, limits.velocity))
@@ -190,7 +190,7 @@ def _ramps(velocity: float, wanted: float, limits: PathLimits) -> list[_Leg]:
 
 
 def _legs(velocity: float, distance: float, limits: PathLimits, end: float) -> list[_Leg]:
-    """Return the legs of a way to a position; in which direction it is makes no difference."""
+    """Return the legs of a path to a position in either direction."""
     direction = copysign(1.0, distance or velocity)
     velocity, distance = velocity * direction, distance * direction
     stopping = velocity * abs(velocity) / (2 * limits.deceleration)
@@ -203,7 +203,7 @@ def _legs(velocity: float, distance: float, limits: PathLimits, end: float) -> l
 
 
 def _forward(velocity: float, distance: float, limits: PathLimits, end: float) -> list[_Leg]:
-    """Return the legs of a way straight ahead: to the top velocity, along, to the end velocity."""
+    """Return the legs of a path ahead: to the top velocity, along, to the end velocity."""
     up, down = limits.acceleration, limits.deceleration
     slowest = sqrt(max(0.0, velocity**2 - 2 * down * distance)) if end > 0.0 else 0.0
     end = max(slowest, min(end, sqrt(velocity**2 + 2 * up * distance)))
@@ -220,12 +220,12 @@ def _forward(velocity: float, distance: float, limits: PathLimits, end: float) -
 
 
 class PathFollower(Part):
-    """Keeps the reference on a path, as long as nobody else moves it.
+    """Keeps the reference on a path, as long as nothing else moves it.
 
-    The reference that a mode finds is that of the tick before: there a path begins.
+    A mode finds the reference of the previous tick: a path begins there.
 
     Args:
-        reference: of the drive.
+        reference: the reference of the drive.
     """
 
     __slots__ = ("_left_at", "_path", "_reference")
@@ -245,15 +245,15 @@ class PathFollower(Part):
         return Motion(self._reference.position, self._reference.velocity)
 
     def begin(self, path: Path) -> None:
-        """Take another path; it has to begin at `motion`, at `began_us`."""
+        """Follow another path, which must begin at `motion`, at `began_us`."""
         self._path, self._left_at = path, (self._reference.position, self._reference.velocity)
 
     def leave(self) -> None:
-        """Have no path any more."""
+        """Drop the path."""
         self._left_at = None
 
     def follow(self, now_us: int) -> bool:
-        """Move the reference to where the path is now. Returns: whether the path has ended."""
+        """Move the reference along the path to now; return whether the path has ended."""
         motion = self._path.at(now_us)
         self._reference.place(*motion)
         self._left_at = motion.position, motion.velocity
@@ -261,5 +261,5 @@ class PathFollower(Part):
 
 
 def began_us(now_us: int) -> int:
-    """Return since when the reference is where a mode finds it in this tick, in microseconds."""
+    """Return the time of the reference that a mode finds in this tick, in microseconds."""
     return now_us - TICK_US

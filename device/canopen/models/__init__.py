@@ -1,1 +1,1 @@
-"""Devices that are emulated out of the box: their objects and what they do with them."""
+"""Models of CANopen devices: their objects and their behaviour."""

@@ -1,7 +1,7 @@
 """A positioning drive like Maxon's EPOS 24/5 with a wheel of beego (DECISION K21).
 
-Objects, units and defaults follow the EPOS Firmware Specification as far as CiA 402
-has the same; docs/reference/devices/epos.md says what is ours.
+Objects, units and defaults follow the EPOS Firmware Specification where it agrees with CiA 402;
+docs/reference/devices/epos.md lists our choices.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ from tickrig.wire.canopen.eds.object_table import (
 from tickrig.wire.canopen.pdo import PdoDescription
 
 NODE_ID: Final = 1
-"""beego: 1 is the left wheel, 2 the right one."""
+"""Wheels of beego: 1 is left, 2 is right."""
 
 _I8: Final = DataType.INTEGER8
 _I16: Final = DataType.INTEGER16
@@ -107,13 +107,13 @@ def make_epos(node_id: int = NODE_ID, nonvolatile: Nonvolatile | None = None) ->
 
     Args:
         node_id: 1..127, or 255 for a slave that waits for LSS.
-        nonvolatile: what it kept from an earlier life, as stored parameters; nothing if left out.
+        nonvolatile: stored parameters from an earlier run; nothing if omitted.
 
     Returns:
         A slave that boots in its first tick.
 
     Raises:
-        ValueError: an impossible node-ID.
+        ValueError: invalid node-ID.
     """
     slave = make_slave(dictionary(), node_id, nonvolatile, make_application)
     slave.model = "epos"
@@ -121,7 +121,7 @@ def make_epos(node_id: int = NODE_ID, nonvolatile: Nonvolatile | None = None) ->
 
 
 def dictionary() -> Dictionary:
-    """Return the objects with default values, for one slave; their description is shared."""
+    """Return the objects of one slave with default values; slaves share the description."""
     return _template().copy()
 
 

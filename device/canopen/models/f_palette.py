@@ -60,13 +60,13 @@ def make_f_palette(node_id: int = NODE_ID, nonvolatile: Nonvolatile | None = Non
 
     Args:
         node_id: 1..127, or 255 for a slave that waits for LSS.
-        nonvolatile: what it kept from an earlier life, as stored parameters; nothing if left out.
+        nonvolatile: stored parameters from an earlier run; nothing if omitted.
 
     Returns:
         A slave that boots in its first tick.
 
     Raises:
-        ValueError: an impossible node-ID.
+        ValueError: invalid node-ID.
     """
     slave = make_slave(dictionary(), node_id, nonvolatile, make_application)
     slave.model = "f-palette"
@@ -74,7 +74,7 @@ def make_f_palette(node_id: int = NODE_ID, nonvolatile: Nonvolatile | None = Non
 
 
 def dictionary() -> Dictionary:
-    """Return the objects with default values, for one slave; their description is shared."""
+    """Return the objects of one slave with default values; slaves share the description."""
     return _template().copy()
 
 
@@ -85,7 +85,7 @@ def _template() -> Dictionary:
 
 
 def object_table(profile: CommunicationProfile) -> ObjectTable:
-    """Return the objects of such a module, with these communication objects."""
+    """Return the objects of the module, with these communication objects."""
     objects = ObjectTable()
     add_communication(objects, profile)
     _add_digital(objects)

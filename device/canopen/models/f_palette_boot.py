@@ -1,6 +1,6 @@
 """The I/O module f-palette with a boot loader: its program is downloaded over the bus (CiA 302-3).
 
-The document of the module knows no such thing: it is what a test of a download needs.
+The module's document describes no boot loader; it exists to test downloads.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from tickrig.device.canopen.stack import make_slave
 
 NODE_ID: Final = 17
 PROGRAM: Final = b"f-palette"
-"""What it runs until another program is downloaded."""
+"""The program that runs until another one is downloaded."""
 
 
 class BootableModule(Ds401):
-    """The I/O module; its inputs and outputs are its program's."""
+    """The I/O module; its inputs and outputs belong to its program."""
 
     def __init__(self, node: CanopenSlave, slot: int) -> None:
         super().__init__(node, slot, inputs=(f_palette.ADC,) * f_palette.ANALOGUE_INPUTS)
@@ -37,14 +37,14 @@ class BootableModule(Ds401):
 def make_f_palette_boot(
     node_id: int = NODE_ID, nonvolatile: Nonvolatile | None = None
 ) -> CanopenSlave:
-    """Make the module; arguments and errors are those of `make_f_palette`."""
+    """Make the module; arguments and errors as in `make_f_palette`."""
     slave = make_slave(dictionary(), node_id, nonvolatile, make_application)
     slave.model = "f-palette-boot"
     return slave
 
 
 def dictionary() -> Dictionary:
-    """Return the objects with default values, for one slave; their description is shared."""
+    """Return the objects of one slave with default values; slaves share the description."""
     return _template().copy()
 
 

@@ -1,7 +1,5 @@
 r"""Motion of a motor core unit: objects, trajectory, shaft, modes.
 
-The motion that the motor core unit plans: a trapezoid, exact in whole numbers.
-
 >>> motion = Trajectory()
 >>> ticks = 0
 >>> while motion.position_ndeg != 90 * DEGREE:
@@ -34,13 +32,13 @@ DEGREE: Final = 1_000_000_000
 MAX_VELOCITY_UDEG_S: Final = 360_000_000
 _MAX_ACCELERATION_UDEG_S2: Final = 3_600_000_000
 CHANGE_UDEG_S: Final = _MAX_ACCELERATION_UDEG_S2 * CONTROL_US // 1_000_000
-"""By how much the velocity changes in a control tick, at most."""
+"""Largest change of the velocity in a control tick."""
 
 _NDEG: Final = CONTROL_US // 2_000
-"""Nanodegrees that a tick adds for 1 udeg/s at its begin, and for 1 udeg/s at its end."""
+"""Nanodegrees that a tick adds for 1 udeg/s at its start, and for 1 udeg/s at its end."""
 
 _LANDING_NDEG: Final = 1_000
-"""A microdegree: what whole velocities may leave at the end of an approach."""
+"""A microdegree: the remainder that whole velocities may leave at the end of an approach."""
 
 
 @dataclass(slots=True)
@@ -52,8 +50,8 @@ class Trajectory:
     Attributes:
         position_ndeg: at the end of the present control tick.
         velocity_udeg_s: likewise.
-        begin_ndeg: position at the begin of the control tick.
-        begin_udeg_s: velocity at the begin of the control tick.
+        begin_ndeg: position at the start of the control tick.
+        begin_udeg_s: velocity at the start of the control tick.
     """
 
     position_ndeg: int = 0
@@ -62,12 +60,12 @@ class Trajectory:
     begin_udeg_s: int = 0
 
     def place(self, position_ndeg: int, velocity_udeg_s: int) -> None:
-        """Go on from a motion that is not its own."""
+        """Continue from a given motion."""
         self.position_ndeg, self.velocity_udeg_s = position_ndeg, velocity_udeg_s
         self._begin()
 
     def approach(self, target_ndeg: int, limit_udeg_s: int) -> None:
-        """Step so that it comes to a stop at the target, as early as the limits allow.
+        """Make a step that stops at the target as early as the limits allow.
 
         Args:
             target_ndeg: where to stop.
@@ -94,7 +92,7 @@ class Trajectory:
         """Return position in deg, velocity in deg/s and acceleration in deg/s^2 within the tick.
 
         Args:
-            since_us: since the begin of the control tick, 0..`CONTROL_US`.
+            since_us: since the start of the control tick, 0..`CONTROL_US`.
         """
         acceleration = (self.velocity_udeg_s - self.begin_udeg_s) / CONTROL_US
         since_s, begin = since_us / 1e6, self.begin_udeg_s / 1e6
@@ -106,17 +104,17 @@ class Trajectory:
 
 
 def _stoppable_udeg_s(distance_ndeg: int) -> int:
-    """Return the velocity at the end of a tick from which it stops just within a distance.
+    """Return the velocity at the end of a tick from which it can just stop within a distance.
 
-    The distance is what the tick itself adds for its end velocity v, and the
-    stop: full brake ticks, the last one shorter. With m full ones it is
-    (2 (m + 1) v - m (m + 1) CHANGE) * _NDEG; at v = m * CHANGE, m (m + 1) * CHANGE * _NDEG.
+    The distance is what the tick itself adds for its end velocity v, plus the braking distance:
+    full brake ticks, the last one shorter. With m full ones it is (2 (m + 1) v - m (m + 1) CHANGE)
+    * _NDEG; at v = m * CHANGE, m (m + 1) * CHANGE * _NDEG.
     """
     full = (isqrt(1 + 4 * (distance_ndeg // (_NDEG * CHANGE_UDEG_S))) - 1) // 2
     return (distance_ndeg // _NDEG + full * (full + 1) * CHANGE_UDEG_S) // (2 * (full + 1))
 
 
-# What the objects of the motor core unit ask for, in the units of its motion, and show.
+# Demands and actual values of the motor core unit, between its objects and the units of its motion.
 
 _FULL_SCALE: Final = 0x2010
 _ANGLE_OFFSET: Final = 0x2011
@@ -132,16 +130,16 @@ _MAX_CURRENT_MA: Final = 10_000
 class References(Part):
     """Reference, limits and full scales.
 
-    Full scale is 32767. After a failure the error value of 6444h:01 is the reference, if
-    6443h:01 is not 0, until another reference comes.
+    Full scale is 32767. After a failure, if 6443h:01 is not 0, the error value of 6444h:01 is the
+    reference until another one arrives.
 
     Args:
         node: the slave.
-        on_reference: called when a reference comes after a failure.
+        on_reference: called when a reference arrives after a failure.
 
     Attributes:
         entries: the objects.
-        failed: no reference has come since the failure.
+        failed: no reference has arrived since the failure.
     """
 
     def __init__(self, node: CanopenSlave, on_reference: Callable[[], None]) -> None:
@@ -162,7 +160,7 @@ class References(Part):
         self._reference.written = self._reference_written
 
     def start(self) -> None:
-        """Know of no failure."""
+        """Clear the failure."""
         self.failed = False
         listeners = PdoConsumer.of(self._node).on_rpdo
         if self._reference_written not in listeners:
@@ -170,42 +168,42 @@ class References(Part):
 
     @property
     def number(self) -> int:
-        """The reference that counts, -32767..32767."""
+        """The effective reference, -32767..32767."""
         if self.failed and self._error_mode.number:
             return _limited(self._error_value.number, _I16_MAX)
         return _limited(self._reference.number, _I16_MAX)
 
     @property
     def offset_mdeg(self) -> int:
-        """Where the shaft is when the angle is 0."""
+        """Angle of the shaft at the user's angle 0."""
         return self._offset.number
 
     @property
     def target_ndeg(self) -> int:
-        """Where the shaft shall be, in angle mode."""
+        """Demanded angle of the shaft, in angle mode."""
         angle_ndeg = _part(self.number, self._angle.number * 1_000_000)
         return self.offset_mdeg * 1_000_000 + angle_ndeg
 
     @property
     def velocity_udeg_s(self) -> int:
-        """How fast it shall turn, in velocity mode."""
+        """Demanded velocity, in velocity mode."""
         wanted = _part(self.number, self._velocity.number * 1_000)
         return _limited(wanted, MAX_VELOCITY_UDEG_S)
 
     @property
     def current_ma(self) -> int:
-        """What shall flow, in current mode."""
+        """Demanded current, in current mode."""
         return _limited(_part(self.number, self._current.number), _MAX_CURRENT_MA)
 
     @property
     def velocity_limit_udeg_s(self) -> int:
-        """How fast it may turn in angle mode; 0 stands for the limit of the unit."""
+        """Largest velocity in angle mode; 0 stands for the limit of the unit."""
         limit = abs(_part(self._velocity_limit.number, self._velocity.number * 1_000))
         return _limited(limit, MAX_VELOCITY_UDEG_S) or MAX_VELOCITY_UDEG_S
 
     @property
     def current_limit_ma(self) -> int:
-        """What may flow; 0 stands for the peak current of the unit."""
+        """Largest current; 0 stands for the peak current of the unit."""
         limit = abs(_part(self._current_limit.number, self._current.number))
         return _limited(limit, _MAX_CURRENT_MA) or _MAX_CURRENT_MA
 
@@ -215,15 +213,15 @@ class References(Part):
             self._on_reference()
 
     def angle(self, angle_mdeg: float) -> int:
-        """Return an angle of the shaft as 6401h:01 shows it."""
+        """Return an angle of the shaft in the units of 6401h:01."""
         return _share(angle_mdeg - self.offset_mdeg, self._angle.number)
 
     def velocity(self, velocity_mdeg_s: float) -> int:
-        """Return a velocity as 6401h:02 shows it."""
+        """Return a velocity in the units of 6401h:02."""
         return _share(velocity_mdeg_s, self._velocity.number)
 
     def current(self, current_ma: float) -> int:
-        """Return a current as 6401h:03 shows it."""
+        """Return a current in the units of 6401h:03."""
         return _share(current_ma, self._current.number)
 
 
@@ -233,7 +231,7 @@ def _part(reference: int, full_scale: int) -> int:
 
 
 def _share(value: float, full_scale: int) -> int:
-    """Return the 16-bit number that stands for a value; beyond full scale it stays there."""
+    """Return the 16-bit number of a value, limited to full scale."""
     return _limited(round(value * _I16_MAX / max(1, full_scale)), _I16_MAX)
 
 
@@ -245,7 +243,7 @@ def _limited(value: int, most: int) -> int:
 
 
 class Shaft(Part):
-    """Counts of the motor encoder as an angle of the shaft; the gear encoder says where 0 is.
+    """The angle of the shaft from the counts of the motor encoder; the gear encoder defines 0.
 
     Args:
         servo: motor, gear and loops.
@@ -274,7 +272,7 @@ class Shaft(Part):
 
     @property
     def slip_deg(self) -> float:
-        """By how much the encoders disagree."""
+        """Difference between the encoders."""
         return abs(remainder(self.angle_ndeg / 1e9 - self._gear_angle_deg, 360))
 
     @property
@@ -283,24 +281,24 @@ class Shaft(Part):
         return remainder(self.servo.gear_counts * self._gear_deg, 360)
 
     def find_zero(self) -> None:
-        """Take the angle from the gear encoder; it knows no turns."""
+        """Set the angle from the gear encoder, which does not count turns."""
         self._zero_counts = self.servo.counts - self._gear_angle_deg * self._counts_per_deg
 
     def release(self) -> None:
-        """Take the power off."""
+        """Switch the power off."""
         self.servo.release()
 
     def push(self, current_a: float) -> None:
-        """Let a current flow."""
+        """Drive a current."""
         self.servo.drive_current(current_a)
 
     def turn(self, velocity_deg_s: float, acceleration_deg_s2: float) -> None:
-        """Turn with a velocity."""
+        """Drive at a velocity."""
         scale = self._counts_per_deg
         self.servo.drive_velocity(velocity_deg_s * scale, acceleration_deg_s2 * scale)
 
     def point(self, position_deg: float, velocity_deg_s: float, acceleration_deg_s2: float) -> None:
-        """Be at a position."""
+        """Drive to a position."""
         scale = self._counts_per_deg
         self.servo.drive_position(
             position_deg * scale + self._zero_counts,
@@ -309,11 +307,11 @@ class Shaft(Part):
         )
 
 
-# What the motor core unit lets its motor do: the modes of 2000h, and braking.
+# Actions of the motor: the modes of 2000h, and braking.
 
 
 class Mode(IntEnum):
-    """Mode as 2000h has it."""
+    """Mode in 2000h."""
 
     FREE = 0
     CURRENT = 1
@@ -322,7 +320,7 @@ class Mode(IntEnum):
 
 
 class Action(Enum):
-    """What the motor does."""
+    """Action of the motor."""
 
     COAST = auto()  # without power
     PUSH = auto()  # current follows the reference
@@ -337,29 +335,29 @@ ACTIONS: Final = {
     Mode.VELOCITY: Action.TURN,
     Mode.ANGLE: Action.POINT,
 }
-"""What a mode does where references act."""
+"""Action of each mode while references are effective."""
 
 _DEVIATION_DEG: Final = 1.0
 _DEVIATION_DEG_S: Final = 10.0
 _DEVIATION_MA: Final = 200
 
 _LOOPS: Final = (Action.TURN, Action.POINT, Action.BRAKE)
-"""The velocity is planned."""
+"""Actions with a planned velocity."""
 
 
 class Motion(Part):
-    """Plans one control tick after the other, and gives it to the motor ms by ms.
+    """Plans one control tick at a time, and commands the motor each ms.
 
-    Whatever begins goes on from the motion that is: the planned velocity if there
+    Each action starts from the present motion: the planned velocity if there
     is one, or else the measured one, the measured angle, the present current.
 
     Args:
         shaft: the motor behind its gear.
-        references: where it shall go.
+        references: the demands.
 
     Attributes:
-        action: what the motor does.
-        reached: the planned motion has ended at the reference, and the motor is there.
+        action: action of the motor.
+        reached: the planned motion has ended at the reference, and the motor has reached it.
     """
 
     def __init__(self, shaft: Shaft, references: References) -> None:
@@ -375,18 +373,18 @@ class Motion(Part):
 
     @property
     def loops(self) -> bool:
-        """Whether a velocity is to be kept."""
+        """Whether a velocity is demanded."""
         return self.action in _LOOPS
 
     @property
     def steady(self) -> bool:
-        """Whether the next control tick would be as this one."""
+        """Whether the next control tick would be the same as this one."""
         trajectory = self._trajectory
         stands = trajectory.begin_udeg_s == trajectory.velocity_udeg_s == 0
         return stands and self._begin_ma == self._end_ma
 
     def deviates(self, since_us: int) -> bool:
-        """Return whether the motor is far from what is wanted of it now."""
+        """Return whether the motor is far from its demand."""
         position_deg, velocity_deg_s, _ = self._trajectory.at(since_us)
         match self.action:
             case Action.COAST:
@@ -401,7 +399,7 @@ class Motion(Part):
                 assert_never(self.action)
 
     def plan(self, action: Action) -> None:
-        """Plan the control tick that begins."""
+        """Plan the control tick that starts now."""
         if action is not self.action:
             self._begin(action)
         match action:
@@ -425,7 +423,7 @@ class Motion(Part):
         """Command the motor until the next ms.
 
         Args:
-            since_us: since the begin of the control tick.
+            since_us: since the start of the control tick.
         """
         position_deg, velocity_deg_s, acceleration_deg_s2 = self._trajectory.at(since_us)
         match self.action:
@@ -442,7 +440,7 @@ class Motion(Part):
                 assert_never(self.action)
 
     def _begin(self, action: Action) -> None:
-        """Go on from the motion that is."""
+        """Continue from the present motion."""
         shaft, trajectory = self._shaft, self._trajectory
         velocity = trajectory.velocity_udeg_s if self.loops else shaft.velocity_udeg_s
         current_ma = shaft.current_ma
@@ -463,7 +461,7 @@ class Motion(Part):
 
 
 def mode_of(number: int) -> Mode:
-    """Return what 2000h stands for; a number that it does not take is no mode.
+    """Return the mode of a value of 2000h; an unknown value means no mode.
 
     >>> mode_of(3).name, mode_of(4).name
     ('ANGLE', 'FREE')
@@ -489,8 +487,8 @@ class Display(Part):
 
     Args:
         dictionary: of the unit.
-        shaft: what is measured.
-        references: they know the full scales.
+        shaft: the measurements.
+        references: have the full scales.
     """
 
     def __init__(self, dictionary: Dictionary, shaft: Shaft, references: References) -> None:
@@ -499,7 +497,7 @@ class Display(Part):
         self._shaft, self._references = shaft, references
 
     def show(self, motion: Motion, *, faulty: bool) -> None:
-        """Show what is."""
+        """Write the present values."""
         shaft, references = self._shaft, self._references
         self._angle.value = references.angle(shaft.angle_ndeg / 1e6)
         self._velocity.value = references.velocity(shaft.velocity_udeg_s / 1e3)

@@ -24,27 +24,27 @@ from tickrig.wire.canopen.nmt import NmtState
 from tickrig.wire.canopen.pdo import PdoDescription
 from tickrig.wire.instant import NEVER
 
-# What may go wrong in a motor core unit, how it is seen, and the EMCYs of it.
+# Faults of a motor core unit, how they are detected, and their EMCYs.
 
 
 @dataclass(frozen=True, slots=True)
 class _Measurements(Immutable):
-    """What the unit measures of itself.
+    """Measurements of the unit.
 
     Attributes:
         on: the power stage is on.
-        loops: a velocity is to be kept.
+        loops: a velocity is demanded.
         tripped: the comparator of the power stage has switched it off.
         supply_mv: supply of the motor.
         winding_dc: temperature of the winding, 0.1 degC.
         housing_dc: temperature of the housing and of the power stage in it, 0.1 degC.
         velocity_deg_s: velocity of the shaft by the motor encoder.
         current_ma: current in the motor.
-        limited: limits or the supply keep the current below what the loops want.
-        deviates: the motor is far from what is wanted of it.
-        spare_mv: voltage that the supply leaves above the back-EMF, to make a current with.
+        limited: limits or the supply keep the current below the demand of the loops.
+        deviates: the motor is far from its demand.
+        spare_mv: voltage of the supply above the back-EMF, available for current.
         overloaded: the I2t of the power stage is used up.
-        slip_deg: by how much motor encoder and gear encoder disagree.
+        slip_deg: difference between motor encoder and gear encoder.
     """
 
     on: bool
@@ -70,9 +70,9 @@ class _Fault(Immutable):
         name: for people.
         code: emergency error code (CiA 402-1).
         register: bits of the error register.
-        seen: whether the cause is there.
-        gone: whether it is not there any more; not always the opposite of `seen`.
-        after_us: for how long it must be seen.
+        seen: whether the cause is present.
+        gone: whether the cause has ended; not always the opposite of `seen`.
+        after_us: how long the cause must be seen.
     """
 
     name: str
@@ -83,7 +83,7 @@ class _Fault(Immutable):
     after_us: int = 0
 
     def __reduce__(self) -> tuple[Callable[[str], _Fault], tuple[str]]:
-        """Stand in a pickle by its name."""
+        """Return its name for a pickle."""
         return _fault, (self.name,)
 
 
@@ -98,7 +98,7 @@ _SUPPLY_MARGIN_MV: Final = 1_000
 _WINDING_DC: Final = 1_180
 _HOUSING_DC: Final = 1_100
 _COOLED_DC: Final = 100
-"""A temperature must fall by so much before a fault can be cleared."""
+"""Hysteresis by which a temperature must fall before its fault can be cleared."""
 
 _STALLED_DEG_S: Final = 1.0
 _STALLED_US: Final = 500_000
@@ -106,7 +106,8 @@ _OVERLOADED_US: Final = 1_000_000
 _NO_CURRENT_MA: Final = 50
 _NO_CURRENT_US: Final = 100_000
 _SPARE_MV: Final = 500
-"""With less no current is missed: the motor turns as fast as its supply lets it."""
+"""Below this voltage a missing current is no fault: the motor turns as fast as its supply
+allows."""
 _SLIP_DEG: Final = 1.0
 _DIP_US: Final = 5_000
 
@@ -114,7 +115,7 @@ _DRIVE: Final = ErrorRegister.DEVICE_PROFILE
 
 
 def _unless_tripped(measured: _Measurements) -> bool:
-    """Take a cause for gone that is not seen without power or motion: it would come back."""
+    """Return whether a cause that shows only with power or motion counts as ended."""
     return not measured.tripped
 
 
@@ -165,17 +166,17 @@ _FAULTS: Final = (
         after_us=_OVERLOADED_US,
     ),
 )
-"""In this order; what is seen first is reported first."""
+"""The faults in the order in which they are checked and reported."""
 
 
 class _Supervision(Part):
-    """The faults that there are: each is reported by EMCY, and again when it is cleared.
+    """The present faults; each is reported by EMCY when it occurs and when it is cleared.
 
     Args:
         node: the slave.
 
     Attributes:
-        faults: those that there are, in the order in which they came.
+        faults: the present faults in order of occurrence.
     """
 
     def __init__(self, node: CanopenSlave) -> None:
@@ -185,16 +186,16 @@ class _Supervision(Part):
 
     @property
     def waiting(self) -> bool:
-        """Whether a cause is seen, but not for long enough yet."""
+        """Whether a cause has been seen, but not yet for long enough."""
         return bool(self._since_us)
 
     def start(self) -> None:
-        """Know of no fault; a cause that is still there is found anew."""
+        """Clear all faults; a cause that remains is detected again."""
         self.faults.clear()
         self._since_us.clear()
 
     def look(self, now_us: int, measured: _Measurements) -> bool:
-        """Look for causes. Returns: whether there is a new fault."""
+        """Check for causes; return whether there is a new fault."""
         known = len(self.faults)
         for fault in _FAULTS:
             if fault in self.faults:
@@ -206,7 +207,7 @@ class _Supervision(Part):
         return len(self.faults) > known
 
     def clear(self, measured: _Measurements) -> bool:
-        """Let go of the faults whose cause is gone. Returns: whether there were any."""
+        """Clear the faults whose cause has ended; return whether there were any."""
         gone = [fault for fault in self.faults if fault.gone(measured)]
         for fault in gone:
             self.faults.remove(fault)
@@ -254,11 +255,11 @@ _READINGS: Final[Mapping[str, Callable[[Servo], float]]] = MappingProxyType(
         "winding_c": lambda servo: servo.winding_c,
     }
 )
-"""The outputs that are the motor's own."""
+"""Outputs of the motor itself."""
 
 
 def _apply_inputs(servo: Servo, inputs: QuantityBank) -> None:
-    """Let the world act on the motor, if it has changed."""
+    """Apply the physical inputs to the motor if they have changed."""
     if inputs.changed:
         inputs.changed = False
         servo.supply_v, servo.ambient_c = inputs["supply_v"], inputs["ambient_c"]
@@ -271,7 +272,7 @@ def _apply_inputs(servo: Servo, inputs: QuantityBank) -> None:
 _MODE: Final = 0x2000
 
 _COOLING_US: Final = 1_000_000
-"""How often a motor at rest is looked at until it has the temperature of the air."""
+"""Period at which a motor at rest is updated until it has the temperature of the air."""
 
 _COOLED_C: Final = 0.1
 
@@ -280,13 +281,12 @@ _COOLED_C: Final = 0.1
 class MotorCoreUnit(Application):
     """A brushless motor with strain wave gear, two encoders and driver (NEDO report, Table 5).
 
-    A reference acts only in Operational; in other NMT states a motor that has a mode
-    brakes to standstill and is held there. A control tick has 10 ms; what wakes a unit
-    at rest begins one. Faults take the power off the motor until a write to 2000h finds
-    their causes gone.
+    A reference acts only in Operational; in other NMT states a motor that has a mode brakes to
+    standstill and is held there. A control tick lasts 10 ms; an event that wakes a unit at rest
+    starts one. Faults switch off the motor until a write to 2000h after their causes have ended.
 
-    Not emulated: commutation, torque ripple, elasticity and play of the gear, power
-    that comes back into the supply while braking, failure of the control supply.
+    Not emulated: commutation, torque ripple, elasticity and play of the gear, power that flows back
+    into the supply while braking, failure of the control supply.
 
     Attributes:
         servo: motor, gear and loops.
@@ -323,7 +323,7 @@ class MotorCoreUnit(Application):
         raise KeyError(name)
 
     def power_on(self) -> None:
-        """Find a motor that has been without power since the last tick."""
+        """Start with a motor that has been without power since the latest tick."""
         self.servo.release()
 
     def without_power(self, now_us: int) -> int:
@@ -334,7 +334,7 @@ class MotorCoreUnit(Application):
         return NEVER if self.servo.resting else now_us + TICK_US
 
     def start(self) -> None:
-        """Know of no fault; the gear encoder says where the shaft is."""
+        """Clear all faults, and take the angle of the shaft from the gear encoder."""
         self._supervision.start()
         self._references.start()
         self._mode_was_written = False
@@ -342,18 +342,18 @@ class MotorCoreUnit(Application):
         self.request()
 
     def state_changed(self, old: NmtState, new: NmtState) -> None:
-        """Let references act in Operational only."""
+        """Make references effective in Operational only."""
         if new is NmtState.OPERATIONAL:
             self._references.failed = False
         self.request()
 
     def communication_error(self) -> None:
-        """Let 6443h and 6444h give the reference."""
+        """Use the error value of 6443h and 6444h as reference."""
         self._references.failed = True
         self.request()
 
     def on_execute(self, now_us: int) -> None:
-        """Let time pass for the motor, look after it, drive it."""
+        """Advance the motor, check for faults, and drive it."""
         self.servo.step_to(now_us)
         _apply_inputs(self.servo, self.inputs)
         failed = self._supervise(now_us)
@@ -364,7 +364,7 @@ class MotorCoreUnit(Application):
         self.schedule(self._rested_us(now_us) if controls and self._rests else now_us + TICK_US)
 
     def _supervise(self, now_us: int) -> bool:
-        """Find new faults, let go of old ones. Returns: whether there is a new one."""
+        """Detect new faults, clear ended ones; return whether there is a new one."""
         if self._mode_was_written:
             self._mode_was_written = False
             if self._supervision.clear(self._measurements(now_us)):
@@ -374,7 +374,7 @@ class MotorCoreUnit(Application):
         return failed
 
     def _control(self, now_us: int) -> None:
-        """Begin a control tick."""
+        """Start a control tick."""
         self._begin_us = now_us
         self.servo.current_limit_a = self._references.current_limit_ma / 1_000
         self._motion.plan(self._action)
@@ -382,7 +382,7 @@ class MotorCoreUnit(Application):
 
     @property
     def _action(self) -> motor_core_motion.Action:
-        """What faults, NMT state and mode let the motor do."""
+        """Action of the motor allowed by faults, NMT state and mode."""
         if self._supervision.faults:
             return motor_core_motion.Action.COAST
         action = motor_core_motion.ACTIONS[motor_core_motion.mode_of(self._mode.number)]
@@ -418,7 +418,7 @@ class MotorCoreUnit(Application):
         return self._motion.steady and self.servo.resting and not self._supervision.waiting
 
     def _rested_us(self, now_us: int) -> int:
-        """Return when to look at a motor at rest again: as long as it cools down or warms up."""
+        """Return when to update a motor at rest again, while its temperature changes."""
         air_c, servo = self.servo.ambient_c, self.servo
         warmer_c = max(abs(servo.winding_c - air_c), abs(servo.housing_c - air_c))
         return now_us + _COOLING_US if warmer_c > _COOLED_C else NEVER
@@ -429,7 +429,7 @@ class MotorCoreUnit(Application):
 
 
 NODE_ID: Final = 32
-"""Unless another is given."""
+"""Default node-ID."""
 
 I16: Final = DataType.INTEGER16
 I32: Final = DataType.INTEGER32
@@ -466,7 +466,7 @@ _PROFILE: Final = object_table.CommunicationProfile(
 )
 
 make_application: Final = MotorCoreUnit
-"""What the unit does with its objects."""
+"""Return the application of the unit."""
 
 
 def make_motor_core_unit(
@@ -476,13 +476,13 @@ def make_motor_core_unit(
 
     Args:
         node_id: 1..127, or 255 for a slave that waits for LSS.
-        nonvolatile: what it kept from an earlier life, as stored parameters; nothing if left out.
+        nonvolatile: stored parameters from an earlier run; nothing if omitted.
 
     Returns:
         A slave that boots in its first tick.
 
     Raises:
-        ValueError: an impossible node-ID.
+        ValueError: invalid node-ID.
     """
     slave = make_slave(dictionary(), node_id, nonvolatile, make_application)
     slave.model = "motor-core-unit"
@@ -490,7 +490,7 @@ def make_motor_core_unit(
 
 
 def dictionary() -> Dictionary:
-    """Return the objects with default values, for one slave; their description is shared."""
+    """Return the objects of one slave with default values; slaves share the description."""
     return _template().copy()
 
 

@@ -18,7 +18,7 @@ from tickrig.wire.canopen.emcy import EmcyCode, ErrorRegister
 from tickrig.wire.canopen.sdo_frame import AbortCode
 from tickrig.wire.instant import NEVER
 
-# From mapped entries to the bytes of a PDO and back, prepared once per mapping.
+# Conversion between mapped entries and the bytes of a PDO, prepared once per mapping.
 
 Pack = Callable[[], bytes]
 Unpack = Callable[[bytes], None]
@@ -28,7 +28,7 @@ class Slot(NamedTuple):
     """One mapped object.
 
     Attributes:
-        entry: None for a dummy, which takes up bits of an RPDO and goes nowhere.
+        entry: None for a dummy, which fills bits of an RPDO.
         bits: length in the PDO.
     """
 
@@ -50,15 +50,15 @@ def total_bits(slots: tuple[Slot, ...]) -> int:
 
 
 def alone_in(slots: tuple[Slot, ...]) -> Entry | None:
-    """Return the entry whose bytes are those of a TPDO; None if it takes more to make them."""
+    """Return the entry whose bytes equal those of a TPDO; None if no single entry does."""
     entry = slots[0].entry if len(slots) == 1 and slots[0].whole else None
     return None if entry is None or entry.source is not None else entry
 
 
 def make_pack(slots: tuple[Slot, ...]) -> Pack:
-    """Return what makes the bytes of a TPDO out of the entries.
+    """Return a function that packs the entries into the bytes of a TPDO.
 
-    An object that is mapped shorter than it is gives its low bytes.
+    An object that is mapped with fewer bits than it has contributes its low bits.
     """
     entries = [slot.entry for slot in slots if slot.entry is not None]
     if not all(slot.whole for slot in slots):
@@ -70,10 +70,10 @@ def make_pack(slots: tuple[Slot, ...]) -> Pack:
 
 
 def make_unpack(slots: tuple[Slot, ...]) -> Unpack:
-    """Return what gives the bytes of an RPDO, which must be enough, to the entries.
+    """Return a function that unpacks the bytes of an RPDO, which must be enough, into the entries.
 
-    An object that is mapped shorter than it is gets zeros above, as CANopenNode
-    does it; bytes behind the last object are for nobody.
+    An object that is mapped with fewer bits than it has gets zeros above, as in CANopenNode; bytes
+    after the last object are ignored.
     """
     if not all(slot.whole or (slot.entry is None and slot.bits % 8 == 0) for slot in slots):
         return _Bits(slots).unpack
@@ -87,7 +87,7 @@ def make_unpack(slots: tuple[Slot, ...]) -> Unpack:
 
 
 def _make_write(entry: Entry) -> Unpack:
-    """Return what writes an entry from a PDO: the straight way if nobody judges the entry."""
+    """Return a function that writes an entry from a PDO: directly if the entry has no checks."""
     # A read-only object that a default mapping names is written, too; `download` would
     # refuse it.
     straight = entry.takes_all or not entry.description.writable
@@ -95,7 +95,7 @@ def _make_write(entry: Entry) -> Unpack:
 
 
 def _present(entry: Entry) -> bytes:
-    """Return the bytes of an entry that may be made on demand; the last ones if none can be."""
+    """Return the bytes of an entry, computed on demand if needed; the last ones if that fails."""
     try:
         return entry.present()
     except SdoAbort:
@@ -116,7 +116,7 @@ def _split(steps: list[tuple[Unpack, int, int]], data: bytes) -> None:
 
 
 class _Bits(Part):
-    """Objects that do not fill whole bytes, behind each other."""
+    """Objects that do not fill whole bytes, packed one after the other."""
 
     __slots__ = ("_slots",)
 
@@ -147,12 +147,12 @@ _Source = tuple[int, int, int]
 
 
 def _fits_mpdo(entry: Entry, direction: Access) -> bool:
-    """Return whether an object may be in an MPDO: mappable and of one to four bytes."""
+    """Return whether an MPDO can carry an object: mappable, one to four bytes."""
     return direction in entry.description.access and 0 < entry.size <= pdo.MPDO_DATA_BYTES
 
 
 def scanned_entries(dictionary: Dictionary) -> Iterator[Entry]:
-    """Give the objects of the scanner lists that an MPDO can carry."""
+    """Yield the objects of the scanner lists that fit into an MPDO."""
     for value in _list_values(dictionary, _SCANNER_LISTS):
         row = pdo.Scanned.parse(value)
         for step in range(row.block):
@@ -162,7 +162,7 @@ def scanned_entries(dictionary: Dictionary) -> Iterator[Entry]:
 
 
 def _dispatched_entries(dictionary: Dictionary) -> Iterator[tuple[_Source, Entry]]:
-    """Give the objects of the dispatching lists, each with where its value comes from."""
+    """Yield the objects of the dispatching lists, each with its source."""
     for value in _list_values(dictionary, _DISPATCHING_LISTS):
         row = pdo.Dispatched.parse(value)
         for step in range(row.block):
@@ -172,7 +172,7 @@ def _dispatched_entries(dictionary: Dictionary) -> Iterator[tuple[_Source, Entry
 
 
 def _list_values(dictionary: Dictionary, lists: range) -> Iterator[int]:
-    """Give the entries in use: sub-index 0 says how many, 0 is an empty one."""
+    """Yield the used entries: sub-index 0 is their number; an entry of 0 is empty."""
     for index in lists:
         count = dictionary.find(index)
         if count is not None:
@@ -181,9 +181,9 @@ def _list_values(dictionary: Dictionary, lists: range) -> Iterator[int]:
 
 
 class MpdoQueue(TpdoMode):
-    """MPDOs: one frame an object, one frame an inhibit time, in the order of events.
+    """MPDOs: one frame per object and per inhibit time, in the order of events.
 
-    An event of an object that waits already adds no frame: the newest data are sent.
+    An event of an object that is already waiting adds no frame: the newest data are sent.
     """
 
     timed: ClassVar[bool] = True
@@ -195,35 +195,35 @@ class MpdoQueue(TpdoMode):
         self._waiting: dict[object, bytes | Entry] = {}
 
     def put(self, key: object, frame: bytes | Entry) -> None:
-        """Send a frame, or what an entry then holds, as soon as the inhibit time allows."""
+        """Send a frame, or the later value of an entry, as soon as the inhibit time allows."""
         self._waiting[key] = frame
         self.due_us = self._free_us
         self.sender.wake(self.due_us)
 
     def run(self, now_us: int) -> None:
-        """Send the first, or all if there is no inhibit time."""
+        """Send the first waiting frame, or all without an inhibit time."""
         while self._waiting and self._free_us <= now_us:
             frame = self._waiting.pop(next(iter(self._waiting)))
             self.sender.send(frame if isinstance(frame, bytes) else self._frame_of(frame))
-            # The inhibit time is between frames of this CAN-ID, whatever object they carry.
+            # The inhibit time separates all frames of this CAN-ID, whatever object they carry.
             self._free_us = now_us + self._inhibit_us
         self.due_us = self._free_us if self._waiting else NEVER
 
     def answer(self) -> None:
-        """Send nothing: a remote frame cannot say which object."""
+        """Send nothing: a remote frame cannot select an object."""
 
     def _frame_of(self, entry: Entry) -> bytes:
         return pdo.Mpdo(False, self._node_id, entry.index, entry.sub, _present(entry)).encode()
 
 
 class DamProducer(MpdoQueue):
-    """MPDO in destination address mode: the application says what goes where.
+    """MPDO in destination address mode: the application chooses object and destination.
 
     Its own mapping entry is not used.
     """
 
     def send_to(self, node_id: int, index: int, sub: int, data: bytes) -> None:
-        """Write an object of another node, or of all with node-ID 0."""
+        """Write an object of another node, or of all nodes with node-ID 0."""
         self.put((node_id, index, sub), pdo.Mpdo(True, node_id, index, sub, data).encode())
 
 
@@ -239,15 +239,15 @@ class SamProducer(MpdoQueue):
 class DamConsumer(Part):
     """Writes the object that an MPDO in destination address mode names.
 
-    One for another node is ignored, one for a missing object is answered with
-    EMCY 8230h, which the next good one clears.
+    An MPDO for another node is ignored. One for a missing object raises EMCY 8230h, which the next
+    valid one clears.
     """
 
     def __init__(self, node: CanopenSlave) -> None:
         self._node, self._missing = node, False
 
     def unpack(self, data: bytes) -> None:
-        """Take the eight bytes of a frame."""
+        """Handle the eight bytes of a frame."""
         mpdo = pdo.Mpdo.parse(data[:8])
         if not mpdo.destination or mpdo.node_id not in (0, self._node.node_id):
             return
@@ -265,9 +265,9 @@ class DamConsumer(Part):
 
 
 class SamConsumer(Part):
-    """Writes the object that the dispatching list has for an object of a producer.
+    """Writes the object that the dispatching list assigns to an object of a producer.
 
-    What is not in the list is ignored.
+    Objects that are not in the list are ignored.
     """
 
     def __init__(self, dictionary: Dictionary) -> None:
@@ -277,7 +277,7 @@ class SamConsumer(Part):
         }
 
     def unpack(self, data: bytes) -> None:
-        """Take the eight bytes of a frame."""
+        """Handle the eight bytes of a frame."""
         mpdo = pdo.Mpdo.parse(data[:8])
         found = self._writes.get((mpdo.node_id, mpdo.index, mpdo.sub))
         if found is not None and not mpdo.destination:
@@ -301,19 +301,18 @@ _NOTHING: Final = pdo.MappedObject(0, 0, 0)
 
 
 class PdoMapping(Part):
-    """What a PDO carries, and the order in which it may be changed.
+    """The mapping of a PDO, and the procedure to change it.
 
-    An object is mapped while the PDO is invalid and sub-index 0 is 0; it is
-    judged at once, and all of them again when sub-index 0 is set. 0 takes an
-    object out. A default mapping is carried out even where the dictionary does
-    not call an object mappable, because many EDS files do not; one that names
-    missing objects or too many bits leaves the PDO without effect.
+    An object is mapped while the PDO is invalid and sub-index 0 is 0; it is checked at once, and
+    all are checked again when sub-index 0 is set. 0 removes an object. A default mapping is used
+    even if the dictionary does not declare an object mappable, as in many EDS files; one with
+    missing objects or too many bits disables the PDO.
 
     Args:
         dictionary: where the mapped objects are.
         index: of the mapping parameter.
         direction: Access.RPDO or Access.TPDO.
-        parameters: know whether the PDO is valid.
+        parameters: the communication parameters, which tell whether the PDO is valid.
     """
 
     def __init__(
@@ -334,7 +333,7 @@ class PdoMapping(Part):
         return len(self._objects) if self._count is None else self._count.number
 
     def slots(self) -> tuple[Slot, ...]:
-        """Return what is mapped; nothing if that cannot be carried out, or for an MPDO."""
+        """Return the mapped objects; none if the mapping is invalid, or for an MPDO."""
         try:
             slots = self._slots(self.count)
         except SdoAbort:
@@ -348,8 +347,8 @@ class PdoMapping(Part):
         return tuple(self._slot(each) for each in mapped if each != _NOTHING)
 
     def _slot(self, mapped: pdo.MappedObject) -> Slot:
-        """Find an object; SdoAbort if there is none or it has not so many bits."""
-        # 0005 00 08h: eight bits that an RPDO carries and nobody takes (CiA 301, dummy
+        """Find an object; SdoAbort if it does not exist or has too few bits."""
+        # 0005 00 08h: eight bits that an RPDO carries without effect (CiA 301, dummy
         # mapping).
         if mapped.sub == 0 and mapped.index in _DUMMIES and self._direction is Access.RPDO:
             if not 0 < mapped.bits <= _DUMMIES[mapped.index]:
@@ -361,7 +360,7 @@ class PdoMapping(Part):
         return Slot(entry, mapped.bits)
 
     def _check_slot(self, slot: Slot) -> None:
-        """Refuse what the dictionary does not let into a PDO of this direction."""
+        """Raise SdoAbort if the dictionary does not allow the object in a PDO of this direction."""
         if slot.entry is not None and self._direction not in slot.entry.description.access:
             raise SdoAbort(AbortCode.NOT_MAPPABLE)
 
@@ -393,7 +392,7 @@ class PdoMapping(Part):
 
 
 def _fits(entry: Entry, bits: int) -> bool:
-    """Return whether an object has so many bits; a string has whole bytes."""
+    """Return whether an object has that many bits; a string has whole bytes."""
     if entry.size:
         return 0 < bits <= 8 * entry.size
     return 0 < bits <= 8 * min(entry.description.max_bytes, 8) and bits % 8 == 0

@@ -1,4 +1,4 @@
-"""Communication parameters of PDOs, and what starts a TPDO."""
+"""Communication parameters of PDOs, and the transmission types of TPDOs."""
 
 from __future__ import annotations
 
@@ -33,19 +33,19 @@ _NOT_IN_A_CAN_ID: Final = EXTENDED | 0x1FFF_F800
 
 
 class PdoParameters(Part):
-    """When and under which CAN-ID a PDO goes over the bus.
+    """The communication parameters of a PDO: CAN-ID, transmission type and timing.
 
     The CAN-ID, the inhibit time and the SYNC start value change only while the
     PDO is invalid, transmission type and event timer at any time. Bit 30 may
-    change while it is valid. What a write breaks is answered with 0609 0030h.
+    change while it is valid. A write that breaks these rules is refused with 0609 0030h.
 
     Not emulated: PDOs with a 29-bit CAN-ID; bit 29 is refused.
 
     Args:
         dictionary: with or without these objects.
         index: of the communication parameter.
-        types: transmission types that such a PDO may have.
-        changed: called with each entry that has another value now.
+        types: allowed transmission types.
+        changed: called with each entry whose value has changed.
     """
 
     def __init__(
@@ -66,9 +66,9 @@ class PdoParameters(Part):
 
     @property
     def valid(self) -> bool:
-        """Whether the PDO exists, with a CAN-ID that it may have."""
+        """Whether the PDO exists and has an allowed CAN-ID."""
         cob_id = self._number(COB_ID, INVALID)
-        # A default of an EDS may hold what a write would be refused for: such a PDO does
+        # A default of an EDS may hold a value that a write could not set: such a PDO does
         # not exist.
         return not cob_id & (INVALID | _NOT_IN_A_CAN_ID) and not is_restricted(cob_id & CAN_ID_MASK)
 
@@ -79,7 +79,7 @@ class PdoParameters(Part):
 
     @property
     def answers_rtr(self) -> bool:
-        """Whether a remote frame fetches the TPDO: bit 30 is 0."""
+        """Whether the TPDO can be requested by a remote frame: bit 30 is 0."""
         return not self._number(COB_ID) & FLAG_30
 
     @property
@@ -89,7 +89,7 @@ class PdoParameters(Part):
 
     @property
     def inhibit_us(self) -> int:
-        """Least time between two event-driven TPDOs."""
+        """Minimum time between two event-driven TPDOs."""
         return self._number(INHIBIT_TIME) * 100
 
     @property
@@ -129,11 +129,11 @@ class PdoParameters(Part):
             raise SdoAbort(AbortCode.VALUE_RANGE)
 
 
-# What the transmission types of TPDOs do (CiA 301, transmission type).
+# Behaviour of the transmission types of TPDOs (CiA 301, transmission type).
 
 
 class PdoSender(Protocol):
-    """What a mode sees of its TPDO."""
+    """The interface of a TPDO to its mode."""
 
     @property
     def parameters(self) -> PdoParameters:
@@ -145,19 +145,19 @@ class PdoSender(Protocol):
         ...
 
     def send(self, data: bytes | None = None) -> None:
-        """Send bytes, or the mapped objects as they are now."""
+        """Send bytes, or the present values of the mapped objects."""
 
     def wake(self, due_us: int) -> None:
-        """Have the mode run at this time, unless it is run earlier anyway."""
+        """Schedule a run of the mode at this time or earlier."""
 
 
 class TpdoMode(Part):
-    """A TPDO that does nothing by itself; a remote frame fetches it.
+    """Base of transmission types: a TPDO that is sent only on a remote frame.
 
     Attributes:
-        due_us: when it wants to be run.
+        due_us: when it is due to run.
         synchronous: whether it acts on SYNC.
-        timed: whether it ever wants to be run.
+        timed: whether it ever needs to run by time.
         on_change: whether a change of a mapped object is an event.
         on_sync: called with the counter of each SYNC, 0 if it has none.
     """
@@ -173,21 +173,21 @@ class TpdoMode(Part):
         self.on_sync: Callable[[int], None] = _ignore
 
     def request(self, entry: Entry | None = None) -> None:
-        """Take an event: the change of an object, or one that the application makes."""
+        """Handle an event: the change of an object, or one raised by the application."""
 
     def run(self, now_us: int) -> None:
-        """Do what is due."""
+        """Do the work that is due."""
 
     def retime(self, now_us: int) -> None:
-        """Follow another event timer."""
+        """Apply a changed event timer."""
 
     def answer(self) -> None:
-        """Send what a remote frame asks for."""
+        """Answer a remote frame."""
         self.sender.send()
 
 
 class Silent(TpdoMode):
-    """A TPDO that does not exist, or carries nothing."""
+    """A TPDO that does not exist or has no mapped objects."""
 
     def answer(self) -> None:
         """Send nothing."""
@@ -205,7 +205,7 @@ class SynchronousAcyclic(TpdoMode):
         self.on_sync = self._send_if_marked
 
     def request(self, entry: Entry | None = None) -> None:
-        """Send with the next SYNC."""
+        """Mark the TPDO to be sent with the next SYNC."""
         self._marked = True
 
     def _send_if_marked(self, counter: int) -> None:
@@ -215,10 +215,10 @@ class SynchronousAcyclic(TpdoMode):
 
 
 class SynchronousCyclic(TpdoMode):
-    """Types 1 to 240: sent with each n-th SYNC, the n-th one is the first.
+    """Types 1 to 240: sent with each n-th SYNC, first with the n-th.
 
-    With a SYNC start value, and if SYNC carries a counter, the first is the one
-    whose counter has that value, as in CANopenNode.
+    With a SYNC start value, and if SYNC carries a counter, the first is the SYNC whose counter has
+    that value, as in CANopenNode.
     """
 
     __slots__ = ("_left", "_period", "_start")
@@ -254,7 +254,7 @@ class SynchronousCyclic(TpdoMode):
 
 
 class RtrSynchronous(TpdoMode):
-    """Type 252: sampled with SYNC, and when it begins; sent on a remote frame."""
+    """Type 252: sampled with SYNC and at the start; sent on a remote frame."""
 
     synchronous: ClassVar[bool] = True
 
@@ -272,9 +272,9 @@ class RtrSynchronous(TpdoMode):
 
 
 class EventDriven(TpdoMode):
-    """Types 254 and 255: sent on an event or when the event timer has elapsed, and at first.
+    """Types 254 and 255: sent at the start, on an event and when the event timer has elapsed.
 
-    Not earlier than the inhibit time after the last one, then with the newest data.
+    It is not sent before the inhibit time after the last one has passed, then with the newest data.
     """
 
     timed: ClassVar[bool] = True
@@ -286,7 +286,7 @@ class EventDriven(TpdoMode):
         self._marked, self._retimed, self._free_us, self.due_us = True, False, 0, 0
 
     def request(self, entry: Entry | None = None) -> None:
-        """Send as soon as the inhibit time allows."""
+        """Schedule the TPDO for the end of the inhibit time."""
         if not self._marked:
             self._marked, self.due_us = True, self._free_us
             self.sender.wake(self.due_us)
@@ -298,14 +298,14 @@ class EventDriven(TpdoMode):
         elif now_us < self._free_us:
             self._marked, self.due_us = True, self._free_us
         else:
-            # Cleared before it is sent: what the transmission itself sets off is an event
-            # of the next one.
+            # Cleared before sending: an event that the transmission itself causes belongs to the
+            # next one.
             self._marked, self._free_us = False, now_us + self._inhibit_us
             self._time_anew(now_us)
             self.sender.send()
 
     def retime(self, now_us: int) -> None:
-        """Start the event timer anew with the next run."""
+        """Restart the event timer with the next run."""
         if not self._marked:
             self._retimed, self.due_us = True, now_us
             self.sender.wake(self.due_us)

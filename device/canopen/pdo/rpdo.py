@@ -27,17 +27,16 @@ _RPDO_PARAMETERS: Final = range(0x1400, 0x1600)
 _RPDO_MAPPINGS: Final = 0x1600
 
 _Target = tuple[pdo_mapping.Unpack, int]
-"""What takes the bytes, and how many it needs."""
+"""The handler of the bytes, and the number of bytes it needs."""
 
 
 class Rpdo(Part):
-    """Gives what it receives to the mapped objects, at once or with the next SYNC.
+    """Writes received data to the mapped objects, at once or with the next SYNC.
 
-    A frame with too few bytes is not used: EMCY 8210h. One with too many is used
-    up to the length of the mapping: EMCY 8220h. The next right one clears both.
-    The event timer is its deadline, EMCY 8250h; it runs anew from each frame
-    that can be used. These EMCYs carry the number of the RPDO. A synchronous one
-    that comes after the synchronous window (1007h) is thrown away.
+    A frame with too few bytes is dropped: EMCY 8210h. One with too many is used up to the length of
+    the mapping: EMCY 8220h. The next correct one clears both. The event timer is the deadline, EMCY
+    8250h; each usable frame restarts it. These EMCYs carry the number of the RPDO. A synchronous
+    RPDO that arrives after the synchronous window (1007h) is dropped.
 
     Args:
         consumer: the service that it belongs to.
@@ -65,7 +64,7 @@ class Rpdo(Part):
 
     @property
     def reconfigures(self) -> bool:
-        """Whether it may write a communication object: an MPDO, or one is mapped."""
+        """Whether it may write a communication object: it is an MPDO, or maps one."""
         entries = (slot.entry for slot in self.mapping.slots())
         return self.mapping.count in (DAM_MPDO, SAM_MPDO) or any(
             entry is not None and entry.index in COMMUNICATION_AREA for entry in entries
@@ -73,11 +72,11 @@ class Rpdo(Part):
 
     @property
     def synchronous(self) -> bool:
-        """Whether it acts with SYNC."""
+        """Whether it takes effect with SYNC."""
         return self.parameters.transmission_type in SYNCHRONOUS
 
     def listen(self) -> Handler | None:
-        """Prepare to receive; return the handler of its frames, None if it does not exist."""
+        """Prepare to receive; return the handler of its frames, None if the RPDO does not exist."""
         target = self._target() if self.parameters.valid else None
         if target is None:
             self.stop()
@@ -93,17 +92,17 @@ class Rpdo(Part):
         return self._take
 
     def restart(self) -> None:
-        """Know of no error and no frame."""
+        """Clear errors and pending frames."""
         self._errors: set[int] = set()
         self._dam: pdo_mapping.DamConsumer | None = None
         self.stop()
 
     def stop(self) -> None:
-        """Forget what waits for SYNC, and the deadline."""
+        """Drop the frame that waits for SYNC, and the deadline."""
         self._pending, self.deadline_us = None, NEVER
 
     def sync(self) -> None:
-        """Give the objects what has come since the last SYNC; the newest frame counts."""
+        """Write the newest frame since the last SYNC to the objects."""
         data, self._pending = self._pending, None
         if data is not None:
             self._deliver(data)
@@ -128,13 +127,13 @@ class Rpdo(Part):
         )
 
     def _take(self, frame: CanFrame) -> None:
-        """Use a frame at once."""
+        """Handle a frame at once."""
         data = frame[1]
         if (len(data) == self._length and not self._supervised) or self._passes(data):
             self._deliver(data)
 
     def _keep(self, frame: CanFrame) -> None:
-        """Keep a frame for the next SYNC."""
+        """Store a frame for the next SYNC."""
         data = frame[1]
         # Synchronous window (1007h): a frame that comes later than so long after SYNC is
         # dropped.
@@ -149,7 +148,7 @@ class Rpdo(Part):
             notify(self.number)
 
     def _passes(self, data: bytes) -> bool:
-        """Judge length and time. Returns: whether the frame can be used."""
+        """Check length and time; return whether the frame can be used."""
         # Too short: not used (8210h). Too long: used, and the bytes behind ignored (8220h).
         if len(data) < self._length:
             self._break(EmcyCode.PDO_TOO_SHORT)
@@ -191,14 +190,13 @@ _SYNCHRONOUS_WINDOW_LENGTH: Final = 0x1007
 class PdoConsumer(Service):
     """Receives PDOs in Operational.
 
-    On SYNC the synchronous RPDOs of the cycle reach their objects at once, in
-    the order of their numbers, before the synchronous TPDOs of the same SYNC
-    are made. Which frames are before the SYNC is decided by the wire, also
-    within a tick.
+    On SYNC the synchronous RPDOs of the cycle reach their objects at once, in the order of their
+    numbers, before the synchronous TPDOs of the same SYNC are made. The order on the wire decides
+    which frames come before the SYNC, also within a tick.
 
     Attributes:
         rpdos: those that the dictionary has.
-        on_rpdo: called with the number of an RPDO when its objects have got its values.
+        on_rpdo: called with the number of an RPDO when its objects have been written.
     """
 
     def __init__(self, node: CanopenSlave, slot: int) -> None:
@@ -214,7 +212,7 @@ class PdoConsumer(Service):
         if window is not None:
             self._window_changed(window)
             window.watch(self._window_changed)
-        if self.rpdos or window is not None:  # else each SYNC touched it for nothing
+        if self.rpdos or window is not None:  # avoids a call for each SYNC
             node.sync_handlers.append(self._sync)
 
     @property
@@ -223,7 +221,7 @@ class PdoConsumer(Service):
         return self.node.now_us > self._window_end_us
 
     def start(self) -> None:
-        """Know of no error and no SYNC."""
+        """Clear errors and the time of the last SYNC."""
         self._window_end_us = self._due_us = NEVER
         for rpdo in self.rpdos:
             rpdo.restart()
@@ -242,7 +240,7 @@ class PdoConsumer(Service):
                 yield rpdo.parameters.can_id, handler
 
     def reconfigured_by(self, state: NmtState) -> Iterator[int]:
-        """Name the RPDOs that may write communication objects, and the SYNC that makes them act."""
+        """Return the RPDOs that may write communication objects, and the SYNC that applies them."""
         if state is not NmtState.OPERATIONAL:
             return
         rpdos = [rpdo for rpdo in self.rpdos if rpdo.parameters.valid and rpdo.reconfigures]
@@ -253,7 +251,7 @@ class PdoConsumer(Service):
             yield sync.number & CAN_ID_MASK
 
     def state_changed(self, old: NmtState, new: NmtState) -> None:
-        """Forget what has come if the node is not Operational any more."""
+        """Drop received data when the node leaves Operational."""
         if old is NmtState.OPERATIONAL:
             self._synchronous, self._window_end_us = (), NEVER
             for rpdo in self.rpdos:
@@ -268,13 +266,13 @@ class PdoConsumer(Service):
         self.await_deadline(min(rpdo.deadline_us for rpdo in self.rpdos))
 
     def await_deadline(self, due_us: int) -> None:
-        """Come back at a deadline, unless one is earlier."""
+        """Schedule a deadline, unless an earlier one is scheduled."""
         if due_us < self._due_us:
             self._due_us = due_us
             self.schedule(due_us)
 
     def changed(self) -> None:
-        """Listen to what the communication parameters say now."""
+        """Listen according to the changed communication parameters."""
         if self.node.state is NmtState.OPERATIONAL:
             self.node.rewire()
 
@@ -285,5 +283,5 @@ class PdoConsumer(Service):
             self._window_end_us = self.node.now_us + self._window_us
 
     def _window_changed(self, window: Entry) -> None:
-        """Know the synchronous window at each SYNC."""
+        """Restart the synchronous window at each SYNC."""
         self._window_us = window.number

@@ -26,7 +26,7 @@ from tickrig.wire.instant import NEVER
 # A valid TPDO begins with an event, therefore each event-driven one is sent once when the
 # node becomes Operational, as CANopenNode does it.
 #
-# What leads to a transmission, and when:
+# Causes of a transmission:
 #
 # type        on SYNC                            otherwise
 # 0           if an event has happened since     -
@@ -62,17 +62,17 @@ _RTR_MODES: Final[dict[int, type[pdo_parameters.TpdoMode]]] = {
 
 
 class Tpdo(Part):
-    """Sends the mapped objects when its transmission type says so.
+    """Sends the mapped objects according to its transmission type.
 
-    For its mode it is the sender: parameters, `pack`, `send`, `wake`.
+    To its mode it is the sender: parameters, `pack`, `send`, `wake`.
 
     Args:
         producer: the service that it belongs to.
         number: 1..512.
 
     Attributes:
-        mode: its transmission type at work.
-        pack: makes the bytes out of the mapped objects.
+        mode: the active transmission type.
+        pack: packs the mapped objects into bytes.
         entries: the mapped objects.
     """
 
@@ -99,7 +99,7 @@ class Tpdo(Part):
         self._watched: list[Entry] = []
 
     def begin(self) -> None:
-        """Start anew with the present parameters."""
+        """Restart with the present parameters."""
         self.end()
         self._can_id = self.parameters.can_id
         slots = self.mapping.slots()
@@ -112,19 +112,19 @@ class Tpdo(Part):
             self._watch(self.entries)
 
     def end(self) -> None:
-        """Send no more."""
+        """Stop sending."""
         for entry in self._watched:
             entry.unwatch(self.mode.request)
         self.mode = pdo_parameters.Silent(self)
 
     def send(self, data: bytes | None = None) -> None:
-        """Send bytes, or the mapped objects as they are now."""
+        """Send bytes, or the present values of the mapped objects."""
         # MPDOs and samples bring their own bytes, and are no transmission of the mapped
         # objects.
         if data is not None:
             self._node.send(self._can_id, data)
             return
-        alone = self._alone  # what most TPDOs carry is at hand: two objects less, 2 % of a network
+        alone = self._alone  # the common case without two objects: 2 % of a network
         self._node.send(self._can_id, self.pack() if alone is None else alone.data)
         for notify in self._producer.on_sent:
             notify(self.entries)
@@ -134,7 +134,7 @@ class Tpdo(Part):
         self.mode.answer()
 
     def _watch(self, entries: Iterable[Entry]) -> None:
-        """Follow each change that counts as an event."""
+        """Watch each entry whose change is an event."""
         self._watched = [entry for entry in entries if entry.key not in self._producer.quiet]
         for entry in self._watched:
             entry.watch(self.mode.request)
@@ -148,7 +148,7 @@ class Tpdo(Part):
             self._producer.changed(self)
 
     def _make_mode(self) -> pdo_parameters.TpdoMode:
-        """Return the transmission type at work."""
+        """Return the mode of the transmission type."""
         kind, count = self.parameters.transmission_type, self.mapping.count
         if not self.parameters.valid:
             return pdo_parameters.Silent(self)
@@ -178,18 +178,16 @@ class Tpdo(Part):
 class PdoProducer(Service):
     """Sends PDOs in Operational.
 
-    They are made at the place of TPDOs in the tick, after the application: a
-    TPDO that SYNC causes has the values that the RPDOs of this SYNC and the
-    application have left at the end of the tick. It leaves in the same tick,
-    so it is never later than the synchronous window (1007h).
-    Each event-driven TPDO is sent once when the node enters Operational or the
-    TPDO is switched on, as in CANopenNode. Remote frames are answered by each
-    TPDO whose bit 30 is 0, whatever its type.
+    They are packed at the place of TPDOs in the tick, after the application: a TPDO of a SYNC has
+    the values after the RPDOs of this SYNC and the application. It is sent in the same tick, so
+    never after the synchronous window (1007h). Each event-driven TPDO is sent once when the node
+    enters Operational or the TPDO is switched on, as in CANopenNode. Remote frames are answered by
+    each TPDO whose bit 30 is 0, whatever its type.
 
     Attributes:
         tpdos: those that the dictionary has.
-        quiet: keys of entries whose change is no event, because a profile judges
-            it; to be set before the node is Operational.
+        quiet: keys of entries whose change is not an event, because a profile decides on events;
+            set it before the node is Operational.
         on_sent: called with the mapped objects of each TPDO that has been sent.
     """
 
@@ -210,13 +208,13 @@ class PdoProducer(Service):
         node.sync_handlers.append(self._sync)
 
     def request(self, number: int) -> None:
-        """Let an event happen to a TPDO (254, 255: sent; 0: sent with the next SYNC)."""
+        """Raise an event for a TPDO (254, 255: sent; 0: sent with the next SYNC)."""
         for tpdo in self.tpdos:
             if tpdo.number == number:
                 tpdo.mode.request()
 
     def request_for(self, entry: Entry) -> None:
-        """Let an event happen to each TPDO that carries an entry."""
+        """Raise an event for each TPDO that carries an entry."""
         for tpdo in self.tpdos:
             if entry in tpdo.entries:
                 tpdo.mode.request()
@@ -238,14 +236,14 @@ class PdoProducer(Service):
         self._due_us = NEVER
 
     def remote_handlers(self, state: NmtState) -> Iterator[tuple[int, Handler]]:
-        """Listen to remote frames that fetch a TPDO."""
+        """Listen to remote frames that request a TPDO."""
         if state is NmtState.OPERATIONAL:
             for tpdo in self.tpdos:
                 if tpdo.parameters.valid and tpdo.parameters.answers_rtr:
                     yield tpdo.parameters.can_id, tpdo.answer
 
     def state_changed(self, old: NmtState, new: NmtState) -> None:
-        """Start all TPDOs in Operational, stop them when it is left."""
+        """Start all TPDOs when Operational is entered, stop them when it is left."""
         self._counters = ()
         for tpdo in self.tpdos:
             if new is NmtState.OPERATIONAL:
@@ -255,20 +253,20 @@ class PdoProducer(Service):
         self._collect()
 
     def changed(self, tpdo: Tpdo) -> None:
-        """Start a TPDO anew with other communication parameters."""
+        """Restart a TPDO with changed communication parameters."""
         if self.node.state is NmtState.OPERATIONAL:
             tpdo.begin()
             self.node.rewire()
             self._collect()
 
     def wake(self, due_us: int) -> None:
-        """Run a TPDO at this time, unless it comes back earlier anyway."""
+        """Schedule a run of a TPDO at this time or earlier."""
         if due_us < self._due_us:
             self._due_us = due_us
             self.node.await_tick(self, due_us)
 
     def tick(self, now_us: int) -> None:
-        """Send what SYNC has asked for, then what events have."""
+        """Send the TPDOs of SYNC, then those of events."""
         if self._counters:
             # All SYNCs that came in this tick, each with its counter: two of them send two
             # frames.
@@ -289,7 +287,7 @@ class PdoProducer(Service):
             self.wake(self.node.now_us)
 
     def _collect(self) -> None:
-        """Find out which TPDOs act on SYNC, and which on events or with time."""
+        """Determine which TPDOs act on SYNC, and which on events or by time."""
         modes = [tpdo.mode for tpdo in self.tpdos]
         self._synchronous = tuple(mode for mode in modes if mode.synchronous)
         self._timed = tuple(mode for mode in modes if mode.timed)

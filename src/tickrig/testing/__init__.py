@@ -1,4 +1,4 @@
-"""What tests devices of anybody: for the extra `test`, which brings pytest and Hypothesis."""
+"""Tests for your own devices; needs the extra `test` (pytest and Hypothesis)."""
 
 from tickrig._lazy import lazy
 

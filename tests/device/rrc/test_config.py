@@ -12,7 +12,7 @@ def test_the_power_on_event_can_be_that_of_the_manuals_table() -> None:
 
 
 def test_another_power_on_event_is_refused() -> None:
-    with pytest.raises(ValueError, match="'Hello' is none of"):
+    with pytest.raises(ValueError, match="'Hello' is not one of"):
         RrcConfig(power_on_event="Hello")
 
 

@@ -1,4 +1,4 @@
-"""The device that an EDS or DCF describes (CiA 306)."""
+"""Device descriptions from EDS and DCF files (CiA 306)."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ from tickrig.wire.canopen.eds.object_table import (
 # The PDOs that an EDS implies by CompactPDO, and does not describe (CiA 306-1, [DeviceInfo]).
 
 _MOST_PDOS: Final = 0x200
-"""Each way."""
+"""Largest number of PDOs in each direction."""
 _MAPPING: Final = 0x200
 _MOST_MAPPED: Final = 0x40
 _PREDEFINED: Final = 4
-"""PDOs each way that have a CAN-ID by the predefined connection set (CiA 301)."""
+"""PDOs in each direction with a CAN-ID of the predefined connection set (CiA 301)."""
 _OFF: Final = 0x8000_0000
 
 _U8: Final = DataType.UNSIGNED8
@@ -41,19 +41,19 @@ ELEMENTS: Final = (
     *(("COB-ID", _U32), ("Transmission type", _U8), ("Inhibit time", _U16)),
     *(("Compatibility entry", _U8), ("Event timer", _U16), ("SYNC start value", _U8)),
 )
-"""Sub-indices 1 to 6 of a communication parameter; bits 0 to 5 of CompactPDO say which it has."""
+"""Sub-indices 1 to 6 of a communication parameter; bits 0 to 5 of CompactPDO enable them."""
 
 _Implied = tuple[ObjectDescription, list[EntryDescription]]
 
 
 class _Way(NamedTuple):
-    """What RPDOs and TPDOs differ in.
+    """Differences between RPDOs and TPDOs.
 
     Attributes:
-        name: of one.
-        key: of their number in [DeviceInfo].
+        name: RPDO or TPDO.
+        key: keyword of their number in [DeviceInfo].
         first: index of the first communication parameter.
-        can_id: of the first, without the node-ID.
+        can_id: CAN-ID of the first, without the node-ID.
     """
 
     name: str
@@ -69,13 +69,13 @@ WAYS: Final = (
 
 
 def _implied_pdos(file: EdsFile) -> Iterator[_Implied]:
-    """Give the communication and mapping parameters that CompactPDO stands for.
+    """Yield the communication and mapping parameters implied by CompactPDO.
 
-    NrOfRXPDO and NrOfTXPDO count all PDOs: those that are described, and behind them as many
-    more as are missing, on the lowest numbers that are free. What is described stays as it is,
-    and only its other half is implied. A mapping parameter has 64 entries, as Lely's reader has
-    it. The file says no defaults, so the COB-IDs are those of CiA 301: the first four by the
-    predefined connection set, the others off; a DCF may give values, as in [1600Value].
+    NrOfRXPDO and NrOfTXPDO count all PDOs: the described ones, then the implied ones on the lowest
+    free numbers. Described objects are unchanged; only a missing half is implied. A mapping
+    parameter has 64 entries, as in Lely's reader. The file has no defaults for them, so the COB-IDs
+    are those of CiA 301: the first four of the predefined connection set, the others off; a DCF may
+    give values, as in [1600Value].
     """
     mask = file.number("DeviceInfo", "CompactPDO")
     subs = [sub for sub in range(1, len(ELEMENTS) + 1) if mask >> sub - 1 & 1]
@@ -113,7 +113,7 @@ def _parameter(file: EdsFile, way: _Way, number: int, subs: list[int]) -> _Impli
 
 
 def _cob_id(way: _Way, number: int) -> EntryDescription:
-    """Make the COB-ID of a PDO as CiA 301 has it."""
+    """Make the COB-ID of a PDO (CiA 301)."""
     index, (name, kind), on = way.first + number, ELEMENTS[0], number < _PREDEFINED
     cob_id = way.can_id + 0x100 * number if on else _OFF
     return EntryDescription(index, 1, name, kind, RW, default=cob_id, relative=on)
@@ -149,15 +149,15 @@ _Objects = Mapping[int, ObjectDescription]
 def _module_objects(
     file: EdsFile, entries: Iterable[EntryDescription], objects: _Objects
 ) -> Iterator[_Added]:
-    """Give the objects of the modules that a DCF connects, and the list of them (1027h).
+    """Yield the objects of the modules that a DCF connects, and the module list (1027h).
 
-    A fixed object is there once, however many modules have it. A sub-index extension adds
-    sub-indices in the order of the modules, and goes on in the next object behind the sub-index
-    that ObjExtend gives. What the file describes itself, as a DCF may, stays as it is.
+    A fixed object exists once, however many modules have it. A sub-index extension adds sub-indices
+    in the order of the modules, and continues in the next object after the sub-index in ObjExtend.
+    Objects that the file describes itself, as a DCF may, are unchanged.
 
     Args:
-        file: takes what is wrong: modules that are not described, or none that is connected.
-        entries: those that the file describes.
+        file: collects errors: modules that are not described, or no connected modules.
+        entries: the described entries.
         objects: their names and kinds.
 
     Returns:
@@ -200,7 +200,7 @@ def _list_numbers(file: EdsFile, section: str) -> list[int]:
 def _listed(
     modules: list[int], rows: Iterable[EntryDescription], objects: _Objects
 ) -> Iterator[_Added]:
-    """Give 1027h with the numbers of the modules, where the file leaves them open."""
+    """Yield 1027h with the numbers of the modules, where the file leaves them open."""
     own = [row for row in rows if row.index == _MODULE_LIST]
     if own:
         count = min(len(modules), max(row.sub for row in own))
@@ -219,7 +219,7 @@ def _filled(row: EntryDescription, values: Mapping[int, int]) -> EntryDescriptio
 
 
 def _fixed(file: EdsFile, modules: list[int]) -> Iterator[_Added]:
-    """Give the fixed objects of modules."""
+    """Yield the fixed objects of modules."""
     seen: set[int] = set()
     for module in dict.fromkeys(modules):
         listing = f"M{module}FixedObjects"
@@ -242,7 +242,7 @@ def _fixed(file: EdsFile, modules: list[int]) -> Iterator[_Added]:
 
 
 def _extensions(file: EdsFile, modules: list[int]) -> dict[int, list[str]]:
-    """Return the sections that extend objects, each as often as its module is there, by index."""
+    """Return the sections that extend objects, by index, once for each connected module."""
     found: dict[int, list[str]] = {}
     for module in modules:
         listing = f"M{module}SubExtends"
@@ -258,7 +258,7 @@ def _extensions(file: EdsFile, modules: list[int]) -> dict[int, list[str]]:
 def _extended(
     file: EdsFile, index: int, sections: list[str], objects: _Objects
 ) -> Iterator[_Added]:
-    """Give an object with the sub-indices that modules add, and those that it goes on in."""
+    """Yield an object with the sub-indices added by modules, and the objects that continue it."""
     rows: list[EntryDescription] = []
     free_bits = 0
     for section in sections:
@@ -290,7 +290,7 @@ def _object(
 
 
 def _count(file: EdsFile, section: str) -> tuple[int, int]:
-    """Return how many sub-indices a module adds, or how many bits of one (`0;2`)."""
+    """Return the number of sub-indices that a module adds, or of bits of one (`0;2`)."""
     text = file.value(section, "Count")
     whole, _, bits = text.partition(";")
     try:
@@ -320,14 +320,14 @@ _Kinds = dict[int, ObjectCode]
 
 @dataclass(frozen=True, slots=True)
 class EdsDevice:
-    """What a file says of a device.
+    """The device described by a file.
 
     Attributes:
         info: vendor, product, bit rates.
         entries: of all objects.
         objects: names and kinds by index.
-        node_id: of a DCF, None if it gives none.
-        bit_rate: of a DCF in bit/s, None if it gives none.
+        node_id: of a DCF, None if missing.
+        bit_rate: of a DCF in bit/s, None if missing.
     """
 
     info: DeviceInfo
@@ -338,14 +338,13 @@ class EdsDevice:
 
 
 def read_device(file: EdsFile) -> EdsDevice:
-    """Read what is sound in a file; the rest becomes its errors.
+    """Read a file; invalid parts are skipped and added to its errors.
 
-    What is not by the standard and has one meaning all the same becomes a
-    warning that says what is taken: C suffixes, empty and missing keywords,
-    CompactSubObj in a RECORD, texts beyond ASCII. A ParameterValue (DCF) counts
-    as power-on value. ObjFlags concern configuration tools, not the device, and
-    are not kept. What CompactPDO implies is there as if it were described, and so are the
-    objects of connected modules.
+    A deviation from the standard with a clear meaning becomes a warning that names the value used:
+    C suffixes, empty and missing keywords, CompactSubObj in a RECORD, texts beyond ASCII. A
+    ParameterValue (DCF) is used as power-on value. ObjFlags concern configuration tools, not the
+    device, and are dropped. Objects implied by CompactPDO and those of connected modules are
+    included.
     """
     kinds = _kinds(file)
     entries = list(_entries(file, kinds))
@@ -399,7 +398,7 @@ def _node_id(file: EdsFile) -> int | None:
 
 
 def _bit_rate(file: EdsFile) -> int | None:
-    """Return the bit rate of a DCF in bit/s, which CiA 306 gives in kbit/s; None if it is none."""
+    """Return the bit rate of a DCF in bit/s (CiA 306 uses kbit/s); None if it is invalid."""
     said = file.number(COMMISSIONING, "Baudrate")
     if said <= max(BIT_RATES_KBIT):
         return 1_000 * said or None
@@ -411,7 +410,7 @@ def _bit_rate(file: EdsFile) -> int | None:
 
 
 def _kinds(file: EdsFile) -> _Kinds:
-    """Return the kind of each object; those that only define a data type are left out."""
+    """Return the kind of each object, without those that only define a data type."""
     kinds = {}
     with_subs = {index for _, index, sub in file.objects() if sub is not None}
     for section, index, sub in file.objects():

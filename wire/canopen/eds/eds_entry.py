@@ -1,4 +1,4 @@
-"""The entries of an object of an EDS or DCF: a variable, or the elements of an array or record."""
+"""Entries of an EDS or DCF object: a variable, or the elements of an array or record."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ _OCTETS: Final = DataType.OCTET_STRING
 
 
 class StandardObject(NamedTuple):
-    """One object, or each of a range.
+    """Properties of one object, or of each object in a range.
 
     Attributes:
-        composed: it has sub-indices.
+        composed: whether it has sub-indices.
         types: data type by sub-index.
-        others: that of the sub-indices not named, None where it may be any.
-        fixed: nobody may write it.
+        others: data type of the other sub-indices, None for any.
+        fixed: whether it is read-only.
     """
 
     composed: bool
@@ -80,7 +80,7 @@ _RANGES: Final = (
 
 
 def standard_object(index: int) -> StandardObject | None:
-    """Return what CiA 301 says of an object; None where it says nothing that is checked."""
+    """Return the properties of an object in CiA 301; None if nothing is checked."""
     for area, found in _RANGES:
         if index in area:
             return found
@@ -88,7 +88,7 @@ def standard_object(index: int) -> StandardObject | None:
 
 
 def _standard_type(index: int, sub: int, *, composed: bool) -> DataType | None:
-    """Return the data type of an entry, None where the documents give none.
+    """Return the data type of an entry, None if the standards do not define it.
 
     Args:
         index: of the object.
@@ -110,7 +110,7 @@ def _standard_type(index: int, sub: int, *, composed: bool) -> DataType | None:
 
 _SIMPLE_TYPES: Final = range(0x1C)
 _NUMBERS: Final = (*eds_value.FLOATS, *eds_value.TIMES)
-"""Data types of numbers that are no integers."""
+"""Data types of numbers that are not integers."""
 _ASCII_TEXTS: Final = (DataType.VISIBLE_STRING, DataType.VISIBLE_CHAR)
 _TRUTH: Final = (0, 1)
 _TRUTH_WORDS: Final = {"yes": 1, "true": 1, "no": 0, "false": 0}
@@ -118,31 +118,31 @@ _TYPE_WORDS: Final = {kind.name.lower(): int(kind) for kind in DataType}
 _KIND_WORDS: Final = {code.name.lower(): int(code) for code in object_table.ObjectCode}
 HIGHEST_SUB: Final = 254
 _NO_DATA: Final = (0, object_table.ObjectCode.DEFTYPE, object_table.ObjectCode.DEFSTRUCT)
-"""Kinds of objects that hold nothing: NULL, and definitions of data types."""
+"""Kinds of objects without a value: NULL, and definitions of data types."""
 _DESCRIBED: Final = (*VARIABLES, object_table.ObjectCode.ARRAY, object_table.ObjectCode.RECORD)
 _ERROR_FIELD: Final = 0x1003
 COUNTS: Final = (_ERROR_FIELD, *range(0x1600, 0x1800), *range(0x1A00, 0x1C00))
-"""Objects whose sub-index 0 counts what is in use, not what is there."""
+"""Objects whose sub-index 0 counts the used entries, not the existing ones."""
 LONE_LETTERS: Final = {"r": "ro", "w": "wo"}
 _MISSING: Final = {
     "ParameterName": "name-missing",
     "DataType": "data-type-missing",
     "AccessType": "access-missing",
 }
-"""The rule that a keyword left out breaks."""
+"""The rule that a missing keyword violates."""
 
 
 def read_entry(
     file: EdsFile, section: str, index: int, sub: int, name: str | None = None
 ) -> object_table.EntryDescription:
-    """Read an entry; what it lacks is noted, and what stands for it.
+    """Read an entry; note missing keywords and the values used instead.
 
     Args:
-        file: takes what is wrong.
-        section: where the entry is described, its array's for a compact one.
+        file: collects errors.
+        section: section of the entry, or of its array for a compact one.
         index: of its object.
         sub: sub-index.
-        name: that of the file's `ParameterName` if left out.
+        name: None for the file's `ParameterName`.
     """
     if name is None:
         name = _required(file, section, "ParameterName", "")
@@ -163,7 +163,7 @@ def read_entry(
 
 
 def _required(file: EdsFile, section: str, key: str, instead: str) -> str:
-    """Return the text of a keyword that every entry has; `instead`, and a warning, without it."""
+    """Return the text of a mandatory keyword; if it is missing, warn and return `instead`."""
     if file.has(section, key):
         return file.value(section, key)
     taken = f"{instead} is taken" if instead else "none is taken"
@@ -172,7 +172,7 @@ def _required(file: EdsFile, section: str, key: str, instead: str) -> str:
 
 
 class _Type(NamedTuple):
-    """A data type, whether the file says it, and what one that it derives leaves of its values."""
+    """A data type, whether the file defines it, and the limits of a derived one."""
 
     kind: DataType
     is_said: bool = True
@@ -197,7 +197,7 @@ def _data_type(file: EdsFile, section: str, index: int, sub: int) -> _Type:
 
 
 def _usual_type(section: str, index: int, sub: int) -> DataType:
-    """Return the data type that CiA 301 gives an object, DOMAIN where it gives none."""
+    """Return the data type of an object in CiA 301, DOMAIN if it has none."""
     if section.endswith("sub0"):
         return DataType.UNSIGNED8
     composed = bool(sub) or not section.endswith(f"{index:04X}")
@@ -205,7 +205,7 @@ def _usual_type(section: str, index: int, sub: int) -> DataType:
 
 
 def _derived(file: EdsFile, section: str, number: int, own: tuple[str, str, str]) -> _Type:
-    """Return the type behind one of the file's own, as CanFestival writes them.
+    """Return the base type of a data type defined in the file, as CanFestival writes them.
 
     Sub-index 1 is the type, 2 and 3 are the smallest and the largest number; of a string, 2 is its
     length.
@@ -255,7 +255,7 @@ def _access(file: EdsFile, section: str) -> object_table.Access:
     except ValueError:
         known, access = "rw", object_table.Access.from_eds("rw", mappable=mappable)
     if known != text:
-        what = f"AccessType={shorten(text)} is none of CiA 306" if text else "AccessType is empty"
+        what = f"AccessType={shorten(text)} is not in CiA 306" if text else "AccessType is empty"
         file.warn(section, f"{what}: {known} is taken", "access-form", "AccessType")
     return access
 
@@ -281,7 +281,7 @@ def _default(
 
 
 def _text(file: EdsFile, section: str, key: str, kind: DataType) -> str:
-    """Return the text of a value: of a number without a comment, and as CiA 306 writes it."""
+    """Return the text of a value; of a number in CiA 306 notation without a comment."""
     if kind.is_integer:
         return file.numeric(section, key)
     return file.word(section, key) if kind in _NUMBERS else file.value(section, key)
@@ -290,16 +290,16 @@ def _text(file: EdsFile, section: str, key: str, kind: DataType) -> str:
 def read_value_beside(
     file: EdsFile, index: int, sub: int, kind: DataType
 ) -> tuple[bytes | None, bool]:
-    """Return the value that a DCF gives an entry without a section, None if it gives none.
+    """Return the value in a DCF of an entry without a section, None if missing.
 
     Args:
-        file: takes what is wrong.
-        index: of the object; the value stands in `[INDEXValue]`.
+        file: collects errors.
+        index: of the object; the value is in `[INDEXValue]`.
         sub: sub-index.
         kind: its data type.
 
     Returns:
-        The bytes, and whether the node-ID is added to them.
+        The bytes, and whether to add the node-ID.
     """
     place = f"{index:04X}Value"
     said = _text(file, place, str(sub), kind)
@@ -341,7 +341,7 @@ def _value(
 def _check_form(  # noqa: PLR0913, PLR0917 - a place, its text and what it is
     file: EdsFile, section: str, key: str, kind: DataType, text: str, value: Value
 ) -> None:
-    """Warn of a value that has one meaning, and is not written as CiA 306 has it."""
+    """Warn of a value with a clear meaning that is not in CiA 306 notation."""
     if kind in eds_value.BYTES and isinstance(value, bytes) and not eds_value.is_hex_bytes(text):
         what = "its text" if value == text.encode() else value.hex(" ").upper()
         reason = f"{key}={shorten(text)} is no hexadecimal bytes: {what} is taken"
@@ -356,7 +356,7 @@ def _check_form(  # noqa: PLR0913, PLR0917 - a place, its text and what it is
 
 
 def _foreign_text(file: EdsFile, section: str, key: str, kind: DataType) -> bytes:
-    """Return the bytes of a text beyond ASCII: of ISO 8859-1 if it has them, else of UTF-8."""
+    """Return the bytes of a text beyond ASCII: in ISO 8859-1 if possible, else in UTF-8."""
     text = file.value(section, key)
     try:
         data, coding = kind.encode(text), "ISO 8859-1"
@@ -396,7 +396,7 @@ def _limit(file: EdsFile, section: str, key: str, kind: DataType) -> int | float
 
 
 def _factor(file: EdsFile, section: str) -> float:
-    """Return the factor, which the canopen library reads too; it is of no standard."""
+    """Return the factor, a non-standard keyword that the canopen library also reads."""
     text = file.word(section, "Factor")
     try:
         factor = float(text or 1)
@@ -410,7 +410,7 @@ def _factor(file: EdsFile, section: str) -> float:
 
 
 def object_kind(file: EdsFile, section: str, with_subs: bool) -> object_table.ObjectCode | None:
-    """Return the kind of an object; what has sub-indices is no variable, whatever the file says."""
+    """Return the kind of an object; an object with sub-indices is never a variable."""
     usual = object_table.ObjectCode.RECORD if with_subs else object_table.ObjectCode.VAR
     number = file.number(section, "ObjectType", usual, words=_KIND_WORDS)
     if number in _NO_DATA:
@@ -428,10 +428,10 @@ def object_kind(file: EdsFile, section: str, with_subs: bool) -> object_table.Ob
 def read_object(
     file: EdsFile, head: str, index: int, kind: object_table.ObjectCode, subs: list[tuple[str, int]]
 ) -> Iterator[object_table.EntryDescription]:
-    """Read the entries of one object; those that are described beside a compact one replace its.
+    """Read the entries of one object; individual sections override those of a compact one.
 
     Args:
-        file: takes what is wrong.
+        file: collects errors.
         head: its section.
         index: of the object.
         kind: of the object.
@@ -459,7 +459,7 @@ def read_object(
 def _compact(
     file: EdsFile, head: str, index: int, count: int
 ) -> Iterator[object_table.EntryDescription]:
-    """Read an object that is described by one of its elements."""
+    """Read a compact object, described by one of its elements."""
     title = file.value(head, "ParameterName")
     elements = []
     for sub in range(1, count + 1):

@@ -1,4 +1,4 @@
-"""An electronic data sheet as sections of keywords (CiA 306, CiA 311)."""
+"""Electronic data sheets as sections of keywords (CiA 306, CiA 311)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tickrig.wire.canopen.eds.xdd import XddError, is_xml, xdd_lines
 # The rule for all readers here: what has one meaning is read, with a warning that says what
 # is taken; what has none, or would make it another device than its author meant, is an
 # error. Readers do not raise: `EdsFile` collects all findings, each once, with line and
-# rule name, and whoever reads a file sees them all at once.
+# rule name, and a user sees them all at once.
 #
 # The readers stand on each other, and each knows only the one below:
 #
@@ -42,7 +42,7 @@ from tickrig.wire.canopen.eds.xdd import XddError, is_xml, xdd_lines
 
 _LONGEST: Final = 40
 _LONGEST_TITLE: Final = len("1018sub01")
-"""Of a sub-index by CiA 311."""
+"""Keyword of a sub-index (CiA 311)."""
 _DCF_ENDINGS: Final = (".dcf", ".xdc")
 
 
@@ -50,11 +50,11 @@ class Finding(NamedTuple):
     """A fault of a file.
 
     Attributes:
-        file: what the file is called.
+        file: name of the file.
         section: without brackets, empty for the file as a whole.
-        reason: which key or line, what it says, and what was allowed or is taken instead.
-        line: where it is, 0 where the file as a whole is meant.
-        rule: name of the rule of `canmon eds check` that it breaks, empty if there is none.
+        reason: the key or line, its text, and the allowed or used value.
+        line: line number, 0 for the file as a whole.
+        rule: name of the violated rule of `canmon eds check`, empty if there is none.
     """
 
     file: str
@@ -64,14 +64,14 @@ class Finding(NamedTuple):
     rule: str = ""
 
     def __str__(self) -> str:
-        """Say it in one line."""
+        """Return the finding as one line."""
         place = f"{self.file}:{self.line}" if self.line else self.file
         where = f"[{shorten(self.section)}] " if self.section else ""
         return f"{place}: {where}{self.reason}" + (f" ({self.rule})" if self.rule else "")
 
 
 def finding_lines(findings: Iterable[Finding]) -> Iterator[str]:
-    """Give what is wrong in EDS files, a line each; what is so in many sections, once."""
+    """Yield the findings in EDS files, one line each; a finding in many sections only once."""
     alike: dict[tuple[str, str], list[Finding]] = {}
     for finding in dict.fromkeys(findings):
         alike.setdefault((finding.file, finding.reason), []).append(finding)
@@ -81,7 +81,7 @@ def finding_lines(findings: Iterable[Finding]) -> Iterator[str]:
 
 
 class EdsError(ValueError):
-    """An EDS that cannot be used: all that is wrong with it, a line each."""
+    """An EDS that cannot be used; the message has all findings, one line each."""
 
     def __init__(self, findings: Iterable[Finding]) -> None:
         self.findings = tuple(findings)
@@ -89,7 +89,7 @@ class EdsError(ValueError):
 
 
 def shorten(text: str) -> str:
-    r"""Return a text of a file so that it fits into a line, and can be printed.
+    r"""Return a text of a file shortened to one printable line.
 
     >>> shorten("a" * 99) == "a" * 37 + "...", shorten("a\x00b")
     (True, 'a?b')
@@ -109,20 +109,20 @@ _OWN_WORD: Final = re.compile(r"(MaxBytes|DefaultBytes) of (\w+) is (\w+)")
 class EdsFile:
     """The sections of an EDS, DCF, XDD or XDC, as CiA 306 spells them.
 
-    It collects what is wrong: first its own lines, then what its readers find.
-    A line that cannot be read matters only in a section that describes the device.
-    Of a section or keyword that is there twice the first counts, as for most readers.
+    It collects findings: first those of its lines, then those of its readers. An unreadable line
+    matters only in a section that describes the device. Of a duplicate section or keyword the first
+    is used, as in most readers.
 
     Args:
-        name: what findings call it.
+        name: name in findings.
         text: the whole file.
 
     Attributes:
-        sections: texts by lower-case keyword, by section: `1017`, `1018sub1`, `DeviceInfo`.
-        lines: all lines; of XML those that an EDS would have, with the numbers of their elements.
+        sections: texts by section and lower-case keyword: `1017`, `1018sub1`, `DeviceInfo`.
+        lines: all lines; of XML the equivalent EDS lines, with the line numbers of their elements.
         is_xml: whether it is XML.
-        errors: what makes it another device than its author meant.
-        warnings: what is not by the standard, and still has one meaning.
+        errors: findings that change the described device.
+        warnings: deviations from the standard with a clear meaning.
     """
 
     def __init__(self, name: str, text: str) -> None:
@@ -143,26 +143,26 @@ class EdsFile:
 
     @property
     def errors(self) -> tuple[Finding, ...]:
-        """All of them, each once, in the order in which they were found."""
+        """All errors, without duplicates, in the order in which they were found."""
         return tuple(self._errors)
 
     @property
     def warnings(self) -> tuple[Finding, ...]:
-        """All of them, likewise."""
+        """All warnings, likewise."""
         return tuple(self._warnings)
 
     @property
     def is_dcf(self) -> bool:
-        """Whether it is of one node: its name says so, or that it has a node-ID."""
+        """Whether it is a DCF: by its name, or because it has a node-ID."""
         return self.name.lower().endswith(_DCF_ENDINGS) or "DeviceComissioning" in self.sections
 
     def refuse(self, section: str, reason: str, rule: str, key: str = "") -> None:
-        """Note an error, at the line of a keyword or a section."""
+        """Add an error at the line of a keyword or a section."""
         line = self.line(section, key)
         self._errors[Finding(self.name, section, reason, line, rule)] = None
 
     def warn(self, section: str, reason: str, rule: str, key: str = "") -> None:
-        """Note what is odd, likewise."""
+        """Add a warning, likewise."""
         line = self.line(section, key)
         self._warnings[Finding(self.name, section, reason, line, rule)] = None
 
@@ -172,20 +172,20 @@ class EdsFile:
         return place or self._places.get((section, ""), 0)
 
     def value(self, section: str, key: str) -> str:
-        """Return the text of a keyword, empty if it is not there; see `word`."""
+        """Return the text of a keyword, empty if it is missing; see `word`."""
         found = self.sections.get(section)
         return "" if found is None else found.get(key.lower(), "")
 
     def has(self, section: str, key: str) -> bool:
-        """Return whether a keyword is there, with a text or without."""
+        """Return whether a keyword exists, with or without a text."""
         return key.lower() in self.sections.get(section, {})
 
     def word(self, section: str, key: str) -> str:
-        """Return what a keyword says that takes no free text, without a comment behind it.
+        """Return the value of a keyword without free text, without a trailing comment.
 
-        CiA 306 has comments in lines of their own, and readers take ` ;` for one behind any value.
-        Behind a number or an access type `;`, `#` and `//` begin one, too, with a warning: they
-        cannot mean anything else there, as they can in a text.
+        In CiA 306 comments are separate lines; readers also accept ` ;` after any value. After a
+        number or an access type, `;`, `#` and `//` start a comment too, with a warning: unlike in a
+        text, they have no other meaning there.
         """
         text = self.value(section, key)
         said = eds_value.without_comment(text)
@@ -195,7 +195,7 @@ class EdsFile:
         return said
 
     def numeric(self, section: str, key: str) -> str:
-        """Return the text of a number as CiA 306 writes it; a warning if the file does not."""
+        """Return the text of a number in CiA 306 notation; warn if the file differs."""
         text = self.value(section, key)
         if eds_value.is_plain_number(text):
             return text
@@ -217,9 +217,9 @@ class EdsFile:
     ) -> int:
         """Return the number of a keyword.
 
-        Where there is none the default counts, with a warning if the keyword is
-        empty, is no number, or not one from `low` to `high`. One of `words`, which
-        are in lower case, stands for its number, with a warning.
+        The default is used if it is missing, and with a warning if the keyword is empty, not a
+        number, or not in `low` to `high`. One of `words` (lower case) stands for its number, with a
+        warning.
         """
         text = self.numeric(section, key)
         if not text:
@@ -243,7 +243,7 @@ class EdsFile:
         return default
 
     def objects(self) -> Iterator[tuple[str, int, int | None]]:
-        """Give the sections of objects, with index and sub-index; None for the object itself."""
+        """Return the sections of objects, with index and sub-index; None for the object itself."""
         return iter(self._objects)
 
     def _parse(self) -> None:
@@ -260,14 +260,14 @@ class EdsFile:
         self._objects = [(section, *place) for section, place in places if place]
 
     def _take_comments(self) -> None:
-        """Learn what CiA 306 has no keyword for from comments, as `write_eds` writes it."""
+        """Read properties without a CiA 306 keyword from comments of `write_eds`."""
         for text in self.sections.get("Comments", {}).values():
             if match := _OWN_WORD.fullmatch(text):
                 key, section, value = match.groups()
                 self.sections.get(section, {}).setdefault(key.lower(), value)
 
     def _begin(self, line: eds_value.EdsLine) -> _Section:
-        """Begin a section, or go on with one that is there already."""
+        """Start a section, or continue an existing one."""
         title = line.section
         if (
             self.is_xml
@@ -304,7 +304,7 @@ class EdsFile:
             self._warn_at(line, reason, "doubled-key")
 
     def _skip(self, line: eds_value.EdsLine) -> None:
-        """Note the first such line before the sections, and each one in them."""
+        """Report the first such line before the sections, and each one in them."""
         if line.section or not self._warnings:
             reason = f"{shorten(line.content)!r} is no keyword with a value: it is skipped"
             self._warn_at(line, reason, "no-keyword")
@@ -314,12 +314,12 @@ class EdsFile:
 
 
 UTF_8_MARK: Final = b"\xef\xbb\xbf"
-"""Some editors write it before text of another encoding, too."""
+"""Byte order mark of UTF-8; some editors write it before text of another encoding, too."""
 _UTF_16: Final = (b"\xff\xfe", b"\xfe\xff")
 
 
 CODE_PAGES: Final = ("cp1252", "cp850")
-"""Encodings of one byte a letter in which older editors write: of Windows, and of DOS."""
+"""Single-byte encodings of older editors: Windows and DOS."""
 _WITHIN_WORD: Final = re.compile(
     rb"(?<=[A-Za-z\x80-\xff])[\x80-\x91\x93-\xff](?=[A-Za-z\x80-\xff])"
 )
@@ -332,9 +332,9 @@ _LETTERS_850: Final = frozenset((*range(0x80, 0x9B), *range(0xA0, 0xA6)))
 def encoding_of(data: bytes) -> str:
     r"""Return the encoding of a file, by its name in Python.
 
-    UTF-16 where its mark is there or every other byte of its beginning is zero; UTF-8 where it is
-    that. Else it is of one byte a letter: CP850 where that has letters within words and
-    Windows-1252 has none, otherwise Windows-1252.
+    UTF-16 if it has the byte order mark or every other byte at the start is zero; UTF-8 if it is
+    valid UTF-8. Otherwise a single-byte encoding: CP850 if it gives letters within words where
+    Windows-1252 does not, else Windows-1252.
 
     >>> encoding_of(b"[\0F\0"), encoding_of("µ".encode()), encoding_of(b"\xb5")
     ('utf-16-le', 'utf-8', 'cp1252')
@@ -357,11 +357,11 @@ def encoding_of(data: bytes) -> str:
 
 
 def decode_text(data: bytes, encoding: str = "") -> str:
-    r"""Return the text of a file, in whatever encoding, without a byte order mark.
+    r"""Return the text of a file in any encoding, without a byte order mark.
 
     Args:
         data: the whole file.
-        encoding: its encoding by its name in Python, empty for that which its bytes show.
+        encoding: name of its encoding in Python, empty to detect it.
 
     >>> decode_text("\ufeffµ".encode()), decode_text("µ".encode("cp1252"))
     ('µ', 'µ')

@@ -13,7 +13,7 @@ from tickrig.wire.canopen.datatypes import DataType, Value
 # The lines of an EDS or DCF: section titles, keywords with values, comments (CiA 306).
 
 _SECTIONS: Final = ("DeviceInfo", "DeviceComissioning")
-"""Those that describe the device, beside its objects."""
+"""Sections that describe the device, besides its objects."""
 
 _NAMED: Final = (
     *_SECTIONS,
@@ -25,20 +25,20 @@ KNOWN_SECTIONS: Final = {
     **{name.lower(): name for name in _NAMED},
     "devicecommissioning": "DeviceComissioning",
 }
-"""The spelling of CiA 306 by the name in lower case."""
+"""Section names in CiA 306 spelling, by name in lower case."""
 
 _OBJECT: Final = re.compile(r"([0-9A-F]{4})(?:(SUB)([0-9A-F]{1,2})|(NAME|VALUE|DENOTATION))?")
 _LOOSE: Final = re.compile(
     r"(?:0X)?([0-9A-F]{4})[ _]*(?:(SUB)[ _]*0*([0-9A-F]{1,2})|(NAME|VALUE|DENOTATION))?"
 )
-"""Titles as people write them: `1018 sub 1`, `0x1018`, `1018_sub_1`, `1018sub0001`."""
+"""Section titles as found in files: `1018 sub 1`, `0x1018`, `1018_sub_1`, `1018sub0001`."""
 _DERIVED_TYPE: Final = re.compile(r"([0-9A-F]{1,3})SUB([123])")
 _MODULE: Final = re.compile(
     r"M([0-9]+)(?:(MODULEINFO|COMMENTS|FIXEDOBJECTS|SUBEXTENDS)"
     r"|(FIXED|SUBEXT)([0-9A-F]{1,4})(?:SUB([0-9A-F]{1,2}))?)",
     re.ASCII,
 )
-"""Titles of what modules of a modular device have: `M1ModuleInfo`, `M1SubExt6000`."""
+"""Section titles of the modules of a modular device: `M1ModuleInfo`, `M1SubExt6000`."""
 _MODULE_WORDS: Final = {
     word.upper(): word
     for word in ("ModuleInfo", "Comments", "FixedObjects", "SubExtends", "Fixed", "SubExt")
@@ -48,16 +48,16 @@ _LINE_COMMENT: Final = re.compile(r"(^|\s);.*|^\s*#.*")
 
 
 class EdsLine(NamedTuple):
-    """One line, and what it says.
+    """One line, with its parsed content.
 
     Attributes:
         number: 1 for the first line of a file.
-        text: the line as it stands there, without its end.
-        section: that it begins or stands in, as CiA 306 spells it; empty before the first.
-        title: of the section that it begins, as it stands there; empty elsewhere.
-        key: of a keyword, empty elsewhere.
-        value: of a keyword; `#` and `//` stay there, for a text may have them.
-        content: what is left of it without a comment.
+        text: the line as written, without its end.
+        section: its section in CiA 306 spelling; empty before the first.
+        title: title of the section that it starts, as written; empty elsewhere.
+        key: keyword, empty elsewhere.
+        value: of a keyword; `#` and `//` are kept, because a text may contain them.
+        content: the line without a comment.
     """
 
     number: int
@@ -70,12 +70,12 @@ class EdsLine(NamedTuple):
 
     @property
     def is_keyword(self) -> bool:
-        """Whether it gives a keyword a value; the name may be missing."""
+        """Whether it assigns a value; the name may be missing."""
         return "=" in self.content and not self.title
 
 
 def _split_lines(text: str) -> list[str]:
-    r"""Return the lines of a text, whatever ends them.
+    r"""Return the lines of a text, with any line ends.
 
     >>> _split_lines("a\r\nb\rc\nd")
     ['a', 'b', 'c', 'd']
@@ -107,7 +107,7 @@ def read_lines(text: str) -> list[EdsLine]:
 
 @lru_cache(maxsize=4096)  # each line of a section asks: a tenth of the time of a file
 def canonical_section(title: str) -> str:
-    """Return the name of a section as CiA 306 spells it.
+    """Return the name of a section in CiA 306 spelling.
 
     >>> canonical_section("1a00SUB0A"), canonical_section("deviceinfo"), canonical_section("a0")
     ('1A00subA', 'DeviceInfo', 'a0')
@@ -148,7 +148,7 @@ def object_section(section: str) -> tuple[int, int | None] | None:
 
 @lru_cache(maxsize=4096)
 def describes_device(section: str) -> bool:
-    """Return whether a section, or what stands before the first one, describes the device."""
+    """Return whether a section, or the part before the first one, describes the device."""
     if not section or section in _SECTIONS or _OBJECT.fullmatch(section.upper()):
         return True
     return is_module_object(section)
@@ -168,7 +168,7 @@ def is_module_object(section: str) -> bool:
 
 _NODE_ID: Final = "$NODEID"
 NODE_IDS: Final = (_NODE_ID, "NODEID")
-"""What stands for the node-ID, also where its sign was forgotten."""
+"""Notations of the node-ID, also without the dollar sign."""
 
 _TEXTS: Final = (DataType.VISIBLE_STRING, DataType.UNICODE_STRING, DataType.VISIBLE_CHAR)
 BYTES: Final = (DataType.OCTET_STRING, DataType.DOMAIN)
@@ -197,9 +197,9 @@ _TRUTH: Final = {"true": True, "false": False}
 
 
 def without_comment(text: str) -> str:
-    """Return a number, or a word, without the comment behind it.
+    """Return a number or a word without a trailing comment.
 
-    `#`, `//` and `;` begin one, with a blank before them or without.
+    `#`, `//` and `;` start one, with or without a blank before them.
 
     >>> without_comment("0x07 # VAR"), without_comment("7//VAR"), without_comment("$NODEID+8;x")
     ('0x07', '7', '$NODEID+8')
@@ -217,7 +217,7 @@ def parse_value(kind: DataType, text: str) -> tuple[Value, bool]:
         text: not empty.
 
     Returns:
-        The value, and whether the node-ID is to be added to it.
+        The value, and whether to add the node-ID.
 
     Raises:
         ValueError: not a value of this type.
@@ -246,10 +246,11 @@ def parse_value(kind: DataType, text: str) -> tuple[Value, bool]:
 
 
 def _twos_complement(kind: DataType, number: int) -> int:
-    """Return the number of an integer type whose bits are those of a number.
+    """Return the number of an integer type with the same bits as a number.
 
-    A negative number of an unsigned type is the two's complement, and so are, for a signed one,
-    its bits without a sign, in its own width or in that of a wider type of C. Others stay.
+    A negative number of an unsigned type becomes its two's complement. For a signed type, an
+    unsigned bit pattern in its own width or that of a wider C type becomes the negative number.
+    Others are unchanged.
 
     >>> _twos_complement(DataType.UNSIGNED8, -128), _twos_complement(DataType.UNSIGNED8, -129)
     (128, -129)
@@ -282,16 +283,16 @@ def parse_number(text: str) -> int:
 
 
 def is_plain_number(text: str) -> bool:
-    """Return whether a text is a number as CiA 306 writes it, or empty, as nearly all are."""
+    """Return whether a text is empty or a number in CiA 306 notation, as nearly all are."""
     return _PLAIN.fullmatch(text) is not None
 
 
 def plain_numbers(text: str) -> str:
-    """Return numbers as CiA 306 writes them.
+    """Return numbers in CiA 306 notation.
 
-    What C adds to them goes, blanks and underscores within them, a comment behind them, and zeros
-    that make no octal number, a plus before them, and decimals that are 0; hexadecimal ones of
-    assemblers begin with 0x. Node-IDs are not touched.
+    It removes C suffixes, blanks and underscores within numbers, trailing comments, leading zeros
+    that do not form an octal number, a plus sign, and decimals that are 0; assembler notation of
+    hexadecimal numbers becomes 0x. Node-IDs are unchanged.
 
     >>> plain_numbers("0x1234567890ABCDEFLL"), plain_numbers("$NODEID+0x80u"), plain_numbers("0009")
     ('0x1234567890ABCDEF', '$NODEID+0x80', '9')
@@ -314,15 +315,15 @@ def plain_numbers(text: str) -> str:
 
 
 def parse_limit(kind: DataType, text: str, *, upper: bool = True) -> int | float | None:
-    """Read a limit; None if the type has none or it is that of every value of the type.
+    """Read a limit; None if the type has no limits or the limit does not restrict it.
 
     Args:
         kind: its data type.
         text: not empty.
-        upper: whether it is HighLimit. A limit beyond the type, which cuts nothing, stays as it is.
+        upper: whether it is HighLimit. A limit beyond the type, which has no effect, is kept.
 
     Raises:
-        ValueError: it is no number of at most 64 bits.
+        ValueError: it is not a number of at most 64 bits.
 
     >>> parse_limit(DataType.UNSIGNED8, "-1"), parse_limit(DataType.INTEGER8, "0xFFFF")
     (255, 65535)
@@ -344,7 +345,7 @@ def parse_limit(kind: DataType, text: str, *, upper: bool = True) -> int | float
 
 
 def format_limit(kind: DataType, limit: int | float) -> str:
-    """Write a limit, of a float as its bytes where they hold it."""
+    """Write a limit; of a float as its bytes if they represent it exactly."""
     with suppress(ValueError):
         if kind in FLOATS and kind.decode(data := kind.encode(limit)) == limit:
             return format_value(kind, data)
@@ -352,9 +353,9 @@ def format_limit(kind: DataType, limit: int | float) -> str:
 
 
 def format_value(kind: DataType, data: bytes, *, relative: bool = False) -> str:
-    """Write a value; what it cannot express is for the caller to see by reading it again.
+    """Write a value; the caller detects losses by reading it again.
 
-    A float is written as its bytes, as Lely's tools want it; 0 is 0 for all.
+    A float is written as its bytes, as Lely's tools require; 0 is always written as 0.
 
     >>> format_value(DataType.UNSIGNED32, (0x180).to_bytes(4, "little"), relative=True)
     '$NODEID+0x180'
@@ -374,7 +375,7 @@ def format_value(kind: DataType, data: bytes, *, relative: bool = False) -> str:
 
 
 def parse_sum(text: str) -> tuple[int, bool]:
-    """Read a sum of numbers, and whether the node-ID is one of them.
+    """Read a sum of numbers; also return whether the node-ID is part of it.
 
     >>> parse_sum("$NODEID+0x180"), parse_sum("5")
     ((384, True), (5, False))
@@ -395,7 +396,7 @@ def _parse_float(layout: str, text: str) -> float:
 
 
 def is_hex_bytes(text: str) -> bool:
-    """Return whether a text is hexadecimal bytes as CiA 306 writes them.
+    """Return whether a text is hexadecimal bytes in CiA 306 notation.
 
     >>> is_hex_bytes("01 02FF"), is_hex_bytes("0x0102"), is_hex_bytes("hello")
     (True, False, False)

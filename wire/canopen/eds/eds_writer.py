@@ -1,4 +1,4 @@
-"""EDS and DCF files out of the objects of a device (CiA 306)."""
+"""Write EDS and DCF files for the objects of a device (CiA 306)."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _NO_WORD: Final = re.compile(r"[^a-z0-9]+")
 
 
 class Table(Protocol):
-    """EntryDescription objects: an `ObjectTable`, or what the dictionaries of slaves share."""
+    """EntryDescription objects: an `ObjectTable`, or the shared description of dictionaries."""
 
     @property
     def objects(self) -> Mapping[int, object_table.ObjectDescription]:
@@ -42,17 +42,16 @@ class Table(Protocol):
         ...
 
     def __iter__(self) -> Iterator[object_table.EntryDescription]:
-        """Give all entries, sorted by index and sub-index."""
+        """Return all entries, sorted by index and sub-index."""
         ...
 
 
 def write_eds(table: Table, info: object_table.DeviceInfo = _NO_INFO) -> str:
     """Write the objects with their default values.
 
-    What CiA 306 has no keyword for stands in its comments, where it is needed:
-    `MaxBytes` limits a string or domain, `DefaultBytes` gives a default that no
-    text can express. The file is named after the product and dated 1970: the
-    same dictionary gives the same text.
+    Properties without a CiA 306 keyword are written as comments if needed: `MaxBytes` limits a
+    string or domain, `DefaultBytes` gives a default that no text can express. The file is named
+    after the product and dated 1970, so the same dictionary gives the same text.
 
     Raises:
         ValueError: a name or an access that an EDS cannot hold.
@@ -79,7 +78,7 @@ def write_dcf(
         node_id: 1..127.
         bit_rate: in bit/s.
         values: bytes of the present values by index << 8 | sub-index; others have their default,
-            with the node-ID where it belongs to it.
+            with the node-ID added if relative.
         info: the head of the file.
     """
     commissioning = [
@@ -135,7 +134,7 @@ def _file_info(info: object_table.DeviceInfo, ending: str) -> Iterator[str]:
 
 
 def _comments(table: Table) -> Iterator[str]:
-    """Give what CiA 306 has no keyword for; `EdsFile` reads it."""
+    """Yield comments for properties without a CiA 306 keyword; `EdsFile` reads them."""
     for info, entries in _grouped(table):
         for entry, title in zip(entries, _titles(info, entries), strict=True):
             if entry.max_bytes != object_table.MAX_VARIABLE_BYTES:
@@ -232,7 +231,7 @@ def access_type(entry: object_table.EntryDescription) -> str:
     """Return the AccessType of an entry.
 
     Raises:
-        ValueError: no word of CiA 306 says it.
+        ValueError: CiA 306 has no word for it.
 
     >>> from tickrig.wire.canopen.eds.object_table import RWW, DataType, EntryDescription
     >>> access_type(EntryDescription(0x6040, 0, "Controlword", DataType.UNSIGNED16, RWW))
@@ -249,13 +248,13 @@ def access_type(entry: object_table.EntryDescription) -> str:
 
 
 def _default(entry: object_table.EntryDescription) -> str | None:
-    """Return the text of a default, None if no text comes back exactly."""
+    """Return the text of a default, None if no text represents it exactly."""
     text = format_value(entry.data_type, entry.default, relative=entry.relative)
     return text if _reads_as(entry, text) else None
 
 
 def _reads_as(entry: object_table.EntryDescription, text: str) -> bool:
-    """Return whether a default comes back exactly."""
+    """Return whether reading restores a default exactly."""
     if not text:
         return not any(entry.default) and len(entry.default) == entry.data_type.size
     if _fits_a_line(text):

@@ -1,4 +1,4 @@
-"""Objects of a device, written down as its manual lists them, and the head of its EDS."""
+"""Object tables of devices, written as in their manuals, and the head of an EDS."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from tickrig.wire.canopen.pdo import PdoDescription
 from tickrig.wire.errors import FieldError
 
 MAX_VARIABLE_BYTES: Final = 0xFFFF_FFFF
-"""What a string or domain holds unless its description says less: all that SDO can carry."""
+"""Default size limit of a string or domain: the most that SDO can transfer."""
 
 
 class Access(Flag):
-    """What the bus may do with an entry."""
+    """Access of the bus to an entry."""
 
     NONE = 0
     READ = 1
@@ -37,11 +37,13 @@ class Access(Flag):
             mappable: whether PDOs may carry it (PDOMapping).
 
         Raises:
-            ValueError: no such access.
+            ValueError: unknown access.
         """
         access = _ACCESS_TYPES.get(access_type.lower())
         if access is None:
-            raise ValueError(f"access type {access_type!r} is none of {', '.join(_ACCESS_TYPES)}")
+            raise ValueError(
+                f"access type {access_type!r} is not one of {', '.join(_ACCESS_TYPES)}"
+            )
         if not mappable:
             return access
         return access | _MAPPABLE.get(access_type.lower(), cls.TPDO | cls.RPDO)
@@ -56,7 +58,7 @@ ROT: Final = RO | Access.TPDO
 RWW: Final = RW | Access.RPDO
 """Read and written, may be mapped into an RPDO."""
 RWRW: Final = RWW | Access.TPDO
-"""Read and written, may be mapped both ways."""
+"""Read and written, may be mapped in both directions."""
 
 _ACCESS_TYPES: Final = {"ro": RO, "wo": WO, "rw": RW, "rwr": RW, "rww": RW, "const": CONST}
 _MAPPABLE: Final = {
@@ -69,7 +71,7 @@ _MAPPABLE: Final = {
 
 
 class ObjectCode(IntEnum):
-    """Kind of an object, as an EDS gives it."""
+    """Kind of an object, as in an EDS."""
 
     DOMAIN = 0x2
     DEFTYPE = 0x5
@@ -80,7 +82,7 @@ class ObjectCode(IntEnum):
 
 
 class ObjectDescription(NamedTuple):
-    """What an object is called and what kind it is, beside its entries."""
+    """Name and kind of an object."""
 
     name: str
     code: ObjectCode = ObjectCode.VAR
@@ -88,15 +90,15 @@ class ObjectDescription(NamedTuple):
 
 @mypyc_attr(serializable=True)
 class EntryDescription:
-    """What never changes of a variable, or of one element of an array or record (CiA 306).
+    """Constant description of a variable, or of one element of an array or record (CiA 306).
 
     Args:
         index: 0x0000..0xFFFF.
         sub: 0..255.
         name: as in the EDS.
-        data_type: decides size and notation; DOMAIN where a file names an unknown one.
-        access: what the bus may do.
-        default: power-on value or its bytes; if left out, zero or the limit next to it, or empty.
+        data_type: determines size and notation; DOMAIN if a file has an unknown one.
+        access: access of the bus.
+        default: power-on value or its bytes; if omitted, zero or the nearest limit, or empty.
         low: smallest value, None for that of the data type.
         high: largest value.
         relative: the node-ID is added to the default ($NODEID).
@@ -105,12 +107,12 @@ class EntryDescription:
         factor: by which its number is multiplied to be in that unit.
 
     Raises:
-        FieldError: the default is no value of the data type.
+        FieldError: the default is not a value of the data type.
 
     Attributes:
         default: bytes of the power-on value.
         has_default: whether one was given.
-        size: size in bytes, 0 where it varies.
+        size: size in bytes, 0 if it varies.
         signed: whether it is a signed integer.
         readable: the bus may read it.
         writable: the bus may write it.
@@ -160,10 +162,10 @@ class EntryDescription:
             relative: the node-ID is added to it.
 
         Returns:
-            A description of its own.
+            A new description.
 
         Raises:
-            FieldError: the default is no value of the data type.
+            FieldError: the default is not a value of the data type.
         """
         return EntryDescription(
             *(self.index, self.sub, self.name, self.data_type, self.access),
@@ -177,11 +179,11 @@ class EntryDescription:
         )
 
     def __repr__(self) -> str:
-        """Name it as a log line would."""
+        """Return its name for a log line."""
         return f"<{self.index:04X}h:{self.sub:02X} {self.name}>"
 
     def power_on_data(self, node_id: int) -> bytes:
-        """Return the bytes of the default, with the node-ID where it belongs to it.
+        """Return the bytes of the default, with the node-ID added if it is relative.
 
         Args:
             node_id: 1 to 127.
@@ -193,7 +195,7 @@ class EntryDescription:
 
 
 def _nearest_to_zero(kind: DataType, low: int | float | None, high: int | float | None) -> bytes:
-    """Return the bytes of the value that nobody gives: 0, or the limit next to it."""
+    """Return the bytes of an omitted default: 0, or the nearest limit."""
     nearest: int | float = 0
     if low is not None and low > 0:
         nearest = low
@@ -212,7 +214,7 @@ class Element(NamedTuple):
         sub: 1..254.
         name: as in the EDS.
         kind: data type.
-        access: what the bus may do.
+        access: access of the bus.
         default: power-on value.
         relative: the node-ID is added to it.
     """
@@ -227,7 +229,7 @@ class Element(NamedTuple):
 
 @mypyc_attr(serializable=True)
 class ObjectTable:
-    """Collects objects, sorted by index and sub-index when they are given out.
+    """Collects objects, and returns them sorted by index and sub-index.
 
     Attributes:
         objects: names and kinds.
@@ -244,7 +246,7 @@ class ObjectTable:
         self._infos: dict[int, ObjectDescription] = {}
 
     def __iter__(self) -> Iterator[EntryDescription]:
-        """Give all rows."""
+        """Return all rows."""
         return iter(sorted(self._rows, key=attrgetter("key")))
 
     @property
@@ -288,7 +290,7 @@ class ObjectTable:
         *,
         max_bytes: int = MAX_VARIABLE_BYTES,
     ) -> None:
-        """Add an array of elements that are alike; sub-index 0 counts them."""
+        """Add an array of equal elements; sub-index 0 counts them."""
         self._head(index, name, ObjectCode.ARRAY, RO, count)
         self._rows += (
             EntryDescription(
@@ -307,9 +309,9 @@ class ObjectTable:
         count: int | None = None,
         code: ObjectCode = ObjectCode.RECORD,
     ) -> None:
-        """Add a record; sub-index 0 holds `count`, or else the highest sub-index.
+        """Add a record; sub-index 0 holds `count`, by default the highest sub-index.
 
-        With `code` it is an array whose elements have names and defaults of their own.
+        With `code` it is an array whose elements have individual names and defaults.
         """
         rows = list(elements)
         highest = max(row.sub for row in rows) if count is None else count
@@ -328,12 +330,12 @@ class ObjectTable:
 
 BIT_RATES_KBIT: Final = (10, 20, 50, 125, 250, 500, 800, 1000)
 BIT_RATES: Final = frozenset(1_000 * kbit for kbit in BIT_RATES_KBIT)
-"""All of them, in bit/s."""
+"""All bit rates, in bit/s."""
 
 
 @dataclass(frozen=True, slots=True)
 class DeviceInfo:
-    """Who made it, and what it can do.
+    """Vendor, product and bit rates.
 
     Attributes:
         vendor_name: empty if unknown.
@@ -348,7 +350,7 @@ class DeviceInfo:
     bit_rates: frozenset[int] = frozenset()
 
 
-# The communication objects that all our models have (CiA 301, 1000h to 1FFFh).
+# The communication objects of all our models (CiA 301, 1000h to 1FFFh).
 
 U8: Final = DataType.UNSIGNED8
 U16: Final = DataType.UNSIGNED16
@@ -359,19 +361,19 @@ OFF: Final = 0x8000_0000
 _ERRORS_KEPT: Final = 8
 _CONSUMERS: Final = 4
 _MAPPED: Final = 8
-"""Entries that a mapping record holds."""
+"""Number of entries in a mapping record."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CommunicationProfile:
-    """What differs from device to device.
+    """Differences between devices.
 
     Attributes:
         device_type: 1000h.
         name: 1008h.
         hardware: 1009h.
         software: 100Ah.
-        product_code: 1018h:02; the vendor-ID is 0, which is nobody's.
+        product_code: 1018h:02; the vendor-ID is 0, which belongs to no vendor.
         rpdos: from 1400h on.
         tpdos: from 1800h on.
         revision: 1018h:03.

@@ -1,6 +1,6 @@
-"""XDD and XDC files, which are XML (CiA 311), as the lines that an EDS would have.
+"""XDD and XDC files (XML, CiA 311), converted to the lines of an EDS.
 
-Document types, and entities with them, are refused; nothing is fetched, whatever a file names.
+Document types and their entities are refused; no external file is fetched.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ _COMMISSIONING: Final = {
     **{"networkName": "NetworkName", "networkNumber": "NetNumber"},
     "CANopenManager": "CANopenManager",
 }
-"""`nodeID` by CiA 311, `NodeID` as CANopenEditor writes it."""
+"""`nodeID` as in CiA 311, `NodeID` as CANopenEditor writes it."""
 _OBJECT: Final = {
     **{"name": "ParameterName", "subNumber": "SubNumber", "defaultValue": "DefaultValue"},
     **{"actualValue": "ParameterValue", "denotation": "Denotation", "objFlags": "ObjFlags"},
@@ -63,10 +63,10 @@ _FILE: Final = {
 
 
 class XddError(ValueError):
-    """XML that is not read.
+    """XML that cannot be read.
 
     Attributes:
-        line: where, 0 for the file as a whole.
+        line: line number, 0 for the file as a whole.
     """
 
     def __init__(self, reason: str, line: int) -> None:
@@ -76,7 +76,7 @@ class XddError(ValueError):
 
 @mypyc_attr(serializable=True)
 class Element:
-    """An element of XML: names without prefixes."""
+    """An XML element; names have no prefixes."""
 
     def __init__(self, name: str, attributes: dict[str, str], line: int) -> None:
         self.name = name
@@ -87,15 +87,15 @@ class Element:
 
 
 def is_xml(text: str) -> bool:
-    """Return whether a text is XML: it begins as no EDS can."""
+    """Return whether a text is XML: it starts as no EDS can."""
     return text.lstrip().startswith("<")
 
 
 def xdd_lines(text: str) -> list[EdsLine]:
-    """Return the lines of the EDS that says what an XDD or XDC says.
+    """Return the lines of an EDS equivalent to an XDD or XDC.
 
     Raises:
-        XddError: it is not well-formed, has a document type, or no object list of CANopen.
+        XddError: it is not well-formed, has a document type, or no CANopen object list.
     """
     elements = read_xml(text)
     if not any(element.name == "CANopenObjectList" for element in elements):
@@ -129,7 +129,7 @@ def read_xml(text: str) -> list[Element]:
 
 
 class _Reader:
-    """Takes the events of the parser, after so many lines that it has not seen."""
+    """Handles the events of the parser, after a number of skipped lines."""
 
     def __init__(self, skipped: int) -> None:
         self.skipped = skipped
@@ -168,7 +168,7 @@ _Item = tuple[str, str, int]
 
 
 def _section(title: str, line: int, items: Iterable[_Item]) -> Iterator[EdsLine]:
-    """Give the lines of a section."""
+    """Yield the lines of a section."""
     section = canonical_section(title)
     yield EdsLine(line, f"[{title}]", section, title or "-", content=f"[{title}]")
     for key, value, number in items:
@@ -177,7 +177,7 @@ def _section(title: str, line: int, items: Iterable[_Item]) -> Iterator[EdsLine]
 
 
 def _renamed(element: Element, names: Mapping[str, str]) -> Iterator[_Item]:
-    """Give those attributes of an element that an EDS has keywords for."""
+    """Yield the attributes of an element that have an EDS keyword."""
     for name, key in names.items():
         if name in element.attributes:
             text = element.attributes[name]
@@ -194,7 +194,7 @@ def _head(elements: list[Element]) -> Iterator[EdsLine]:
 
 
 def _head_items(element: Element) -> Iterator[tuple[str, _Item]]:
-    """Give what an element says of the file or device, each with its section."""
+    """Yield the keywords of an element for the file or device, each with its section."""
     match element.name:
         case "ProfileBody":
             yield from (("FileInfo", item) for item in _renamed(element, _FILE))
@@ -218,7 +218,7 @@ def _head_items(element: Element) -> Iterator[tuple[str, _Item]]:
 
 
 def _kbit(text: str) -> str:
-    """Return a bit rate in kbit/s; a text that is none as it is.
+    """Return a bit rate in kbit/s; other texts unchanged.
 
     >>> _kbit("250 Kbps"), _kbit("1 Mbps"), _kbit("500000"), _kbit("auto-baudRate")
     ('250', '1000', '500000', 'auto-baudRate')
@@ -242,7 +242,7 @@ def _objects(elements: list[Element], parameters: _Parameters) -> Iterator[EdsLi
 
 
 def _entry(element: Element, parameters: _Parameters) -> Iterator[_Item]:
-    """Give the keywords of an object or one of its entries; its own attributes come first."""
+    """Yield the keywords of an object or one of its entries, its own attributes first."""
     parameter = parameters.of(element)
     said = {key: (text, line) for key, text, line in _renamed(element, _OBJECT)}
     kind = element.attributes.get("objectType", "7")
@@ -264,11 +264,11 @@ def _entry(element: Element, parameters: _Parameters) -> Iterator[_Item]:
 
 
 _COMPOSED: Final = ("8", "9")
-"""Object types of arrays and records, which have their values in sub-objects."""
+"""Object types of arrays and records, whose values are in sub-objects."""
 
 
 def _own(element: Element) -> Iterator[_Item]:
-    """Give data type and access of an element itself."""
+    """Yield data type and access of an element itself."""
     if "dataType" in element.attributes:
         text = element.attributes["dataType"].removeprefix("0x")
         yield "DataType", f"0x{text}", element.line
@@ -277,7 +277,7 @@ def _own(element: Element) -> Iterator[_Item]:
 
 
 class _Parameters:
-    """The parameters of the device profile, which objects refer to by `uniqueIDRef`."""
+    """The parameters of the device profile, referenced by `uniqueIDRef`."""
 
     def __init__(self, elements: list[Element]) -> None:
         self._known = {
@@ -287,11 +287,11 @@ class _Parameters:
         }
 
     def of(self, element: Element) -> Element | None:
-        """Return what an element refers to, None if that is not there."""
+        """Return the element that an element refers to, None if it is missing."""
         return self._known.get(element.attributes.get("uniqueIDRef", ""))
 
     def items(self, parameter: Element | None) -> Iterator[_Item]:
-        """Give the keywords that a parameter holds."""
+        """Yield the keywords of a parameter."""
         if parameter is None:
             return
         access = parameter.attributes.get("access", "read")
@@ -309,7 +309,7 @@ class _Parameters:
                     yield from self._data_type(child)
 
     def _data_type(self, child: Element) -> Iterator[_Item]:
-        """Give the data type that an element names, or that what it refers to is made of."""
+        """Yield the data type of an element, or of the type that it refers to."""
         referred = self.of(child) if child.name == "dataTypeIDRef" else None
         for element in (child, *(referred.children if referred is not None else ())):
             if element.name in _DATA_TYPES:

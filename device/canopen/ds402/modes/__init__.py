@@ -1,1 +1,1 @@
-"""Modes of operation of a drive (CiA 402-2) and Maxon's own; what moves the axis is in motion/."""
+"""Modes of operation of a drive (CiA 402-2), and Maxon's own modes."""

@@ -14,10 +14,10 @@ _STEP_US: Final = 1_000
 
 
 class LatchedSetPoint(Mode):
-    """Follows a set-point that is latched until somebody writes another one.
+    """Follows a set-point that stays latched until another one is written.
 
-    When it begins it brakes; meanwhile the object of the set-point shows the reference:
-    nothing moves before the master says so.
+    At the start it brakes, and the object of the set-point shows the reference: nothing moves
+    before the master writes a set-point.
 
     Attributes:
         index: object of the target.
@@ -72,10 +72,9 @@ class LatchedSetPoint(Mode):
 
 
 class CyclicPosition(LatchedSetPoint):
-    """Goes to the target position within an interpolation period, on a straight line.
+    """Moves to the target position within an interpolation period, on a straight line.
 
-    A SYNC begins a line, and so does another target without SYNC. At the end of
-    the line it stays.
+    A SYNC begins a line, and so does another target without SYNC. At the end of the line it stops.
 
     Not emulated: extrapolation when SYNC is late; the torque offset.
     """
@@ -101,7 +100,7 @@ class CyclicPosition(LatchedSetPoint):
         return False
 
     def ahead(self, steps: int) -> list[tuple[float, float]]:
-        """Return the rest of the line, and its end."""
+        """Return the remaining points of the line, then its end."""
         if self._latched is not None or self.drive.fresh:
             return []
         position, left, most = self.reference.position, self._left, self.settings.max_velocity
@@ -118,7 +117,7 @@ class CyclicPosition(LatchedSetPoint):
         return line
 
     def skip(self, steps: int) -> None:
-        """Be further on the line."""
+        """Advance on the line."""
         self._left, self.limited = max(0, self._left - steps), False
 
     def _begin(self) -> None:
@@ -135,11 +134,11 @@ class CyclicPosition(LatchedSetPoint):
 
 
 class InterpolatedPosition(CyclicPosition):
-    """Goes to the data record 60C1h:01 within an interpolation period, on a straight line.
+    """Moves to the data record 60C1h:01 within an interpolation period, on a straight line.
 
-    It does so while bit 4 of the controlword is set; bit 12 of the statusword says
-    that it does. Otherwise it brakes with the profile deceleration. A SYNC begins
-    a line, and so does another record without SYNC. Bit 10: the line has ended.
+    It does so while bit 4 of the controlword is set; bit 12 of the statusword is then set.
+    Otherwise it brakes with the profile deceleration. A SYNC begins a line, and so does another
+    record without SYNC. Bit 10: the line has ended.
 
     Not emulated: a buffer of records (60C4h); sub-modes beside 0 (60C0h).
     """
@@ -155,11 +154,11 @@ class InterpolatedPosition(CyclicPosition):
         self._active = False
 
     def start(self) -> None:
-        """Interpolate from now on."""
+        """Enable interpolation."""
         self._active = True
 
     def stop(self) -> None:
-        """Interpolate no longer."""
+        """Disable interpolation."""
         self._active = False
 
     def run(self, now_us: int) -> bool:
@@ -172,17 +171,17 @@ class InterpolatedPosition(CyclicPosition):
         return settled
 
     def ahead(self, steps: int) -> list[tuple[float, float]]:
-        """Return nothing: its bits in the statusword change on the way."""
+        """Return no steps: its bits in the statusword change on the way."""
         return []
 
     def halt(self, now_us: int) -> bool:
-        """Brake as 605Dh says; the next record begins a line."""
+        """Brake according to 605Dh; the next record begins a line."""
         self._left, self.flags = 0, self.flags & ~Statusword.MODE_12
         return super().halt(now_us)
 
 
 class CyclicVelocity(Mode):
-    """Has the target velocity at the end of an interpolation period, on a straight ramp.
+    """Reaches the target velocity at the end of an interpolation period, on a straight ramp.
 
     When the mode is chosen while the drive is enabled, the target velocity becomes
     that of the reference.
@@ -196,7 +195,7 @@ class CyclicVelocity(Mode):
         self._slope = 0.0
 
     def enter(self, *, enabled: bool) -> None:
-        """Take the present velocity for the target, unless the drive is just being enabled."""
+        """Use the present velocity as target, unless the drive is just being enabled."""
         if enabled:
             self.drive.parameters.write(indices.TARGET_VELOCITY, self._present)
 
@@ -239,7 +238,7 @@ class _PositionSetting(LatchedSetPoint):
     index = _POSITION_SETTING
 
     def follow(self, now_us: int) -> bool:
-        """Be at the setting value."""
+        """Set the reference to the setting value."""
         self.reference.place(self.target())
         return True
 
@@ -255,13 +254,13 @@ class _VelocitySetting(Mode):
     halts = False
 
     def enter(self, *, enabled: bool) -> None:
-        """Take the present velocity, unless the drive is just being enabled."""
+        """Use the present velocity, unless the drive is just being enabled."""
         if enabled:
             present = round(self.reference.velocity / self.settings.units.per_velocity)
             self.drive.parameters.write(_VELOCITY_SETTING, present)
 
     def run(self, now_us: int) -> bool:
-        """Turn as fast as the setting value."""
+        """Turn at the velocity of the setting value."""
         wanted = self.number(_VELOCITY_SETTING) * self.settings.units.per_velocity
         velocity = self.take(self.drive.limits.velocity(wanted))
         self.reference.place(self.reference.position, velocity)
@@ -279,13 +278,13 @@ class _CurrentSetting(Mode):
     halts = False
 
     def enter(self, *, enabled: bool) -> None:
-        """Take the present current, unless the drive is just being enabled."""
+        """Use the present current, unless the drive is just being enabled."""
         if enabled:
             present = round(1_000 * self.reference.current_a) * self.axis.forward
             self.drive.parameters.write(_CURRENT_SETTING, present)
 
     def run(self, now_us: int) -> bool:
-        """Have the current of the setting value."""
+        """Drive the current of the setting value."""
         wanted_a = self.number(_CURRENT_SETTING) / 1_000 * self.axis.forward
         self.reference.current_a = self.take(self.drive.limits.current(wanted_a))
         return True
@@ -296,4 +295,4 @@ MODES: Final[dict[int, type[Mode]]] = {
     -2: _VelocitySetting,
     -3: _CurrentSetting,
 }
-"""By number in 6060h."""
+"""Modes by their number in 6060h."""

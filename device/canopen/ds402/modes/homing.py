@@ -11,7 +11,7 @@ from tickrig.device.canopen.ds402.modes.mode import DriveView, Mode
 from tickrig.device.canopen.ds402.modes.profile_position import SLOWEST, STEEPEST
 from tickrig.device.twin import Part
 
-# The search for home: the methods as a table, and which way to go by the switches (CiA 402-2).
+# The search for home: a table of the methods, and the direction by the switches (CiA 402-2).
 
 
 class Switch(IntFlag):
@@ -23,14 +23,14 @@ class Switch(IntFlag):
 
 
 class HomingMethod(NamedTuple):
-    """Where home is and how it is looked for.
+    """A homing method: where home is and how to find it.
 
     Attributes:
-        switch: whose edge is looked for, None if no edge is.
+        switch: the switch whose edge counts, None if none does.
         first: direction of the search when the switch is not active.
-        approach: direction in which the edge, then the index pulse, is crossed at last.
+        approach: direction in which the edge, then the index pulse, is crossed at the end.
         active: whether the switch is active behind the edge, seen in that direction.
-        turns: whether the search turns round at the limit switch of its first direction.
+        turns: whether the search reverses at the limit switch of its first direction.
         by_index: whether home is the next index pulse behind the edge.
     """
 
@@ -72,7 +72,7 @@ METHODS: Final[dict[int, HomingMethod]] = {
     35: HomingMethod(None, 0, 0, active=False, turns=False, by_index=False),
     37: HomingMethod(None, 0, 0, active=False, turns=False, by_index=False),
 }
-"""By the number in 6098h; 35 and 37 take the present position."""
+"""Methods by their number in 6098h; 35 and 37 use the present position."""
 
 _LIMIT: Final = {-1: Switch.NEGATIVE_LIMIT, 0: Switch(0), +1: Switch.POSITIVE_LIMIT}
 """The limit switch ahead, by direction."""
@@ -81,7 +81,7 @@ _BOTH_LIMITS: Final = Switch.NEGATIVE_LIMIT | Switch.POSITIVE_LIMIT
 
 
 class Phase(Enum):
-    """What the search is about."""
+    """Phase of the search."""
 
     SEEK = auto()  # fast, to where the switch is active
     LEAVE = auto()  # fast, back to the side from which the edge is approached
@@ -92,17 +92,16 @@ class Phase(Enum):
 
 
 class HomingSearch(Part):
-    """Looks for the home of a method.
+    """Searches for home with a method.
 
-    The edge that counts is crossed slowly in every case: an axis that hits the
-    switch in the search, or that a narrow switch does not give the room to brake,
-    goes back first. So home is the same place from everywhere. An edge counts
-    only while the axis moves as demanded.
+    The edge that counts is crossed slowly in every case: an axis that hits the switch in the
+    search, or that cannot brake within a narrow switch, goes back first. So home is the same
+    position from every start. An edge counts only while the axis moves as demanded.
 
     Attributes:
-        method: what is looked for.
-        phase: what it is about.
-        direction: where to go, -1 or +1; 0 for nowhere.
+        method: the homing method.
+        phase: phase of the search.
+        direction: -1 or +1; 0 to stop.
     """
 
     def __init__(self, method: HomingMethod, switches: Switch) -> None:
@@ -114,7 +113,7 @@ class HomingSearch(Part):
 
     @property
     def slow(self) -> bool:
-        """Whether to go at the speed of 6099h:02 instead of 6099h:01."""
+        """Whether to move at the speed of 6099h:02 instead of 6099h:01."""
         return self.phase in (Phase.APPROACH, Phase.INDEX)
 
     @property
@@ -123,7 +122,7 @@ class HomingSearch(Part):
         return self.phase in (Phase.FOUND, Phase.FAILED)
 
     def step(self, switches: Switch, moving: int, *, crawling: bool, index: bool) -> None:
-        """Look at the switches of one control step.
+        """Update the search with the switches of one control step.
 
         Args:
             switches: those that are active.
@@ -168,7 +167,7 @@ class HomingSearch(Part):
         return Phase.INDEX if self.method.by_index else Phase.FOUND
 
     def _meet_limit(self) -> None:
-        """Turn round once, if the method does; give up otherwise."""
+        """Reverse once if the method allows it, else give up."""
         turns = self.method.turns and self.direction == self.method.first
         if self.phase is Phase.SEEK and turns:
             self.direction = -self.direction
@@ -177,9 +176,9 @@ class HomingSearch(Part):
 
 
 class _Stage(Enum):
-    """Where a homing is."""
+    """Progress of a homing."""
 
-    IDLE = auto()  # not begun, or interrupted
+    IDLE = auto()  # not started, or interrupted
     SEARCHING = auto()
     ATTAINED = auto()
     FAILED = auto()
@@ -194,15 +193,15 @@ _FLAGS: Final = {
 
 
 class Homing(Mode):
-    """Looks for the home position, calls it what 607Ch says, and goes back to it.
+    """Searches for the home position, gives it the position 607Ch, and returns to it.
 
-    The axis brakes beyond the edge or the index pulse that is home, and returns:
-    in the end 6064h is 607Ch. An index pulse comes whenever the encoder has
-    turned by its counts; it is found to the count, an edge to what the axis moves
-    in a tick. Halt and the falling edge of bit 4 end a homing in progress; a
-    rising edge begins anew. What a homing found holds until the next one begins.
+    The axis brakes beyond the edge or the index pulse that is home, and returns: in the end 6064h
+    is 607Ch. An index pulse comes whenever the encoder has turned by its counts; it is found to the
+    count, an edge to what the axis moves in a tick. Halt and the falling edge of bit 4 end a homing
+    in progress; a rising edge starts a new one. The result of a homing is valid until the next one
+    begins.
 
-    Bits 13, 12, 10: 000 in progress, 001 not begun or interrupted, 010 home is
+    Bits 13, 12, 10: 000 in progress, 001 not started or interrupted, 010 home is
     attained, 011 and the axis stands, 100 an error, 101 and the axis stands.
 
     Not emulated: methods 15, 16, 31, 32, 36 and those of manufacturers; a time-out.
@@ -233,13 +232,13 @@ class Homing(Mode):
             self._end(_Stage.IDLE)
 
     def halt(self, now_us: int) -> bool:
-        """Interrupt a homing in progress; brake as 605Dh says."""
+        """Interrupt a homing in progress; brake according to 605Dh."""
         self.stop()
         self.flags = _FLAGS[self._stage]
         return super().halt(now_us)
 
     def run(self, now_us: int) -> bool:
-        """Search; at the end brake, or go to the home position."""
+        """Search; at the end brake, or move to the home position."""
         if self._search is not None:
             self._watch_switches(self._search)
         if self._search is not None:
@@ -257,7 +256,7 @@ class Homing(Mode):
         self._path.leave()
 
     def _watch_switches(self, search: HomingSearch) -> None:
-        """Look at switches and index pulse, and what follows from them."""
+        """Update the search with the switches and the index pulse."""
         before, self._counts = self._counts, self.axis.motor.counts
         pulse = index_pulse(before, self._counts, self.axis.motor.counts_per_turn)
         velocity = self.reference.velocity * self.axis.forward
@@ -271,13 +270,13 @@ class Homing(Mode):
             self._end(_Stage.FAILED)
 
     def _attain(self, method: HomingMethod, counts: int) -> None:
-        """Take a place for the home position."""
+        """Define counts as the home position."""
         self.axis.place_home(self.number(indices.HOME_OFFSET), counts)
         self._home = float(counts) if method.approach else None
         self._end(_Stage.ATTAINED)
 
     def _steer(self, search: HomingSearch, now_us: int) -> None:
-        """Go where the search wants to go."""
+        """Move in the direction of the search."""
         speed = self._speeds[search.slow]
         wanted = search.direction * self.axis.forward * speed
         if wanted != self._velocity or not self._path.kept:
@@ -295,7 +294,7 @@ class Homing(Mode):
 
     @property
     def _speeds(self) -> tuple[float, float]:
-        """Counts per second in the search for a switch, and for the home position."""
+        """Speeds of the search for a switch and for the home position, in counts per second."""
         settings = self.settings
         fast, slow = settings.homing_speeds
         return min(settings.max_velocity, fast), min(settings.max_velocity, slow)
@@ -307,7 +306,7 @@ class Homing(Mode):
 
 
 def index_pulse(before: int, after: int, per_turn: int) -> int | None:
-    """Return the first index pulse on the way from some counts to others, None if there is none.
+    """Return the first index pulse between two positions in counts, None if there is none.
 
     >>> index_pulse(1990, 2010, 2000), index_pulse(2000, 2010, 2000), index_pulse(1, 0, 2000)
     (2000, None, 0)

@@ -1,4 +1,4 @@
-"""What a drive does in Operation enabled: the base of all modes of operation (CiA 402-2)."""
+"""Base of all modes of operation: the work of a drive in Operation enabled (CiA 402-2)."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from tickrig.device.twin import Part
 
 @dataclass(slots=True, kw_only=True)
 class DriveView:
-    """What a mode of operation sees of its drive.
+    """The parts of a drive that its modes of operation use.
 
     Attributes:
         parameters: the objects.
         axis: motor, reference, settings and zero.
         switches: limit switches and home switch.
-        limits: what the axis may do.
-        stopping: brakes as the option codes say.
-        controlword: as it was written last.
+        limits: limits of the axis.
+        stopping: brakes according to the option codes.
+        controlword: the latest controlword.
         fresh: a SYNC came or a target changed since the last step.
     """
 
@@ -38,19 +38,19 @@ class DriveView:
 class Mode(Part):
     """No mode: the motor comes to a standstill and is held there.
 
-    A mode moves the reference of the axis, which is that of the mode before when it
-    begins; the drive then commands the motor.
+    A mode moves the reference of the axis and starts from the one the previous mode left; the drive
+    then commands the motor.
 
     Args:
-        drive: what it sees of the drive.
+        drive: the parts of the drive that it uses.
 
     Attributes:
-        control: the loop that the motor works with.
+        control: the control loop of the motor.
         halts: bit 8 of the controlword stops it.
-        minds_limits: limit switches and software limits stop it; homing looks itself.
-        shows_following_error: bit 13 says that the motor does not follow.
-        flags: its bits in the statusword: 10, 12, 13 and what else it owns.
-        limited: a limit cut something in the last step (bit 11 of the statusword).
+        minds_limits: limit switches and software limits stop it; homing checks them itself.
+        shows_following_error: bit 13 shows a following error.
+        flags: its bits in the statusword: 10, 12, 13 and further bits it owns.
+        limited: a limit cut a demand in the last step (bit 11 of the statusword).
     """
 
     control: ClassVar[Control] = Control.POSITION
@@ -69,10 +69,11 @@ class Mode(Part):
         return self.axis.settings
 
     def enter(self, *, enabled: bool) -> None:
-        """Begin.
+        """Start the mode.
 
         Args:
-            enabled: the mode was chosen in Operation enabled; or else the drive is being enabled.
+            enabled: True if the mode was chosen in Operation enabled, False if the drive is just
+                being enabled.
         """
 
     def start(self) -> None:
@@ -98,18 +99,19 @@ class Mode(Part):
     def ahead(self, steps: int) -> list[tuple[float, float]]:
         """Return position and velocity of the reference after each of the next steps.
 
-        Nothing is changed. What is left out, and what limits cut, is known step by step alone.
+        The state does not change. The list ends before a step that needs a single `step`, such as
+        one that a limit cuts.
 
         Args:
-            steps: how many at most, without input.
+            steps: largest number of steps, without input.
         """
         return []
 
     def skip(self, steps: int) -> None:
-        """Go on as after so many steps; the reference is placed by who skips them."""
+        """Advance the mode by a number of steps; the caller sets the reference."""
 
     def halt(self, now_us: int) -> bool:
-        """Brake as 605Dh says; see `step`."""
+        """Brake according to 605Dh; see `step`."""
         stands = self.drive.stopping.by(indices.HALT_OPTION)
         self.flags &= ~Statusword.TARGET_REACHED
         if stands:
@@ -117,7 +119,7 @@ class Mode(Part):
         return stands
 
     def take(self, demand: Clamped) -> float:
-        """Return what is left of a demand; the statusword shows whether a limit cut it."""
+        """Return the limited demand; the statusword shows whether a limit cut it."""
         value, clamped = demand
         self.limited |= clamped
         return value
@@ -135,10 +137,10 @@ class Mode(Part):
 
 
 class Window(Part):
-    """Finds out whether something has been inside for long enough: windows and thresholds.
+    """Detects a condition that has been true for long enough: windows and thresholds.
 
     Attributes:
-        waiting: it is inside, and the time runs.
+        waiting: the condition is true, and the time runs.
     """
 
     __slots__ = ("_since_us", "waiting")
@@ -148,7 +150,7 @@ class Window(Part):
         self._since_us: int | None = None
 
     def holds(self, now_us: int, inside: bool, for_us: int) -> bool:
-        """Take what is so now. Returns: whether it has been inside for `for_us`."""
+        """Update the condition; return whether it has been true for `for_us`."""
         if not inside:
             self._since_us, self.waiting = None, False
             return False

@@ -45,7 +45,7 @@ class _ProfileVelocity(Mode):
         return ended and not (self._arrived.waiting or self._slow.waiting)
 
     def halt(self, now_us: int) -> bool:
-        """Brake as 605Dh says."""
+        """Brake according to 605Dh."""
         stands = self.drive.stopping.by(indices.HALT_OPTION)
         self._show(now_us, stands, 0.0)
         return stands and not (self._arrived.waiting or self._slow.waiting)
@@ -67,7 +67,7 @@ class _ProfileVelocity(Mode):
 class _ProfileTorque(Mode):
     """Ramps the current to the target torque, 6071h, with the slope 6087h.
 
-    The torque is taken as the current: rated torque at rated current, without
+    The torque equals the current: rated torque at rated current, without
     friction. Halt ramps it to zero. Bit 10: the ramp has ended.
 
     Not emulated: other torque profiles than the linear ramp (6088h).
@@ -95,7 +95,7 @@ class _ProfileTorque(Mode):
 
 
 class _CyclicTorque(Mode):
-    """Has the torque 6071h and the offset 60B2h at once.
+    """Applies the torque 6071h plus the offset 60B2h at once.
 
     When the mode is chosen while the drive is enabled, the target torque becomes
     that of the motor.
@@ -105,14 +105,14 @@ class _CyclicTorque(Mode):
     halts = False
 
     def enter(self, *, enabled: bool) -> None:
-        """Take the present torque for the target, unless the drive is just being enabled."""
+        """Use the present torque as target, unless the drive is just being enabled."""
         if enabled:
             present = self.axis.per_mille_of(self.reference.current_a)
             offset = self.number(indices.TORQUE_OFFSET)
             self.drive.parameters.write(indices.TARGET_TORQUE, present - offset)
 
     def run(self, now_us: int) -> bool:
-        """Follow."""
+        """Apply the target torque."""
         self.reference.current_a = self.target_current(self.number(indices.TORQUE_OFFSET))
         self.flags = Statusword.MODE_12
         return True
@@ -129,7 +129,7 @@ MODES: Final[dict[int, type[Mode]]] = {
     9: CyclicVelocity,
     10: _CyclicTorque,
 }
-"""Of any drive; a model may have more of its own, with negative numbers."""
+"""Modes of any drive; a model may add its own, with negative numbers."""
 
 
 def offered(modes: Mapping[int, type[Mode]], listed: int) -> Mapping[int, type[Mode]]:
@@ -142,7 +142,7 @@ def offered(modes: Mapping[int, type[Mode]], listed: int) -> Mapping[int, type[M
 
 
 def supported(modes: Mapping[int, type[Mode]]) -> int:
-    """Return 6502h: bit n - 1 for mode n.
+    """Return the value of 6502h: bit n - 1 for mode n.
 
     >>> hex(supported(MODES))
     '0x3ed'

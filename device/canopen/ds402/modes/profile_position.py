@@ -1,4 +1,4 @@
-"""Profile position mode (CiA 402-2): set-points, one after the other or at once."""
+"""Profile position mode (CiA 402-2): set-points, in sequence or at once."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tickrig.device.canopen.ds402.settings import Settings
 from tickrig.device.twin import Immutable
 
 SLOWEST: Final = 1.0
-"""Counts per second: a profile has to end some time."""
+"""Lowest velocity in counts per second, so that each profile ends."""
 
 STEEPEST: Final = 1e12
 """Counts per second per second, for ramps without a limit."""
@@ -20,7 +20,7 @@ STEEPEST: Final = 1e12
 
 @dataclass(frozen=True, slots=True)
 class _SetPoint(Immutable):
-    """A target and how to get there, as it was when the set-point was given.
+    """A target and its limits, as they were when the set-point was given.
 
     Attributes:
         target: counts.
@@ -36,15 +36,14 @@ class _SetPoint(Immutable):
 
 
 class ProfilePosition(Mode):
-    """Goes to set-points; one more may wait for its turn.
+    """Moves to set-points; one more may wait.
 
-    A set-point takes target, velocities and ramps with it when bit 4 rises; later
-    changes are for the next one. Bit 12 falls when bit 4 has fallen and no
-    set-point waits; while one waits, only one that changes at once is taken. A
-    relative target is added to the target before it. With bit 9 the present
-    set-point is passed at its profile velocity, unless the way turns there.
-    Bit 10: nothing waits, the profile has ended, and the motor is within 6067h
-    of the target for 6068h. After an end velocity the motor goes on with it.
+    Target, velocities and ramps of a set-point are latched when bit 4 rises; later changes apply to
+    the next one. Bit 12 falls when bit 4 has fallen and no set-point waits; while one waits, only a
+    set-point with immediate change is accepted. A relative target is added to the previous target.
+    With bit 9 the present set-point is passed at its profile velocity, unless the direction
+    reverses there. Bit 10: nothing waits, the profile has ended, and the motor is within 6067h of
+    the target for 6068h. After an end velocity the motor continues at it.
 
     Not emulated: 60F2h positioning option code; more than one waiting set-point.
     """
@@ -60,7 +59,7 @@ class ProfilePosition(Mode):
         self._acknowledges = self._arrived = False
 
     def start(self) -> None:
-        """Take a new set-point and acknowledge it."""
+        """Accept a new set-point and acknowledge it."""
         self._acknowledges = True
         controlword, present = self.drive.controlword, self._present
         if present is None or self._arrived or controlword & Controlword.CHANGE_AT_ONCE:
@@ -71,11 +70,11 @@ class ProfilePosition(Mode):
                 self._pass_by(present, self._waiting)
 
     def stop(self) -> None:
-        """Take the acknowledge back."""
+        """Clear the acknowledge bit."""
         self._acknowledges = False
 
     def run(self, now_us: int) -> bool:
-        """Follow the path; at its end take the next set-point."""
+        """Follow the path; at its end start the next set-point."""
         if not self._path.kept:
             self._path.begin(self._plan(trapezoid.began_us(now_us)))
         if self._path.follow(now_us):
@@ -87,18 +86,18 @@ class ProfilePosition(Mode):
         return self._arrived and self.reference.velocity == 0 and not self._near.waiting
 
     def halt(self, now_us: int) -> bool:
-        """Brake as 605Dh says; the way goes on afterwards."""
+        """Brake according to 605Dh; the motion continues afterwards."""
         stands = super().halt(now_us)
         self._acknowledge()
         return stands
 
     def _go(self, point: _SetPoint) -> None:
-        """Go to a set-point from here."""
+        """Plan the path to a set-point from the present motion."""
         self._present, self._waiting, self._arrived = point, None, False
         self._path.leave()
 
     def _pass_by(self, present: _SetPoint, following: _SetPoint) -> None:
-        """Do not stop at the present set-point, if the way goes on in its direction."""
+        """Pass the present set-point without a stop if the next one lies in the same direction."""
         onward = (following.target - present.target) * (present.target - self.reference.position)
         if onward > 0:
             self._present = replace(present, end_velocity=present.limits.velocity)
@@ -147,7 +146,7 @@ class ProfilePosition(Mode):
 def _profile_limits(
     settings: Settings, shape: trapezoid.RampShape = trapezoid.RampShape.LINEAR
 ) -> trapezoid.PathLimits:
-    """Return what 6081h, 6083h and 6084h allow; a profile velocity of 0 is the slowest one."""
+    """Return the limits of 6081h, 6083h and 6084h; 0 as profile velocity means the slowest."""
     return trapezoid.PathLimits(
         max(SLOWEST, settings.profile_velocity),
         min(STEEPEST, settings.acceleration),

@@ -210,7 +210,7 @@ def test_all_errors_of_a_file_are_told_at_once() -> None:
         ),
         (
             "[1017]\nParameterName=x\nDataType=5\nAccessType=rx\n",
-            "a.eds:4: [1017] AccessType=rx is none of CiA 306: rw is taken (access-form)",
+            "a.eds:4: [1017] AccessType=rx is not in CiA 306: rw is taken (access-form)",
         ),
         (
             f"[2000]\n{U8}LowLimit=low\n",
@@ -263,7 +263,7 @@ def test_all_errors_of_a_file_are_told_at_once() -> None:
         ),
         (
             "[2000]\nParameterName=x\nDataType=5\nAccessType=R\n",
-            "a.eds:4: [2000] AccessType=R is none of CiA 306: ro is taken (access-form)",
+            "a.eds:4: [2000] AccessType=R is not in CiA 306: ro is taken (access-form)",
         ),
         (
             "[2000]\nParameterName=x\nDataType=0x40\nAccessType=ro\n",

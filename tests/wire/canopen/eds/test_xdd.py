@@ -46,7 +46,7 @@ def test_objects_have_their_attributes_and_those_of_the_parameters_they_name() -
     assert device.objects[0x2002].code is ObjectCode.ARRAY
     assert [str(one) for one in file.warnings] == [
         "a.xdd:56: [DeviceInfo] BaudRate_250 is there twice: 1 is taken (doubled-key)",
-        "a.xdd:25: [2001] AccessType=noAccess is none of CiA 306: rw is taken (access-form)",
+        "a.xdd:25: [2001] AccessType=noAccess is not in CiA 306: rw is taken (access-form)",
         "a.xdd:49: [2003] DataType is missing: DOMAIN is taken (data-type-missing)",
         "a.xdd:49: [2003] AccessType is missing: rw is taken (access-missing)",
         "a.xdd:50: [2004] DataType is missing: DOMAIN is taken (data-type-missing)",

@@ -35,7 +35,7 @@ def test_a_command_to_the_rrc_says_this(line: bytes, text: str) -> None:
 
 def test_a_line_that_is_no_command_is_said_to_be() -> None:
     (text,) = rrc(b"fly\n", to_device=True)
-    assert text.startswith("b'fly' is none of limit, output")
+    assert text.startswith("b'fly' is not one of limit, output")
 
 
 @pytest.mark.parametrize(
