@@ -264,7 +264,10 @@ class _HumanOperator:
 
     def _find_fault(self, name: str) -> InputSignal:
         if name not in self._physical.inputs.table:
-            raise NotOnThisBench(f"no hand can make {name}: it is a fault of the wire")
+            raise NotOnThisBench(
+                f"no hand can make {name}: it changes what passes on the wire, which an emulator"
+                " alone can (key control of [hardware])"
+            )
         return self._physical.inputs.find(name, SignalType.FAULT)
 
     def _wish(self, item: InputSignal, value: Setting) -> str:

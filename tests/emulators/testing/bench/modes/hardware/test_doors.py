@@ -9,7 +9,9 @@ import can
 import pytest
 from can.interfaces.virtual import VirtualBus
 
-from tickrig import Bench
+from tests.emulators.testing.bench.modes.hardware.plans import Answers
+from tickrig import Bench, NotOnThisBench
+from tickrig.emulators.canopen.faults import NODE_FAULTS
 from tickrig.emulators.testing.rig_file.plan import (
     BusPlan,
     DeviceKind,
@@ -43,6 +45,32 @@ def drive() -> Iterator[can.BusABC]:
 def bench() -> Iterator[Bench]:
     with Bench.of_plan(PLAN, "hardware") as bench:
         yield bench
+
+
+@pytest.mark.parametrize("fault", [*NODE_FAULTS, "drive/drop", "drop=0.5@2s-3s"])
+def test_a_fault_of_frames_is_refused_on_real_nodes(bench: Bench, fault: str) -> None:
+    name = fault.partition("=")[0]
+    for ordered in (lambda: bench.fault(fault), lambda: bench["drive"].clear(name)):
+        with pytest.raises(NotOnThisBench, match=r"no hand can make .*: it changes what passes"):
+            ordered()
+    assert told(bench) == []
+
+
+def test_a_mistake_in_a_fault_of_real_nodes_is_told_first(bench: Bench) -> None:
+    for fault, said in (
+        ("sdo_slwo", "did you mean 'sdo_slow'"),
+        ("sdo_slow=5", "'5' has no unit: write 5s, 5ms or 5us"),
+        ("sdo_abort=zz", "'zz' is not INDEX"),
+    ):
+        with pytest.raises(ValueError, match=said):
+            bench["drive"].fault(fault)
+
+
+def test_a_physical_fault_of_a_real_node_is_asked_of_a_human() -> None:
+    human = Answers("")
+    with Bench.of_plan(PLAN, "hardware", human) as bench:
+        bench["drive"].fault("power_off")
+    assert human.asked[0].startswith("drive: make this fault: its supply is cut (power_off)")
 
 
 def told(bench: Bench) -> list[str]:

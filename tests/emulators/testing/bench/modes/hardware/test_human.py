@@ -132,7 +132,7 @@ def test_a_fault_that_a_hand_can_make_is_made_and_mended(bench_of: BenchOf) -> N
 @pytest.mark.parametrize(
     ("spec", "options", "text"),
     [
-        ("cut", {}, "no hand can make cut: it is a fault of the wire"),
+        ("cut", {}, "no hand can make cut: it changes what passes on the wire"),
         ("bus_unplugged@2s-3s", {}, "no hand makes bus_unplugged at a certain time"),
         ("bus_unplugged", {"for_": "1s"}, "no hand makes bus_unplugged at a certain time"),
         ("bus_unplugged", {"when": lambda: True}, "the moment that something is so"),

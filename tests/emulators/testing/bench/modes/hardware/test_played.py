@@ -7,6 +7,7 @@ import signal
 from collections.abc import Iterator
 from pathlib import Path
 
+import canopen
 import pytest
 from click.testing import CliRunner
 
@@ -163,6 +164,17 @@ def test_a_master_meets_two_nodes_in_another_process() -> None:
         assert left.sdo.upload(0x1000, 0) == b"\x92\x01\x02\0"
         left.nmt.state = "OPERATIONAL"
         assert bench.wait_until(lambda: bench.get("left/state") == "Operational", within="5s")
+        bench["left"].fault("sdo_abort=1000h:0x06010002,read")
+        with pytest.raises(canopen.SdoAbortedError, match="0x06010002"):
+            left.sdo.upload(0x1000, 0)
+        bench["left"].clear("sdo_abort")
+        bench["left"].fault("sdo_mute", for_="60s")
+        left.sdo.RESPONSE_TIMEOUT, left.sdo.MAX_RETRIES = 0.3, 0
+        with pytest.raises(canopen.SdoCommunicationError, match="No SDO response"):
+            left.sdo.upload(0x1000, 0)
+        bench["left"].clear("sdo_mute")
+        left.sdo.RESPONSE_TIMEOUT = 5
+        assert left.sdo.upload(0x1000, 0) == b"\x92\x01\x02\0"
         bench["right"].fault("power_off")
         assert bench.wait_until(lambda: bench["right"].get("state") == "Off", within="5s")
         assert "can > 000#0101" in bench.transcript()
