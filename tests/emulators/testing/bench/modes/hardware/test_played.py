@@ -169,7 +169,7 @@ def test_a_master_meets_two_nodes_in_another_process() -> None:
             left.sdo.upload(0x1000, 0)
         bench["left"].clear("sdo_abort")
         bench["left"].fault("sdo_mute", for_="60s")
-        left.sdo.RESPONSE_TIMEOUT, left.sdo.MAX_RETRIES = 0.3, 0
+        left.sdo.RESPONSE_TIMEOUT, left.sdo.MAX_RETRIES = 0.3, 1
         with pytest.raises(canopen.SdoCommunicationError, match="No SDO response"):
             left.sdo.upload(0x1000, 0)
         bench["left"].clear("sdo_mute")
