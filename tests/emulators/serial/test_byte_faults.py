@@ -261,17 +261,24 @@ def test_minimalmodbus_notices(
             master.read_register(0x10)
 
 
+IN_REAL_TIME = {"delay": "300ms", "jitter": "2s", "split": "300ms", "flip": "0.2"}
+"""Arguments with which a host with a timeout of 0.1 s notices."""
+
+
 @pytest.mark.realtime
-@pytest.mark.parametrize("fault", ["delay=300ms", "split=300ms", "truncate", "garbage", "break"])
-def test_a_host_on_a_pty_notices(fault: str) -> None:
+@pytest.mark.parametrize("name", BYTE_FAULTS)
+def test_a_host_on_a_pty_notices(name: str) -> None:
     with Bench(Changing(115_200), mode="real", seed=3) as bench:
         port = bench.serial(timeout=5)
         port.write(b"abc\n")
         assert port.readline() == b"abc\n"
-        bench.fault(fault)
+        bench.fault(f"{name}={IN_REAL_TIME[name]}" if name in IN_REAL_TIME else name)
         port.timeout = 0.1
-        port.write(b"abc\n")
-        assert port.readline() != b"abc\n"
+        heard = list[bytes]()
+        for request in (b"abc\n", b"defg\n", b"hijkl\n"):
+            port.write(request)
+            heard.append(port.readline())
+        assert heard != [b"abc\n", b"defg\n", b"hijkl\n"]
 
 
 def session(seed: int, *, dense: bool = False) -> str:

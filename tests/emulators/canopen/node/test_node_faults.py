@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
+import json
 import logging
 import os
 import subprocess
 import sys
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from hashlib import sha256
 from pathlib import Path
 
 import canopen
 import pytest
+from click.testing import CliRunner, Result
 
-from tickrig import Bench
+from tickrig import Bench, open_bench
 from tickrig.emulators.can.faults import CAN_FAULTS, NARROWED
 from tickrig.emulators.canopen import choices
 from tickrig.emulators.canopen.faults import NODE_FAULTS, NodeFaults
-from tickrig.emulators.commands import ctl_cli
+from tickrig.emulators.commands import cli, ctl_cli
 from tickrig.emulators.rig.faults import bind_arguments
 from tickrig.emulators.rig.rig import Rig
 from tickrig.wire.can import CanFrame
@@ -26,12 +30,12 @@ LONG_NAME = "a drive whose name needs segments"
 ROOT = Path(__file__).parents[4]
 
 
-def bench_of(folder: Path) -> Bench:
+def bench_of(folder: Path, mode: str = "virtual") -> Bench:
     """Return a bench with two drives, the name of one in segments."""
     eds = (ROOT / "examples/eds/epos.eds").read_text("utf-8")
     file = folder / "drive.eds"
     file.write_text(eds.replace("DefaultValue=EPOS\n", f"DefaultValue={LONG_NAME}\n"), "utf-8")
-    return Bench(axis2=f"2={file}", axis3="3=epos", seed=3)
+    return Bench(axis2=f"2={file}", axis3="3=epos", seed=3, mode=mode)
 
 
 def no_objects() -> canopen.ObjectDictionary:
@@ -369,6 +373,81 @@ def test_what_is_armed_since_when_and_how_often_it_acted_can_be_asked(master: Ma
     assert line.split()[1:] == ["on", "0.051000", "s", "2", "delay=20ms", "rate=1", "count=2"]
 
 
+RIG = """
+[device.axis1]
+type = "epos"
+node_id = 1
+
+[device.axis2]
+type = "epos"
+node_id = 2
+
+[fault]
+axis1 = ["emcy_storm=5441h,10ms@100ms-150ms", "sdo_abort=6081h:0x06090030,write"]
+axis2 = "boot_late=300ms"
+
+[real]
+control = "bench.ctl"
+
+[real.can]
+interface = "virtual"
+channel = "node faults"
+"""
+
+
+def run(*words: str) -> Result:
+    return CliRunner().invoke(cli.main, words)
+
+
+def test_a_rig_file_orders_faults_of_its_nodes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("rig.toml").write_text(RIG, "utf-8")
+    assert "2 devices, 1 wire, 3 faults" in run("check", "rig.toml").output
+    done = run("run", "rig.toml", "--virtual", "--for", "500ms", "-vv")
+    assert done.exit_code == 0, done.output
+    assert done.output.count("081#4154010000000000") == 5
+    (booted,) = [line for line in done.output.splitlines() if "can < 702#00" in line]
+    assert "0.30" in booted
+    Path("rig.toml").write_text(RIG.replace("300ms", "300"), "utf-8")
+    said = run("check", "rig.toml").output
+    assert "fault.axis2: boot_late: delay: '300' has no unit: write 300s, 300ms or 300us" in said
+
+
+@pytest.mark.realtime
+def test_the_command_ctl_orders_and_lists_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("rig.toml").write_text(RIG, "utf-8")
+    with open_bench("rig.toml", mode="real"):
+        for word, said in (
+            ("axis2/sdo_slow", ""),
+            ("axis2/sdo_slow=20ms,count=2", ""),
+            ("sdo_slow", "no fault 'sdo_slow'; did you mean 'axis1/sdo_slow'?"),
+            ("axis2/sdo_slwo", "no fault 'axis2/sdo_slwo'; did you mean 'axis2/sdo_slow'?"),
+            ("axis2/sdo_slow=5", "sdo_slow: delay: '5' has no unit: write 5s, 5ms or 5us"),
+            ("axis2/sdo_slow=1s,2s", "'2s' is one argument too many: sdo_slow[=DELAY]"),
+            ("axis2/bus_off=1", "bus_off takes no argument, got 1"),
+        ):
+            done = run("ctl", "bench.ctl", "fault", word)
+            assert (done.exit_code, done.output.removeprefix("Error: ").strip()) == (
+                2 if said else 0,
+                said,
+            )
+        rows = {
+            line.split()[0]: line for line in run("ctl", "bench.ctl", "faults").output.splitlines()
+        }
+        assert rows["axis2/sdo_slow"].endswith("delay=20ms rate=1 count=2")
+        assert " on " in rows["axis1/sdo_abort"]
+        assert {f"axis{number}/{name}" for number in (1, 2) for name in NODE_FAULTS} <= rows.keys()
+        assert run("ctl", "bench.ctl", "clear", "axis2/sdo_slow").exit_code == 0
+        listed = json.loads(run("ctl", "bench.ctl", "faults", "--json").output)["faults"]
+        (slow,) = [row for row in listed if row["name"] == "axis2/sdo_slow"]
+        assert (slow["on"], slow["arguments"]["delay"]) == (False, "800ms")
+
+
 # The same in each run.
 
 ALL = (*NARROWED, *NODE_FAULTS)
@@ -423,28 +502,72 @@ def test_a_fork_in_the_middle_of_a_fault_goes_on_alike(tmp_path: Path) -> None:
             assert trip(bench, "id_doubled").partition("0.060000")[2] == ends[0]
 
 
-def all_trips(tmp_path: Path) -> str:
-    texts = []
-    for name in ALL:
-        with bench_of(tmp_path) as bench:
-            texts.append(trip(bench, name))
+def all_trips(tmp_path: Path, *, dense: bool = False) -> str:
+    """Return a hash of what happens with each fault."""
+    texts, made = [], Rig.__init__
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Rig, "__init__", lambda self, *of, **how: made(self, *of, dense=dense, **how))
+        for name in ALL:
+            with bench_of(tmp_path) as bench:
+                texts.append(trip(bench, name))
     return sha256("\n".join(texts).encode()).hexdigest()
 
 
+@pytest.mark.unmeasured
 def test_hash_seeds_make_no_difference(tmp_path: Path) -> None:
-    program = f"import pathlib, {__name__} as tests; print(tests.all_trips(pathlib.Path('.')))"
-    hashes = {
-        subprocess.run(
-            [sys.executable, "-c", program],
+    bench_of(tmp_path).close()  # its files are there
+
+    def hash_of(seed: int) -> str:
+        call = f"tests.all_trips(pathlib.Path('.'), dense={bool(seed % 2)})"
+        return subprocess.run(
+            [sys.executable, "-c", f"import pathlib, {__name__} as tests; print({call})"],
             env={**os.environ, "PYTHONHASHSEED": str(seed), "PYTHONPATH": str(ROOT)},
             cwd=tmp_path,
             capture_output=True,
             text=True,
             check=True,
         ).stdout
-        for seed in (1, 2)
-    }
+
+    with ThreadPoolExecutor(2) as pool:
+        hashes = set(pool.map(hash_of, range(10)))
     assert hashes == {f"{all_trips(tmp_path)}\n"}
+
+
+SHORT = {
+    "sdo_slow": "20ms",
+    "heartbeat_late": "50ms",
+    "boot_late": "100ms",
+}
+"""Arguments with which a fault that takes long is over sooner."""
+
+
+@pytest.mark.realtime
+@pytest.mark.parametrize("name", ALL)
+def test_each_fault_of_a_node_acts_in_real_time(name: str, tmp_path: Path) -> None:
+    logging.disable(logging.CRITICAL)
+    with bench_of(tmp_path, "real") as bench:
+        bench.run_for("50ms")
+        master = Master(bench)
+        master.node.sdo.RESPONSE_TIMEOUT = 2
+        master.node.sdo.download(0x1017, 0, (50).to_bytes(2, "little"))
+        master.sync_pdos(1)
+        master.node.sdo.RESPONSE_TIMEOUT = 0.1
+        bench["axis2"].fault(f"{name}={SHORT[name]}" if name in SHORT else name)
+        for use in (master.read, lambda: master.read(0x1008), master.read_block, master.write):
+            with suppress(canopen.SdoAbortedError, canopen.SdoCommunicationError):
+                use()
+        master.network.sync.transmit()
+        bench.run_for("100ms")
+        master.node.nmt.state = "RESET"
+
+        def acted() -> bool:
+            rows = bench._mode.request("faults")["faults"]
+            assert isinstance(rows, list)
+            (row,) = [row for row in rows if row["name"] == f"axis2/{name}"]
+            return bool(row["acted"])
+
+        assert bench.wait_until(acted, "5s")
+    logging.disable(logging.NOTSET)
 
 
 @pytest.mark.realtime
