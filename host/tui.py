@@ -23,6 +23,7 @@ from contextlib import contextmanager
 from functools import lru_cache
 from typing import Any, ClassVar, Final, NamedTuple
 
+from rich.cells import cell_len
 from rich.segment import Segment
 from rich.style import Style
 from textual.app import App
@@ -58,8 +59,8 @@ def line_text(line: Line) -> str:
 
 
 def line_width(line: Line) -> int:
-    """Return how many characters it has."""
-    return sum(len(text) for text, _ in line)
+    """Return how many cells it takes; a wide character takes two."""
+    return sum(cell_len(text) for text, _ in line)
 
 
 __all__ = ["Line", "LineView", "line_text", "plain"]
@@ -193,6 +194,9 @@ def rounded_up(total: int) -> int:
 
 def line_strip(line: Line, base: Style, left: int, width: int) -> Strip:
     """Return a line as it is painted: from a column on, filled up to a width."""
+    if line_width(line) != len(line_text(line)):
+        whole = Strip([Segment(in_cells(text), _style_on(base, style)) for text, style in line])
+        return whole.crop(left, left + width).adjust_cell_length(width, base)
     segments, column = [], -left
     for text, style in line:
         begin, column = column, column + len(text)

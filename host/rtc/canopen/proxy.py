@@ -326,6 +326,7 @@ class ProxyRtc(RtComponent):
         sdo_layouts: objects of the device that have ports by SDO.
 
     Attributes:
+        node_id: of the device.
         sources: TPDOs of the device, whose data go to OutPorts.
         sinks: RPDOs of the device, which take data from InPorts.
         sdo_sources: objects of the device whose values go to OutPorts.
@@ -345,6 +346,7 @@ class ProxyRtc(RtComponent):
         sdo_layouts: tuple[SdoPortLayout, ...] = (),
     ) -> None:
         super().__init__(entry.name)
+        self.node_id = entry.id
         self.requested, self.ready = NOTHING, False
         self.passing = self.confirmed = False
         named = [(layout, entry.ports.get(layout.name, layout.name)) for layout in layouts]

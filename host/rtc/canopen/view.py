@@ -21,7 +21,7 @@ from tickrig.host.rtc.canopen.definition import (
 )
 from tickrig.host.rtc.canopen.events import ServerEvent
 from tickrig.host.rtc.canopen.pdo_layout import PdoLayout, proxy_index
-from tickrig.host.rtc.canopen.proxy import ProxyRtc
+from tickrig.host.rtc.canopen.proxy import PdoSink, PdoSource, ProxyRtc
 from tickrig.host.rtc.canopen.served_node import NodePhase, ServedNode
 from tickrig.host.rtc.canopen.server import RtcCanopenServer
 from tickrig.host.rtc.component import RtComponent
@@ -39,12 +39,14 @@ class PortView:
         data_type: name of its type, as `TimedShort`.
         out: it gives data.
         peers: full names of the ports that it is connected with.
+        pdo: the PDO that carries its values; None if none does.
     """
 
     name: str
     data_type: str
     out: bool
     peers: tuple[str, ...]
+    pdo: PdoName | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -344,14 +346,22 @@ def _component(component: RtComponent) -> ComponentView:
 
 def _ports(component: RtComponent) -> tuple[PortView, ...]:
     """Return the data ports; service ports cannot be joined with those of a device."""
+    pdos = dict[str, PdoName]()
+    if isinstance(component, ProxyRtc):
+        carriers: tuple[PdoSource | PdoSink, ...] = (*component.sources, *component.sinks)
+        for one in carriers:
+            pdo = PdoName(component.node_id, one.layout.name)
+            pdos |= {port.full_name: pdo for port in one.ports}
     ports = component.ports.values()
-    return tuple(_port(port) for port in ports if isinstance(port, DataPort))
+    return tuple(_port(port, pdos) for port in ports if isinstance(port, DataPort))
 
 
-def _port(port: DataPort[Any]) -> PortView:
+def _port(port: DataPort[Any], pdos: Mapping[str, PdoName]) -> PortView:
     ends = (end for connector in port.connectors for end in connector.profile.ports)
-    peers = tuple(end for end in ends if end != port.full_name)
-    return PortView(port.full_name, port.data_type.__name__, isinstance(port, OutPort), peers)
+    name = port.full_name
+    peers = tuple(end for end in ends if end != name)
+    is_out = isinstance(port, OutPort)
+    return PortView(name, port.data_type.__name__, is_out, peers, pdos.get(name))
 
 
 def _pdo(node_id: int, layout: PdoLayout) -> PdoView:

@@ -443,4 +443,24 @@ def dot(at: Path) -> None:
     click.echo(load("tickrig.host.rtc.system.dot:system_graph")(components(at)))
 
 
-SYSTEM_VERBS: Final = (save, status, stop, check, dot)
+@click.command()
+@at
+def edit(at: Path) -> None:
+    """Show the system as a picture on the terminal, and change it (extra tickrig[tui]).
+
+    Boxes with ports, a wire for each connector. Arrows go from port to port; a, d, r
+    activate, deactivate, reset; m marks a port, c connects it, x disconnects; Tab goes to
+    the configuration, e edits it. F1 shows the keys.
+
+    \b
+    tickrig rtc edit
+    tickrig rtc edit --at /tmp/cart
+    """  # noqa: D301 - click wants the backspace
+    try:
+        edit_system = load("tickrig.host.rtc.editor.app:edit_system")
+    except ImportError as error:
+        raise Refused(f"the editor needs Textual: pip install 'tickrig[tui]' ({error})") from None
+    edit_system(at)
+
+
+SYSTEM_VERBS: Final = (save, status, stop, check, dot, edit)

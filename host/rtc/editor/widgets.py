@@ -177,8 +177,8 @@ class QuestionScreen(ModalScreen[str | None]):
 
     BINDINGS: ClassVar[list[BindingType]] = [Binding("escape", "leave", "leave")]
     CSS = """
-    Question { align: center middle; }
-    Question Vertical {
+    QuestionScreen { align: center middle; }
+    QuestionScreen Vertical {
         width: 80%; max-width: 76; height: auto;
         border: round $accent; background: $surface; padding: 0 1;
     }
@@ -248,19 +248,22 @@ class ChoiceScreen(ModalScreen[T | None]):
 
     def on_input_changed(self, event: Input.Changed) -> None:
         """Show the rows that contain what is typed."""
-        words = event.value.casefold().split()
-        self.choices.offer(
-            [
-                row
-                for row in self._rows
-                if all(word in line_text(row.line).casefold() for word in words)
-            ]
-        )
+        self._search(event.value)
 
     def on_input_submitted(self, event: Input.Submitted) -> None:
         """Take the row under the cursor."""
+        self._search(event.value)
         if self.choices.row is not None:
             self.dismiss(self.choices.row.item)
+
+    def _search(self, text: str) -> None:
+        words = text.casefold().split()
+        found = [
+            row
+            for row in self._rows
+            if all(word in line_text(row.line).casefold() for word in words)
+        ]
+        self.choices.offer(found)
 
     def on_cursor_view_entered(self, event: CursorView.Entered) -> None:
         """Take the row that was chosen by the mouse."""

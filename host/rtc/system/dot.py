@@ -29,12 +29,14 @@ class Box:
         title: what stands below its name.
         ins: names of the ports at its left.
         outs: names of the others.
+        state: of its life cycle, as `ACTIVE`.
     """
 
     name: str
     title: str
     ins: tuple[str, ...]
     outs: tuple[str, ...]
+    state: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +65,11 @@ def write_dot(boxes: Iterable[Box], edges: Iterable[Edge]) -> str:
 
 def system_graph(components: Iterable[Any]) -> str:
     """Return the graph of a system whose components are described as the control socket does."""
+    return write_dot(*boxes_and_edges(components))
+
+
+def boxes_and_edges(components: Iterable[Any]) -> tuple[list[Box], list[Edge]]:
+    """Return the boxes and edges of a system that is described as the control socket does."""
     described = tuple(components)
     ends = dict.fromkeys(
         tuple(connector["ports"])
@@ -70,7 +77,7 @@ def system_graph(components: Iterable[Any]) -> str:
         for port in component["ports"]
         for connector in port["connectors"]
     )
-    return write_dot(map(_box, described), (Edge(*pair) for pair in ends))
+    return [_box(component) for component in described], [Edge(*pair) for pair in ends]
 
 
 def _box(component: Any) -> Box:
@@ -78,12 +85,12 @@ def _box(component: Any) -> Box:
     for port in component["ports"]:
         side = ins if port["kind"] == "DataInPort" else outs
         side.append(port["name"].rpartition(".")[2])
-    state = component["state"].capitalize()
-    return Box(component["name"], f"{component['type']} {state}", tuple(ins), tuple(outs))
+    return Box(component["name"], component["type"], tuple(ins), tuple(outs), component["state"])
 
 
 def _label(box: Box) -> str:
-    name = r"\n".join(_escaped(word) for word in (box.name, box.title) if word)
+    title = f"{box.title} {box.state.capitalize()}".strip()
+    name = r"\n".join(_escaped(word) for word in (box.name, title) if word)
     fields = (_ports(box.ins), name, _ports(box.outs))
     return "|".join(field for field in fields if field)
 

@@ -21,6 +21,22 @@ def test_a_line_is_cut_and_filled_to_its_window(left: int, width: int, text: str
     assert (strip.text, strip.cell_length) == (text, width)
 
 
+@pytest.mark.parametrize(
+    ("left", "width", "text"),
+    [
+        (0, 8, "ロボ1   "),
+        (0, 4, "ロボ"),
+        (2, 3, "ボ1"),
+        (0, 3, "ロ "),
+        (1, 4, " ボ1"),
+        (9, 2, "  "),
+    ],
+)
+def test_a_wide_character_takes_two_cells(left: int, width: int, text: str) -> None:
+    strip = line_strip(plain("ロボ1"), Style(), left, width)
+    assert (strip.text, strip.cell_length) == (text, width)
+
+
 def test_pieces_keep_their_style_on_the_ground_of_the_widget() -> None:
     ground = Style.parse("white on blue")
     first, second = list(line_strip(LINE, ground, 0, 9))

@@ -14,17 +14,26 @@ from textual.binding import Binding, BindingType
 from textual.containers import Container
 
 from tickrig.host.canmon.model.decode.decoded import write_entry
-from tickrig.host.rtc.canopen.definition import ServerRefused
+from tickrig.host.rtc.canopen.definition import PdoLink, RtConnection, ServerRefused
 from tickrig.host.rtc.canopen.editor.objects_pane import ObjectsPane
 from tickrig.host.rtc.canopen.editor.pdo_screen import PdoScreen
 from tickrig.host.rtc.canopen.editor.session import EditorSession
-from tickrig.host.rtc.canopen.editor.system_pane import Item, SystemPane, connect, link, remove
+from tickrig.host.rtc.canopen.editor.system_pane import (
+    Item,
+    SystemPane,
+    boxes_and_edges,
+    connect,
+    joints,
+    link,
+    remove,
+)
 from tickrig.host.rtc.canopen.events import ServerEvent, ServerEventType
 from tickrig.host.rtc.canopen.served_node import NodePhase
-from tickrig.host.rtc.canopen.view import NodeView, ServerView
-from tickrig.host.rtc.editor.widgets import CursorView, QuestionScreen
+from tickrig.host.rtc.canopen.view import NodeView, PortView, ServerView, SystemView
+from tickrig.host.rtc.editor.picture_view import PictureView
+from tickrig.host.rtc.editor.widgets import ChoiceScreen, CursorRow, CursorView, QuestionScreen
 from tickrig.host.rtc.states import RtcRefused
-from tickrig.host.tui import FramedApp, KeyFooter, Line, LineView
+from tickrig.host.tui import FramedApp, KeyFooter, Line, LineView, plain
 
 # The line at the bottom, and lines of events.
 
@@ -109,6 +118,7 @@ class SystemEditor(FramedApp):
         Binding("k", "join('link')", "link"),
         Binding("x", "remove", "remove"),
         Binding("p", "pdos", "PDOs"),
+        Binding("v", "picture", "picture"),
         Binding("g", "read", "read the object again", show=False),
         Binding("w", "write", "write"),
         Binding("l", "live", "live"),
@@ -120,12 +130,14 @@ class SystemEditor(FramedApp):
         super().__init__()
         self.session, self._bus = session, bus
         self.system, self.objects = SystemPane(), ObjectsPane()
+        self.picture = PictureView()
         self.events, self.status = LineView("events"), LineView("status")
 
     def compose(self) -> ComposeResult:
         """Lay out the panes."""
         with Container(id="panes"):
             yield self.system
+            yield self.picture
             yield self.objects
         yield self.events
         yield self.status
@@ -134,6 +146,7 @@ class SystemEditor(FramedApp):
     def on_mount(self) -> None:
         """Begin to paint."""
         self.status.can_focus, self.events.border_title = False, "events"
+        self.picture.display = False
         self.system.focus()
         self.set_interval(PAINT_S, self.look)
 
@@ -162,6 +175,8 @@ class SystemEditor(FramedApp):
             view = self.session.view
             system, events = view.system, view.events[-_EVENTS_SHOWN:]
         self.system.look(system)
+        if self.picture.display:
+            self._look_at_picture(system)
         self.objects.turn_to(self.system.node_id, self.session.eds_paths)
         with self.session.lock:
             self.objects.look(view)
@@ -177,6 +192,17 @@ class SystemEditor(FramedApp):
         self.events.show([line for event in events for line in _event_lines(event, width)])
         if follows:
             self.events.show_end()
+
+    def _look_at_picture(self, system: SystemView) -> None:
+        marked = self.system.marked.item if self.system.marked else None
+        self.picture.marked = marked.name if isinstance(marked, PortView) else ""
+        self.picture.offer(*boxes_and_edges(system))
+        self.picture.frame("system", self.picture.at)
+
+    def on_picture_view_moved(self) -> None:
+        """Let the keys be about what is under the cursor of the picture."""
+        self.system.go_to(self.picture.at)
+        self.look()
 
     def on_cursor_view_moved(self) -> None:
         """Show what belongs to the row under the cursor."""
@@ -218,9 +244,42 @@ class SystemEditor(FramedApp):
             self.look()
 
     def action_remove(self) -> None:
-        """End the link or connection under the cursor."""
-        if (row := self.system.row) is not None:
+        """End the link or connection under the cursor; in the picture, one of the port."""
+        if (row := self.system.row) is None:
+            return
+        if not (self.picture.display and isinstance(row.item, PortView)):
             self._command(lambda view: remove(view, row.item))
+            return
+        with self.session.lock:
+            found = joints(self.session.view.system, row.item)
+        if not found:
+            self._refuse("go to a port that is connected or linked")
+        elif len(found) == 1:
+            self._command(lambda view: remove(view, found[0]))
+        else:
+            texts = [f"{one.source} → {one.target}" for one in found]
+            rows = [
+                CursorRow(text, plain(text), one) for text, one in zip(texts, found, strict=True)
+            ]
+
+            def chosen(one: PdoLink | RtConnection | None) -> None:
+                if one is not None:
+                    self._command(lambda view: remove(view, one))
+
+            self.push_screen(ChoiceScreen(f"remove from {row.item.name}", rows), chosen)
+
+    def action_picture(self) -> None:
+        """Show the system as a picture, or as a list again."""
+        shown = not self.picture.display
+        self.picture.display, self.system.display = shown, not shown
+        if not shown:
+            self.system.focus()
+            return
+        self.system.folded.clear()
+        self.picture.focus()
+        self.look()
+        if isinstance(row := self.system.row and self.system.row.item, NodeView | PortView):
+            self.picture.go_to(row.name)
 
     def action_pdos(self) -> None:
         """Show the PDOs of the node in whose rows the cursor is, and change them."""

@@ -20,10 +20,12 @@ from tickrig.host.rtc.canopen.view import (
     SystemView,
 )
 from tickrig.host.rtc.editor.widgets import CursorRow, CursorView
+from tickrig.host.rtc.system.dot import Box, Edge
 from tickrig.host.tui import Line
 
 Item = NodeView | ComponentView | PdoView | PortView | PdoLink | RtConnection
 _SystemRow = CursorRow[Item]
+_Owner = NodeView | ComponentView
 
 _STATES: Final = {"ACTIVE": "bold green", "INACTIVE": "cyan", "ERROR": "bold white on red"}
 _DIM: Final = "bright_black"
@@ -144,6 +146,40 @@ def _joints(system: SystemView) -> Iterator[_SystemRow]:
         )
 
 
+def boxes_and_edges(system: SystemView) -> tuple[list[Box], list[Edge]]:
+    """Return what a picture shows: nodes and components, connections, and links past the PC."""
+    boxes, port_of = list[Box](), dict[PdoName, str]()
+    owners: tuple[_Owner, ...] = (*system.nodes, *system.components)
+    for one in owners:
+        sides: tuple[list[str], list[str]] = [], []
+        for port in one.ports:
+            sides[port.out].append(port.name.rpartition(".")[2])
+            if port.pdo is not None:
+                port_of.setdefault(port.pdo, port.name)
+        if isinstance(one, NodeView):
+            title, state = f"node {one.node_id}", one.proxy_state or one.phase.value
+            names = {pdo.name: f"{one.name}.{pdo.name.pdo}" for pdo in one.pdos}
+            port_of = names | port_of  # a PDO without a port has a place all the same
+        else:
+            title, state = one.type_name, one.state
+        boxes.append(Box(one.name, title, tuple(sides[False]), tuple(sides[True]), state))
+    edges = [Edge(entry.source, entry.target) for entry in system.connections]
+    edges += [
+        Edge(port_of[link.source], port_of[link.target], dashed=True)
+        for link in system.links
+        if link.source in port_of and link.target in port_of
+    ]
+    return boxes, edges
+
+
+def joints(system: SystemView, port: PortView) -> list[PdoLink | RtConnection]:
+    """Return the connections and links of a port."""
+    return [
+        *(one for one in system.connections if port.name in (one.source, one.target)),
+        *(one for one in system.links if port.pdo in (one.source, one.target)),
+    ]
+
+
 def connect(view: ServerView, first: Item, second: Item) -> None:
     """Join two ports through the PC; ServerRefused or RtcRefused if they do not fit."""
     if not (isinstance(first, PortView) and isinstance(second, PortView)):
@@ -154,9 +190,15 @@ def connect(view: ServerView, first: Item, second: Item) -> None:
 
 def link(view: ServerView, first: Item, second: Item) -> None:
     """Link a TPDO with an RPDO, without the PC; ServerRefused if they do not fit."""
-    if not (isinstance(first, PdoView) and isinstance(second, PdoView)):
+    ends = [
+        one.pdo if isinstance(one, PortView) else one.name
+        for one in (first, second)
+        if isinstance(one, PdoView | PortView)
+    ]
+    names = [one for one in ends if one is not None]
+    if len(names) != 2:
         raise ServerRefused("linked are PDOs: mark one, go to another")
-    source, target = sorted((first.name, second.name), key=lambda name: name.pdo[0] != "t")
+    source, target = sorted(names, key=lambda name: name.pdo[0] != "t")
     if (source.pdo[0], target.pdo[0]) != ("t", "r"):
         raise ServerRefused(f"{source} and {target}: a TPDO is linked with an RPDO")
     view.link(source, target)
@@ -171,9 +213,6 @@ def remove(view: ServerView, item: Item) -> None:
             view.disconnect(first, second)
         case _:
             raise ServerRefused("links and connections are removed: they are at the end")
-
-
-_Owner = NodeView | ComponentView
 
 
 class SystemPane(CursorView[Item]):
@@ -227,6 +266,13 @@ class SystemPane(CursorView[Item]):
                 self.node_id = node.node_id
             case ComponentView():
                 self.node_id = 0
+
+    def go_to(self, name: str) -> None:
+        """Put the cursor on a node, component or port by its name."""
+        for number, row in enumerate(self.rows_shown):
+            if isinstance(row.item, NodeView | ComponentView | PortView) and row.item.name == name:
+                self.put_cursor(number)
+                return
 
     def mark(self) -> bool:
         """Mark the port or PDO under the cursor, or let it go; False if it is none."""

@@ -156,7 +156,7 @@ def test_a_connection_is_removed_also_one_that_waits_for_its_ports(two: Path) ->
 REFUSED = [
     ("16.tpdo1", "32.rpdo2", "k", "16.tpdo1 has 8 bits, 32.rpdo2 has 64"),
     ("16.tpdo1", "16.tpdo2", "k", "16.tpdo1 and 16.tpdo2: a TPDO is linked with an RPDO"),
-    ("16.tpdo1", "Motor0.rpdo2", "k", "linked are PDOs: mark one, go to another"),
+    ("16.tpdo1", "Motor0.rpdo2", "k", "16.tpdo1 has 8 bits, 32.rpdo2 has 64"),
     ("16.tpdo1", "Motor0.rpdo2", "c", "through the PC go ports: mark one, go to another"),
     ("out Palette0.tpdo1", "in  Motor0.rpdo2", "c", "Palette0.tpdo1 carries IDL:RTC/TimedOct"),
     ("16.tpdo1", "16.tpdo1", "x", "links and connections are removed: they are at the end"),

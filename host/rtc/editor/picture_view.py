@@ -1,0 +1,170 @@
+"""The picture of a system on a screen: a cursor goes from port to port."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+from textual.binding import Binding, BindingType
+from textual.content import Content
+from textual.events import Blur, Click, Focus, Resize
+from textual.message import Message
+
+from tickrig.host.rtc.editor.picture import Picture, draw, neighbour
+from tickrig.host.rtc.system.dot import Box, Edge
+from tickrig.host.tui import LineView
+
+
+class PictureView(LineView):
+    """Shows components as boxes and connectors as wires.
+
+    Attributes:
+        at: the box or port under the cursor, by its full name; empty without boxes.
+        marked: the port that is to be connected; empty for none.
+        picture: what is shown.
+    """
+
+    HELP = """
+    # Picture
+
+    Components with their ports, in ports at the left, out ports at the right, and a wire for each
+    connector; a dashed wire does not pass the PC. Green is Active, cyan Inactive, red Error.
+
+    Arrows move the cursor to what is next in that direction, `n` to the next component. A click
+    moves it, too.
+
+    To connect two ports: mark one, go to the other, connect.
+    """
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("up", "go(0, -1)", show=False),
+        Binding("down", "go(0, 1)", show=False),
+        Binding("left", "go(-1, 0)", show=False),
+        Binding("right", "go(1, 0)", show=False),
+        Binding("n", "next(1)", "next", show=False),
+        Binding("N", "next(-1)", "previous", show=False),
+        Binding("home", "end(0)", show=False),
+        Binding("end", "end(-1)", show=False),
+    ]
+
+    class Moved(Message):
+        """Something else is under the cursor."""
+
+    def __init__(self, id: str = "picture") -> None:  # noqa: A002 - Textual's name
+        super().__init__(id)
+        self.at = self.marked = ""
+        self.picture = Picture((), {})
+        self._boxes: tuple[Box, ...] = ()
+        self._edges: tuple[Edge, ...] = ()
+        self._painted: object = None
+
+    @property
+    def owner(self) -> str:
+        """The component in whose box the cursor is; empty without one."""
+        return next((box.name for box in self._boxes if self.at in _names(box)), "")
+
+    @property
+    def port(self) -> str:
+        """The full name of the port under the cursor; empty on a component."""
+        return self.at if self.at in self.picture.places and self.at != self.owner else ""
+
+    @property
+    def is_out(self) -> bool:
+        """Whether the port under the cursor is at the right of its box."""
+        return any(f"{box.name}.{port}" == self.at for box in self._boxes for port in box.outs)
+
+    def joined(self, port: str) -> list[str]:
+        """Return the other ends of the wires of a port."""
+        ends = [(edge.source, edge.target) for edge in self._edges]
+        return [b if a == port else a for a, b in ends if port in (a, b)]
+
+    def offer(self, boxes: Sequence[Box], edges: Sequence[Edge]) -> None:
+        """Show a system; the cursor stays on what it was on."""
+        self._boxes, self._edges = tuple(boxes), tuple(edges)
+        names = {one for box in boxes for one in _names(box)}
+        if self.marked not in names:
+            self.marked = ""
+        self.paint()
+
+    def paint(self) -> None:
+        """Show the picture and the cursor, if something changed."""
+        columns = max(20, int(self.scrollable_content_region.width))
+        wanted = self._boxes, self._edges, columns, self.at, self.marked, self.has_focus
+        if wanted == self._painted:
+            return
+        self._painted = wanted
+        self.picture = self._draw(columns)
+        if self.at not in self.picture.places:
+            self.at = self._boxes[0].name if self._boxes else ""
+            self.picture = self._draw(columns)
+        self.show(self.picture.lines)
+
+    def _draw(self, columns: int) -> Picture:
+        lit = {self.marked: "bold yellow"} if self.marked else {}
+        if self.at:
+            lit[self.at] = "reverse" if self.has_focus else "underline"
+        return draw(self._boxes, self._edges, columns, lit)
+
+    def go_to(self, name: str) -> None:
+        """Put the cursor on a box or port, and bring it into view."""
+        if name not in self.picture.places:
+            return
+        self.at = name
+        place, width = self.picture.places[name], int(self.scrollable_content_region.width)
+        top, left = self.top, int(self.scroll_offset.x)
+        if not top < place.line < top + self.rows - 1:
+            self.scroll_to(y=max(0, place.line - self.rows // 2), immediate=True)
+        if place.column < left or place.column + place.width > left + width:
+            self.scroll_to(x=max(0, place.column - width // 2), immediate=True)
+        self.paint()
+        self.post_message(self.Moved())
+
+    def action_go(self, right: int, down: int) -> None:
+        """Move the cursor to what is next in a direction."""
+        if self.at in self.picture.places:
+            self.go_to(neighbour(self.picture.places, self.at, right, down))
+
+    def action_next(self, by: int) -> None:
+        """Move the cursor to the next component."""
+        names = [box.name for box in self._boxes]
+        if names:
+            here = names.index(self.owner) if self.owner in names else 0
+            self.go_to(names[(here + by) % len(names)])
+
+    def action_end(self, place: int) -> None:
+        """Move the cursor to the first or last component."""
+        if self._boxes:
+            self.go_to(self._boxes[place].name)
+
+    def on_click(self, event: Click) -> None:
+        """Put the cursor where the mouse is."""
+        at = event.get_content_offset(self)
+        if at is None:
+            return
+        line, cell = self.top + at.y, int(self.scroll_offset.x) + at.x
+        for name, place in self.picture.places.items():
+            if place.line == line and place.column - 1 <= cell <= place.column + place.width:
+                self.go_to(name)
+
+    def on_focus(self, event: Focus) -> None:
+        """Show that the keys go here."""
+        self.paint()
+
+    def on_blur(self, event: Blur) -> None:
+        """Show that the keys go elsewhere."""
+        self.paint()
+
+    def on_resize(self, event: Resize) -> None:
+        """Draw for the new width."""
+        self.paint()
+
+    def frame(self, title: str, below: str = "") -> None:
+        """Write on the frame what changed: it paints the whole view again."""
+        if str(self.border_title or "") != title:
+            self.border_title = Content(title)
+        if str(self.border_subtitle or "") != below:
+            self.border_subtitle = Content(below) if below else None
+
+
+def _names(box: Box) -> tuple[str, ...]:
+    ports = (*box.ins, *box.outs)
+    return (box.name, *(f"{box.name}.{port}" for port in ports))

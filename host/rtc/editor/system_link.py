@@ -1,0 +1,144 @@
+"""A running system at its control socket, asked by a thread while a screen shows it."""
+
+from __future__ import annotations
+
+import queue
+import threading
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from tickrig.host.control.client import ControlClient, ControlRefused
+from tickrig.host.control.requests import Object
+
+_PERIOD_S: Final = 0.2
+"""How often the system is described anew."""
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What came of a request.
+
+    Attributes:
+        text: for people; empty if there is nothing to say.
+        refused: it was not done.
+    """
+
+    text: str
+    refused: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class _Request:
+    do: str
+    fields: Object
+    then: Callable[[Object], str]
+
+
+class SystemLink:
+    """Asks a system what it is and what shall be done, in a thread of its own.
+
+    The connection is made again if it breaks: the system may be started again, or another one.
+
+    Args:
+        socket: the control socket of the system.
+
+    Attributes:
+        components: their descriptions, as they were last.
+        problem: why nothing is known now; empty while the system answers.
+    """
+
+    def __init__(self, socket: Path) -> None:
+        self._socket = socket
+        self.components: list[Any] = []
+        self.problem = ""
+        self._answers = deque[Answer]()
+        self._requests: queue.SimpleQueue[_Request | None] = queue.SimpleQueue()
+        self._client: ControlClient | None = None
+        self._thread = threading.Thread(target=self._run, name="system", daemon=True)
+
+    def request(
+        self, do: str, then: Callable[[Object], str] | None = None, **fields: object
+    ) -> None:
+        """Have something done soon; `take_answers` says what came of it.
+
+        Args:
+            do: the verb of the request.
+            then: is called with the answer in the thread, and returns what people are shown.
+            fields: of the request.
+        """
+        self._requests.put(_Request(do, fields, then or (lambda answer: "")))
+
+    def take_answers(self) -> list[Answer]:
+        """Return what came of requests since the last call."""
+        taken = list[Answer]()
+        while self._answers:
+            taken.append(self._answers.popleft())
+        return taken
+
+    def turn(self) -> None:
+        """Make all requests there are, and describe the system; called by the thread."""
+        while not self._requests.empty():
+            if (request := self._requests.get()) is not None:
+                self._make(request)
+        answer = self._request("describe")
+        if isinstance(answer, str):
+            self.problem = answer
+        elif isinstance(components := answer.get("components"), list):
+            self.components, self.problem = components, ""
+
+    def start(self) -> None:
+        """Begin to ask."""
+        self._thread.start()
+
+    def close(self) -> None:
+        """Ask no more; a request under way is not waited for."""
+        self._requests.put(None)
+
+    def _run(self) -> None:
+        while True:
+            self.turn()
+            try:
+                request = self._requests.get(timeout=_PERIOD_S)
+            except queue.Empty:
+                continue
+            if request is None:
+                self._hang_up()
+                return
+            self._make(request)
+
+    def _make(self, request: _Request) -> None:
+        answer = self._request(request.do, **request.fields)
+        if isinstance(answer, str):
+            self._answers.append(Answer(answer, refused=True))
+            return
+        try:
+            text = request.then(answer)
+        except (OSError, ValueError) as error:
+            self._answers.append(Answer(str(error), refused=True))
+        else:
+            self._answers.append(Answer(text))
+
+    def _request(self, do: str, **fields: object) -> Object | str:
+        """Return the answer, or why there is none."""
+        try:
+            if self._client is None:
+                self._client = ControlClient(self._socket)
+            return self._client.request(do, **fields)
+        except ControlRefused as error:
+            return str(error)
+        except TimeoutError:
+            why = "the system does not answer"
+        except OSError as error:
+            why = str(error.strerror or error)
+        except ValueError as error:
+            why = str(error)
+        self._hang_up()
+        return f"socket {self._socket}: {why}"
+
+    def _hang_up(self) -> None:
+        if self._client is not None:
+            self._client.close()
+            self._client = None
