@@ -272,6 +272,7 @@ class SystemEditor(FramedApp):
         """Show the system as a picture, or as a list again."""
         shown = not self.picture.display
         self.picture.display, self.system.display = shown, not shown
+        self.query_one("#panes").set_class(shown, "-pictured")
         if not shown:
             self.system.focus()
             return

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from textwrap import wrap
 from typing import ClassVar, Final
 
 from textual.app import ComposeResult
@@ -123,7 +124,7 @@ class PdoScreen(ModalScreen[None]):
     CSS = """
     PdoScreen { background: $background; }
     PdoScreen CursorView { height: 1fr; border: round $accent; }
-    PdoScreen #pdo-status { height: 1; background: $boost; }
+    PdoScreen #pdo-status { height: 2; background: $boost; }
     """
 
     def __init__(self, session: EditorSession, node_id: int) -> None:
@@ -138,7 +139,7 @@ class PdoScreen(ModalScreen[None]):
         self._writing: PendingTransfer[None] | None = None
         self._saving: tuple[PendingTransfer[Mapping[int, bytes]], Path, Path] | None = None
         self._says: Line = plain("")
-        self._read_once = self._warned = False
+        self._read_once = self._warned = self._busy_hit = False
 
     def compose(self) -> ComposeResult:
         """Lay it out."""
@@ -175,13 +176,17 @@ class PdoScreen(ModalScreen[None]):
         self.view.title = f"{title}: {'lost' if node.late else state}"
         names = {(one.mapped.index, one.mapped.sub): one.name for one in self._file.mappable}
         self.view.offer(pdo_rows(self._node_id, self.pdos, self.wanted, names, links))
-        self.status.show([self._status()])
+        width = max(20, int(self.status.scrollable_content_region.width) - 1)
+        ((text, style),) = self._status()
+        self.status.show([plain(f" {part}", style) for part in wrap(text.strip(), width)])
 
     def _status(self) -> Line:
+        hint = "; keys change nothing until it ends" if self._busy_hit else ""
         if self._writing is not None:
-            return plain(" writing to the node ...", _CHANGED)
+            return plain(f" writing to the node ...{hint}", _CHANGED)
         if self._reading is not None or self._saving is not None:
-            return plain(" reading the node ...", _DIM)
+            return plain(f" reading the node ...{hint}", _DIM)
+        self._busy_hit = False
         if self._says[0][0]:
             return self._says
         if not self.pdos:
@@ -204,7 +209,6 @@ class PdoScreen(ModalScreen[None]):
             self._writing = None
             if writing.problem:
                 self._note(writing.problem, _ALARM)
-                self.app.notify(writing.problem, severity="error")
             else:
                 self._note("written, and read back", _GOOD)
                 self.pdos |= self.wanted
@@ -405,7 +409,8 @@ class PdoScreen(ModalScreen[None]):
     def _is_busy(self) -> bool:
         busy = self._writing is not None or self._saving is not None or self._reading is not None
         if busy:
-            self._refuse("wait: a transfer is running")
+            self._busy_hit = True
+            self.look()
         return busy
 
     def _choose_object(self, at: PdoPlace, place: int, *, insert: bool) -> None:
@@ -490,7 +495,9 @@ class PdoScreen(ModalScreen[None]):
                 command(self._session.view)
         except ValueError as error:
             self._refuse(str(error))
-        self.look()
+        else:
+            self.look()
 
     def _refuse(self, why: str) -> None:
-        self.app.notify(why, severity="error")
+        self._note(why, _ALARM)
+        self.look()

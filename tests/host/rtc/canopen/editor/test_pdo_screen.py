@@ -24,6 +24,11 @@ async def open_pdos(desk: Desk, node: str = "16 Palette0") -> None:
         await desk.pass_ms(100)
 
 
+def told(desk: Desk) -> str:
+    """Return what the lines at the bottom say, without their line break."""
+    return " ".join(desk.shown("pdo-status").split())
+
+
 async def choose(desk: Desk, text: str) -> None:
     assert isinstance(desk.app.screen, ChoiceScreen)
     await desk.answer(text)
@@ -134,7 +139,7 @@ def test_what_cannot_be_is_refused_and_changes_nothing(two: Path) -> None:
             await desk.press(key)
             if answer:
                 await desk.answer(answer)
-            assert desk.said[-1].startswith(why)
+            assert told(desk).startswith(why)
         assert isinstance(desk.app.screen, PdoScreen)
         assert desk.app.screen.wanted == {}
 
@@ -154,7 +159,7 @@ def test_a_refused_write_is_told_with_its_text_and_the_old_mapping_is_back(two: 
         await desk.press("w")
         await passed(desk)
         why = "1600h:01 refused: object cannot be mapped (06040041h); the old values are back"
-        assert desk.said[-1] == why
+        assert told(desk) == why
         assert why in screen_text(desk.app)
         assert mapping(desk, 16, 0x1600) == [0x6200_0108]
         assert desk.nodes[16].slave.dictionary[0x1400, 1].number == 0x210
@@ -175,10 +180,10 @@ def test_a_node_that_is_gone_in_the_middle_has_its_old_mapping_when_it_is_back(t
             desk.session.turn(desk.link.now_us + 1_000)
         desk.nodes[16].physical["unplugged"].write(1)
         await desk.press("x", "i", "o")
-        assert desk.said[-1] == "wait: a transfer is running"
+        assert told(desk) == "writing to the node ...; keys change nothing until it ends"
         for _ in range(20):
             await desk.pass_ms(100)
-        assert "its old PDOs are written when it boots" in desk.said[-1]
+        assert "its old PDOs are written when it boots" in told(desk)
         assert "PDOs of 16 Palette0: " in screen_text(desk.app)
         assert entries[0x1A00, 0].number == 0
         desk.nodes[16].physical["unplugged"].write(0)
@@ -205,7 +210,7 @@ def test_a_tpdo_is_linked_with_an_rpdo_of_another_node_and_cut(two: Path) -> Non
         await desk.go_to("16.tpdo1", "pdos")
         await desk.press("k")
         await choose(desk, "32.rpdo2")
-        assert desk.said[-1] == "16.tpdo1 has 8 bits, 32.rpdo2 has 64"
+        assert told(desk) == "16.tpdo1 has 8 bits, 32.rpdo2 has 64"
 
     at_desk(act, two)
 
@@ -221,7 +226,7 @@ def test_a_linked_rpdo_has_its_own_cob_id_again_after_it_was_set_up_anew() -> No
         await desk.press("c")
         await desk.answer("0x321")
         await desk.press("w")
-        assert desk.said[-1] == "32.rpdo2 is linked: cut the link to change its COB-ID"
+        assert told(desk) == "32.rpdo2 is linked: cut the link to change its COB-ID"
         await desk.press("u", "k")
         await desk.pass_ms(100)
         assert desk.nodes[32].slave.dictionary[0x1401, 1].number == 0x320
@@ -262,7 +267,7 @@ def test_a_node_is_saved_as_dcf_and_the_dcf_is_loaded_again(two: Path, tmp_path:
         await desk.press("ctrl+s")
         await desk.answer(str(file))
         await passed(desk)
-        assert f"{file}: " in desk.shown("pdo-status")
+        assert told(desk) == f"{file}: 126 values saved"
         text = file.read_text("utf-8")
         assert "NodeID=16" in text
         section = text[text.index("[1A00sub2]") :]
@@ -273,7 +278,7 @@ def test_a_node_is_saved_as_dcf_and_the_dcf_is_loaded_again(two: Path, tmp_path:
         assert mapping(desk, 16, 0x1A00) == [0x6000_0108]
         await desk.press("ctrl+o")
         await desk.answer(str(file))
-        assert "1 changed PDO: w writes" in desk.shown("pdo-status")
+        assert told(desk) == f"{file}: 1 changed PDO: w writes"
         await desk.press("w")
         await passed(desk)
         assert mapping(desk, 16, 0x1A00) == [0x6000_0108, 0x6401_0510]
@@ -293,7 +298,7 @@ def test_a_dcf_that_cannot_be_used_is_refused(two: Path, name: str, why: str) ->
         await open_pdos(desk)
         await desk.press("ctrl+o")
         await desk.answer(name)
-        assert desk.said[-1].endswith(why)
+        assert told(desk).endswith(why)
 
     at_desk(act, two)
 
@@ -303,7 +308,7 @@ def test_changes_are_not_lost_by_one_key(two: Path) -> None:
         await open_pdos(desk)
         await desk.go_to("16.tpdo1", "pdos")
         await desk.press("o", "escape")
-        assert desk.said[-1] == "1 changed, not written: w writes, again leaves"
+        assert told(desk) == "1 changed, not written: w writes, again leaves"
         await desk.press("escape")
         assert not isinstance(desk.app.screen, PdoScreen)
 
