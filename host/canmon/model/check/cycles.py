@@ -44,14 +44,17 @@ _SHORTEST_US: Final = 900
 """A shorter period is a burst, or below what clocks of loggers can tell."""
 _FLOOR_US: Final = 700
 """Stamps of loggers are off by so much whatever the source does."""
+_CALM: Final = 0.12
+"""Gaps that usually differ by more have no rhythm that could be judged."""
 _STEADY: Final = 0.15
 _SAME: Final = 0.12
 _ON_LEVEL: Final = 0.6
 _MOST_LEVELS: Final = 5
 _MOST_ODD: Final = 0.12
 """More odd gaps than this share are how the source is."""
+_LOST: Final = 1.65
 _NOISY: Final = 0.08
-_TIMES_NOISIER: Final = 6
+_TIMES_NOISIER: Final = 4
 _LEAST_NOISY: Final = 2
 _LEAST_QUIET: Final = 0.3
 
@@ -105,20 +108,18 @@ def rhythm_of(times: Sequence[int]) -> Rhythm | None:
     windows = _windows(gaps)
     middles = sorted(middle for middle, _ in windows)
     period_us = middles[len(middles) // 2]
-    if period_us < _SHORTEST_US:
+    usual = sorted(spread for _, spread in windows)[len(windows) // 4]
+    if period_us < _SHORTEST_US or usual > max(_CALM * period_us, min(_FLOOR_US, period_us / 4)):
         return None
-    levels = _levels(windows, len(gaps))
-    if not levels:
+    levels = _levels(windows, len(gaps), usual)
+    if not 0 < len(levels) <= _MOST_LEVELS:
         return None
-    covered = sum(one.end - one.begin for one in levels)
     main = max(levels, key=lambda one: one.end - one.begin).period_us
-    spreads = sorted(spread for middle, spread in windows if _alike(middle, main))
-    quiet = spreads[len(spreads) // 4] if spreads else 0
-    noisy = _noisy(windows, main, quiet) if len(levels) == 1 else []
-    loud = sum(end - begin for begin, end, _, _ in noisy)
-    if covered + loud < _ON_LEVEL * len(gaps):
-        return None
-    if len(levels) > _MOST_LEVELS:
+    spreads = sorted(spread for middle, spread in windows if _alike(middle, main, usual))
+    quiet = spreads[len(spreads) // 4] if spreads else usual
+    noisy = _noisy(windows, gaps, main, quiet) if len(levels) == 1 else []
+    covered = sum(one.end - one.begin for one in levels)
+    if covered + sum(end - begin for begin, end, _, _ in noisy) < _ON_LEVEL * len(gaps):
         return None
     missing: list[tuple[int, int]] = []
     extra: list[int] = []
@@ -128,10 +129,10 @@ def rhythm_of(times: Sequence[int]) -> Rhythm | None:
             begin=level.begin + _WINDOW * (place > 0),
             end=level.end - _WINDOW * (place < len(levels) - 1),
         )
-        found = _odd(gaps, inner, quiet)
+        lost, doubled, events = _odd(gaps, inner, quiet)
         most = max(3, _MOST_ODD * (level.end - level.begin))
-        missing += found[0] if len(found[0]) <= most else []
-        extra += found[1] if len(found[1]) <= most else []
+        missing += lost if len(lost) <= most else []
+        extra += doubled if len(doubled) <= most and events <= len(doubled) + 2 else []
     return Rhythm(tuple(levels), tuple(missing), tuple(extra), tuple(noisy), quiet)
 
 
@@ -156,19 +157,20 @@ def _windows(gaps: Sequence[int]) -> list[tuple[int, int]]:
     return list(zip(table[:, middle].tolist(), spreads, strict=True))
 
 
-def _alike(one: float, other: float) -> bool:
-    return abs(one - other) <= max(_SAME * max(one, other), min(_FLOOR_US, other / 4))
+def _alike(one: float, other: float, usual: int) -> bool:
+    """Say whether two periods are the same, where gaps usually have a spread."""
+    return abs(one - other) <= max(_SAME * max(one, other), min(_FLOOR_US, other / 4), 2 * usual)
 
 
 def _is_steady(middle: int, spread: int) -> bool:
     return spread <= max(_STEADY * middle, min(_FLOOR_US, middle / 3))
 
 
-def _levels(windows: Sequence[tuple[int, int]], gaps: int) -> list[Level]:
+def _levels(windows: Sequence[tuple[int, int]], gaps: int, usual: int) -> list[Level]:
     """Return runs of steady windows with the same middle; noisy ones of that middle join them."""
     runs: list[list[int]] = []  # first window, one behind the last, its middle
     for at, (middle, spread) in enumerate(windows):
-        same = bool(runs) and _alike(middle, runs[-1][2])
+        same = bool(runs) and _alike(middle, runs[-1][2], usual)
         if same and (_is_steady(middle, spread) or at - runs[-1][1] < 1):
             runs[-1][1] = at + 1
         elif not same and _is_steady(middle, spread):
@@ -177,42 +179,59 @@ def _levels(windows: Sequence[tuple[int, int]], gaps: int) -> list[Level]:
     joined: list[list[int]] = []
     for run in runs:
         lone = run[1] - run[0] < 2 and len(windows) > 2
-        if joined and _alike(run[2], joined[-1][2]):
+        if joined and _alike(run[2], joined[-1][2], usual):
             joined[-1][1] = run[1]
         elif not lone:
             joined.append(run)
     size = min(_WINDOW, gaps)
-    levels = [Level(begin * size, end * size, middle) for begin, end, middle in joined]
+    levels = []
+    for begin, end, _ in joined:
+        middles = sorted(middle for middle, _ in windows[begin:end])
+        levels.append(Level(begin * size, end * size, middles[len(middles) // 2]))
     if levels and levels[-1].end + size > gaps:
         levels[-1] = levels[-1]._replace(end=gaps)
     return levels
 
 
-def _odd(gaps: Sequence[int], level: Level, quiet: int) -> tuple[list[tuple[int, int]], list[int]]:
-    """Return the gaps of a level where frames are missing, and the frames that are too many."""
+def _odd(
+    gaps: Sequence[int], level: Level, quiet: int
+) -> tuple[list[tuple[int, int]], list[int], int]:
+    """Judge the odd gaps of a level.
+
+    Returns:
+        The gaps where frames are missing, the frames that are too many, and how many frames came
+        with events.
+    """
     period = level.period_us
     off = max(0.2 * period, 4 * quiet, min(_FLOOR_US, period / 3))
     missing: list[tuple[int, int]] = []
     extra: list[int] = []
-    taken = -1
+    events, taken = 0, -1
     for at in _outside(gaps, level.begin, level.end, period - off, period + off):
         if at <= taken:
             continue
-        gap = int(gaps[at])
-        before = int(gaps[at - 1]) if at else None
-        behind = int(gaps[at + 1]) if at + 1 < len(gaps) else None
-        if gap > period + off:
+        around = [int(gap) for gap in gaps[at : at + 3]]
+        if around[0] > period + off:
             made_up = any(
-                one < period - off and abs(gap + one - 2 * period) <= off
-                for one in (before, behind)
-                if one is not None
+                len(around) > more
+                and min(around[1 : more + 1]) < period - off
+                and abs(sum(around[: more + 1]) - (more + 1) * period) <= off
+                for more in (1, 2)
             )
-            if not made_up and gap > 1.5 * period:
-                missing.append((at, max(1, round(gap / period) - 1)))
-        elif behind is not None and abs(gap + behind - period) <= off:
+            if made_up:
+                taken = at + 2
+            elif around[0] > _LOST * period:
+                missing.append((at, max(1, round(around[0] / period) - 1)))
+        elif len(around) > 1 and abs(around[0] + around[1] - period) <= off / 2:
             extra.append(at + 1)
             taken = at + 1
-    return missing, extra
+        elif at and abs(int(gaps[at - 1]) + around[0] - 2 * period) <= off / 2:
+            continue  # the frame before was late
+        elif len(around) < 2 or around[1] <= period + off:
+            events += 1
+        else:  # too early by what the next gap is longer
+            taken = at + 1
+    return missing, extra, events
 
 
 def _outside(gaps: Sequence[int], begin: int, end: int, low: float, high: float) -> list[int]:
@@ -225,7 +244,7 @@ def _outside(gaps: Sequence[int], begin: int, end: int, low: float, high: float)
 
 
 def _noisy(
-    windows: Sequence[tuple[int, int]], period: int, quiet: int
+    windows: Sequence[tuple[int, int]], gaps: Sequence[int], period: int, quiet: int
 ) -> list[tuple[int, int, int, int]]:
     """Return the runs of windows with a large jitter, where the others are quiet."""
     limit = max(_NOISY * period, 500, _TIMES_NOISIER * quiet)
@@ -239,7 +258,12 @@ def _noisy(
             runs[-1][1] = at + 1
         elif is_loud:
             runs.append([at, at + 1])
-    long = [run for run in runs if run[1] - run[0] >= _LEAST_NOISY]
+    long = [
+        run
+        for run in runs
+        if run[1] - run[0] >= _LEAST_NOISY
+        and _both_ways(gaps, run[0] * _WINDOW, run[1] * _WINDOW, period, limit)
+    ]
     inside = sum(sum(loud[begin:end]) for begin, end in long)
     if not long or len(long) > 2 or inside < 0.7 * sum(loud):
         return []
@@ -252,3 +276,11 @@ def _noisy(
         )
         for begin, end in long
     ]
+
+
+def _both_ways(gaps: Sequence[int], begin: int, end: int, period: int, limit: float) -> bool:
+    """Say whether gaps are longer as often as they are shorter: events make them shorter only."""
+    part = [int(gap) for gap in gaps[begin:end]]
+    longer = sum(gap > period + limit / 3 for gap in part)
+    shorter = sum(gap < period - limit / 3 for gap in part)
+    return 3 * longer >= shorter

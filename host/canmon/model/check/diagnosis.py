@@ -46,6 +46,7 @@ from tickrig.host.canmon.model.check.bus_frames import (
     Hit,
     steady_times,
 )
+from tickrig.host.canmon.model.check.rule import ONE_TIME
 from tickrig.host.canmon.model.decode import node_memory
 from tickrig.host.canmon.model.decode.decoder import Decoder
 from tickrig.host.canmon.model.decode.pdos import PdoDecoder
@@ -88,6 +89,12 @@ RULES: Final[Mapping[str, str]] = MappingProxyType(
 
 MOST_LOAD: Final = 80.0
 _ANY_BUS: Final = frozenset(["no-error-frames", "time-back", "max-load"])
+_TIMED: Final = (
+    *("time-back", "max-load", "silence", "no-lost-heartbeat", "seen-once"),
+    *(f"pdo-{what}" for what in ("period", "jitter", "missing", "doubled")),
+    *(f"sync-{what}" for what in ("missing", "doubled", "period")),
+)
+"""Rules that a log without times cannot break."""
 _KEPT_FRAMES: Final = 1_000
 _KEPT_TEXTS: Final = 3
 _LOST_AFTER: Final = 1.5
@@ -95,6 +102,10 @@ _LOST_AFTER: Final = 1.5
 _LEAST_PAIRS: Final = 4
 _LOAD_US: Final = 500_000
 _LOAD_STEP_US: Final = 50_000
+_STOPPED: Final = 5
+_STOPPED_US: Final = 250_000
+"""Frames stop if they do not come for so many periods, and so long, at the end of a log."""
+_SURE_FRAMES: Final = 50
 _LONG_US: Final = 1_000_000
 _LEAST_FRAMES: Final = 100
 _SOON_US: Final = 1_500_000
@@ -197,7 +208,10 @@ class Diagnoser:
             judged |= one.judged
             why |= one.unjudged
         for rule, texts in ((NO_LOSS, lost), ("no-error-frames", errors)):
-            faults += [BusFault(rule, "", None, None, text, 0, 0, 1, ()) for text in texts]
+            begin_us = min((bus.at_us[0] for bus in self.kept), default=0)
+            faults += [
+                BusFault(rule, "", None, None, text, begin_us, begin_us, 1, ()) for text in texts
+            ]
         judged |= {NO_LOSS} if self.kept.frames else set()
         if self.without_errors and "no-error-frames" not in {fault.rule for fault in faults}:
             judged.discard("no-error-frames")
@@ -244,7 +258,8 @@ class _BusJudge:
         self._rows = bus.rows_by_ident()
         self._backward = bus.backward()
         self._times, self._set_back = steady_times(bus, self._backward)
-        self._end_us = max(self._times) if len(bus) else 0
+        # A clock that was set back leaves the end of the log before other times in it.
+        self._end_us = max(self._times[self._set_back[-1] if self._set_back else 0 :])
 
     def faults(self) -> list[BusFault]:
         """Return what is wrong."""
@@ -268,10 +283,11 @@ class _BusJudge:
         self._events = events
         events.end(self._end_us)
         self._cuts = sorted(events.cuts)
-        self.unjudged |= self._without()
+        self.unjudged = self._without() | self.unjudged
         self.judged |= RULES.keys() - _ANY_BUS - self.unjudged.keys()
         self._lengths(decoder)
-        self._rhythms()
+        if "time-back" not in self.unjudged:
+            self._rhythms()
         if not self._drives(decoder):
             self.judged.discard("drive-fault")
             self.unjudged["drive-fault"] = "no statusword of CiA 402 came"
@@ -310,13 +326,18 @@ class _BusJudge:
     # What holds for any bus
 
     def _time(self) -> None:
-        for row in self._backward:
-            back_us = self._bus.at_us[row - 1] - self._bus.at_us[row]
-            self._hit("time-back", None, f"the time goes back by {ms_text(back_us)} ms", [row])
-        if len(self._bus) > 1 and self._bus.at_us[0] == self._end_us:
-            self.unjudged["time-back"] = "all frames have one time"
+        at_us, rows = self._bus.at_us, self._backward
+        if rows:
+            most_us = max(at_us[row - 1] - at_us[row] for row in rows)
+            text = f"the time goes back by {'up to ' * (len(rows) > 1)}{ms_text(most_us)} ms"
+            self._hit("time-back", None, text, rows, len(rows))
+        if len(self._bus) > 1 and not rows and at_us[0] == self._end_us:
+            self.unjudged |= dict.fromkeys(_TIMED, ONE_TIME)
+            self.judged.discard("time-back")
 
     def _load(self) -> None:
+        if "max-load" in self.unjudged:
+            return
         if self._bit_rate is None:
             self.unjudged["max-load"] = "no bit rate is known: give -b, as -b 500000"
             return
@@ -498,7 +519,10 @@ class _BusJudge:
                     text = f"{name} does not come for {ms_text(end - begin)} ms, its period is"
                     text += f" {ms_text(period)}"
                     self._hit(f"{kind}-missing", ident, text, piece[at : at + 2], count)
+            payload = self._bus.picked(self._bus.payload, piece)
             for at in rhythm.extra:
+                if payload[at] != payload[at - 1] and len(piece) < _SURE_FRAMES:
+                    continue  # an event may come in the middle of a period by chance
                 text = f"{name} comes {ms_text(int(times[at]) - int(times[at - 1]))} ms after the"
                 text += f" one before, its period is {ms_text(period)}"
                 self._hit(f"{kind}-doubled", ident, text, [piece[at]])
@@ -513,7 +537,9 @@ class _BusJudge:
                 rule = "pdo-jitter" if kind == "pdo" else "sync-period"
                 self._hit(rule, ident, text, shown[:_KEPT_FRAMES])
             last_us = int(times[-1])
-            if piece is pieces[-1] and self._end_us - last_us > 3 * rhythm.levels[-1].period_us:
+            if piece is pieces[-1] and self._end_us - last_us > max(
+                _STOPPED * rhythm.levels[-1].period_us, _STOPPED_US
+            ):
                 text = f"{name} stops {ms_text(self._end_us - last_us)} ms before the end, its"
                 text += f" period is {ms_text(period)}"
                 self._hit(f"{kind}-missing", ident, text, [piece[-1]])
@@ -531,10 +557,12 @@ class _BusJudge:
     def _heartbeats(self, node: int, one: node_events.NodeEvents) -> None:
         ident = nmt.ERROR_CONTROL_COB_ID + node
         rows = [row for row in one.heartbeats if self._bus.dlc[row] > 0]
+        if self._two_beats(ident, rows, [self._times[row] for row in rows]):
+            return
         pieces = self._pieces(ident, rows)
         for piece in pieces:
             times = [self._times[row] for row in piece]
-            if not times or self._two_beats(ident, piece, times):
+            if not times:
                 continue
             rhythm = cycles.rhythm_of(times)
             if rhythm is None:
@@ -647,7 +675,7 @@ class _BusJudge:
             return False
         before = False
         for at, value in zip(runs, values, strict=True):
-            fault = bool(value & 0x08)
+            fault = bool(value & node_events.FAULT)
             if fault and not before:
                 said = node_memory.drive_state(value)
                 text = f"the drive is in fault: statusword {value:04X}h {said}"

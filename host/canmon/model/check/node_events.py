@@ -10,6 +10,7 @@ from typing import Final, NamedTuple
 from tickrig.host.canmon.model.check.bus_frames import BusFrames, Hit
 from tickrig.host.canmon.model.decode import decoded
 from tickrig.host.canmon.model.decode.decoder import Decoder
+from tickrig.host.canmon.model.decode.node_memory import STATUSWORD, drive_state
 from tickrig.host.canmon.model.decode.sdo import WRONG_TOGGLE
 from tickrig.host.canmon.model.decode.services import nmt_state_name
 from tickrig.host.canmon.model.frames import ERROR, REMOTE, Record, ms_text
@@ -27,6 +28,8 @@ SYNC_ID: Final = 0x080
 TIME_ID: Final = 0x100
 LSS_IDS: Final = (0x7E4, 0x7E5)
 NODE_MASK: Final = 0x7F
+FAULT: Final = 0x08
+"""The fault bit of a CiA 402 statusword."""
 _TOGGLE: Final = 0x80
 _STATES: Final = frozenset(map(int, nmt.NmtState))
 _COMMANDS: Final = frozenset(map(int, nmt.NmtCommand))
@@ -99,6 +102,7 @@ class NodeEvents:
     command: tuple[int, int, int] | None = None  # when, the state that it wants, its row
     told_since: int = 0
     reset: bool = False
+    fault: bool = False
     requests: int = 0
     latest_request: bytes = b""
     latest_answer: tuple[int, bytes, int] | None = None
@@ -189,6 +193,7 @@ class BusEvents:
         self._requests: dict[tuple[int, int], int] = {}
         self._silent: list[tuple[int, str, int]] = []
         self._row = 0
+        self._untimed = times[0] == times[-1]
 
     def take(self, row: int) -> None:
         """Take a frame of a service."""
@@ -276,7 +281,7 @@ class BusEvents:
         heard = self._first.get(node, self._row) < self._row
         latest = one.boots[-1] if one.boots else None
         if heard and not one.reset:
-            if latest is not None and at_us - self._times[latest] <= _PAIR_US:
+            if not self._untimed and latest is not None and at_us - self._times[latest] <= _PAIR_US:
                 said = ms_text(at_us - int(self._times[latest]))
                 self._hit(
                     *("doubled-node", node, nmt.ERROR_CONTROL_COB_ID + node),
@@ -345,7 +350,8 @@ class BusEvents:
         if latest is None or not one.requests or blocks or data[:1] == b"\x80":
             return
         if (
-            latest[2] == one.requests
+            not self._untimed
+            and latest[2] == one.requests
             and data[:4] == latest[1][:4]
             and at_us - latest[0] <= _PAIR_US
         ):
@@ -379,6 +385,8 @@ class BusEvents:
         elif transfer.retries and transfer.mode is decoded.TransferMode.EXPEDITED:
             again = f"asked again {counted(transfer.retries, 'time')}"
             self._silent.append((node, f"{what} is not answered, {again}", row))
+        if entry == STATUSWORD and transfer.direction is decoded.TransferDirection.UPLOAD:
+            self._statusword(node, ident, transfer.data or b"")
         if WRONG_TOGGLE in transfer.flaws:
             self._hit("sdo-toggle", node, ident, f"{what}: {WRONG_TOGGLE}")
         if (
@@ -390,6 +398,15 @@ class BusEvents:
                 self.cuts.append(Cut(at_us, node))
             elif entry[0] in _SYNC_PARAMETERS:
                 self.cuts.append(Cut(at_us, 0))
+
+    def _statusword(self, node: int, ident: int, data: bytes) -> None:
+        """Judge a statusword that was read."""
+        one, value = self.nodes[node], int.from_bytes(data[:2], "little")
+        fault = bool(value & FAULT)
+        if fault and not one.fault:
+            text = f"the drive is in fault: statusword {value:04X}h {drive_state(value)}"
+            self._hit("drive-fault", node, ident, text)
+        one.fault = fault
 
     def _judge_silent(self) -> None:
         """Tell of requests without an answer; those to nodes that nobody heard are one finding."""
@@ -411,7 +428,8 @@ def _first_rows(rows: Mapping[int, Sequence[int]]) -> dict[int, int]:
     first: dict[int, int] = {}
     for ident, found in rows.items():
         node = ident & NODE_MASK
-        if node and ident <= STANDARD_MAX and _sends(ident):
+        # An EMCY comes before the boot-up of some nodes.
+        if node and ident <= STANDARD_MAX and _sends(ident) and ident not in EMCY_IDS:
             first[node] = min(int(found[0]), first.get(node, int(found[0])))
     return first
 

@@ -81,3 +81,22 @@ def test_a_heartbeat_that_is_left_out_is_found() -> None:
         *(800_000, 1_000_000),
     )
     assert [place.number for place in fault.frames] == [9, 10]
+
+
+def lines(text: str, step_us: int = 1_000) -> list[Record]:
+    """Return frames, one each millisecond."""
+    return [
+        Record(at * step_us, "can0", CanFrame.parse(frame)) for at, frame in enumerate(text.split())
+    ]
+
+
+def test_without_times_nothing_is_judged_by_them() -> None:
+    found = diagnose([lines("701#00 704#00 701#7F 701#7F 704#00 180#R 081#0050010000000000", 0)])
+    assert [fault.rule for fault in found.faults] == ["no-emcy", "no-reboot"]
+    assert found.unjudged["pdo-missing"] == found.unjudged["time-back"]
+    assert "no-lost-heartbeat" in found.unjudged
+
+
+def test_an_emcy_before_the_first_boot_up_is_no_sign_of_life() -> None:
+    (fault,) = diagnose([lines("081#0050010000000000 701#00 701#7F 701#7F")]).faults
+    assert fault.rule == "no-emcy"
