@@ -154,13 +154,13 @@ def _wrong(verdict: Verdict, first_us: int) -> str:
     faults, judged = verdict.diagnosis.faults, verdict.diagnosis.judged
     if not faults:
         return f"No fault was found by {counted(len(judged), 'rule')}."
-    first = faults[0]
+    first = next((one for one in faults if one.frames), faults[0])
     at = f"{max(0, first.first_us - first_us) / 1e6:.3f} s"
-    more = f", {counted(sum(one.amount for one in faults), 'time')} in all"
-    return (
-        f"{counted(len(faults), 'fault')} found{more}; the first, at {at}: {first.where}:"
-        f" {first.text}."
-    )
+    return f"{counted(len(faults), 'fault')} found; the first, at {at}: {_fault_text(first)}."
+
+
+def _fault_text(fault: BusFault) -> str:
+    return f"{fault.where}: {fault.text}".removeprefix(": ")
 
 
 def _page_data(survey: Survey, verdict: Verdict, head: ReportHead) -> dict[str, object]:
@@ -224,7 +224,7 @@ def _finding(survey: Survey, fault: BusFault, verdict: Verdict) -> dict[str, obj
         "t": survey.since(fault.first_us) if places else 0,
         "at": [survey.since(place.at_us) for place in places],
         "rule": one_line(fault.rule),
-        "text": one_line(f"{fault.where}: {fault.text}".removeprefix(": ")),
+        "text": one_line(_fault_text(fault)),
         "key": _key(fault.channel, fault.node),
         "count": fault.amount,
         "frames": [
@@ -431,5 +431,5 @@ def print_page(page: Path, path: Path) -> None:
         except (OSError, subprocess.TimeoutExpired) as error:
             raise BrowserError(f"{path}: Chromium wrote nothing: {error}") from None
     if not path.is_file() or ended.returncode:
-        last = one_line((ended.stderr.strip().splitlines() or ["no message"])[-1])
+        last = one_line(ended.stderr.strip().rpartition("\n")[2] or "no message")
         raise BrowserError(f"{path}: Chromium wrote nothing (status {ended.returncode}): {last}")

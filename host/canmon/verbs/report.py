@@ -182,7 +182,7 @@ class _Seen:
 
         if not listening.take_blocks(log, take):
             return False
-        self._end()
+        self._end(log)
         return True
 
     def by_frames(self, source: Source) -> None:
@@ -199,11 +199,13 @@ class _Seen:
 
         with listening.until_interrupted():
             listening.listen(source, take, None)
-        self._end()
+        self._end(source)
 
-    def _end(self) -> None:
+    def _end(self, source: AnySource[Any]) -> None:
         self.survey.end()
-        self.diagnosis = self._diagnoser.diagnosis()
+        self._diagnoser.without_errors = source.without_errors
+        lost = [f"{source.lost} frames were lost"] if source.lost else []
+        self.diagnosis = self._diagnoser.diagnosis(lost, source.errors())
 
 
 class _Reading:

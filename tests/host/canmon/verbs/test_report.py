@@ -73,7 +73,7 @@ def test_three_sentences_say_what_there_was(log: str, tmp_path: Path) -> None:
     lines = report(log, "-o", tmp_path / "run.html", "-b", "500k").stdout.splitlines()
     assert lines[0].startswith("run.log holds 358 frames of can0 in 5.90 s, from 2020-09-13 12:26")
     assert lines[1] == "1 node was heard; at the end 3 is operational."
-    assert re.match(r"[0-9]+ faults found, [0-9]+ times in all; the first, at 0\.", lines[2])
+    assert re.match(r"[0-9]+ faults found; the first, at 0\.", lines[2])
     page = unescape((tmp_path / "run.html").read_text("utf-8"))
     assert " ".join(lines) in page
 
@@ -105,6 +105,14 @@ def test_a_finding_has_its_node_and_the_frames_around(data: dict[str, Any]) -> N
     times = [frame[0] for frame in abort["frames"]]
     assert times == sorted(times)
     assert times[0] < 602_000 < times[-1]
+
+
+def test_the_page_says_what_is_no_frame(log: str, tmp_path: Path) -> None:
+    with Path(log).open("a", encoding="ascii") as file:
+        file.write("what?\n")
+    report(log, "-o", tmp_path / "run.html")
+    about = [line[0] for line in data_of(tmp_path / "run.html")["about"]]
+    assert any("line 359 is no frame: 'what?'" in line for line in about)
 
 
 def test_a_statusword_is_drawn_as_states(tmp_path: Path) -> None:
