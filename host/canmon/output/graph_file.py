@@ -9,9 +9,18 @@ from io import BytesIO
 from itertools import cycle, groupby
 from operator import itemgetter
 from pathlib import Path
-from typing import BinaryIO, Final, TextIO
+from typing import Any, BinaryIO, Final, TextIO
 
-from tickrig.host.canmon.model.graph.plot import COLOURS, Chart, Curve, chart, html_page, svg
+from tickrig.host.canmon.model.graph.plot import (
+    COLOURS,
+    Band,
+    Chart,
+    Curve,
+    chart,
+    html_page,
+    state_colour,
+    svg,
+)
 from tickrig.host.canmon.model.graph.series import Series, View
 from tickrig.host.cli.messages import Refused, SourceFailed
 from tickrig.host.text.whole_file import replacing, write_whole
@@ -29,7 +38,8 @@ def write_csv(file: TextIO, series: Sequence[Series], view: View) -> None:
     for at_us, group in groupby(samples, key=itemgetter(0)):
         cells: list[str | float] = [""] * len(series)
         for _, number, _, value in group:
-            cells[number] = int(value) if value.is_integer() else value
+            shown = int(value) if value.is_integer() else value
+            cells[number] = series[number].name(value) or shown
         writer.writerow([f"{at_us // 1_000_000}.{at_us % 1_000_000:06d}", *cells])
 
 
@@ -47,12 +57,21 @@ def _samples(number: int, series: Series, view: View) -> Iterator[tuple[int, int
 _DPI: Final = 100
 _AXIS_SHARE: Final = 0.09
 """Of the width, for each axis beyond the second."""
+_LEAST_HEIGHT, _BAND_HEIGHT = 250, 45
+"""Pixels of a picture with states, and of each row of them."""
+_LETTER: Final = 8
+"""Pixels of a letter."""
 _MARGIN: Final = 0.03
 """Of an axis, above and below its curves."""
 
 
-def write_png(
-    file: BinaryIO, series: Sequence[Series], view: View, width: int = 960, height: int = 400
+def write_png(  # noqa: PLR0913, PLR0917 - what is drawn, and how
+    file: BinaryIO,
+    series: Sequence[Series],
+    view: View,
+    width: int = 960,
+    height: int = 400,
+    title: str = "",
 ) -> None:
     """Write a picture of so many pixels.
 
@@ -61,9 +80,19 @@ def write_png(
     """
     from matplotlib.figure import Figure  # noqa: PLC0415 - an extra, and slow
 
-    figure = Figure(figsize=(width / _DPI, height / _DPI), dpi=_DPI, layout="constrained")
     drawn = chart(series, view, width)
-    first = figure.add_subplot()
+    if drawn.bands:  # what is too low for all of them is made higher
+        height = max(height, _LEAST_HEIGHT + _BAND_HEIGHT * len(drawn.bands))
+    figure = Figure(figsize=(width / _DPI, height / _DPI), dpi=_DPI, layout="constrained")
+    curves, states = bool(drawn.curves or not drawn.bands), len(drawn.bands)
+    ratios = [*[6.0] * curves, *[1.0] * states]
+    grid = figure.add_gridspec(len(ratios), 1, height_ratios=ratios)
+    first = figure.add_subplot(grid[0])
+    strips = [first] * (not curves)
+    strips += [figure.add_subplot(grid[place]) for place in range(1, len(ratios))]
+    for band, strip in zip(drawn.bands, strips, strict=True):
+        _draw_band(strip, band, drawn)
+    first.set_title(title, loc="left", fontsize="small")
     first.grid(visible=True, alpha=0.4)
     axes = {axis: first.twinx() if number else first for number, axis in enumerate(drawn.ranges)}
     for number, (axis, (low, high)) in enumerate(drawn.ranges.items()):
@@ -76,13 +105,35 @@ def write_png(
         label = f"{curve.label} [{curve.unit}]" if curve.unit else curve.label
         times, values = _points(curve, drawn)
         lines += axes[curve.axis].plot(times, values, label=label, color=colour, linewidth=1.2)
-    first.set_xlim(view.seconds(view.from_us), view.seconds(view.to_us))
-    first.set_xlabel("s")
+    for one in {first, *strips}:
+        one.set_xlim(view.seconds(view.from_us), view.seconds(view.to_us))
+        one.tick_params(labelbottom=False)
+    lowest = strips[-1] if strips else first
+    lowest.tick_params(labelbottom=True)
+    lowest.set_xlabel("s")
     if view.cursor_us is not None:
         first.axvline(view.seconds(view.cursor_us), color="#888888", linewidth=1)
     if lines:
         figure.legend(handles=lines, loc="outside upper left", ncols=3)
     figure.savefig(file, format="png")
+
+
+def _draw_band(strip: Any, band: Band, drawn: Chart) -> None:
+    """Draw states as a row of rectangles with their names."""
+    strip.set_yticks([])
+    strip.set_ylabel(band.label, rotation=0, ha="right", va="center")
+    for run in band.runs:
+        begin, end = (_second(drawn, column) for column in (run.begin, run.end))
+        strip.axvspan(begin, end, color=state_colour(band, run.name))
+        if (run.end - run.begin) > _LETTER * len(run.name):
+            strip.text(
+                begin, 0.5, f" {run.name}", va="center", transform=strip.get_xaxis_transform()
+            )
+
+
+def _second(drawn: Chart, column: int) -> float:
+    view = drawn.view
+    return view.seconds(view.from_us) + column * view.span_us / drawn.columns / 1e6
 
 
 def _points(curve: Curve, drawn: Chart) -> tuple[list[float], list[float]]:
@@ -105,7 +156,9 @@ def check_graph_path(path: Path) -> None:
         raise Refused(f"-o {path}: a graph is written as {', '.join(_KINDS)}")
 
 
-def write_graph(path: Path, series: Sequence[Series], view: View, size: tuple[int, int]) -> None:
+def write_graph(
+    path: Path, series: Sequence[Series], view: View, size: tuple[int, int], title: str = ""
+) -> None:
     """Write curves as the file's name says.
 
     Args:
@@ -113,29 +166,32 @@ def write_graph(path: Path, series: Sequence[Series], view: View, size: tuple[in
         series: the curves.
         view: what is seen.
         size: width and height of a picture in pixels.
+        title: of a picture.
 
     Raises:
         Refused: matplotlib is not there, for PNG.
         SourceFailed: the file cannot be written.
     """
     try:
-        _write(path, series, view, size)
+        _write(path, series, view, size, title)
     except OSError as error:
         raise SourceFailed(f"{path}: {error.strerror}") from error
     except ImportError:
         raise Refused(f"{path}: PNG needs matplotlib: pip install 'tickrig[plot]'") from None
 
 
-def _write(path: Path, series: Sequence[Series], view: View, size: tuple[int, int]) -> None:
+def _write(
+    path: Path, series: Sequence[Series], view: View, size: tuple[int, int], title: str
+) -> None:
     match path.suffix.lower():
         case ".svg":
-            write_whole(path, svg(series, view, *size))
+            write_whole(path, svg(series, view, *size, title))
         case ".html":
-            write_whole(path, html_page(series, view, *size, title=path.stem))
+            write_whole(path, html_page(series, view, *size, title=title or path.stem))
         case ".csv":
             with replacing(path) as beside, beside.open("w", encoding="utf-8", newline="") as file:
                 write_csv(file, series, view)
         case _:
             picture = BytesIO()
-            write_png(picture, series, view, *size)
+            write_png(picture, series, view, *size, title)
             write_whole(path, picture.getvalue())

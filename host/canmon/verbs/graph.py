@@ -6,19 +6,36 @@ import os
 import re
 import shutil
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, fields
 from functools import partial
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from tickrig._lazy import LazyModule
+from tickrig.host.canmon.model.frames import REMOTE, Record, date_text, ident_text, rate_text
 from tickrig.host.canmon.model.graph.plot import render
-from tickrig.host.canmon.model.graph.series import Collector, ObjectName, Series, View, parse_signal
+from tickrig.host.canmon.model.graph.series import (
+    BUS_SIGNALS,
+    OF_NODES,
+    Collector,
+    FrameSlice,
+    Series,
+    View,
+    parse_signal,
+)
+from tickrig.host.canmon.model.survey import SignalName, SignalTrack, Survey
 from tickrig.host.canmon.output.graph_file import check_graph_path, write_graph
-from tickrig.host.canmon.output.listening import follow, report, span_option, take_blocks
+from tickrig.host.canmon.output.listening import (
+    bit_rates_of,
+    follow,
+    report,
+    span_option,
+    take_blocks,
+)
 from tickrig.host.canmon.sources.source import BlockLog, block_log, open_source
 from tickrig.host.canmon.verbs.decode_options import (
     decode_options,
@@ -30,6 +47,14 @@ from tickrig.host.cli.can_options import BusOptions, bus_options, fd_options
 from tickrig.host.cli.messages import Refused, refusing
 from tickrig.host.cli.options import PATH, time_option
 from tickrig.host.cli.start import paint
+from tickrig.host.text.names import closest
+from tickrig.host.text.page_text import one_line
+
+if TYPE_CHECKING:
+    from tickrig.host.canmon.model.columns import column_survey
+    from tickrig.host.canmon.model.decode.decoder import Decoder
+else:  # numpy
+    column_survey = LazyModule("tickrig.host.canmon.model.columns.column_survey")
 
 _SIZE: Final = re.compile(r"([0-9]{2,4})x([0-9]{2,4})")
 _RANGE: Final = re.compile(r"([1-9])=((?:(?!\.\.)[0-9.eE+-])++)\.\.([0-9.eE+-]+)")
@@ -48,6 +73,7 @@ class _GraphRequest:
         size: of a picture in pixels.
         window_us: what is shown of a bus.
         span_us: how long a bus is heard, None where it was not said.
+        title: of a picture.
     """
 
     files: tuple[Path, ...]
@@ -58,6 +84,7 @@ class _GraphRequest:
     size: tuple[int, int]
     window_us: int
     span_us: int | None
+    title: str
 
     def view(self, series: Sequence[Series]) -> View:
         """Return the view that is asked for; Refused if nothing is in it."""
@@ -110,7 +137,7 @@ SIZE: Final = (100, 28)
 
 @click.command()
 @click.argument("source")
-@click.argument("signals", nargs=-1, required=True, metavar="SIGNAL...")
+@click.argument("signals", nargs=-1, metavar="[SIGNAL]...")
 @decode_options
 @click.option(
     *("-o", "files"),
@@ -120,6 +147,7 @@ SIZE: Final = (100, 28)
     metavar="FILE",
     help=".svg .html .png .csv",
 )
+@click.option("--title", default="", metavar="TEXT", help="Of a picture.")
 @time_option("--from", "from_us", help="Begin 3s after the first sample.")
 @time_option("--to", "to_us", help="End 9s after the first sample.")
 @time_option("--at", "at_us", help="Read out the values there.")
@@ -133,16 +161,19 @@ SIZE: Final = (100, 28)
 @bus_options
 @fd_options
 def command(source: str, signals: Sequence[str], **options: Any) -> None:
-    """Draw curves of SOURCE: in the terminal, or to files.
+    """Draw curves of SOURCE: in the terminal, or to files; without SIGNAL, list what there is.
 
     A SIGNAL is an object, as 3.velocity_actual_value or 3.statusword.fault
     (names of the EDS or DBC file, or of what SDO traffic told), or a slice, as
     ID[BYTES]TYPE*FACTOR+OFFSET: BYTES is 2, 2:6, bit 2.3 or bits 2.3+5; TYPE
     is u, s or f, with b behind it big-endian. LABEL= before it names it, @2
     behind it takes another axis. A spike never vanishes: each column shows its
-    least and greatest value.
+    least and greatest value. load, nmt, emcy, sdo and 'sync jitter' are curves
+    or states of the bus and its nodes, as 3.nmt; a statusword is its states.
 
     \b
+    canmon graph run.log --eds 3=drive.eds
+    canmon graph run.log 3.velocity_actual_value 3.statusword 3.emcy load
     canmon graph run.log '181[2:6]s*0.001'
     canmon graph run.blf 'speed=181[2:6]s*0.001' '281[0:2]@2' -o g.svg -o g.csv
     canmon graph can0 3.velocity_actual_value --eds 3=drive.eds --window 5s
@@ -156,19 +187,107 @@ def command(source: str, signals: Sequence[str], **options: Any) -> None:
     with refusing():
         words = [parse_signal(text) for text in signals]
     eds, dbc, strict = (options.pop(name) for name in ("eds", "dbc", "strict"))
-    objects = any(isinstance(word.source, ObjectName) for word in words)
-    decoder = make_decoder(eds, dbc) if objects or eds or dbc else None
-    log = None if objects else block_log([source])
+    bus = BusOptions(**options)
+    if not words:
+        _list(source, make_decoder(eds, dbc), bus, request, strict=strict)
+        return
+    rates = bit_rates_of([source], bus)
+    slices = all(isinstance(word.source, FrameSlice) for word in words)
+    decoder = None if slices and not eds and not dbc else make_decoder(eds, dbc)
+    log = block_log([source]) if slices else None
     collector = Collector(words)
     whole = log is not None and take_blocks(log, collector.take_columns)
-    frames = (log if whole else None) or open_source([source], BusOptions(**options))
+    frames = (log if whole else None) or open_source([source], bus)
     with closing(frames):
         if not isinstance(frames, BlockLog):
-            collector = Collector(words, decoder, _MOST if frames.live else 0)
+            most = _MOST if frames.live else 0
+            collector = Collector(words, decoder, most, rates, each_node=True)
             lines = partial(_live, collector.series, request)
             follow(frames, [source], collector.take_all, request.span_us, lines)
-        _show(collector.series, request)
+        if not frames.live and not frames.failed:
+            _refuse_missing(source, collector)
+        _show(source, collector.series, request)
     report(frames, strict)
+
+
+def _refuse_missing(source: str, collector: Collector) -> None:
+    """Refuse objects that a log does not hold, with the names that could be meant."""
+    for text in collector.missing:
+        node, dot, base = text.lower().rpartition(".") if text[:1].isdecimal() else ("", "", text)
+        of_node = [f"{node}{dot}{kind}" for kind in BUS_SIGNALS if not dot or kind in OF_NODES]
+        names = [*collector.heard, *of_node]
+        meant = closest(text, names) or [name for name in names if base in name.lower()]
+        hint = f"did you mean {meant[0]!r}?" if meant else f"canmon graph {source} lists what is"
+        raise Refused(f"{text!r}: no such signal in {source}; {hint}")
+
+
+def _list(
+    source: str, decoder: Decoder, bus: BusOptions, request: _GraphRequest, *, strict: bool
+) -> None:
+    """List the signals of a source."""
+    survey, log = Survey(decoder), block_log([source])
+    whole = (
+        log is not None
+        and decoder.standard
+        and take_blocks(log, column_survey.ColumnSurvey(decoder, survey).take)
+    )
+    frames = (log if whole else None) or open_source([source], bus)
+    with closing(frames):
+        if not isinstance(frames, BlockLog):
+
+            def take(records: Sequence[Record]) -> None:
+                for record in records:
+                    survey.count(record)
+                    decoded = decoder.take(record)
+                    survey.take(record, decoded)
+                    survey.take_signals(record, decoded)
+
+            follow(frames, [source], take, request.span_us)
+        click.echo("\n".join(_tree(survey)))
+    report(frames, strict)
+
+
+def _tree(survey: Survey) -> Iterator[str]:
+    """Yield the signals as lines: of each node by PDO, then of the bus."""
+    span_us = max(1, survey.since(survey.last_us))
+    several = len(survey.frames) > 1
+    width = max((len(_written(name)) for name in survey.signals), default=0)
+    nodes: dict[tuple[str, int | None], str] = {
+        (row.channel, row.node): row.name for row in survey.rows() if row.present
+    }
+    groups = {(name.channel, name.node) for name in survey.signals} | set(nodes)
+    for channel, node in sorted(groups, key=lambda key: (key[0], key[1] or 0)):
+        place = "other signals" if node is None else f"node {node}"
+        bus = f"{channel} " if several else ""
+        yield one_line(f"{bus}{place}  {nodes.get((channel, node), '')}".rstrip())
+        for name, track in sorted(survey.signals.items(), key=lambda one: _number(one[0].kind)):
+            if (name.channel, name.node) == (channel, node):
+                rate = f"{rate_text(track.count * 1e6 / span_us)}/s"
+                yield one_line(
+                    f"  {_written(name):<{width}}  {name.kind:<6} {rate:>10}  {_values(track)}"
+                )
+        if node is not None:
+            yield "".join(f"  {node}.{kind}" for kind in OF_NODES)
+    bare = sorted({ident_text(ident) for _, ident in survey.counts.sums if not ident & REMOTE})
+    yield "bus"
+    yield "  load  sync jitter"
+    if bare:
+        yield f"  bytes of frames, as {bare[0]}[0:2]: {' '.join(bare)}"
+
+
+def _number(kind: str) -> tuple[str, int]:
+    return kind.rstrip("0123456789"), int(kind.lstrip("abcdefghijklmnopqrstuvwxyz") or 0)
+
+
+def _written(name: SignalName) -> str:
+    return name.name if name.node is None else f"{name.node}.{name.name}"
+
+
+def _values(track: SignalTrack) -> str:
+    """Write the range of a signal, or its states."""
+    if track.states is None:
+        return f"{track.low:g} .. {track.high:g} {track.unit}".rstrip()
+    return ", ".join(dict.fromkeys(state for _, state in track.states.changes))
 
 
 def _live(
@@ -178,7 +297,7 @@ def _live(
     return render(series, view, width, height, colour="NO_COLOR" not in os.environ)
 
 
-def _show(series: Sequence[Series], request: _GraphRequest) -> None:
+def _show(source: str, series: Sequence[Series], request: _GraphRequest) -> None:
     """Write the files, else print the picture; say what has no samples."""
     for one in series:
         if not one:
@@ -187,7 +306,7 @@ def _show(series: Sequence[Series], request: _GraphRequest) -> None:
             click.echo(f"{one.label}: {one.not_numbers} samples are no numbers", err=True)
     view = request.view(series)
     for file in request.files:
-        write_graph(file, series, view, request.size)
+        write_graph(file, series, view, request.size, _title(source, view, request.title))
     if not request.files:
         width, height = shutil.get_terminal_size(SIZE)
         colour = sys.stdout.isatty() and "NO_COLOR" not in os.environ
@@ -195,5 +314,15 @@ def _show(series: Sequence[Series], request: _GraphRequest) -> None:
         show = partial(paint, sys.stdout) if colour else click.echo
         show("\n".join(line.rstrip() for line in lines) + "\n" * colour)
 
+
+def _title(source: str, view: View, title: str) -> str:
+    """Return what stands above a picture: what it is, of what, and when its time begins."""
+    begun = f"0 s is {date_text(view.origin_us)}" if view.origin_us >= _DATED_US else ""
+    name = Path(source).name if Path(source).is_file() else source
+    return ", ".join(filter(None, [one_line(title), one_line(name), begun]))
+
+
+_DATED_US: Final = 1_000_000_000_000_000
+"""Times before it (September 2001) are no dates, but count from the start of a recorder."""
 
 explained(command)

@@ -144,31 +144,65 @@ class Curve:
     stops: tuple[Stop, ...]
 
 
+class StateRun(NamedTuple):
+    """A state that lasts.
+
+    Attributes:
+        begin: its first column.
+        end: one behind its last.
+        name: of the state.
+    """
+
+    begin: int
+    end: int
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Band:
+    """States of a signal, one behind the other.
+
+    Attributes:
+        label: what people call it.
+        runs: from left to right.
+    """
+
+    label: str
+    runs: tuple[StateRun, ...]
+
+
 @dataclass(frozen=True, slots=True)
 class Chart:
-    """All curves of a picture.
+    """All curves and bands of a picture.
 
     Attributes:
         view: what is seen.
         columns: how many columns the picture has.
         curves: in the order in which they were asked for.
+        bands: likewise, of signals whose values are states.
         ranges: least and greatest value by axis, in the order of the axes.
     """
 
     view: View
     columns: int
     curves: tuple[Curve, ...]
+    bands: tuple[Band, ...]
     ranges: dict[int, tuple[float, float]]
 
 
 def chart(series: Sequence[Series], view: View, columns: int) -> Chart:
     """Bring series into so many columns; a spike stays, however short it is."""
     curves = tuple(
-        Curve(one.label, one.axis, one.unit, _stops(one, view, columns)) for one in series
+        Curve(one.label, one.axis, one.unit, _stops(one, view, columns))
+        for one in series
+        if one.names is None
+    )
+    bands = tuple(
+        Band(one.label, tuple(_runs(one, view, columns))) for one in series if one.names is not None
     )
     axes = sorted({curve.axis for curve in curves})
     ranges = {axis: view.ranges.get(axis) or _range(curves, axis, columns) for axis in axes}
-    return Chart(view, columns, curves, ranges)
+    return Chart(view, columns, curves, bands, ranges)
 
 
 def _stops(series: Series, view: View, columns: int) -> tuple[Stop, ...]:
@@ -178,6 +212,30 @@ def _stops(series: Series, view: View, columns: int) -> tuple[Stop, ...]:
     left = [_outside(series, seen.start - 1, view, columns)] if seen.start else []
     right = [_outside(series, seen.stop, view, columns)] if seen.stop < len(series) else []
     return (*left, *inside, *right)
+
+
+def _runs(series: Series, view: View, columns: int) -> Iterator[StateRun]:
+    """Yield the states in a view; each lasts until another one is told."""
+    if not series.at_us:
+        return
+    first = max(0, (series.before(view.from_us) or 0))
+    begin, name = (
+        0 if series.at_us[first] <= view.from_us else -1,
+        series.name(series.values[first]),
+    )
+    for index in range(first, len(series)):
+        at_us, now = series.at_us[index], series.name(series.values[index])
+        if at_us > view.to_us:
+            break
+        column = max(0, (at_us - view.from_us) * columns // (view.span_us + 1))
+        if begin < 0:
+            begin, name = column, now
+        elif now != name:
+            if column > begin:
+                yield StateRun(begin, column, name)
+            begin, name = column, now
+    if begin >= 0:
+        yield StateRun(begin, columns, name)
 
 
 def _outside(series: Series, index: int, view: View, columns: int) -> Stop:
@@ -201,6 +259,17 @@ COLOURS: Final = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e
 _AXIS_WIDTH: Final = 64
 _LEGEND_HEIGHT: Final = 20
 _BOTTOM: Final = 28
+_BAND_HEIGHT: Final = 22
+_TITLE_HEIGHT: Final = 24
+_STATE_COLOURS: Final = ("#b9d3f0", "#f3d58f", "#bfe0dc", "#d9c7ee", "#f2cfa8", "#d5d8dc")
+_KNOWN_STATES: Final = {
+    "operational": "#9fd3b4",
+    "operation enabled": "#9fd3b4",
+    "no error": "#dfe9e2",
+    "stopped": "#f0b3ad",
+    "fault": "#f0b3ad",
+    "fault reaction active": "#f0b3ad",
+}
 _STYLE: Final = (
     "text{font:12px sans-serif;fill:#444}.grid{stroke:#ddd}.frame{fill:none;stroke:#888}"
     ".curve{fill:none;stroke-width:1.3;stroke-linejoin:round}.cursor{stroke:#888}"
@@ -216,29 +285,40 @@ class _Area(NamedTuple):
     height: int
 
 
-def _area_of(axes: int, curves: int, width: int, height: int) -> _Area:
-    """Return what remains for the curves beside axes and legend: 50 pixels at least."""
+def _area_of(series: Sequence[Series], width: int, height: int, title: str = "") -> _Area:
+    """Return what remains for the curves beside axes, bands and legend: 50 pixels at least.
+
+    Above bands it is 150: the picture grows with them.
+    """
+    curves = [one for one in series if one.names is None]
     left = _AXIS_WIDTH
-    right = _AXIS_WIDTH * max(0, axes - 1) + 16
-    top = _LEGEND_HEIGHT * curves + 8
-    return _Area(left, top, max(50, width - left - right), max(50, height - top - _BOTTOM))
+    right = _AXIS_WIDTH * max(0, len({one.axis for one in curves}) - 1) + 16
+    top = _LEGEND_HEIGHT * len(curves) + 8 + _TITLE_HEIGHT * bool(title)
+    bands = 2 * _BAND_HEIGHT * (len(series) - len(curves))
+    least = 150 if bands else 50
+    high = max(least, height - top - _BOTTOM - bands) if curves or not bands else 0
+    return _Area(left, top, max(50, width - left - right), high)
 
 
-def svg(series: Sequence[Series], view: View, width: int = 960, height: int = 400) -> str:
+def svg(
+    series: Sequence[Series], view: View, width: int = 960, height: int = 400, title: str = ""
+) -> str:
     """Return a picture of so many pixels; the first axis is on the left, others on the right."""
-    axes = len({one.axis for one in series})
-    area = _area_of(axes, len(series), width, height)
+    area = _area_of(series, width, height, title)
     drawn = chart(series, view, area.width)
+    height = max(height, area.top + area.height + 2 * _BAND_HEIGHT * len(drawn.bands) + _BOTTOM)
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}"'
         f' width="{width}" height="{height}">',
         f"<style>{_STYLE}</style>",
         '<rect width="100%" height="100%" fill="#fff"/>',
         f'<clipPath id="area">{_rect(area)}</clipPath>',
-        *_svg_time_axis(view, area),
-        *_value_axes(drawn, area),
+        *_svg_title(title),
+        *_svg_time_axis(view, area, len(drawn.bands)),
+        *(_value_axes(drawn, area) if drawn.curves else ()),
         f'<g clip-path="url(#area)">{"".join(_curves(drawn, area))}</g>',
-        *_legend(drawn.curves),
+        *_svg_bands(drawn.bands, area),
+        *_legend(drawn.curves, _TITLE_HEIGHT * bool(title)),
         _cursor(view, area),
         _rect(area, ' class="frame"'),
         "</svg>",
@@ -256,9 +336,38 @@ def _text_element(x: float, y: float, anchor: str, text: str, colour: str = "") 
     return f'<text x="{x:g}" y="{y:g}" text-anchor="{anchor}"{fill}>{escape(text)}</text>'
 
 
-def _svg_time_axis(view: View, area: _Area) -> Iterator[str]:
+def state_colour(band: Band, name: str) -> str:
+    """Return the colour of a state: its own, or one of those that are left, in turn."""
+    names = dict.fromkeys(run.name for run in band.runs if run.name not in _KNOWN_STATES)
+    if name not in names:
+        return _KNOWN_STATES[name]
+    return _STATE_COLOURS[list(names).index(name) % len(_STATE_COLOURS)]
+
+
+def _svg_title(title: str) -> Iterator[str]:
+    if title:
+        yield _text_element(_AXIS_WIDTH, _TITLE_HEIGHT - 6, "start", title)
+
+
+def _svg_bands(bands: Sequence[Band], area: _Area) -> Iterator[str]:
+    """Draw states below the curves: the name of the signal, and under it a row of states."""
+    for number, band in enumerate(bands):
+        y = area.top + area.height + 2 * _BAND_HEIGHT * number
+        yield _text_element(area.left, y + _BAND_HEIGHT - 5, "start", f"▬ {band.label}")
+        for run in band.runs:
+            yield (
+                f'<rect x="{area.left + run.begin}" y="{y + _BAND_HEIGHT}"'
+                f' width="{run.end - run.begin}" height="{_BAND_HEIGHT - 4}"'
+                f' fill="{state_colour(band, run.name)}"><title>{escape(run.name)}</title></rect>'
+            )
+            if (run.end - run.begin) > 7 * len(run.name) + 6:
+                x = area.left + run.begin + 4
+                yield _text_element(x, y + 2 * _BAND_HEIGHT - 9, "start", run.name)
+
+
+def _svg_time_axis(view: View, area: _Area, bands: int) -> Iterator[str]:
     low, high = view.seconds(view.from_us), view.seconds(view.to_us)
-    bottom = area.top + area.height
+    bottom = area.top + area.height + 2 * _BAND_HEIGHT * bands
     for second, label in ticks(low, high, max(2, area.width // 100)):
         x = round(area.left + (second - low) / (high - low) * area.width, 1)
         yield f'<path class="grid" d="M{x:g} {area.top}V{bottom}"/>'
@@ -298,11 +407,11 @@ def _points(curve: Curve, shown: tuple[float, float], area: _Area) -> list[str]:
     return points
 
 
-def _legend(curves: Sequence[Curve]) -> Iterator[str]:
+def _legend(curves: Sequence[Curve], top: int = 0) -> Iterator[str]:
     for number, curve in enumerate(curves):
         unit = f" [{curve.unit}]" if curve.unit else ""
         axis = f" (axis {curve.axis})" if curve.axis > 1 else ""
-        y = _LEGEND_HEIGHT * (number + 1) - 3
+        y = top + _LEGEND_HEIGHT * (number + 1) - 3
         yield _text_element(
             _AXIS_WIDTH, y, "start", f"━ {curve.label}{unit}{axis}", COLOURS[number % len(COLOURS)]
         )
@@ -323,26 +432,31 @@ def html_page(
     series: Sequence[Series], view: View, width: int = 960, height: int = 400, title: str = "canmon"
 ) -> str:
     """Return a page that needs nothing else; what is read out are the values of a column."""
-    area = _area_of(len({one.axis for one in series}), len(series), width, height)
-    curves = [
+    area = _area_of(series, width, height, title)
+    drawn = chart(series, view, area.width)
+    curves: list[dict[str, object]] = [
         {
             "label": curve.label,
             "unit": curve.unit,
             "stops": [(x, float(f"{bar.last:.7g}")) for x, bar in curve.stops],
         }
-        for curve in chart(series, view, area.width).curves
+        for curve in drawn.curves
+    ]
+    curves += [
+        {"label": band.label, "unit": "", "stops": [(run.begin, run.name) for run in band.runs]}
+        for band in drawn.bands
     ]
     data = {
         "left": area.left,
         "top": area.top,
-        "height": area.height,
+        "height": area.height + 2 * _BAND_HEIGHT * len(drawn.bands),
         "columns": area.width,
         "from": view.seconds(view.from_us),
         "span": view.span_us / 1e6,
         "curves": curves,
     }
     text = json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
-    parts = {"title": escape(title), "svg": svg(series, view, width, height), "data": text}
+    parts = {"title": escape(title), "svg": svg(series, view, width, height, title), "data": text}
     return re.sub("@(title|svg|data)@", lambda place: parts[place[1]], _PAGE.read_text("utf-8"))
 
 
@@ -411,16 +525,18 @@ class Reading(NamedTuple):
         value: of the latest sample at or before the moment; None before the first.
         age_us: how old that sample is.
         unit: of the value.
+        state: its name, where the value is a state.
     """
 
     label: str
     value: float | None
     age_us: int
     unit: str
+    state: str = ""
 
     def __str__(self) -> str:
         """Write it for people."""
-        value = "-" if self.value is None else f"{self.value:.6g}"
+        value = self.state or ("-" if self.value is None else f"{self.value:.6g}")
         return f"{self.label} {value} {self.unit}".rstrip()
 
 
@@ -434,7 +550,8 @@ def _reading(series: Series, at_us: int) -> Reading:
     if index is None:
         return Reading(series.label, None, 0, series.unit)
     age_us = at_us - series.at_us[index]
-    return Reading(series.label, series.values[index], age_us, series.unit)
+    value = series.values[index]
+    return Reading(series.label, value, age_us, series.unit, series.name(value))
 
 
 _COLOURS: Final = (36, 33, 35, 32, 34, 31)
@@ -464,10 +581,12 @@ def render(
     """
     width, height = max(width, _LEAST_WIDTH), max(height, _LEAST_HEIGHT)
     names = _names(series, view.cursor_us, width, colour)[: height - 5]
-    two_axes = len({one.axis for one in series}) > 1
+    curves = [one for one in series if one.names is None]
+    two_axes = len({one.axis for one in curves}) > 1
     inner = width - LABEL_WIDTH * (1 + two_axes) - 1
-    rows = height - len(names) - 2
     drawn = chart(series, view, inner * DOTS_X)
+    bands = [_band_line(band, inner, colour) for band in drawn.bands][: height - len(names) - 3]
+    rows = height - len(names) - 2 - len(bands)
     canvas = _drawn(drawn, inner, rows)
     marked = None if view.cursor_us is None else _cell(view.cursor_us, view, inner)
     left, right = (_labels(drawn, number, rows) for number in (0, 1))
@@ -476,7 +595,20 @@ def render(
         f"{_painted(canvas.row(row), marked, colour)}{right.get(row, '')}"
         for row in range(rows)
     ]
-    return [*names, *lines, *_time_axis(view, inner)]
+    lines = lines if curves or not bands else []
+    return [*names, *lines, *bands, *_time_axis(view, inner)]
+
+
+def _band_line(band: Band, inner: int, colour: bool) -> str:
+    """Write states as a line: each begins with a bar and its name as far as there is room."""
+    cells = [" "] * inner
+    for run in band.runs:
+        begin, end = run.begin // DOTS_X, max(run.end // DOTS_X, run.begin // DOTS_X + 1)
+        text = f"▏{one_line(run.name)}"[: end - begin].ljust(end - begin)
+        cells[begin:end] = text[: max(0, inner - begin)]
+    line = "".join(cells[:inner])
+    label = one_line(band.label)[-LABEL_WIDTH:]
+    return f"{label:>{LABEL_WIDTH}}│{_coloured(line, 3) if colour else line}"
 
 
 def _names(series: Sequence[Series], cursor_us: int | None, width: int, colour: bool) -> list[str]:

@@ -30,9 +30,13 @@ from operator import le
 from typing import TYPE_CHECKING, Final
 
 from tickrig.host.canmon.model.decode.decoded import Decoded, Signal
-from tickrig.host.canmon.model.decode.node_memory import BITS
+from tickrig.host.canmon.model.decode.node_memory import BITS, drive_state
+from tickrig.host.canmon.model.decode.services import nmt_state_name
 from tickrig.host.canmon.model.frames import Record
-from tickrig.wire.can import MAX_DATA_BYTES, ErrorFrame
+from tickrig.host.canmon.model.traffic import NO_RATES, BitRates
+from tickrig.wire.can import MAX_DATA_BYTES, ErrorFrame, FdFrame, frame_bits
+from tickrig.wire.canopen.emcy import describe
+from tickrig.wire.canopen.nmt import NmtState
 
 if TYPE_CHECKING:
     import numpy as np
@@ -219,6 +223,37 @@ class ObjectName:
 
 
 @dataclass(frozen=True, slots=True)
+class BusSignal:
+    """What a bus or a node does, beside the values of objects.
+
+    Attributes:
+        kind: of `BUS_SIGNALS`.
+        node: node-ID, None for any.
+    """
+
+    kind: str
+    node: int | None = None
+
+
+LOAD, NMT, EMCY, SDO, SYNC_JITTER = "load", "nmt", "emcy", "sdo", "sync jitter"
+BUS_SIGNALS: Final = {
+    LOAD: "load of the bus, in tenths of a second",
+    NMT: "NMT state, as a node tells it",
+    EMCY: "error, until it is reset",
+    SDO: "duration of SDO transfers",
+    SYNC_JITTER: "difference of each SYNC period from the one before",
+}
+"""Words for signals that no frame carries, and what they are."""
+
+OF_NODES: Final = (NMT, EMCY, SDO)
+"""Those that each node has."""
+
+_BUS_SIGNAL: Final = re.compile(
+    r"(?:([0-9]{1,3})\.)?(nmt|emcy|sdo)|load|sync[ ._-]jitter", re.ASCII
+)
+
+
+@dataclass(frozen=True, slots=True)
 class CurveSpec:
     """A curve that is asked for.
 
@@ -230,7 +265,7 @@ class CurveSpec:
     """
 
     label: str
-    source: FrameSlice | ObjectName
+    source: FrameSlice | ObjectName | BusSignal
     axis: int
     text: str
 
@@ -249,7 +284,11 @@ def parse_signal(text: str) -> CurveSpec:
     return CurveSpec(label or "", source, int(axis or 1), signal)
 
 
-def _object(text: str) -> ObjectName:
+def _object(text: str) -> ObjectName | BusSignal:
+    told = _BUS_SIGNAL.fullmatch(text.lower())
+    if told is not None and 1 <= int(told[1] or 1) <= 127:
+        kind = told[2] or (LOAD if told[0] == LOAD else SYNC_JITTER)
+        return BusSignal(kind, int(told[1]) if told[1] else None)
     match = _OBJECT.fullmatch(text)
     if match is None or not 1 <= int(match[1] or 1) <= 127:
         raise ValueError(f"{text!r} is neither an object, as 3.position, nor a slice, as 181[2:6]s")
@@ -273,6 +312,7 @@ class Series:
         at_us: the times.
         values: as many values.
         not_numbers: how many values were NaN or infinite; they are left out.
+        names: of values that are states; None where they are numbers.
     """
 
     label: str
@@ -282,6 +322,7 @@ class Series:
     at_us: array[int] = field(default_factory=lambda: array("q"))
     values: array[float] = field(default_factory=lambda: array("d"))
     not_numbers: int = 0
+    names: dict[float, str] | None = None
 
     def __len__(self) -> int:
         """Count the samples."""
@@ -309,6 +350,17 @@ class Series:
             return
         for time_us, value in zip(times, numbers, strict=True):
             self.append(time_us, value)
+
+    def append_state(self, at_us: int, value: float, name: str) -> None:
+        """Add a state."""
+        if self.names is None:
+            self.names = {}
+        self.names[value] = name
+        self.append(at_us, value)
+
+    def name(self, value: float) -> str:
+        """Return the name of a state; empty for a number."""
+        return "" if self.names is None else self.names.get(value, f"{value:g}")
 
     def clear(self) -> None:
         """Forget the samples."""
@@ -396,28 +448,48 @@ class Collector:
         words: the signals.
         decoder: for objects; without one they have no values.
         most: as `Series.most`.
+        rates: of the bus, for its load.
+        each_node: a signal of any node has a series for each node that has it.
 
     Attributes:
         series: one for each word.
+        heard: names of the objects that were heard while one was looked for.
     """
 
     def __init__(
-        self, words: Sequence[CurveSpec], decoder: Decoder | None = None, most: int = 0
+        self,
+        words: Sequence[CurveSpec],
+        decoder: Decoder | None = None,
+        most: int = 0,
+        rates: BitRates = NO_RATES,
+        *,
+        each_node: bool = False,
     ) -> None:
         self.series = [Series(word.label or word.text, word.axis, most=most) for word in words]
-        self._decoder = decoder
+        self.heard: dict[str, None] = {}
+        self._decoder, self._each_node, self._rates = decoder, each_node, rates
         self._slices: defaultdict[int, list[tuple[FrameSlice, Series]]] = defaultdict(list)
         self._objects: list[_Object] = []
+        self._samplers: list[_Sampler] = []
         for word, series in zip(words, self.series, strict=True):
-            if isinstance(word.source, FrameSlice):
-                self._slices[word.source.key].append((word.source, series))
-            else:
-                self._objects.append(_Object(word, word.source, series))
+            match word.source:
+                case FrameSlice():
+                    self._slices[word.source.key].append((word.source, series))
+                case BusSignal():
+                    self._samplers.append(_Sampler(word, word.source, series, rates))
+                case _:
+                    self._objects.append(_Object(word, word.source, series, self.heard))
+
+    @property
+    def missing(self) -> list[str]:
+        """The objects that were not heard, as they were written."""
+        return [one.text for one in self._objects if not one.is_found]
 
     def join(self, other: Collector) -> None:
         """Take over the signals of another one, with their samples."""
         self.series += other.series
         self._objects += other._objects
+        self._samplers += other._samplers
         for key, pairs in other._slices.items():
             self._slices[key] += pairs
 
@@ -427,10 +499,11 @@ class Collector:
         for pairs in self._slices.values():
             pairs[:] = [pair for pair in pairs if pair[1] is not gone]
         self._objects = [wanted for wanted in self._objects if wanted.series is not gone]
+        self._samplers = [wanted for wanted in self._samplers if wanted.series is not gone]
 
     def take(self, record: Record) -> None:
         """Take the values in a frame."""
-        wanted = self._objects and self._decoder
+        wanted = (self._objects or self._samplers) and self._decoder
         self.take_decoded(record, wanted.take(record) if wanted else None)
 
     def take_decoded(self, record: Record, decoded: Decoded | None) -> None:
@@ -445,6 +518,22 @@ class Collector:
         if decoded is not None and decoded.signals:
             for wanted in self._objects:
                 wanted.take(at_us, decoded)
+        for sampler in self._samplers:
+            fresh = sampler.take(record, decoded)
+            if fresh is not None and self._each_node:
+                self._sample(sampler, fresh, record, decoded)
+
+    def _sample(self, beside: _Sampler, node: int, record: Record, decoded: Decoded | None) -> None:
+        """Begin a series of one more node that has a signal of any node."""
+        for one in self._samplers:
+            if (one.wanted.kind, one.node) == (beside.wanted.kind, node):
+                return
+        word = replace(beside.word, source=BusSignal(beside.wanted.kind, node))
+        series = Series("", word.axis, most=beside.series.most)
+        sampler = _Sampler(word, BusSignal(beside.wanted.kind, node), series, self._rates)
+        sampler.take(record, decoded)
+        self.series.append(series)
+        self._samplers.append(sampler)
 
     def take_all(self, records: Iterable[Record]) -> None:
         """Take the values in frames."""
@@ -463,15 +552,131 @@ class Collector:
                 series.extend(columns.at_us[whole].tobytes(), values.tobytes())
 
 
+_LOAD_US: Final = 100_000
+_NO_ERROR: Final = range(0x0000, 0x0100)
+
+
+class _Sampler:
+    """Takes a signal that no frame carries: what a bus or a node does.
+
+    Args:
+        word: as it was written.
+        wanted: the signal; one of any node is that of the first that has it.
+        series: of its values.
+        rates: of the bus.
+    """
+
+    def __init__(self, word: CurveSpec, wanted: BusSignal, series: Series, rates: BitRates) -> None:
+        self.word, self.wanted, self.series, self.node = word, wanted, series, wanted.node
+        self._rates, self._channel = rates, ""
+        self._begin_us, self._bits = -1, 0
+        self._sync_us, self._gap_us = -1, -1
+        series.unit = {SDO: "ms", SYNC_JITTER: "ms"}.get(wanted.kind, "")
+        if wanted.kind == LOAD:
+            series.unit = "kbit/s" if rates.nominal is None else "%"
+        if wanted.kind in (NMT, EMCY):
+            series.names = {}
+        if wanted.node is not None and not word.label:
+            series.label = f"{wanted.node}.{wanted.kind}"
+
+    def take(self, record: Record, decoded: Decoded | None) -> int | None:
+        """Take a frame; of a signal of any node, return the node-ID of another one that has it."""
+        if self.wanted.kind == LOAD:
+            self._load(record)
+        elif decoded is None:
+            return None
+        elif self.wanted.kind == SYNC_JITTER:
+            if decoded.kind == "sync":
+                self._sync(record)
+        elif decoded.node is not None and (values := self._values(decoded)):
+            if self.node is None:
+                self.node = decoded.node
+                self.series.label = self.word.label or f"{self.node}.{self.wanted.kind}"
+            if decoded.node != self.node:
+                return decoded.node if self.wanted.node is None else None
+            for value, name in values:
+                if name:
+                    self.series.append_state(record.at_us, value, name)
+                else:
+                    self.series.append(record.at_us, value)
+        return None
+
+    def _values(self, decoded: Decoded) -> list[tuple[float, str]]:
+        """Return what a frame says of the signal of its node, each with its name if it has one."""
+        kind, told = decoded.kind, decoded.signals[0].value if decoded.signals else None
+        match self.wanted.kind:
+            case "sdo":
+                return [(one.duration_us / 1e3, "") for one in decoded.transfers]
+            case "nmt" if kind == "boot-up":
+                return [(NmtState.PRE_OPERATIONAL, nmt_state_name(NmtState.PRE_OPERATIONAL))]
+            case "nmt" if kind in ("heartbeat", "guard") and isinstance(told, int):
+                return [(told, nmt_state_name(told))]
+            case "emcy" if kind == "emcy" and isinstance(told, int):
+                name = "no error" if told in _NO_ERROR else f"{told:04X}h {describe(told)}"
+                return [(told, name)]
+            case _:
+                return []
+
+    def _load(self, record: Record) -> None:
+        """Count the bits of a frame; what a window had is told when it is over."""
+        at_us, channel, frame, _ = record
+        if self._begin_us < 0:
+            self._begin_us, self._channel = at_us, channel
+        if channel != self._channel or isinstance(frame, ErrorFrame):
+            return
+        windows = (at_us - self._begin_us) // _LOAD_US
+        if windows > 0:
+            self.series.append(self._begin_us + _LOAD_US, self._per_window())
+            self._bits = 0
+            if windows > 1:  # silence begins and ends with a 0
+                self.series.append(self._begin_us + 2 * _LOAD_US, 0)
+                self.series.append(self._begin_us + windows * _LOAD_US, 0)
+            self._begin_us += windows * _LOAD_US
+        self._bits += self._rates.bits(frame) if isinstance(frame, FdFrame) else frame_bits(frame)
+
+    def _per_window(self) -> float:
+        bits_s = self._bits * 1e6 / _LOAD_US
+        return bits_s / 1e3 if not self._rates.nominal else bits_s * 100 / self._rates.nominal
+
+    def _sync(self, record: Record) -> None:
+        at_us, channel = record.at_us, record.channel
+        if self._sync_us < 0:
+            self._sync_us, self._channel = at_us, channel
+        elif channel == self._channel:
+            gap_us = at_us - self._sync_us
+            if self._gap_us >= 0:
+                self.series.append(at_us, abs(gap_us - self._gap_us) / 1e3)
+            self._sync_us, self._gap_us = at_us, gap_us
+
+
+_STATUSWORD: Final = "statusword"
+
+
 class _Object:
     """An object that is waited for."""
 
-    def __init__(self, word: CurveSpec, wanted: ObjectName, series: Series) -> None:
+    def __init__(
+        self, word: CurveSpec, wanted: ObjectName, series: Series, heard: dict[str, None]
+    ) -> None:
         self._word, self._wanted, self.series = word, wanted, series
+        self._heard = heard
         self._found: tuple[int | None, str] | None = None
+        self._is_state = False
+
+    @property
+    def is_found(self) -> bool:
+        """Whether it was heard."""
+        return self._found is not None
+
+    @property
+    def text(self) -> str:
+        """How it was written."""
+        return self._word.text
 
     def take(self, at_us: int, decoded: Decoded) -> None:
         """Take its value, if it is among the signals."""
+        if self._found is None and len(self._heard) < _MOST_HEARD:
+            self._heard |= dict.fromkeys(_named(decoded.node, one.name) for one in decoded.signals)
         if self._wanted.node not in (None, decoded.node):
             return
         for signal in decoded.signals:
@@ -479,15 +684,27 @@ class _Object:
             if self._found is None and signal.name.lower().startswith(self._wanted.name):
                 self._find(place, signal.unit)
             if place == self._found and (value := self._wanted.value(signal)) is not None:
-                self.series.append(at_us, value)
+                if self._is_state and signal.text:
+                    name = drive_state(int(value)) or signal.text
+                    self.series.append_state(at_us, value, name)
+                else:
+                    self.series.append(at_us, value)
 
     def _find(self, place: tuple[int | None, str], unit: str) -> None:
         """Keep to the first that fits, and call the curve so."""
         self._found = place
+        self._is_state = self._wanted.bit is None and place[1] == _STATUSWORD
         if self._wanted.bit is None:
             self.series.unit = unit
         if not self._word.label:
-            node, name = place
             begun = self._word.text.lower().rfind(self._wanted.name)
             bit = self._word.text[begun + len(self._wanted.name) :]
-            self.series.label = f"{'' if node is None else f'{node}.'}{name}{bit}"
+            self.series.label = _named(*place) + bit
+
+
+_MOST_HEARD: Final = 2_000
+"""Names that are kept to guess which one was meant."""
+
+
+def _named(node: int | None, name: str) -> str:
+    return f"{'' if node is None else f'{node}.'}{name}"

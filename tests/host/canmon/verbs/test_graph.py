@@ -153,3 +153,107 @@ def test_what_a_pipe_brought_is_drawn_when_it_ends(log: str) -> None:
     terminal = Terminal("graph", "-", "way=185[2:6]s", feed=Path(log))
     assert terminal.end() == 0
     assert "━ way 1600" in terminal.text()
+
+
+BUS = """\
+(1600000000.000000) can0 705#00
+(1600000000.010000) can0 080#
+(1600000000.020000) can0 080#
+(1600000000.033000) can0 080#
+(1600000000.100000) can0 705#05
+(1600000000.150000) can0 605#4041600000000000
+(1600000000.152000) can0 585#4B41600037020000
+(1600000000.200000) can0 085#3081110000000000
+(1600000000.250000) can0 185#370200000000
+(1600000000.300000) can0 085#0000000000000000
+(1600000000.350000) can0 185#180201000000
+(1600000000.400000) can0 709#7F
+(1600000000.450000) can0 705#04
+"""
+
+
+@pytest.fixture
+def bus(tmp_path: Path) -> str:
+    (path := tmp_path / "bus.log").write_text(BUS)
+    return str(path)
+
+
+def rows(path: Path) -> list[str]:
+    return path.read_text().splitlines()
+
+
+def test_without_a_signal_all_are_listed(bus: str) -> None:
+    result = canmon(bus, "--eds", f"5={EDS}")
+    assert result.exit_code == 0, result.output
+    lines = [" ".join(line.split()) for line in result.stdout.splitlines()]
+    assert lines[0] == "node 5"
+    assert "5.statusword tpdo1 4.44/s operation enabled, fault" in lines
+    assert "5.position_actual_value tpdo1 4.44/s 0 .. 1" in lines
+    assert lines[3:6] == ["5.nmt 5.emcy 5.sdo", "node 9", "9.nmt 9.emcy 9.sdo"]
+    assert lines[-3:-1] == ["bus", "load sync jitter"]
+
+
+def test_a_large_log_is_listed_like_a_small_one(bus: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    one_by_one = canmon(bus, "--eds", f"5={EDS}").stdout
+    monkeypatch.setattr("tickrig.host.canmon.sources.source.SMALL_BYTES", 0)
+    assert canmon(bus, "--eds", f"5={EDS}").stdout == one_by_one
+
+
+@pytest.mark.parametrize(
+    ("word", "meant"),
+    [("5.statuswrd", "5.statusword"), ("4.statusword", "5.statusword"), ("5.nmmt", "5.nmt")],
+)
+def test_a_misspelt_signal_is_refused_with_the_one_that_is_near(
+    bus: str, word: str, meant: str
+) -> None:
+    result = canmon(bus, word, "--eds", f"5={EDS}")
+    assert result.exit_code == 2
+    assert f"did you mean {meant!r}?" in result.stderr
+
+
+def test_a_statusword_is_its_states(bus: str, tmp_path: Path) -> None:
+    files = [tmp_path / name for name in ("g.csv", "g.svg", "g.html", "g.png")]
+    words = [word for file in files for word in ("-o", str(file))]
+    result = canmon(bus, "5.statusword", "--eds", f"5={EDS}", *words, "--title", "A <drive>")
+    assert (result.exit_code, result.stdout) == (0, "")
+    assert [row.split(",")[1] for row in rows(files[0])] == [
+        "5.statusword",
+        *("operation enabled", "operation enabled", "fault"),
+    ]
+    svg = files[1].read_text("utf-8")
+    assert "<title>fault</title>" in svg
+    assert "A &lt;drive&gt;, bus.log, 0 s is 2020-09-13" in svg
+    assert '"operation enabled"' in files[2].read_text("utf-8")
+    shown = CliRunner(env={"COLUMNS": "60", "LINES": "9"}).invoke(
+        main, ["graph", bus, "5.statusword", "--eds", f"5={EDS}"]
+    )
+    assert "tatusword│▏operation enabled" in shown.stdout
+
+
+def test_what_a_bus_and_its_nodes_do_are_signals(bus: str, tmp_path: Path) -> None:
+    words = ("5.nmt", "5.emcy", "5.sdo", "sync jitter", "-o", str(tmp_path / "g.csv"))
+    assert canmon(bus, *words).exit_code == 0
+    assert rows(tmp_path / "g.csv") == [
+        "t_s,5.nmt,5.emcy,5.sdo [ms],sync jitter [ms]",
+        "1600000000.000000,pre-operational,,,",
+        "1600000000.033000,,,,3",
+        "1600000000.100000,operational,,,",
+        "1600000000.152000,,,2,",
+        "1600000000.200000,,8130h life guard error or heartbeat error,,",
+        "1600000000.300000,,no error,,",
+        "1600000000.450000,stopped,,,",
+    ]
+
+
+def test_a_signal_of_any_node_has_a_row_for_each(bus: str, tmp_path: Path) -> None:
+    assert canmon(bus, "nmt", "-o", str(tmp_path / "g.csv")).exit_code == 0
+    assert rows(tmp_path / "g.csv")[0] == "t_s,5.nmt,9.nmt"
+
+
+def test_the_load_is_a_share_of_the_bit_rate(bus: str, tmp_path: Path) -> None:
+    for words, head in ((("-b", "500k"), "t_s,load [%]"), ((), "t_s,load [kbit/s]")):
+        assert canmon(bus, "load", "-o", str(tmp_path / "g.csv"), *words).exit_code == 0
+        assert rows(tmp_path / "g.csv")[0] == head
+    assert [row.partition(",")[0][-8:] for row in rows(tmp_path / "g.csv")[1:]] == [
+        *("0.100000", "0.200000", "0.300000", "0.400000"),
+    ]
