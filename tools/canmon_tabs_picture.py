@@ -1,4 +1,4 @@
-"""Draw each tab of the monitor, and its settings, at three sizes: small SVG files of one virtual run.
+"""Draw each tab of the monitor and its settings at three sizes: SVG files of one virtual run.
 
 `python tools/canmon_tabs_picture.py docs/pictures` draws them all, and
 `python tools/canmon_tabs_picture.py docs/pictures nodes-80x24` some of them.

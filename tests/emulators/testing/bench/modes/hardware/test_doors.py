@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import can
@@ -50,7 +50,11 @@ def bench() -> Iterator[Bench]:
 @pytest.mark.parametrize("fault", [*NODE_FAULTS, "drive/drop", "drop=0.5@2s-3s"])
 def test_a_fault_of_frames_is_refused_on_real_nodes(bench: Bench, fault: str) -> None:
     name = fault.partition("=")[0]
-    for ordered in (lambda: bench.fault(fault), lambda: bench["drive"].clear(name)):
+    orders: list[Callable[[], object]] = [
+        lambda: bench.fault(fault),
+        lambda: bench["drive"].clear(name),
+    ]
+    for ordered in orders:
         with pytest.raises(NotOnThisBench, match=r"no hand can make .*: it changes what passes"):
             ordered()
     assert told(bench) == []
