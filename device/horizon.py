@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from tickrig.device.twin import Part
 
 
+@dataclass
 class Horizon(Part):
     """Time limits of a rig, shared with its devices that have an attribute `horizon`.
 
@@ -14,7 +17,5 @@ class Horizon(Part):
             event queue; only its traffic is observed.
     """
 
-    __slots__ = ("passed_us", "until_us")
-
-    def __init__(self) -> None:
-        self.passed_us = self.until_us = 0
+    passed_us: int = 0
+    until_us: int = 0

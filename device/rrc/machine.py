@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import ClassVar, Final
+from typing import Final
 
+from tickrig._compiled import mypyc_attr
 from tickrig.device.physical import InputBank, OutputSignal
 from tickrig.device.rrc.board import OUTPUTS, Buzzer, LoadAccount, PowerSequence, new_inputs
 from tickrig.device.rrc.drive import Drive, chosen_mode, count_button_edges
@@ -164,6 +165,7 @@ _MOVES: Final[dict[type[cmd.Command], Move]] = {
 }
 
 
+@mypyc_attr(allow_interpreted_subclasses=True, serializable=True)
 @dataclass(slots=True)
 class Rrc(Copyable):
     """The Robotic Relay Communicator with the VR2 wheelchair around it; a `Device[bytes]`.
@@ -173,13 +175,11 @@ class Rrc(Copyable):
     sounds like, the USB serial driver.
 
     Attributes:
-        type_name: name of its device type, for traces.
         config: durations, names and sizes.
         inputs: its physical inputs, see `board.INPUTS`.
         state: state in the manual's state diagram.
     """
 
-    type_name: ClassVar[str] = "rrc"
     config: RrcConfig = field(default_factory=RrcConfig)
     inputs: InputBank = field(default_factory=new_inputs)
     state: RrcState = field(default=RrcState.OFF, init=False)
@@ -200,6 +200,11 @@ class Rrc(Copyable):
     def __post_init__(self) -> None:
         """Start without power."""
         self.reset()
+
+    @property
+    def type_name(self) -> str:
+        """Name of its device type, for traces."""
+        return "rrc"
 
     @property
     def tick_us(self) -> int:

@@ -6,7 +6,8 @@ from collections import deque
 from dataclasses import dataclass
 from math import gcd
 
-from tickrig.device.twin import Copyable
+from tickrig._compiled import mypyc_attr
+from tickrig.device.twin import Copyable, Part
 from tickrig.emulators.rig.port import LineUart
 from tickrig.wire.instant import NEVER
 from tickrig.wire.uart import PS_PER_US, UartSetting
@@ -42,6 +43,7 @@ from tickrig.wire.uart import PS_PER_US, UartSetting
 # burst.
 
 
+@mypyc_attr(allow_interpreted_subclasses=True, serializable=True)
 class SerialLine(Copyable):
     """Two ends joined by two independent directions.
 
@@ -80,7 +82,7 @@ class SerialLine(Copyable):
         self.b = LineEnd(there, back, uart)
 
 
-class LineEnd:
+class LineEnd(Part):
     """One end of a `SerialLine`; a `Port[bytes]`."""
 
     __slots__ = ("_in", "_out", "uart")
@@ -168,8 +170,8 @@ class LineEnd:
             self._out.put(now_us, traffic)
 
 
-@dataclass(frozen=True, slots=True)
-class _Timing:
+@dataclass
+class _Timing(Part):
     """How long bytes take: `byte_cost` is the bits of a byte, in millionths."""
 
     baud: int
@@ -181,7 +183,7 @@ class _Timing:
         return self.baud // gcd(self.baud, self.byte_cost)
 
 
-class _Burst:
+class _Burst(Part):
     """Bytes sent back to back."""
 
     __slots__ = ("data", "start_us", "taken", "timing")
@@ -205,7 +207,7 @@ class _Burst:
         self.start_us += count * self.timing.byte_cost // self.timing.baud
 
 
-class _Direction:
+class _Direction(Part):
     """One direction of the line: only the latest burst can still be on its way."""
 
     __slots__ = (

@@ -12,6 +12,10 @@ def test_it_works_every_10_ms_and_begins_at_once() -> None:
     assert (rrc.tick_us, rrc.due_us) == (10_000, 0)
 
 
+def test_it_is_called_as_its_device_type_is() -> None:
+    assert Rrc().type_name == "rrc"
+
+
 def test_it_is_due_at_once_when_an_input_is_set_or_it_is_reset() -> None:
     bench = RrcBench().power_on()
     bench.run(10)
