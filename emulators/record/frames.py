@@ -207,7 +207,7 @@ class FrameLog:
         return self._splitter.last_us
 
     @property
-    def by_gap(self) -> bool:
+    def gap_alone(self) -> bool:
         """Whether silence alone ends frames, so that each one that has begun may be whole."""
         return self._rule.cut is _never_whole
 

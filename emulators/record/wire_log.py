@@ -124,7 +124,7 @@ class WireLog:
         return tuple(
             WireLine(0, at_us, mark, data)
             for mark, (at_us, data) in self._begun.items()
-            if data and by_gap == getattr(self._splitters[mark], "by_gap", False)
+            if data and by_gap == getattr(self._splitters[mark], "gap_alone", False)
         )
 
     def add(

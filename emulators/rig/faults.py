@@ -316,9 +316,11 @@ class FaultType(FaultForm, Generic[W]):
 
     Attributes:
         make: builds the fault of one direction from its trigger and its arguments.
+        uart_error: the error that a UART sees each time it acts: `framing`, `parity`, `breaks`.
     """
 
     make: Callable[[FaultTrigger, FaultArguments], Fault[W]]
+    uart_error: str = field(default="", kw_only=True)
 
 
 class FaultyPort(Copyable, Generic[W]):
@@ -448,20 +450,30 @@ class FaultyPort(Copyable, Generic[W]):
         if not (faults and traffic):
             return traffic
         left = told = traffic
-        for fault in faults.values():
+        for name, fault in faults.items():
             if left:
+                acted = self.acted(name)
                 left = fault(now_us, left)
+                self._note_uart_errors(mark, name, self.acted(name) - acted)
                 if not _is_late(fault):
                     told = left
         self._notify(now_us, mark, traffic, told)
         return left
 
+    def _note_uart_errors(self, mark: Mark, name: str, count: int) -> None:
+        error = self.fault_types[name].uart_error
+        if error and count:
+            for hear in self._port.uart.error_listeners:  # type: ignore[attr-defined] # of a ByteEnd
+                hear(mark, error, count)
+
     def _release(self, mark: Mark, faults: Mapping[str, Fault[W]], now_us: int) -> W | None:
         """Return what faults let go now; it meets those behind them as well."""
         released: W | None = None
-        for fault in faults.values():
+        for name, fault in faults.items():
             if released:
-                before, released = released, fault(now_us, released)
+                before, acted = released, self.acted(name)
+                released = fault(now_us, released)
+                self._note_uart_errors(mark, name, self.acted(name) - acted)
                 if not _is_late(fault):
                     self._notify(now_us, mark, before, released)
             if isinstance(fault, HoldingFault) and fault.due_us <= now_us:

@@ -7,6 +7,7 @@ from typing import Protocol
 
 from tickrig.device.core import W
 from tickrig.device.twin import Part
+from tickrig.host.text.trace import Mark
 from tickrig.wire.uart import UartSetting
 
 
@@ -36,11 +37,14 @@ class LineUart(Part):
         setting: the setting, with the latest change.
         since_us: from when on it counts.
         listeners: called with that time and the new setting; they are copied with the line.
+        error_listeners: called with characters that a fault has spoiled: which way they went, the
+            error that a UART sees (`framing`, `parity`, `breaks`), and how many; copied, too.
     """
 
     def __init__(self, setting: UartSetting) -> None:
         self.setting, self.since_us = setting, 0
         self.listeners: list[Callable[[int, UartSetting], None]] = []
+        self.error_listeners: list[Callable[[Mark, str, int], None]] = []
 
 
 class ByteEnd(Port[bytes], Protocol):

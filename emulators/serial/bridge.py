@@ -248,6 +248,12 @@ class Tap(Copyable, Generic[W]):
         """Change the setting of the device at the end behind."""
         self._port.use_uart(now_us, setting)  # type: ignore[attr-defined] # of a ByteEnd
 
+    @property
+    def uart(self) -> LineUart:
+        """The setting of the device, if the port is an end of a line."""
+        uart: LineUart = self._port.uart  # type: ignore[attr-defined] # of a ByteEnd
+        return uart
+
     def _hear(self, now_us: int, mark: Mark, traffic: W) -> None:
         for hear in self.listeners:
             hear(now_us, mark, traffic)

@@ -318,13 +318,18 @@ BYTE_FAULTS: Final[Mapping[str, FaultType[bytes]]] = {
         "the line is 0 before an answer: the host reads a byte of 0",
         _Break,
         arguments=(_time("time", "how long", "2ms"), _FRAME, WAY),
+        uart_error="breaks",
     ),
     "framing": FaultType(
         "a byte arrives one bit short, its stop bit as highest data bit",
         _Framing,
         arguments=(WAY,),
+        uart_error="framing",
     ),
     "parity": FaultType(
-        "a data bit of a byte is turned over, its parity bit is not", _Parity, arguments=(WAY,)
+        "a data bit of a byte is turned over, its parity bit is not",
+        _Parity,
+        arguments=(WAY,),
+        uart_error="parity",
     ),
 }

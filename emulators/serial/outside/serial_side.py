@@ -16,6 +16,7 @@ from tickrig.emulators.rig.event_queue import EventQueue
 from tickrig.emulators.rig.port import ByteEnd
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_waits import Looks, OneThread
+from tickrig.host.text.trace import Mark
 from tickrig.wire.instant import NEVER
 from tickrig.wire.uart import PS_PER_US, Character, UartReceiver, UartSetting
 
@@ -521,6 +522,15 @@ class SerialSide(Copyable):
         self.modem_lines.cts_changed = self._release
         self._changes: deque[tuple[int, UartSetting]] = deque()  # of the device, to come
         end.uart.listeners.append(self._device_changes)
+        end.uart.error_listeners.append(self._spoiled)
+
+    def _spoiled(self, mark: Mark, error: str, count: int) -> None:
+        """Count what a fault of the line has spoiled; without a parity bit none is wrong."""
+        if self.device is None or (error == "parity" and self.device.parity == "N"):
+            return
+        to_device = mark is Mark.TO_DEVICE
+        errors = self.transmitter.errors if to_device else self.receiver.errors
+        setattr(errors, error, getattr(errors, error) + count)
 
     def _device_changes(self, since_us: int, setting: UartSetting) -> None:
         """Note that the device changes its setting, now or behind what it still sends."""

@@ -27,10 +27,11 @@ from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.byte_faults import BYTE_FAULTS
 from tickrig.emulators.serial.outside.serial_ports import SERIAL_PORTS
-from tickrig.emulators.serial.outside.serial_side import SerialSide
+from tickrig.emulators.serial.outside.serial_side import SerialSide, UartErrors
 from tickrig.emulators.serial.rs485_line import Rs485Line
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.emulators.testing.bench.bench import Bench
+from tickrig.wire.uart import Parity, UartSetting
 
 ROOT = Path(__file__).parents[3]
 
@@ -140,6 +141,33 @@ def test_a_parity_error_turns_over_one_bit_of_a_byte(bench: Bench) -> None:
     bench.run_for("5ms")
     heard = bench.link.receive(0)
     assert [(a ^ b).bit_count() for a, b in zip(heard, b"aaaa\n", strict=True)] == [1] * 5
+
+
+@pytest.mark.parametrize(
+    ("fault", "parity", "counted"),
+    [
+        ("framing=count=2", "N", (UartErrors(framing=2), UartErrors())),
+        ("framing=request,count=1", "N", (UartErrors(), UartErrors(framing=1))),
+        ("parity=request", "E", (UartErrors(), UartErrors(parity=2))),
+        ("parity", "E", (UartErrors(parity=2), UartErrors())),
+        ("parity", "N", (UartErrors(), UartErrors())),  # no parity bit, so no UART notices
+        ("break=count=1", "N", (UartErrors(breaks=1), UartErrors())),
+        ("flip=1", "E", (UartErrors(), UartErrors())),
+    ],
+)
+def test_uarts_count_the_characters_that_a_fault_has_spoiled(
+    fault: str, parity: Parity, counted: tuple[UartErrors, UartErrors]
+) -> None:
+    line = SerialLine()
+    port = FaultyPort(line.a, BYTE_FAULTS, seed=3)
+    rig = Rig(Station(Changing(115_200), port))
+    side = SerialSide(rig, line.b, UartSetting(115_200, parity=parity))
+    name, _, words = fault.partition("=")
+    port.arm(name, *filter(None, words.split(",")))
+    side.transmitter.send(0, b"a\n")
+    rig.run_for(50_000)
+    side.receiver.poll(rig.now_us)
+    assert (side.receiver.errors, side.transmitter.errors) == counted
 
 
 def test_a_fault_acts_by_line_or_frame_and_on_requests_if_it_is_told_to(bench: Bench) -> None:
