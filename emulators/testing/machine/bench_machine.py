@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, ClassVar, Final, NamedTuple, TypeVar
 
+from tickrig.emulators.rig.faults import FaultForm, bind_arguments
 from tickrig.emulators.testing.bench.bench import Bench
 from tickrig.host.text.names import near
 from tickrig.host.text.values import Setting
@@ -33,11 +34,11 @@ class World:
 
     Args:
         bench: the bench, in virtual time.
-        faults: names of faults that may come; all unless given.
+        faults: names of faults that may come, with arguments if wanted; all unless given.
         inputs: names of inputs that may change; all but the objects of nodes unless given.
 
     Attributes:
-        faults: those that may come, by name.
+        faults: those that may come, by name and arguments.
         inputs: those that may change.
 
     Raises:
@@ -58,7 +59,9 @@ class World:
         ]
         movable = {item.name: item for item in table if item.type in ("level", "button")}
         usual = [name for name in movable if not name.rpartition("/")[2].startswith("0x")]
-        self.faults = {name: forms[name] for name in _known(faults, forms, forms, "fault")}
+        self.faults = {
+            name: forms[_bare(name, forms)] for name in _known(faults, forms, forms, "fault")
+        }
         self.inputs = [movable[name] for name in _known(inputs, usual, movable, "input")]
         self._wire_faults = [name for name in forms if name not in described.inputs]
         self._watched = [*usual, *(item.name for item in table if item.type == "fault")]
@@ -77,6 +80,20 @@ class World:
                 self._bench.set(name, value)
 
 
+def _bare(name: str, known: Mapping[str, Any]) -> str:
+    """Return the name of a fault that is written with arguments of its own.
+
+    Raises:
+        ValueError: arguments that it does not take.
+    """
+    bare, has_words, words = name.partition("=")
+    form = known.get(bare)
+    if not (has_words and isinstance(form, FaultForm) and form.arguments):
+        return name
+    bind_arguments(bare, form, words.split(","))
+    return bare
+
+
 def _known(
     wanted: Sequence[str] | None,
     usual: Sequence[str] | Mapping[str, Any],
@@ -89,7 +106,7 @@ def _known(
     if isinstance(wanted, str):
         raise ValueError(f"{noun}s is a tuple of names: ({wanted!r},), not {wanted!r}")
     for name in wanted:
-        if name not in known:
+        if _bare(name, known) not in known:
             bare, rate, _ = name.partition("=")
             if rate and bare in known:
                 raise ValueError(
@@ -145,6 +162,7 @@ class BenchMachine:
         bench: the bench, in virtual time.
         world: what may happen to the bench beside the host's calls.
         faults: names of the faults that may come, each for a while; all of the bench unless given.
+            One that has arguments of its own may be written with them: `"sdo_slow=2s"`.
         inputs: names of the inputs and buttons that may change; all of the bench unless given.
         traffic: what somebody else may send: frames in candump's notation, or bytes in hex to a
             device; where there are several wires with a device before them: `drive/705#00`.

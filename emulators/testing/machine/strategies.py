@@ -95,10 +95,10 @@ def _faults(world: World, for_: Sequence[str]) -> st.SearchStrategy[HostStep]:
         wait_us = draw(timing())
         name = draw(st.sampled_from(list(world.faults)))
         form = world.faults[name]
-        rate = draw(st.sampled_from(_RATES)) if form.rated else ""
-        if form.arguments:  # a bare word is one of them
+        rate = draw(st.sampled_from(_RATES)) if form.rated and "rate=" not in name else ""
+        if form.arguments and rate:  # a bare word is one of them
             rate = "" if rate == "1" else f"rate={rate}"
-        rate = f"={rate}" if rate else ""
+        rate = f"{',' if '=' in name else '='}{rate}" if rate else ""
         return HostStep(wait_us, "fault", name + rate, us_of(draw(st.sampled_from(for_))))
 
     return fault()
@@ -175,9 +175,8 @@ def steps(machine: BenchMachine, most: int) -> st.SearchStrategy[list[HostStep]]
 def _with_seed(world: World, drawn: list[HostStep], seed: int) -> list[HostStep]:
     """Return a run whose faults by chance are others; those of seed 0 are the bench's own."""
     # Faults without a rate draw too, such as `jitter` and `garbage`.
-    noisy = any(
-        step.verb == "fault" and world.faults[step.what.partition("=")[0]].rated for step in drawn
-    )
+    rated = {name.partition("=")[0] for name, form in world.faults.items() if form.rated}
+    noisy = any(step.verb == "fault" and step.what.partition("=")[0] in rated for step in drawn)
     return [HostStep(0, SEED, str(seed)), *drawn] if seed and noisy else drawn
 
 

@@ -334,6 +334,27 @@ def test_a_strategy_that_raises_is_not_told_as_a_run() -> None:
     assert not any("a scenario of" in note for note in getattr(caught.value, "__notes__", ()))
 
 
+def test_a_fault_may_be_named_with_its_arguments() -> None:
+    seen: set[str] = set()
+
+    class Watched(Noisy):
+        faults = ("delay=30ms", "truncate=1,rate=0.5")
+
+        def end(self) -> None:
+            lines = self.bench.transcript().splitlines()
+            seen.update(line.split(" ! ")[1] for line in lines if " ! " in line)
+
+    check_host(Watched, max_examples=60, seed=1)
+    assert {"delay=30ms", "delay=30ms,rate=0.1", "truncate=1,rate=0.5"} <= seen
+    assert not any(each.startswith("truncate=1,rate=0.5,") for each in seen)
+
+    class Wrong(Noisy):
+        faults = ("delay=30",)
+
+    with pytest.raises(ValueError, match="delay: delay: '30' has no unit"):
+        check_host(Wrong)
+
+
 def test_noise_without_a_rate_differs_from_run_to_run() -> None:
     seeds = set()
 

@@ -35,6 +35,21 @@ def test_what_is_written_is_read_again(steps: list[HostStep]) -> None:
 
 
 @pytest.mark.parametrize(
+    "devices", [{"axis": "2=epos"}, {"chair": "rrc", "scanner": "urg", "axis": "2=epos"}]
+)
+def test_each_fault_of_a_bench_is_a_step(devices: dict[str, str]) -> None:
+    with Bench(None, **devices) as bench:  # type: ignore[arg-type]  # devices alone
+        fresh = bench.snapshot()
+        for name, form in bench.describe().faults.items():
+            for words in ("", "=rate=0.5,count=1") if form.rated else ("",):
+                fresh.restore()
+                step = HostStep(1_000, "fault", f"{name}{words}", 100_000)
+                assert parse_steps(str(step), "found.txt") == (step,)
+                step.do(bench)
+                assert f"! {name.rpartition('/')[2]}{words}" in bench.transcript()
+
+
+@pytest.mark.parametrize(
     ("line", "said"),
     [
         ("call heat()", "'call heat()' is not '+TIME ACTION ...', as '+5ms call heat()'"),
