@@ -351,7 +351,7 @@ def test_a_fault_may_be_named_with_its_arguments() -> None:
     class Wrong(Noisy):
         faults = ("delay=30",)
 
-    with pytest.raises(ValueError, match="delay: delay: '30' has no unit"):
+    with pytest.raises(ValueError, match="delay: time: '30' has no unit"):
         check_host(Wrong)
 
 
@@ -579,7 +579,7 @@ def test_mistakes_in_a_machine_are_told_in_a_line() -> None:
 class Noisy(Chair):
     """Notes what the device hears of a question on a noisy line."""
 
-    faults = ("flip",)
+    faults: ClassVar[Sequence[str]] = ("flip",)
     inputs = ()
     heard: ClassVar[list[str]] = []
 
