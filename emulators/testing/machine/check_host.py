@@ -51,9 +51,9 @@ def check_host(
         search = search_of(runs, max_examples=max_examples, max_steps=max_steps, seed=seed)
         try:
             search()
-        except BaseException:
-            if runs.failure is None:  # Ctrl-C, or what a strategy has raised
-                raise
+        except BaseException as error:
+            if runs.failure is None or isinstance(error, KeyboardInterrupt):
+                raise  # nothing was found: a strategy has raised it, or a test is skipped
             shortest = runs.shorten(runs.failure)
             failed = shortest or runs.failure
             failed.error.add_note(note_of(runs, failed, repeats=shortest is not None))

@@ -231,8 +231,8 @@ def _time(t_us: int) -> str:
 _LAST_LINES: Final = 12
 
 # A host that calls `sys.exit` and an invariant that calls `pytest.fail` raise no Exception, and
-# have failed all the same. These have not; pytest is not imported here.
-_NO_FAILURES: Final = ("KeyboardInterrupt", "Skipped", "Exit")
+# have failed all the same. These have not; pytest and Hypothesis (`assume`) are not imported here.
+_NO_FAILURES: Final = ("KeyboardInterrupt", "Skipped", "Exit", "UnsatisfiedAssumption", "StopTest")
 
 
 class HostHangsError(AssertionError):

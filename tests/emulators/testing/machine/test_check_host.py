@@ -13,9 +13,10 @@ from pathlib import Path
 from random import Random
 from typing import Any, ClassVar
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from tickrig import Bench
@@ -265,6 +266,39 @@ def failure_of(machine: type[BenchMachine], scenario: str) -> str:
     except BaseException as error:
         return "# " + error.__notes__[-1].partition("\n")[0]
     return ""
+
+
+def test_chance_of_numpy_is_the_same_in_each_run_and_is_given_back() -> None:
+    drawn = []
+
+    class Noting(Chair):
+        faults = inputs = ()
+
+        @host_rule()
+        def ask(self) -> None:
+            drawn.append((random.random(), np.random.random()))
+
+    np.random.seed(3)
+    for _ in range(2):
+        replay_host(Noting, "+0us call ask()\n+0us call ask()\n")
+    after = np.random.random()
+    assert drawn[:2] == drawn[2:]
+    assert drawn[0] != drawn[1]
+    assert after == np.random.RandomState(3).random()
+
+
+def test_an_assumption_that_does_not_hold_is_no_failure() -> None:
+    class Assuming(Chair):
+        faults = inputs = ()
+
+        @host_rule(speed=[10, 20, 30])
+        def drive(self, speed: int) -> None:
+            assume(speed != 30)
+            assert speed != 20, "it is too fast"
+
+    text, scenario = found(Assuming)
+    assert text.startswith("it is too fast")
+    assert "call drive(speed=20)" in scenario
 
 
 def test_an_action_that_does_not_come_is_no_step() -> None:
