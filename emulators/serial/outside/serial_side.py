@@ -20,6 +20,11 @@ from tickrig.host.text.trace import Mark
 from tickrig.wire.instant import NEVER
 from tickrig.wire.uart import PS_PER_US, Character, UartReceiver, UartSetting
 
+
+def _ignore(now_us: int) -> None:
+    """Do nothing."""
+
+
 # Characters that a UART received with an error.
 
 
@@ -100,13 +105,16 @@ class HostReceiver(Copyable):
     Args:
         end: the host's end of the line.
         device: the device's setting.
+        garbled: called with the time when bytes of another setting are sampled.
 
     Attributes:
         errors: how many characters were wrong.
     """
 
-    def __init__(self, end: ByteEnd, device: UartSetting) -> None:
-        self._end, self._device, self._setting = end, device, device
+    def __init__(
+        self, end: ByteEnd, device: UartSetting, garbled: Callable[[int], None] = _ignore
+    ) -> None:
+        self._end, self._device, self._setting, self._garbled = end, device, device, garbled
         self.errors = UartErrors()
         self._uart: UartReceiver | None = None  # none has the device's setting
         self._sent_ps = 0  # when the latest byte of the device ended
@@ -182,6 +190,8 @@ class HostReceiver(Copyable):
     def _sample(self, uart: UartReceiver, now_us: int) -> None:
         """Sample the line up to now."""
         while (at_us := self._end.due_us) <= now_us:
+            if self._setting != self._device:
+                self._garbled(at_us)
             self._listen(uart, at_us * PS_PER_US, self._end.poll(at_us))
         if at_us == NEVER:  # else a byte is on its way that has begun before now
             self._received += uart.push(1, now_us * PS_PER_US)
@@ -218,6 +228,7 @@ class HostTransmitter(Copyable):
         end: the host's end of the line.
         device: the device's setting.
         lines: with the CTS that it may have to wait for.
+        garbled: called with the time when bytes are sent that the device samples otherwise.
 
     Attributes:
         setting: the host's, for what is sent from now on.
@@ -228,9 +239,15 @@ class HostTransmitter(Copyable):
     """
 
     def __init__(
-        self, event_queue: EventQueue, end: ByteEnd, device: UartSetting, lines: ModemLines
+        self,
+        event_queue: EventQueue,
+        end: ByteEnd,
+        device: UartSetting,
+        lines: ModemLines,
+        garbled: Callable[[int], None] = _ignore,
     ) -> None:
         self._event_queue, self._end, self._device, self._lines = event_queue, end, device, lines
+        self._garbled = garbled
         self.setting, self.errors = device, UartErrors()
         self.waits_for_cts = self.suspended = False
         self.held = bytearray()
@@ -324,6 +341,8 @@ class HostTransmitter(Copyable):
         return self.suspended or (self.waits_for_cts and not self._lines.cts)
 
     def _send_sampled(self, now_us: int, data: bytes) -> None:
+        if data and self.setting != self._device:
+            self._garbled(now_us)
         self._advance(now_us)
         busy_us = self._end.sent_us if self._end.unsent(now_us) else now_us
         start_ps = max(busy_us * PS_PER_US, self._free_ps)
@@ -501,6 +520,7 @@ class SerialSide(Copyable):
         transmitter: what the host sends; its `errors` are those that the device's UART sees.
         waits: the waits of the host.
         in_use: whether a port is open here.
+        listeners: called with the time and a text, when bytes pass between two settings.
     """
 
     def __init__(
@@ -517,8 +537,12 @@ class SerialSide(Copyable):
         self.setting: UartSetting = device or UartSetting()
         self.waits = HostWaits(rig)
         self.modem_lines, self.in_use = ModemLines(), False
-        self.receiver = HostReceiver(end, self.setting)
-        self.transmitter = HostTransmitter(rig.event_queue, end, self.setting, self.modem_lines)
+        self.listeners: list[Callable[[int, str], None]] = []
+        self._reported = ""
+        self.receiver = HostReceiver(end, self.setting, self._report_mismatch)
+        self.transmitter = HostTransmitter(
+            rig.event_queue, end, self.setting, self.modem_lines, self._report_mismatch
+        )
         self.modem_lines.cts_changed = self._release
         self._changes: deque[tuple[int, UartSetting]] = deque()  # of the device, to come
         end.uart.listeners.append(self._device_changes)
@@ -531,6 +555,14 @@ class SerialSide(Copyable):
         to_device = mark is Mark.TO_DEVICE
         errors = self.transmitter.errors if to_device else self.receiver.errors
         setattr(errors, error, getattr(errors, error) + count)
+
+    def _report_mismatch(self, now_us: int) -> None:
+        """Call the listeners, once until one of both settings changes."""
+        text = f"the host is set to {self.setting}, the device to {self.device}"
+        if text != self._reported:
+            self._reported = text
+            for listener in self.listeners:
+                listener(now_us, text)
 
     def _device_changes(self, since_us: int, setting: UartSetting) -> None:
         """Note that the device changes its setting, now or behind what it still sends."""

@@ -113,6 +113,14 @@ class Journal(WireLog):
 
         return hear
 
+    def of_settings(self, source: str) -> Callable[[int, str], None]:
+        """Return what takes that a host and its device have other settings of their line."""
+
+        def hear(at_us: int, text: str) -> None:
+            self.add(at_us, Mark.WIRE, text.encode(), source)
+
+        return hear
+
     def of_lost(self, source: str) -> Callable[[int, CanFrame], None]:
         """Return what takes the frames of a bus that no node takes."""
 

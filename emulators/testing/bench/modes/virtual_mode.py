@@ -110,6 +110,7 @@ class _VirtualDoors:
 
     def __init__(self, rig: BenchRig) -> None:
         self._rig, self._mounts = rig.rig, rig.state.mounts
+        self._journal = rig.journal
         self._sides: dict[str, SerialSide] = {}
         self._addresses: dict[str, Address] = {}
         self._offers = _Offers()
@@ -165,7 +166,8 @@ class _VirtualDoors:
         if wire not in self._sides:
             end = mount.line.b
             device = end.uart.setting if mount.settings.uart else None
-            self._sides[wire] = SerialSide(self._rig, end, device)
+            side = self._sides[wire] = SerialSide(self._rig, end, device)
+            side.listeners.append(self._journal.of_settings(wire))
         return self._sides[wire]
 
     def _bus(self, wire: str) -> BusMount:

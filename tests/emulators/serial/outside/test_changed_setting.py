@@ -9,6 +9,7 @@ import pytest
 
 from tests.emulators.changing import Changing
 from tests.emulators.serial.outside.lines import BAUD, SETTING, rig_of
+from tests.test_docs import blocks
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.emulators.rig.station import Station
@@ -89,6 +90,42 @@ def test_bytes_on_their_way_when_it_changes_are_lost_or_garbled() -> None:
     port.write(b"\nhello\n")
     assert port.read(100).endswith(b"hello\n")
     assert b"x" * 30 not in port.read(100)
+
+
+def told_in(bench: Bench) -> list[str]:
+    """Return what the transcript says of settings, without times and the name of the line."""
+    lines = (line.split(" ", 2)[2] for line in bench.transcript().splitlines())
+    return [line for line in lines if "is set to" in line]
+
+
+def test_a_host_that_does_not_follow_is_told_of_in_the_transcript() -> None:
+    with Bench(Changing(115_200)) as bench:
+        port = bench.serial(timeout=0.1)
+        port.write(b"=9600 8E1\n")
+        assert port.readline() == b"OK\n"
+        assert told_in(bench) == []
+        for _ in range(2):
+            port.write(b"name\n")
+            port.read(10)
+        told = "~ the host is set to 115200 8N1, the device to 9600 8E1"
+        assert told_in(bench) == [told]
+        port.baudrate, port.parity = 9_600, "E"
+        port.write(b"\nname\n")
+        assert port.read_until(b"name\n").endswith(b"name\n")
+        assert told_in(bench) == [told]
+
+
+def test_a_host_that_only_listens_at_another_setting_is_told_of() -> None:
+    with Bench(Changing(115_200)) as bench:
+        port = bench.serial(timeout=0.1, baudrate=57_600)
+        bench.link.send(b"name\n")
+        port.read(5)
+        assert told_in(bench) == ["~ the host is set to 57600 8N1, the device to 115200 8N1"]
+
+
+def test_the_example_of_the_page_runs() -> None:
+    (program,) = blocks("docs/reference/bench/serial-port.md", "python")
+    exec(compile(program, "serial-port.md", "exec"), {})
 
 
 def test_it_has_its_first_setting_again_after_a_power_cut() -> None:
