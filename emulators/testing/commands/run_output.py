@@ -137,12 +137,21 @@ def _diagram_of(text: str, signals: _Signals) -> _Diagram:
             except ValueError:
                 continue
             return _Diagram(pair, is_path=True)
-        left, colon, right = text.partition(":")
-        if colon and text.count(":") == 1 and not left.rpartition(_SLASH)[2].startswith("0x"):
+        if _is_path(text):
+            left, _, right = text.partition(":")
             return _Diagram((signals.find(left.strip()), signals.find(right.strip())), is_path=True)
     if any(Path(word).suffix in (".png", ".svg", ".html", _CSV) for word in words):
         raise ValueError(f"it takes names of signals; for the file write -o {text}")
+    for word in words if len(words) > 1 else ():
+        if _is_path(word):
+            raise ValueError(f"a path stands alone: --plot {word} --plot SIGNALS")
     return _Diagram(tuple(dict.fromkeys(map(signals.find, words))))
+
+
+def _is_path(word: str) -> bool:
+    """Say whether a word is meant as `X:Y`, not as an object of a node with a sub-index."""
+    left, colon, _ = word.partition(":")
+    return bool(colon) and not left.rpartition(_SLASH)[2].startswith("0x")
 
 
 # What is kept of them while the run goes on.

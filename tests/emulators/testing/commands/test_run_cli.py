@@ -224,6 +224,8 @@ def test_an_object_of_a_node_is_a_curve_though_its_name_has_a_colon(moving: Path
         ("--plot left/shaft_dg", "no signal 'left/shaft_dg'; did you mean 'left/shaft_deg'?"),
         ("--plot x_m:y_n", "no signal 'y_n'; did you mean"),
         ("--plot x_m,", "no signal ''"),
+        ("--plot half,x_m:y_m", "a path stands alone: --plot x_m:y_m --plot SIGNALS"),
+        ("--plot x_m:y_m:half", "no signal"),
         ("--plot shaft_deg", "'shaft_deg' is of several devices: left/shaft_deg, right/shaft_deg"),
         ("--plot left/state", "left/state is a text, as 'Off'; a curve needs numbers"),
         ("--plot a.svg", "it takes names of signals; for the file write -o a.svg"),
