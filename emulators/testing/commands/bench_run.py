@@ -142,6 +142,9 @@ class _BenchRun(EmulatorRun[BenchOptions]):
         self._mounts: list[Mount] = []
         self._is_over = False
         inputs = [plan.path] if plan.path else []
+        written = [path for path in (*options.files, options.report, options.trace) if path]
+        if twice := {str(path) for path in written if written.count(path) > 1}:
+            raise Refused(f"{min(twice)}: the run writes this file twice; give another name")
         self._plots = run_output.RunPlots(options.plots, options.files, inputs)
         self._page = (
             run_output.RunPage(options.report, plan, options.command, inputs)

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from itertools import pairwise
-from math import isfinite
+from math import isfinite, nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
@@ -281,9 +281,9 @@ class RunPlots:
         return figure
 
     def _draw_path(self, axes: Axes, diagram: _Diagram) -> None:
-        points = self._paths[diagram].points
+        points = self._paths[diagram].points or [(nan, nan)]
         axes.plot([x for x, _ in points], [y for _, y in points], color="tab:blue")
-        axes.plot(*points[:1][0], "o", color="tab:green", label="start")
+        axes.plot(*points[0], "o", color="tab:green", label="start")
         axes.plot(*points[-1], "s", color="tab:red", label="end")
         axes.legend(loc="best")
         units = [self._signals.unit(name) for name in diagram.names]
@@ -296,6 +296,9 @@ class RunPlots:
     def _path_lines(self, diagram: _Diagram) -> Iterator[str]:
         """Yield a path as lines for a terminal; x and y have one scale if they have one unit."""
         points = self._paths[diagram].points
+        if not points:
+            yield f"{':'.join(diagram.names)}: no samples"
+            return
         width, height = _size()
         canvas = plot.Canvas(width, height - 3)
         ranges = [plot.widened(min(column), max(column)) for column in zip(*points, strict=True)]

@@ -210,6 +210,16 @@ def test_curves_are_written_whole_as_the_name_says(moving: Path) -> None:
     assert (moving / "a.csv").read_bytes() == before
 
 
+def test_a_signal_without_a_number_has_an_empty_curve(moving: Path) -> None:
+    pytest.importorskip("matplotlib")
+    (moving / "moving.toml").write_text(MOVING.replace("0.5 * t", "0 / 0 * t"))
+    words = (*VIRTUAL, "--plot", "half", "--plot", "half:half")
+    assert "half:half: no samples" in tickrig_run(*words)[1]
+    files = ("-o", "a.png", "-o", "a.csv", "--report", "run.html")
+    assert tickrig_run(*words, *files)[0] == 0
+    assert (moving / "a.csv").read_text() == "t_s,half\n"
+
+
 def test_an_object_of_a_node_is_a_curve_though_its_name_has_a_colon(moving: Path) -> None:
     words = ("--plot", "left/0x1003:0", "--plot", "left/0x1003:0:right/0x1003:0", "-o", "a.csv")
     assert tickrig_run(*VIRTUAL, *words)[0] == 0
@@ -233,6 +243,7 @@ def test_an_object_of_a_node_is_a_curve_though_its_name_has_a_colon(moving: Path
         ("--plot x_m -o a.doc", "-o a.doc: the name ends in .png, .svg, .html, .csv"),
         ("--plot x_m -o no/a.csv", "-o no/a.csv: no directory no"),
         ("--plot x_m -o moving.toml", "-o moving.toml: the run reads this file"),
+        ("--plot x_m -o a.html --report a.html", "a.html: the run writes this file twice"),
         ("--report a.json", "--report a.json: the name ends in .html, .htm"),
         ("--report no/a.html", "report no/a.html: no directory no"),
     ],
