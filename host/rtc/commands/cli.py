@@ -26,6 +26,7 @@ def rtc() -> None:
     tickrig rtc act ConsoleIn0 ConsoleOut0
     tickrig rtc print ConsoleIn0.out
     tickrig rtc inject ConsoleOut0.in 5
+    tickrig rtc edit                                 all of it on the screen
 
     Exit status 0; 1 where a component did not get to the state that was asked
     for, and where check found something; 2 with one line where something was refused.

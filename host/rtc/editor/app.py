@@ -58,6 +58,8 @@ def detail_rows(component: Any, port: str = "") -> list[CursorRow[Setting]]:
     """
     rows = list(_connector_rows(component, port)) if port else []
     configuration = component["configuration"]
+    if not configuration["parameters"]:
+        rows.append(CursorRow("none", plain("no configuration parameters", _DIM), Setting()))
     for one in configuration["parameters"]:
         allowed = f"  [{one['constraint']}]" if one["constraint"] else ""
         line: Line = (

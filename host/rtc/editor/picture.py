@@ -31,7 +31,8 @@
 # that true:
 #
 #   - In ports are on even lines of a box, out ports on odd ones. All boxes of a row begin on one
-#     line, so a wire that leaves a column and one that enters the next are never on one line.
+#     line, so a wire that leaves a column and one that enters the next are never on one line. Boxes
+#     with ports at one side, across from a box without any, have a port on each line.
 #   - Lanes are intervals of lines, tracks are intervals of channels; both are given out so that no
 #     two intervals on one overlap (`_packed`).
 #
@@ -200,16 +201,19 @@ def _with_others(boxes: list[Box], wires: Sequence[Edge]) -> list[Box]:
 
 
 def _split(port: str) -> tuple[str, str]:
-    """Return the component and the port of a full name, as `A0.out` or `host/A0.rtc:out`."""
+    """Return the component and the port of a full name, as `A0.out` or `host/A0.rtc:out`.
+
+    An engine may know no more of a port elsewhere than one name.
+    """
     at = max(port.rfind("."), port.rfind(":"))
-    return port[: max(0, at)], port[at + 1 :]
+    return port[: max(0, at)] or port, port[at + 1 :]
 
 
 def _layers(names: Sequence[str], joins: Iterable[tuple[str, str]]) -> dict[str, int]:
     """Return how many boxes are at most in front of each one that is joined with another."""
     after = defaultdict[str, list[str]](list)
     for source, target in joins:
-        if source != target and target:
+        if source != target:
             after[source].append(target)
     order, state = list[str](), dict[str, int]()  # 1: on the way, 2: done
     forward = defaultdict[str, list[str]](list)
@@ -218,17 +222,17 @@ def _layers(names: Sequence[str], joins: Iterable[tuple[str, str]]) -> dict[str,
         state.setdefault(root, 1)
         while way:
             name, targets = way[-1]
-            target = next(targets, "")
-            if not target:
+            reached = next(targets, None)
+            if reached is None:
                 state[name] = 2
                 order.append(name)
                 way.pop()
                 continue
-            if state.get(target) != 1:  # else the wire closes a loop
-                forward[name].append(target)
-            if target not in state:
-                state[target] = 1
-                way.append((target, iter(after[target])))
+            if state.get(reached) != 1:  # else the wire closes a loop
+                forward[name].append(reached)
+            if reached not in state:
+                state[reached] = 1
+                way.append((reached, iter(after[reached])))
     layers = dict.fromkeys(names, 0)
     for name in reversed(order):
         for target in forward[name]:
@@ -281,6 +285,8 @@ class _Layout:
         self._wires, self._gap = wires, gap
         self._most = max(_LEAST_BOX, min(_MOST_BOX, most - 2))
         self._cells = self._place(count)
+        self._there = {cell: self._boxes[name] for name, cell in self._cells.items()}
+        self._dense = {box.name for box in boxes if self._is_dense(box)}
         ends = dict(end for box in boxes for end in self._ends(box))
         self._ends_of = [(ends[wire.source], ends[wire.target]) for wire in wires]
         self._columns = 1 + max((column for _, column in self._cells.values()), default=0)
@@ -316,18 +322,32 @@ class _Layout:
             cells[name] = top + number // count, number % count
         return cells
 
+    def _is_dense(self, box: Box) -> bool:
+        """Say whether a box may have a port on each line: it has one side, across from no port."""
+        if box.ins and box.outs:
+            return False
+        row, column = self._cells[box.name]
+        across = self._there.get((row, column + (1 if box.outs else -1)))
+        return across is None or not (across.ins if box.outs else across.outs)
+
     def _ends(self, box: Box) -> Iterable[tuple[str, _End]]:
         row, column = self._cells[box.name]
+        step, first = (1, 1) if box.name in self._dense else (2, 2)
         for number, port in enumerate(box.ins):
-            yield f"{box.name}.{port}", _End(row, column, 1 + 2 * number, column)
+            yield f"{box.name}.{port}", _End(row, column, 1 + step * number, column)
         for number, port in enumerate(box.outs):
-            yield f"{box.name}.{port}", _End(row, column, 2 + 2 * number, column + 1)
+            yield f"{box.name}.{port}", _End(row, column, first + step * number, column + 1)
+
+    def _height(self, box: Box) -> int:
+        if box.name in self._dense:
+            return 2 + max(1, len(box.ins), len(box.outs))
+        return 2 + max(1, 2 * len(box.ins) - 1, 2 * len(box.outs))
 
     def _set_lines(self) -> None:
         """Give tracks, then lines of rows and streets."""
         heights = [0] * self._rows
         for name, (row, _) in self._cells.items():
-            heights[row] = max(heights[row], _height(self._boxes[name]))
+            heights[row] = max(heights[row], self._height(self._boxes[name]))
         far = [n for n, (a, b) in enumerate(self._ends_of) if a.channel != b.channel]
         street_of = {n: _street(*self._ends_of[n]) for n in far}
         track_of, tracks = dict[int, int](), [0] * (self._rows + 1)
@@ -424,7 +444,7 @@ class _Layout:
     ) -> None:
         row, column = self._cells[box.name]
         top, left, width = self._tops[row], self._lefts[column], self._widths[column]
-        right, bottom = left + width - 1, top + _height(box) - 1
+        right, bottom = left + width - 1, top + self._height(box) - 1
         frame = _FRAMES.get(box.state, _DIM)
         canvas.text(top, left, f"┌{'─' * (width - 2)}┐", frame)
         canvas.text(bottom, left, f"└{'─' * (width - 2)}┘", frame)
@@ -457,10 +477,6 @@ class _Layout:
 
 def _owner(port: str) -> str:
     return _split(port)[0]
-
-
-def _height(box: Box) -> int:
-    return 2 + max(1, 2 * len(box.ins) - 1, 2 * len(box.outs))
 
 
 def _street(a: _End, b: _End) -> int:

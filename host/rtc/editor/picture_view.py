@@ -72,6 +72,12 @@ class PictureView(LineView):
         """Whether the port under the cursor is at the right of its box."""
         return any(f"{box.name}.{port}" == self.at for box in self._boxes for port in box.outs)
 
+    @property
+    def _names(self) -> list[str]:
+        """The components, as the eye reads the picture."""
+        places = self.picture.places
+        return sorted((box.name for box in self._boxes), key=lambda name: places[name][:2])
+
     def joined(self, port: str) -> list[str]:
         """Return the other ends of the wires of a port."""
         ends = [(edge.source, edge.target) for edge in self._edges]
@@ -94,7 +100,7 @@ class PictureView(LineView):
         self._painted = wanted
         self.picture = self._draw(columns)
         if self.at not in self.picture.places:
-            self.at = self._boxes[0].name if self._boxes else ""
+            self.at = next(iter(self._names), "")
             self.picture = self._draw(columns)
         self.show(self.picture.lines)
 
@@ -125,15 +131,14 @@ class PictureView(LineView):
 
     def action_next(self, by: int) -> None:
         """Move the cursor to the next component."""
-        names = [box.name for box in self._boxes]
-        if names:
+        if names := self._names:
             here = names.index(self.owner) if self.owner in names else 0
             self.go_to(names[(here + by) % len(names)])
 
     def action_end(self, place: int) -> None:
         """Move the cursor to the first or last component."""
-        if self._boxes:
-            self.go_to(self._boxes[place].name)
+        if names := self._names:
+            self.go_to(names[place])
 
     def on_click(self, event: Click) -> None:
         """Put the cursor where the mouse is."""

@@ -13,7 +13,7 @@ from tickrig.host.rtc.component import ExecutionContext, ModuleSpec, RtComponent
 from tickrig.host.rtc.listeners import call_listeners
 from tickrig.host.rtc.ports.connect import Properties, connect
 from tickrig.host.rtc.ports.connector import Connector
-from tickrig.host.rtc.ports.port import AnyPort, ConnectorProfile
+from tickrig.host.rtc.ports.port import AnyPort, ConnectorBase, ConnectorProfile
 from tickrig.host.rtc.states import LifeCycleState, ReturnCode, RtcRefused
 from tickrig.host.rtc.system.schedule import Schedule
 
@@ -401,15 +401,28 @@ class Manager(Schedule):
 
         Args:
             first: the name of one, as `port` takes it.
-            second: the name of the other.
+            second: the name of the other; if it belongs to no component here, as the profile of the
+                connector has it.
 
         Raises:
             RtcRefused: no such port, or they are not connected.
         """
-        connector = self.port(first).connector_to(self.port(second))
+        try:
+            connector = self.port(first).connector_to(self.port(second))
+        except RtcRefused:
+            connector = self._connector_elsewhere(first, second)
+            if connector is None:
+                raise
         if connector is None:
             raise RtcRefused(f"{first} and {second} are not connected")
         connector.end()
+
+    def _connector_elsewhere(self, first: str, second: str) -> ConnectorBase | None:
+        """Return the connector of a port here with one that no component here has."""
+        ends = {first, second}
+        ports = (port for one in self.components for port in one.ports.values())
+        found = (one for port in ports for one in port.connectors)
+        return next((one for one in found if set(one.profile.ports) == ends), None)
 
     def context_of(self, name: str) -> ExecutionContext:
         """Look up the first execution context of a component.

@@ -116,3 +116,15 @@ def test_a_value_that_cannot_be_injected_is_refused(name: str, error: str) -> No
 def test_values_of_an_inport_are_not_shown() -> None:
     with pytest.raises(RtcRefused, match="is a DataInPort; values are shown of a DataOutPort"):
         Bench().probes.watch("ConsoleOut0.in")
+
+
+def test_a_connector_with_a_port_of_no_component_is_ended_by_its_names() -> None:
+    bench = Bench()
+    bench.run(1)
+    assert bench.seen() == []
+    (_, watching) = bench.manager.port("ConsoleIn0.out").connectors
+    first, second = watching.profile.ports
+    bench.manager.disconnect(second, first)
+    assert len(bench.manager.port("ConsoleIn0.out").connectors) == 1
+    with pytest.raises(RtcRefused, match="no component ''; known: ConsoleIn0"):
+        bench.manager.disconnect(first, second)

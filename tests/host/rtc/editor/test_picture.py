@@ -131,6 +131,12 @@ def test_a_port_that_runs_elsewhere_has_a_box_of_its_own() -> None:
     assert "A0.out" in picture.places
 
 
+def test_an_end_with_one_name_only_is_a_box_of_that_name() -> None:
+    picture = draw([box("A0")], [Edge("A0.out", "outin")], 80)
+    assert "┌ outin ─" in text(picture)
+    assert text(picture).count("▶outin") == 1
+
+
 def test_what_stands_out_has_its_style_and_so_have_its_wires() -> None:
     picture = draw(*CONTROL, 120, {"Map0.vel": "reverse"})
     pieces = {style for line in picture.lines for _, style in line}
