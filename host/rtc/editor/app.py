@@ -165,9 +165,9 @@ class SystemScreen(FramedApp):
         self.details.offer([] if component is None else detail_rows(component, self.view.port))
         active = sum(one["state"] == "ACTIVE" for one in components)
         line: Line = (
-            (f" {self._name} ", "bold"),
-            (f" {counted(len(components), 'component')}, {active} active", ""),
-            (f"  marked: {self.view.marked}" if self.view.marked else "", _MARK),
+            (f" {counted(len(components), 'component')}, {active} active  ", ""),
+            (f"marked: {self.view.marked}  " if self.view.marked else "", _MARK),
+            (self._name, _DIM),
         )
         if self._link.problem:
             line = plain(f" the system is gone, waiting for it ({self._link.problem})", _ALARM)

@@ -174,7 +174,8 @@ class PdoScreen(ModalScreen[None]):
         title = f"PDOs of {node.node_id} {node.name}"
         state = node.proxy_state.capitalize() or node.phase.value
         self.view.title = f"{title}: {'lost' if node.late else state}"
-        names = {(one.mapped.index, one.mapped.sub): one.name for one in self._file.mappable}
+        names = dict.fromkeys(self._file.data_types, "not mappable by its EDS")
+        names |= {(one.mapped.index, one.mapped.sub): one.name for one in self._file.mappable}
         self.view.offer(pdo_rows(self._node_id, self.pdos, self.wanted, names, links))
         width = max(20, int(self.status.scrollable_content_region.width) - 1)
         ((text, style),) = self._status()
@@ -323,31 +324,40 @@ class PdoScreen(ModalScreen[None]):
         name = pdo_edit.pdo_name(self._node_id, at.index)
         with self._session.lock:
             view = self._session.view
-            links = [link for link in view.links if name in (link.source, link.target)]
+            links = {
+                link.target if link.source == name else link.source
+                for link in view.links
+                if name in (link.source, link.target)
+            }
             nodes = view.nodes
-        if links and (at.index not in TPDOS or len(links) == 1):
-            self._command(lambda view: view.unlink(links[0].source, links[0].target))
+
+        def chosen(other: PdoName | None) -> None:
+            if other is not None:
+                ends = (name, other) if at.index in TPDOS else (other, name)
+                change = ServerView.unlink if other in links else ServerView.link
+                self._command(lambda view: change(view, *ends))
+
+        if links and at.index not in TPDOS:  # it has one source
+            chosen(next(iter(links)))
             return
         rows = [
             CursorRow(
                 str(pdo.name),
-                ((f"{pdo.name!s:<12} ", ""), (f"{pdo.bits:>2} bits  {node.name}", _DIM)),
+                (
+                    (f"{pdo.name!s:<12} ", ""),
+                    (f"{pdo.bits:>2} bits  {node.name}", _DIM),
+                    ("  linked: cut" if pdo.name in links else "", _CHANGED),
+                ),
                 pdo.name,
             )
             for node in nodes
             for pdo in node.pdos
             if node.node_id != self._node_id and (pdo.index in TPDOS) != (at.index in TPDOS)
         ]
-        if not rows:
+        if rows:
+            self.app.push_screen(ChoiceScreen(f"link {name} with, or cut the link", rows), chosen)
+        else:
             self._refuse("no other node has a PDO of the other direction that is on")
-            return
-
-        def chosen(other: PdoName | None) -> None:
-            if other is not None:
-                ends = (name, other) if at.index in TPDOS else (other, name)
-                self._command(lambda view: view.link(*ends))
-
-        self.app.push_screen(ChoiceScreen(f"link {name} with", rows), chosen)
 
     def action_save(self) -> None:
         """Ask for a file, and save what the node has as a DCF."""

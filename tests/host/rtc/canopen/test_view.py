@@ -46,8 +46,8 @@ def test_a_node_is_shown_with_its_states_ports_and_pdos() -> None:
     assert (palette.nmt_state, palette.proxy_state) == ("PRE_OPERATIONAL", "INACTIVE")
     assert 0 <= palette.heartbeat_age_us <= 100_000
     assert motor.ports == (
-        PortView("Motor0.tpdo2", "TimedShortSeq", out=True, peers=()),
-        PortView("Motor0.rpdo2", "TimedShortSeq", out=False, peers=("Palette0.tpdo2",)),
+        PortView("Motor0.tpdo2", "TimedShortSeq", True, (), PdoName(32, "tpdo2")),
+        PortView("Motor0.rpdo2", "TimedShortSeq", False, ("Palette0.tpdo2",), SAME_LENGTH[1]),
     )
     assert palette.pdos[:2] == (
         PdoView(PdoName(16, "rpdo1"), 0x210, 8, 0x1400, 0x1800),

@@ -205,6 +205,8 @@ def test_a_tpdo_is_linked_with_an_rpdo_of_another_node_and_cut(two: Path) -> Non
         assert desk.line("16.tpdo2", "pdos").endswith("→ 32.rpdo2")
         assert desk.nodes[32].slave.dictionary[0x1401, 1].number == 0x290
         await desk.press("k")
+        assert "linked: cut" in desk.line("32.rpdo2", "choices")
+        await choose(desk, "32.rpdo2")
         await desk.pass_ms(100)
         assert desk.nodes[32].slave.dictionary[0x1401, 1].number == 0x320
         await desk.go_to("16.tpdo1", "pdos")
