@@ -135,7 +135,7 @@ class SystemScreen(FramedApp):
 
     def __init__(self, link: SystemLink, name: str) -> None:
         super().__init__()
-        self._link, self._name = link, name
+        self._link, self._socket = link, name
         self.view, self.details = PictureView(), CursorView[Setting]("details")
         self.status = LineView("status")
 
@@ -167,7 +167,7 @@ class SystemScreen(FramedApp):
         line: Line = (
             (f" {counted(len(components), 'component')}, {active} active  ", ""),
             (f"marked: {self.view.marked}  " if self.view.marked else "", _MARK),
-            (self._name, _DIM),
+            (self._socket, _DIM),
         )
         if self._link.problem:
             line = plain(f" the system is gone, waiting for it ({self._link.problem})", _ALARM)

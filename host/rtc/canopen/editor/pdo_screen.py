@@ -15,6 +15,7 @@ from textual.screen import ModalScreen
 from tickrig.host.rtc.canopen import pdo_edit
 from tickrig.host.rtc.canopen.definition import TPDOS, DeviceFile, PdoLink, PdoName, ServerRefused
 from tickrig.host.rtc.canopen.editor.session import EditorSession
+from tickrig.host.rtc.canopen.served_node import NodePhase
 from tickrig.host.rtc.canopen.view import PendingTransfer, ServerView
 from tickrig.host.rtc.editor.widgets import ChoiceScreen, CursorRow, CursorView, QuestionScreen
 from tickrig.host.text.values import counted
@@ -169,11 +170,14 @@ class PdoScreen(ModalScreen[None]):
                 return
             links = view.links
         self._take()
-        if not self._read_once and self._reading is None:
+        if node.phase is not NodePhase.READY:
+            self._read_once = False  # what comes back may be another device, or have other values
+        elif not self._read_once and self._reading is None:
             self._read(quiet=True)
         title = f"PDOs of {node.node_id} {node.name}"
         state = node.proxy_state.capitalize() or node.phase.value
-        self.view.title = f"{title}: {'lost' if node.late else state}"
+        problem = f": {node.problem}" if node.problem else ""
+        self.view.title = f"{title}: {'lost' if node.late else state}{problem}"
         names = dict.fromkeys(self._file.data_types, "not mappable by its EDS")
         names |= {(one.mapped.index, one.mapped.sub): one.name for one in self._file.mappable}
         self.view.offer(pdo_rows(self._node_id, self.pdos, self.wanted, names, links))

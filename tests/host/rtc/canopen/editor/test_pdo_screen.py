@@ -195,6 +195,29 @@ def test_a_node_that_is_gone_in_the_middle_has_its_old_mapping_when_it_is_back(t
     at_desk(act, two)
 
 
+def test_another_device_is_not_written_and_read_anew_when_the_right_one_is_back(two: Path) -> None:
+    why = "1000h:00 is 000C0191h, not 00070191h"
+
+    async def act(desk: Desk) -> None:
+        await open_pdos(desk)
+        await desk.go_to("16.tpdo1", "pdos")
+        await desk.press("t")
+        await desk.answer("254")
+        desk.session.server.nodes[16].refuse(why)
+        await desk.pass_ms(100)
+        assert f"PDOs of 16 Palette0: Inactive: {why}" in screen_text(desk.app)
+        await desk.press("w")
+        assert told(desk) == "node 16 is not ready"
+        desk.session.view.write(16, 0x1801, 2, b"\x01")
+        await desk.pass_ms(50)
+        desk.session.view.boot(16)
+        await passed(desk)
+        assert "type   1" in desk.line("16.tpdo2", "pdos")
+        assert "type 254   8 of 64 bits  changed" in desk.line("16.tpdo1", "pdos")
+
+    at_desk(act, two)
+
+
 def test_a_tpdo_is_linked_with_an_rpdo_of_another_node_and_cut(two: Path) -> None:
     async def act(desk: Desk) -> None:
         await open_pdos(desk)
