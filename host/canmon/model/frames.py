@@ -296,6 +296,33 @@ class Stamp(StrEnum):
     DATE = "A"
 
 
+STAMPS: Final = (Stamp.ZERO, Stamp.DELTA, Stamp.ABSOLUTE, Stamp.DATE)
+"""In the order in which a key shows them."""
+
+
+def stamp_text(stamp: Stamp, at_us: int, origin_us: int, before_us: int) -> str:
+    """Write a time.
+
+    Args:
+        stamp: how.
+        at_us: the time.
+        origin_us: that of the first frame.
+        before_us: that of what comes before it.
+
+    >>> [stamp_text(one, 3_500_000, 1_000_000, 3_000_000) for one in STAMPS[:3]]
+    ['2.500000', '0.500000', '3.500000']
+    """
+    match stamp:
+        case Stamp.DELTA:
+            return seconds_text(at_us - before_us, 1)
+        case Stamp.ABSOLUTE:
+            return seconds_text(at_us, 1)
+        case Stamp.DATE:
+            return date_text(at_us)
+        case _:
+            return seconds_text(at_us - origin_us, 1)
+
+
 class DumpLines:
     """Writes one line for each frame.
 

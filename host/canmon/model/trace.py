@@ -103,10 +103,14 @@ class FrameTrace(Ring):
 
     Args:
         capacity: how many frames are kept.
+
+    Attributes:
+        origin_us: the time of the first frame, from which others are counted; None before it.
     """
 
     def __init__(self, capacity: int = _CAPACITY) -> None:
         super().__init__(capacity)
+        self.origin_us: int | None = None
         self._latest: dict[_Key, tuple[int, int]] = {}
         self._last_us: int | None = None
 
@@ -127,13 +131,15 @@ class FrameTrace(Ring):
         self.append(row)
         self._latest[key] = at_us, payload
         self._last_us = at_us
+        if self.origin_us is None:
+            self.origin_us = at_us
         return row
 
     def clear(self) -> None:
         """Begin anew."""
         super().clear()
         self._latest.clear()
-        self._last_us = None
+        self._last_us = self.origin_us = None
 
 
 def _key_of(record: AnyRecord) -> _Key:

@@ -181,8 +181,8 @@ class _Place(NamedTuple):
 class PdoFrames:
     """Makes frames of what people call them.
 
-    An object that is not named has its power-on value, else 0. Values are those on the wire:
-    nothing is scaled.
+    An object that is not named has the value that was remembered, else its power-on value, else
+    0. Values are those on the wire: nothing is scaled.
 
     Args:
         eds: what the files say, by node-ID.
@@ -190,6 +190,12 @@ class PdoFrames:
 
     def __init__(self, eds: Mapping[int, EdsObjects]) -> None:
         self._eds = eds  # to which files of a folder may be added
+        self._remembered: dict[str, dict[str, int]] = {}
+
+    def remember(self, text: str) -> None:
+        """Take the values of a frame that is sent: they count where others are not named."""
+        pdo, (_, fields) = text.split(maxsplit=1)[0].lower(), self._fields(text)
+        self._remembered[pdo] = {place.name: value for place, value in fields}
 
     def frame(self, text: str) -> CanFrame:
         """Return the frame of `NODE.rpdoN NAME=VALUE ...`.
@@ -197,6 +203,11 @@ class PdoFrames:
         Raises:
             ValueError: a node, PDO, object or value that there is not; it names those there are.
         """
+        can_id, fields = self._fields(text)
+        return CanFrame(can_id, pack_bits([(value, place.mapped.bits) for place, value in fields]))
+
+    def _fields(self, text: str) -> tuple[int, list[tuple[_Place, int]]]:
+        """Return the CAN-ID, and the value of each object; ValueError as `frame`."""
         pdo, *settings = text.split()
         match = _PDO.fullmatch(pdo)
         if match is None:
@@ -209,13 +220,12 @@ class PdoFrames:
             raise ValueError(f"{pdo}: PDOs are numbered 1 to {PDOS}")
         sent = NodePdo(match[2].lower() == "r", node, number)
         places = _places(memory, sent.mapping, pdo)
-        values = _values(places, settings, pdo)
-        fields = [(values[place], place.mapped.bits) for place in places]
+        values = _values(places, settings, pdo, self._remembered.get(pdo.lower(), {}))
         can_id = can_id_of(sent, memory)
         if can_id is None:
             entry = write_entry((sent.parameter, 1))
             raise ValueError(f"{pdo}: it has no CAN-ID ({entry} is not valid)")
-        return CanFrame(can_id, pack_bits(fields))
+        return can_id, [(place, values[place]) for place in places]
 
 
 def _places(memory: NodeMemory, index: int, pdo: str) -> list[_Place]:
@@ -232,8 +242,10 @@ def _place(memory: NodeMemory, mapped: MappedObject) -> _Place:
     return _Place(name, mapped, text, memory.number(mapped.index, mapped.sub) or 0)
 
 
-def _values(places: list[_Place], settings: list[str], pdo: str) -> dict[_Place, int]:
-    values = {place: place.power_on for place in places}
+def _values(
+    places: list[_Place], settings: list[str], pdo: str, remembered: Mapping[str, int]
+) -> dict[_Place, int]:
+    values = {place: remembered.get(place.name, place.power_on) for place in places}
     for setting in settings:
         name, equals, word = setting.partition("=")
         if not equals:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
@@ -32,7 +33,7 @@ from tickrig.host.canmon.output.recording import WORDS_METAVAR, read_recording
 from tickrig.host.canmon.sources.source import BusSpec, LineSpec, parse_source
 from tickrig.host.canmon.tui import settings as fields
 from tickrig.host.canmon.tui.panels.alarms_panel import AlarmsPanel
-from tickrig.host.canmon.tui.panels.panel import Panel, make_panels
+from tickrig.host.canmon.tui.panels.panel import FrameWanted, Panel, make_panels
 from tickrig.host.canmon.tui.panels.trace_panel import TracePanel
 from tickrig.host.canmon.tui.session import DecodedFrame, Model, Session, Task, open_session
 from tickrig.host.cli.messages import Refused, SourceFailed
@@ -275,6 +276,50 @@ class _ExportScreen(ModalScreen[str]):
         self.dismiss("")
 
 
+# The screen as a picture.
+
+_FONTS: Final = re.compile(r"\s*@font-face \{.*?\}", re.DOTALL)
+"""Textual names fonts of another site; without them a reader's own are taken."""
+_CELL: Final = (8, 17)
+_GROUND, _INK = "#121212", "#e0e0e0"
+
+
+def write_png(path: Path, strips: Sequence[Strip]) -> None:
+    """Write lines of a screen as PNG, by Pillow and a font of matplotlib.
+
+    Raises:
+        ImportError: matplotlib is not there.
+    """
+    from matplotlib import get_data_path  # noqa: PLC0415 - an extra
+    from PIL import Image, ImageDraw, ImageFont  # noqa: PLC0415 - with it
+
+    wide, high = _CELL
+    fonts = {
+        bold: ImageFont.truetype(
+            str(Path(get_data_path(), "fonts/ttf", f"DejaVuSansMono{'-Bold' * bold}.ttf")), 13
+        )
+        for bold in (False, True)
+    }
+    width = max(strip.cell_length for strip in strips) * wide
+    image = Image.new("RGB", (width, len(strips) * high), _GROUND)
+    draw = ImageDraw.Draw(image)
+    for row, strip in enumerate(strips):
+        column = 0
+        for segment in strip:
+            style = segment.style or Style()
+            ink = style.color.get_truecolor().hex if style.color else _INK
+            ground = style.bgcolor.get_truecolor(foreground=False).hex if style.bgcolor else _GROUND
+            if style.reverse:
+                ink, ground = ground, ink
+            end = column + segment.cell_length
+            draw.rectangle((column * wide, row * high, end * wide - 1, row * high + 16), ground)
+            for letter in segment.text:  # each in its cell, whatever the font says
+                draw.text((column * wide, row * high), letter, ink, fonts[bool(style.bold)])
+                column += 1
+            column = end
+    image.save(path)
+
+
 # What is replaced as a whole when buses or files change.
 
 
@@ -363,6 +408,8 @@ class MonitorApp(FramedApp):
         *[Binding(f"{n}", f"tab({n})", f"tab {n}", show=False) for n in range(1, 10)],
         Binding("w", "export", "save as"),
         Binding("f2", "settings", "settings", key_display="F2"),
+        Binding("f3", "times", "times", key_display="F3"),
+        Binding("f12", "picture", "picture", key_display="F12"),
         Binding("f8", "record", "record", key_display="F8"),
         Binding("f4", "trigger", "trigger", key_display="F4"),
     ]
@@ -612,6 +659,52 @@ class MonitorApp(FramedApp):
 
     def _panel(self, kind: type[_P]) -> _P | None:
         return next((panel for panel in self.panels if isinstance(panel, kind)), None)
+
+    def action_picture(self) -> None:
+        """Ask for a file, and save the screen there as a picture."""
+        name = f"canmon-{self.shown.title}.svg"
+        self.push_screen(_ExportScreen(name, "save the screen as", ".svg or .png"), self._picture)
+
+    def _picture(self, name: str | None) -> None:
+        if not name:
+            return
+        path = Path(name)
+        try:
+            said = self._write_picture(path)
+        except (OSError, ValueError) as error:
+            self.notify(str(error), severity="error")
+            return
+        self.notify(said)
+
+    def _write_picture(self, path: Path) -> str:
+        """Write the screen; return what was written. ValueError for another ending."""
+        if path.suffix.lower() not in (".svg", ".png"):
+            raise ValueError(f"{path}: a picture of the screen is .svg or .png")
+        said = f"{path} is written"
+        if path.suffix.lower() == ".png":
+            strips = self.screen._compositor.render_strips()  # as export_screenshot does
+            try:
+                write_png(path, strips)
+            except ImportError:
+                said = "PNG needs matplotlib: pip install 'tickrig[plot]'; "
+                path = path.with_suffix(".svg")
+                said += f"{path} is written"
+            else:
+                return said
+        path.write_text(_FONTS.sub("", self.export_screenshot(title="canmon tui")), "utf-8")
+        return said
+
+    def action_times(self) -> None:
+        """Write times otherwise, in all tabs."""
+        self.session.next_stamp()
+        self.refresh_view()
+
+    def on_frame_wanted(self, event: FrameWanted) -> None:
+        """Show a frame in the trace."""
+        trace = self._panel(TracePanel)
+        if trace is not None:
+            self.query_one(TabbedContent).active = _tab(trace)
+            self.call_after_refresh(trace.show_frame, event.at_us, event.record)
 
     def action_record(self) -> None:
         """Ask what to record, or end the recording."""

@@ -18,7 +18,7 @@ from tickrig.host.canmon.model.decode.decoded import Decoded
 from tickrig.host.canmon.model.decode.eds_folder import EdsFiles
 from tickrig.host.canmon.model.decode.node_board import NodeBoard
 from tickrig.host.canmon.model.decode.node_memory import EdsObjects
-from tickrig.host.canmon.model.frames import AnyRecord, Record
+from tickrig.host.canmon.model.frames import STAMPS, AnyRecord, Record, Stamp
 from tickrig.host.canmon.model.logs.log_file import Mark
 from tickrig.host.canmon.model.top_model import TopModel
 from tickrig.host.canmon.model.trace import FrameTrace
@@ -136,6 +136,7 @@ class Model:
 
 _POLL_US: Final = 20_000
 _MARKS_KEPT: Final = 1_000
+_SILENT_US: Final = 3_000_000
 
 _Send = Callable[[CanFrame | FdFrame], None]
 """Sends a frame on one bus; SourceFailed if it cannot."""
@@ -189,6 +190,7 @@ class Session:
         withheld: how many were not, because it was not armed.
         trouble: why a frame could not be sent; empty if all could.
         notes: lines for people, until they are shown.
+        stamp: how all tabs write times.
     """
 
     def __init__(
@@ -204,9 +206,11 @@ class Session:
         self.marks: deque[Mark] = deque(maxlen=_MARKS_KEPT)
         self.armed, self.trouble = False, ""
         self.sent = self.withheld = 0
+        self.stamp = Stamp.ZERO
         self.notes: deque[str] = deque(maxlen=_MARKS_KEPT)
         model.eds.notify = self.notes.append
         self._clock, self._watch = clock, Stopwatch()
+        self._begun_us = clock()
         self._echo: list[Record] = []
         self._stop, self._pool = threading.Event(), ThreadPoolExecutor(1, "canmon")
         self._thread: Future[None] | None = None
@@ -217,9 +221,24 @@ class Session:
         return self._clock()
 
     @property
+    def silent(self) -> bool:
+        """Whether nothing came on a bus for some seconds since it was opened."""
+        waited_us = self._clock() - self._begun_us
+        return self.source.live and not self.model.frames and waited_us > _SILENT_US
+
+    @property
     def can_send(self) -> bool:
         """Whether there is a bus to send on."""
         return bool(self.buses)
+
+    @property
+    def origin_us(self) -> int:
+        """The time of the first frame."""
+        return self.model.trace.origin_us or 0
+
+    def next_stamp(self) -> None:
+        """Write times otherwise from now on: since the first frame, the one before, absolute."""
+        self.stamp = STAMPS[(STAMPS.index(self.stamp) + 1) % len(STAMPS)]
 
     def next_bus(self, bus: str) -> str:
         """Return the name of the bus after one, of the first after the last."""

@@ -108,9 +108,9 @@ def _read_nodes(bus: str | None, options: BusOptions, files: EdsFiles, nodes: se
     """Read who nodes are, so that their files are found."""
     source = conform_source.open_conform_source(bus, None, options)
     try:
-        asked = node_bus.NodeBus(source.link)
+        bus_of_nodes = node_bus.NodeBus(source.link)
         for node in sorted(nodes):
-            identity = read_identity(asked, node)
+            identity = read_identity(bus_of_nodes, node)
             if identity is None:
                 said = f"node {node} does not tell vendor and product (1018h)"
                 raise Refused(f"{said}; give --eds {node}=FILE")

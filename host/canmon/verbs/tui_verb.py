@@ -59,8 +59,8 @@ def command(  # noqa: PLR0913 - options
     canmon tui run.log
     ssh robot canmon dump can0 --jsonl | canmon tui -
 
-    Keys: 1 to 9 tabs, F1 help, ctrl+p commands, A arm, F9 stop all, F8 record,
-    F4 trigger, q quit.
+    Keys: 1 to 9 tabs, F1 help, F2 settings, F3 times, ctrl+p commands, A arm,
+    F9 stop all, F8 record, F4 trigger, F12 picture, q quit.
 
     {source}
     """  # noqa: D301 - click wants the backspace

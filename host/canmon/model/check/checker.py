@@ -20,6 +20,7 @@ from tickrig.host.canmon.model.check.rule import (
     CheckedTraffic,
     MaxLoad,
     NoErrorFrames,
+    NoLostHeartbeat,
     Rule,
     Seen,
     TrafficFinding,
@@ -505,8 +506,10 @@ class Alarms:
         self._lost = lost
         for finding in self._checker.advance(now_us - LATE_US):
             self._found(finding)
-        if now_us - self._begin_us >= GRACE_US:
-            self._miss(self._checker.missing(now_us))
+        missing = self._checker.missing(now_us)
+        if now_us - self._begin_us < GRACE_US:  # what has come before may be missed at once
+            missing = [one for one in missing if one.rule == NoLostHeartbeat.name]
+        self._miss(missing)
 
     def rows(self) -> list[Alarm]:
         """Return all rules in their order."""

@@ -38,7 +38,7 @@ from tickrig.host.canmon.model.decode.pdos import (
     pdos_of,
 )
 from tickrig.host.canmon.model.decode.services import nmt_state_name
-from tickrig.host.canmon.model.frames import Record, ident_of, sender_of
+from tickrig.host.canmon.model.frames import Record, Stamp, ident_of, sender_of, stamp_text
 from tickrig.host.text.page_text import json_text
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.emcy import describe
@@ -116,6 +116,11 @@ class NodeStatus:
     def __post_init__(self) -> None:
         """Wait for its first heartbeat."""
         self._heartbeats = Heartbeats(self.memory)
+
+    @property
+    def known_name(self) -> str:
+        """Its name: as it says, else as its file does."""
+        return self.name or self.memory.eds.name
 
     @property
     def period_us(self) -> int | None:
@@ -333,7 +338,7 @@ def _cells(row: NodeStatus, now_us: int, *, with_bus: bool) -> tuple[str, ...]:
     )
     return (
         f"{row.channel} {row.node}" if with_bus else str(row.node),
-        row.name or row.memory.eds.name,
+        row.known_name,
         row.state_text,
         _heartbeat(row, now_us),
         boots if row.boots else "",
@@ -366,10 +371,22 @@ def _emcy(row: NodeStatus) -> str:
     return f"{now} [{row.emcy_count}]"
 
 
-def emcy_history(rows: Sequence[NodeStatus]) -> list[str]:
-    """Return an empty line, a head, and the EMCYs of all nodes, the latest first; or nothing."""
+def emcy_history(
+    rows: Sequence[NodeStatus], stamp: Stamp = Stamp.ABSOLUTE, origin_us: int = 0
+) -> list[str]:
+    """Return an empty line, a head, and the EMCYs of all nodes, the latest first; or nothing.
+
+    Args:
+        rows: the nodes.
+        stamp: how times are written.
+        origin_us: the time of the first frame.
+    """
     found = sorted((emcy.at_us, row.node, emcy.text) for row in rows for emcy in row.emcys)
-    lines = [f"{at_us / 1e6:.6f}  node {node}  {text}" for at_us, node, text in reversed(found)]
+    before = [origin_us, *(at_us for at_us, _, _ in found)]
+    lines = [
+        f"{stamp_text(stamp, at_us, origin_us, before_us)}  node {node}  {text}"
+        for (at_us, node, text), before_us in zip(found, before, strict=False)
+    ][::-1]
     return ["", "EMCY, latest first", *lines] if lines else []
 
 
@@ -385,7 +402,7 @@ def _fields(row: NodeStatus, now_us: int) -> dict[str, object]:
         "t": now_us / 1e6,
         "ch": row.channel,
         "node": row.node,
-        "name": row.name or row.memory.eds.name,
+        "name": row.known_name,
         "state": row.state_text,
         "heartbeat_ms": None if period_us is None else period_us / 1_000,
         "learnt": row.learnt,

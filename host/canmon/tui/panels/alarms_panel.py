@@ -13,8 +13,10 @@ from textual.widgets import Static, TabbedContent, TextArea
 
 from tickrig.host.canmon.extensions import load_rule
 from tickrig.host.canmon.model.check.checker import RULE, Alarms, AlarmState, render_alarms
+from tickrig.host.canmon.model.check.rule import TrafficFinding
 from tickrig.host.canmon.model.check.rules import SWITCHES, VALUES, Rules, parse_rules
-from tickrig.host.canmon.tui.panels.panel import Panel, read_help
+from tickrig.host.canmon.model.frames import stamp_text
+from tickrig.host.canmon.tui.panels.panel import ChoiceView, FrameWanted, Panel, read_help
 from tickrig.host.canmon.tui.session import DecodedFrame, Model, Session, Task
 from tickrig.host.canmon.workspace import SettingError, below
 from tickrig.host.text.toml_reader import load_toml
@@ -95,6 +97,7 @@ class AlarmsPanel(Panel):
     AlarmsPanel #wrong { display: none; height: auto; color: $error; }
     """
     BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("enter", "frame", "frame in the trace", key_display="enter"),
         Binding("space", "acknowledge", "acknowledge"),
         Binding("c", "clear", "clear"),
         Binding("e", "edit", "rules"),
@@ -110,11 +113,13 @@ class AlarmsPanel(Panel):
         self.held.hold(parse_rules(words))
         self.rules_text, self._own = _rules_toml(words), False
         self._lines: list[str] = []
+        self._targets: list[TrafficFinding | None] = []
+        self._chosen: TrafficFinding | None = None
         self._badge = ""
 
     def compose(self) -> ComposeResult:
         """Lay out rules and findings."""
-        yield LineView()
+        yield ChoiceView()
         yield Static(id="wrong", markup=False)
         yield TextArea(tab_behavior="focus")
 
@@ -135,19 +140,55 @@ class AlarmsPanel(Panel):
             tab.label = Content.styled(title, style)
 
     def snapshot(self, model: Model) -> None:
-        """Keep how the rules stand."""
-        lines = render_alarms(self.held.alarms, model.now_us)
-        rules = lines.index("")  # behind it findings, which go on in the next line
+        """Keep how the rules stand, and of each line the finding that it tells."""
+        alarms = self.held.alarms
+        rules = render_alarms(alarms, model.now_us)[: -len(alarms.findings) or None]
+        self._lines, self._targets = rules, [None, *(one.finding for one in alarms.rows())]
+        self._targets += [None] * (len(rules) - len(self._targets))
         width = max(LEAST_WIDTH, self.query_one(LineView).scrollable_content_region.width)
-        rest = [part for line in lines[rules:] for part in _wrapped(line, width)]
-        self._lines = [*lines[:rules], *rest]
+        before = [one.at_us for one in alarms.findings]
+        for finding, before_us in zip(
+            reversed(alarms.findings),
+            reversed([self.session.origin_us, *before[:-1]]),
+            strict=False,
+        ):
+            parts = _wrapped(self._finding(finding, before_us), width)
+            self._lines += parts
+            self._targets += [finding] * len(parts)
+
+    def _finding(self, finding: TrafficFinding, before_us: int) -> str:
+        """Write a finding, with its time as the other tabs have it."""
+        session, (_, _, text) = self.session, str(finding).partition(") ")
+        time = stamp_text(session.stamp, finding.at_us, session.origin_us, before_us)
+        return f"({time}) {text}"
 
     def paint(self) -> None:
         """Show it."""
         lines = [_styled(line) for line in self._lines]
         if not self.held.alarms.rows():
             lines = [plain("no rules: e writes some, F1 shows how")]
-        self.query_one(LineView).show(lines)
+        view = self.query_one(ChoiceView)
+        chosen = self._chosen
+        if chosen is not None and self._target(view.chosen) is not chosen:
+            same = (number for number, one in enumerate(self._targets) if one is chosen)
+            view.chosen = max(same, default=view.chosen)  # findings go down while others come
+        view.show(lines)
+
+    def on_choice_view_chosen(self) -> None:
+        """Stay at this finding, whatever comes above it."""
+        number = self.query_one(ChoiceView).chosen
+        self._chosen = self._target(number) if number > len(self.held.alarms.rows()) else None
+
+    def _target(self, number: int) -> TrafficFinding | None:
+        return self._targets[number] if number < len(self._targets) else None
+
+    def action_frame(self) -> None:
+        """Show the frame of the chosen finding, or of the latest one of a rule, in the trace."""
+        finding = self._target(self.query_one(ChoiceView).chosen)
+        if finding is None:
+            self.notify("choose a finding: the arrows do")
+        else:
+            self.post_message(FrameWanted(finding.at_us, finding.record))
 
     def load(self, settings: Mapping[str, Any]) -> None:
         """Take the rules."""

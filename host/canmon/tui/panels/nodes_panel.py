@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from textwrap import wrap
@@ -13,6 +14,7 @@ from textual.widgets import TabbedContent, TabPane
 
 from tickrig.host.canmon.model.decode import node_board
 from tickrig.host.canmon.model.decode.node_memory import DEVICE_TYPE
+from tickrig.host.canmon.model.frames import Record, Stamp
 from tickrig.host.canmon.risks import nmt_risk
 from tickrig.host.canmon.tui.panels.dictionary_panel import DictionaryPanel
 from tickrig.host.canmon.tui.panels.panel import ChoiceView, Panel, PromptLine, TitleLine, read_help
@@ -21,6 +23,7 @@ from tickrig.host.tui import Line, LineView, line_text, line_width, plain
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.canopen.emcy import describe
 from tickrig.wire.canopen.nmt import ALL_NODES, NMT_COB_ID, NmtCommand, NmtState
+from tickrig.wire.canopen.sdo_frame import REQUEST_COB_ID, RESPONSE_COB_ID
 from tickrig.wire.instant import NEVER
 
 # Nodes as lines with styles: a board with a row for each, and a card of one.
@@ -187,7 +190,7 @@ def _carried(row: node_board.NodeStatus, now_us: int, width: int) -> Line:
 
 
 _COLUMNS: Final = (
-    _BoardColumn("NAME", lambda row, now_us, width: plain(row.name), most=24),
+    _BoardColumn("NAME", lambda row, now_us, width: plain(row.known_name), most=24),
     _BoardColumn("MAKER", lambda row, now_us, width: plain(node_board.maker_text(row)), WIDE, 20),
     _BoardColumn("NMT STATE", _state, kept=True),
     _BoardColumn("HEARTBEAT", heartbeat_line, kept=True),
@@ -202,7 +205,11 @@ _INDENT: Final = 10
 
 
 def card_lines(
-    row: node_board.NodeStatus, rows: Sequence[node_board.NodeStatus], width: int
+    row: node_board.NodeStatus,
+    rows: Sequence[node_board.NodeStatus],
+    width: int,
+    stamp: Stamp = Stamp.ABSOLUTE,
+    origin_us: int = 0,
 ) -> list[Line]:
     """Return what is known of one node, and the EMCYs of all, the latest first.
 
@@ -210,8 +217,10 @@ def card_lines(
         row: the node.
         rows: all nodes.
         width: columns of the screen; what is longer goes on in the next line.
+        stamp: how times are written.
+        origin_us: the time of the first frame.
     """
-    where = f"{row.channel} node {row.node}" + f": {row.name}" * bool(row.name)
+    where = f"{row.channel} node {row.node}" + f": {row.known_name}" * bool(row.known_name)
     lines = [plain(where, _HEAD)]
     lines += _wrapped("device", node_board.identity_words(row), width)
     for pdo in node_board.pdo_contents(row):
@@ -220,7 +229,7 @@ def card_lines(
         lines += _wrapped("drive", row.drive_state, width)
     if row.sdo_errors:
         lines += _wrapped("SDO", f"{row.sdo_errors} failed, the latest: {row.sdo_error}", width)
-    history = node_board.emcy_history(rows)
+    history = node_board.emcy_history(rows, stamp, origin_us)
     heads = [plain(line, _HEAD) for line in history[:2]]
     return [*lines, *heads, *(part for line in history[2:] for part in _wrapped("", line, width))]
 
@@ -245,11 +254,25 @@ class _NodeTask(Task):
     def __init__(self) -> None:
         self.channel = ""
         self._out: list[CanFrame] = []
+        self._asks: deque[CanFrame] = deque()
+        self._due_us = NEVER
+        self._answered_ids: set[int] = set()
 
     @property
     def due_us(self) -> int:
         """When it next wants to be called without a frame."""
-        return _NOW if self._out else NEVER
+        return _NOW if self._out else self._due_us
+
+    @property
+    def scans(self) -> bool:
+        """Whether node-IDs are still asked."""
+        return bool(self._asks)
+
+    def scan(self, channel: str, now_us: int) -> None:
+        """Ask all node-IDs of a bus for their device type, and who answers for its identity."""
+        self.channel, self._due_us = channel, now_us
+        self._answered_ids.clear()
+        self._asks = deque(_upload(node, *DEVICE_TYPE) for node in NODE_IDS)
 
     def command(self, channel: str, node: int, command: NmtCommand) -> None:
         """Command a node on a bus, or all nodes there by 0."""
@@ -258,14 +281,46 @@ class _NodeTask(Task):
 
     def tick(self, now_us: int, records: Sequence[DecodedFrame], /) -> Frames:
         """Return what is to be sent."""
-        out, self._out = tuple(self._out), []
-        return out
+        out, self._out = self._out, []
+        if self._due_us == NEVER:
+            return tuple(out)
+        for record, decoded in records:
+            node = decoded.node or 0
+            if _answers(record, node) and node not in self._answered_ids:
+                self._answered_ids.add(node)
+                self._asks += [_upload(node, *entry) for entry in _IDENTITY]
+        if now_us >= self._due_us:
+            out += [self._asks.popleft()] if self._asks else []
+            self._due_us = now_us + _ASK_US if self._asks else NEVER
+        return tuple(out)
 
     def stop(self) -> None:
         """Send nothing that was not sent yet."""
         self._out.clear()
+        self._asks.clear()
+        self._due_us = NEVER
 
 
+def _upload(node: int, index: int, sub: int) -> CanFrame:
+    """Return the request to read an object."""
+    data = bytes((0x40, index & 0xFF, index >> 8, sub, 0, 0, 0, 0))
+    return CanFrame(REQUEST_COB_ID + node, data)
+
+
+def _answers(record: Record, node: int) -> bool:
+    """Say whether a frame is a response to the read of 1000h."""
+    frame = record.frame
+    return (
+        isinstance(frame, CanFrame)
+        and frame.can_id == RESPONSE_COB_ID + node
+        and frame.data[1:4] == b"\x00\x10\x00"
+    )
+
+
+NODE_IDS: Final = range(1, 128)
+_IDENTITY: Final = tuple((0x1018, sub) for sub in (1, 2, 3))
+_ASK_US: Final = 10_000
+"""Between two requests: 5 % of a bus of 125 kbit/s, and time for an answer."""
 _COMMANDS: Final = {
     "start": NmtCommand.START,
     "stop": NmtCommand.STOP,
@@ -299,6 +354,7 @@ class NodesPanel(Panel):
         Binding("R", "command('reset-node',True)", "reset all", show=False),
         Binding("k", "command('reset-comm')", "reset comm", key_display="k K"),
         Binding("K", "command('reset-comm',True)", "reset comm all", show=False),
+        Binding("f", "scan", "find nodes"),
         Binding("enter", "objects", "objects", key_display="enter"),
     ]
 
@@ -332,7 +388,8 @@ class NodesPanel(Panel):
         self._lines = board_lines(self._rows, model.now_us, width)
         row = self.chosen
         wide = self.query_one("#card", LineView).scrollable_content_region.width
-        self._card = [] if row is None else card_lines(row, self._rows, wide)
+        stamp, origin_us = self.session.stamp, self.session.origin_us
+        self._card = [] if row is None else card_lines(row, self._rows, wide, stamp, origin_us)
 
     def paint(self) -> None:
         """Show them; the board takes no more room than it needs."""
@@ -341,8 +398,34 @@ class NodesPanel(Panel):
         title.styles.text_style = "bold"
         title.show(line_text(head) if rows else "")
         view.styles.height = max(1, min(len(rows), int(self.size.height * _SHARE)))
-        view.show(rows or [plain("no node was heard")])
+        view.show(rows or [plain(self._hint())])
         self.query_one("#card", LineView).show(self._card)
+
+    def _hint(self) -> str:
+        if self.master.scans:
+            return "all node-IDs are asked..."
+        if not self.session.can_send:
+            return "no node was heard"
+        return f"no node was heard: f asks all node-IDs, as canmon net {self._bus} scan does"
+
+    @property
+    def _bus(self) -> str:
+        row = self.chosen
+        return row.channel if row else next(iter(self.session.buses), "")
+
+    def action_scan(self) -> None:
+        """Ask whether all node-IDs shall be asked who they are."""
+        if not self.session.can_send:
+            self.notify("a log has no nodes to be asked")
+        elif self.may_send():
+            question = (
+                f"Read 1000h of node-IDs 1 to 127 on {self._bus}, and 1018h of each that answers."
+                " An SDO transfer of another master may be disturbed. Send it (y or n)?"
+            )
+            self.query_one(PromptLine).prompt(question, "", partial(self._scan, self._bus))
+
+    def _scan(self, bus: str, answer: str) -> None:
+        self._if_yes(answer, lambda: self.master.scan(bus, self.session.now_us))
 
     def on_choice_view_chosen(self) -> None:
         """Show the card of another node."""
@@ -371,7 +454,10 @@ class NodesPanel(Panel):
         self.query_one(PromptLine).prompt(question, "", take)
 
     def _answered(self, channel: str, node: int, command: NmtCommand, answer: str) -> None:
+        self._if_yes(answer, lambda: self.master.command(channel, node, command))
+
+    def _if_yes(self, answer: str, act: Callable[[], object]) -> None:
         if answer.lower() in _YES and self.may_send():
-            self.change(lambda: self.master.command(channel, node, command))
+            self.change(act)
         elif answer.lower() not in (*_YES, "n", "no"):
             raise ValueError(f"{answer!r} is neither y nor n")

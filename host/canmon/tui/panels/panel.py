@@ -14,6 +14,7 @@ from textual.message import Message
 from textual.widget import Widget
 from textual.widgets import Input, Static
 
+from tickrig.host.canmon.model.frames import AnyRecord
 from tickrig.host.canmon.tui.session import Model, Session, Task
 from tickrig.host.canmon.workspace import checked_bus
 from tickrig.host.cli.extensions import ExtensionGroup
@@ -194,6 +195,19 @@ class PictureView(LineView, inherit_bindings=False):
 def read_help(module: str) -> str:
     """Return the help of a tab, in Markdown: it is in a file beside the module of the tab."""
     return Path(module).with_suffix(".md").read_text("utf-8")
+
+
+class FrameWanted(Message):
+    """A frame is to be shown in the trace.
+
+    Args:
+        at_us: its time.
+        record: the frame; None for the latest one until that time.
+    """
+
+    def __init__(self, at_us: int, record: AnyRecord | None) -> None:
+        super().__init__()
+        self.at_us, self.record = at_us, record
 
 
 class Panel(Vertical):

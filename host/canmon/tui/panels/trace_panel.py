@@ -12,7 +12,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 from operator import itemgetter
@@ -21,11 +21,12 @@ from typing import Any, ClassVar, Final
 
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
+from textual.events import Click
 from textual.widgets import Input, Static
 
 from tickrig.host.canmon.model import frames
 from tickrig.host.canmon.model.decode.filter import Filter, FilterError, parse_filter
-from tickrig.host.canmon.model.frames import Stamp
+from tickrig.host.canmon.model.frames import STAMPS, AnyRecord, Stamp
 from tickrig.host.canmon.model.logs.log_file import SUFFIXES
 from tickrig.host.canmon.model.top_model import meaning_text
 from tickrig.host.canmon.model.trace import DisplayFilter, Latest, Ring, TraceRow
@@ -33,7 +34,7 @@ from tickrig.host.canmon.output.recording import write_records
 from tickrig.host.canmon.tui.panels.panel import Panel, PromptLine, read_help
 from tickrig.host.canmon.tui.session import DecodedFrame, Model, Session, Task
 from tickrig.host.canmon.workspace import SettingError, choice, text_of, truth
-from tickrig.host.tui import Line, LineView, line_text
+from tickrig.host.tui import Line, LineView, line_text, plain
 from tickrig.wire.can import CanFrame, ErrorFrame, Frames
 
 # Rows of the trace as lines with styles.
@@ -117,15 +118,8 @@ class TraceLines:
 
     def _stamp(self, row: TraceRow) -> str:
         at_us = row.record.at_us
-        match self.stamp:
-            case frames.Stamp.DELTA:
-                return frames.seconds_text(row.since_us or 0, 1)
-            case frames.Stamp.ABSOLUTE:
-                return frames.seconds_text(at_us, 1)
-            case frames.Stamp.DATE:
-                return frames.date_text(at_us)
-            case _:
-                return frames.seconds_text(at_us - self.origin_us, 1)
+        before_us = at_us - (row.since_us or 0)
+        return frames.stamp_text(self.stamp, at_us, self.origin_us, before_us)
 
     def _data(self, row: TraceRow) -> Iterator[tuple[str, str]]:
         record = row.record
@@ -163,8 +157,16 @@ def _ident(row: TraceRow) -> tuple[str, str]:
     return f"{frames.ident_text(frames.any_ident(frame)):<9} ", style
 
 
-_STAMPS: Final = (Stamp.ZERO, Stamp.DELTA, Stamp.ABSOLUTE, Stamp.DATE)
 _CHANNEL_MAX: Final = 12
+_BOOKMARK: Final = "black on yellow"
+_BOOKMARKS: Final = 1_000
+"""As many are kept in a workspace."""
+SILENT: Final = (
+    "no frame comes: check bit rate and cable (F2); 2, then f asks all node-IDs, as"
+    " canmon net BUS scan does"
+)
+
+
 _GAPS_WIDTH: Final = 90
 """A narrower screen has room for what frames mean, or for the gaps between them."""
 
@@ -187,6 +189,12 @@ class TracePanel(Panel):
         Binding("d", "meaning", "decode"),
         Binding("b", "bits", "bits"),
         Binding("t", "stamp", "time"),
+        Binding("f", "find", "find"),
+        Binding("n", "again(1)", "next", key_display="n N"),
+        Binding("N", "again(-1)", "previous", show=False),
+        Binding("m", "bookmark", "bookmark"),
+        Binding("right_square_bracket", "marked(1)", "next bookmark", show=False),
+        Binding("left_square_bracket", "marked(-1)", "bookmarks", key_display="[ ]"),
         Binding("c", "clear", "clear"),
         Binding("s", "write", "save"),
         Binding("escape", "leave", "leave the filter", show=False),
@@ -201,6 +209,9 @@ class TracePanel(Panel):
         self._follower = _Follower(self)
         session.tasks.append(self._follower)
         self._begin = self._total = 0
+        self._cursor: int | None = None  # the number of a row in the ring that is shown
+        self._bookmarks: set[int] = set()  # times of frames
+        self._wanted: tuple[str, Filter | None] = "", None
         self._head = ""
         self._lines: list[Line] = []
 
@@ -231,8 +242,20 @@ class TracePanel(Panel):
             return
         self._total = passed.count - passed.first
         self._begin = max(0, self._total - view.rows) if self._follows(view) else view.top
-        rows = passed.rows(passed.first + self._begin, view.rows)
-        self._lines = [self._layout.line(row) for row in rows]
+        begin = passed.first + self._begin
+        rows = passed.rows(begin, view.rows)
+        self._lines = [self._marked_line(row, number) for number, row in enumerate(rows, begin)]
+        if not self._total and self.session.silent:
+            self._lines = [plain(SILENT)]
+            self._total = 1
+
+    def _marked_line(self, row: TraceRow, number: int) -> Line:
+        line = self._layout.line(row)
+        if row.record.at_us in self._bookmarks:
+            line = ((line[0][0], _BOOKMARK), *line[1:])
+        if number == self._cursor:
+            return tuple((text, f"{style} reverse".strip()) for text, style in line)
+        return line
 
     def paint(self) -> None:
         """Show them; the latest one if it was in view."""
@@ -248,10 +271,11 @@ class TracePanel(Panel):
     def load(self, settings: Mapping[str, Any]) -> None:
         """Take mode, time stamp, filter and what is shown."""
         self.overwrite = truth(settings, "overwrite", self.overwrite)
-        stamp = choice(settings, "time", self._layout.stamp, [str(one) for one in _STAMPS])
+        stamp = choice(settings, "time", self.session.stamp, [str(one) for one in STAMPS])
+        self.session.stamp = Stamp(stamp)
+        self._bookmarks = _times(settings, "bookmarks")
         self._layout = replace(
             self._layout,
-            stamp=Stamp(stamp),
             bits=truth(settings, "bits", self._layout.bits),
             meaning=truth(settings, "decode", self._layout.meaning),
         )
@@ -265,7 +289,8 @@ class TracePanel(Panel):
         """Return them."""
         return {
             "overwrite": self.overwrite,
-            "time": str(self._layout.stamp),
+            "time": str(self.session.stamp),
+            "bookmarks": sorted(self._bookmarks)[:_BOOKMARKS] or None,
             "bits": self._layout.bits,
             "decode": self._layout.meaning,
             "filter": self.filter_text,
@@ -276,7 +301,7 @@ class TracePanel(Panel):
         wanted: Filter | None = parse_filter(text) if text else None
         with self.session.lock:
             self._display_filter = DisplayFilter(self.session.model.trace, wanted)
-        self.filter_text, self.paused = text, None
+        self.filter_text, self.paused, self._cursor = text, None, None
 
     def on_line_view_moved(self) -> None:
         """Bring the lines that came into view."""
@@ -312,7 +337,7 @@ class TracePanel(Panel):
         """Hold the picture, or go on; frames are taken meanwhile."""
         with self.session.lock:
             held = self._display_filter.passed.copy(), self._display_filter.latest()
-        self.paused = None if self.paused else held
+        self.paused, self._cursor = (None, None) if self.paused else (held, None)
         self.refresh_view()
 
     def action_overwrite(self) -> None:
@@ -332,15 +357,109 @@ class TracePanel(Panel):
 
     def action_stamp(self) -> None:
         """Show another time: since the first frame, since the one before, absolute, date."""
-        place = (_STAMPS.index(self._layout.stamp) + 1) % len(_STAMPS)
-        self._layout = replace(self._layout, stamp=_STAMPS[place])
+        self.session.next_stamp()
         self.refresh_view()
+
+    def show_frame(self, at_us: int, record: AnyRecord | None = None) -> None:
+        """Hold the trace at a frame, or at the latest one until a time."""
+        if record is not None and self.filter_text and self._place(at_us, record) is None:
+            self.apply_filter("")
+            self.query_one("#wanted").display = False
+            self.notify("the filter hid this frame: it is off now")
+        place = self._place(at_us, record)
+        if place is None:
+            self.notify("the trace does not have this frame any more")
+            return
+        self._go(place)
+
+    def _place(self, at_us: int, record: AnyRecord | None) -> int | None:
+        """Return the number of a row in the ring that is shown; None if it is not there."""
+        passed, place = self._passed(), None
+        for number, row in enumerate(passed.rows(passed.first, passed.count), passed.first):
+            if record is not None and (row.record is record or row.record == record):
+                return number
+            if record is None and row.record.at_us <= at_us:
+                place = number
+        return place
+
+    def _passed(self) -> Ring:
+        with self.session.lock:
+            return self.paused[0] if self.paused else self._display_filter.passed.copy()
+
+    def _go(self, number: int) -> None:
+        """Hold the picture, with a row in its middle."""
+        if self.paused is None:
+            with self.session.lock:
+                self.paused = self._display_filter.passed.copy(), self._display_filter.latest()
+        self.overwrite, self._cursor = False, number
+        view = self.query_one(LineView)
+        self.refresh_view()  # as many lines as there are have to be known before it is scrolled
+        top = number - self.paused[0].first - view.rows // 2
+        view.scroll_to(y=max(0, top), animate=False, immediate=True, force=True)
+        self.refresh_view()
+
+    def action_find(self) -> None:
+        """Ask for a filter, and go to the next frame that it passes."""
+        self.query_one(PromptLine).prompt(
+            "find, as 'node=3 and emcy' or 'sdo[6040h]'; then n next, N previous",
+            self._wanted[0],
+            self._find,
+        )
+
+    def _find(self, text: str) -> None:
+        self._wanted = text, parse_filter(text)
+        self.action_again(1)
+
+    def action_again(self, step: int) -> None:
+        """Go to the next frame that was asked for, or to the one before."""
+        text, wanted = self._wanted
+        if wanted is not None:
+            self._search(step, f"further {text}", lambda row: _passes(row, wanted))
+        else:
+            self.action_find()
+
+    def action_bookmark(self) -> None:
+        """Mark the frame of the cursor, else the first in view, or unmark it."""
+        passed, view = self._passed(), self.query_one(LineView)
+        number = passed.first + view.top if self._cursor is None else self._cursor
+        for row in passed.rows(number, 1):
+            self._bookmarks ^= {row.record.at_us}
+        self.refresh_view()
+
+    def action_marked(self, step: int) -> None:
+        """Go to the next bookmark, or to the one before."""
+        self._search(step, "further bookmark", lambda row: row.record.at_us in self._bookmarks)
+
+    def _search(self, step: int, what: str, fits: Callable[[TraceRow], bool]) -> None:
+        """Go to the next row that fits, or to the one before; behind the last comes the first."""
+        passed, begin = self._passed(), self._cursor
+        if begin is None:
+            begin = passed.first + self.query_one(LineView).top - (step > 0)
+        rows = list(enumerate(passed.rows(passed.first, passed.count), passed.first))
+        place = begin - passed.first
+        above, below = rows[: max(0, place)], rows[max(0, place + 1) :]
+        order = [*below, *above] if step > 0 else [*above[::-1], *below[::-1]]
+        found = next((number for number, row in order if fits(row)), None)
+        if found is None:
+            self.notify(f"no {what}")
+            return
+        if (found - begin) * step < 0:
+            self.notify(f"from the {'first' if step > 0 else 'last'} frame again")
+        self._go(found)
+
+    def on_click(self, event: Click) -> None:
+        """Put the cursor on a line."""
+        view = self.query_one(LineView)
+        row = event.screen_y - view.region.y
+        if not self.overwrite and 0 <= row < min(view.rows, self._total - view.top):
+            self._go(self._passed().first + view.top + row)
 
     def action_clear(self) -> None:
         """Begin anew."""
         with self.session.lock:
             self._display_filter.clear()
-        self.paused = None
+        self.paused = self._cursor = None
+        self._bookmarks.clear()
         self.refresh_view()
 
     def action_write(self) -> None:
@@ -361,13 +480,12 @@ class TracePanel(Panel):
         """Make room for what is there: buses, and the first time."""
         buses = {one.row.record.channel for one in latest}
         width = min(_CHANNEL_MAX, max(map(len, buses))) if len(buses) > 1 else 0
-        first = passed.rows(0, 1) if passed.first == 0 else []
-        origin_us = first[0].record.at_us if first else self._layout.origin_us
         self._layout = replace(
             self._layout,
+            stamp=self.session.stamp,
             channel_width=width,
             counts=self.overwrite,
-            origin_us=origin_us,
+            origin_us=self.session.origin_us,
             gaps=not self._layout.meaning or self.size.width >= _GAPS_WIDTH,
         )
 
@@ -376,6 +494,19 @@ class TracePanel(Panel):
         words += [f"filter {self.filter_text}"] * bool(self.filter_text)
         note = f"   [{', '.join(words)}]" if words else ""
         return line_text(self._layout.head()) + note
+
+
+def _passes(row: TraceRow, wanted: Filter) -> bool:
+    """Say whether a frame passes a filter; a line of a serial port that means nothing does not."""
+    return row.decoded is not None and wanted.matches(row.record, row.decoded)
+
+
+def _times(settings: Mapping[str, Any], name: str) -> set[int]:
+    """Return times in microseconds; SettingError if they are none."""
+    value = settings.get(name, [])
+    if not isinstance(value, list) or not all(type(item) is int for item in value):
+        raise SettingError((name,), "is no array of times in microseconds")
+    return set(value)
 
 
 class _Follower(Task):

@@ -93,11 +93,21 @@ class TransmitTask(Task):
             return
         self.list.armed = armed
         self.list.enable(number, now_us)
+        self._remember(number)
 
     def once(self, number: int, *, armed: bool) -> None:
         """Send a row now; ValueError if it is not armed."""
         self.list.armed = armed
+        if armed:
+            self._remember(number)
         self._out += self.list.once(number)
+
+    def _remember(self, number: int) -> None:
+        """Give a row of a PDO the values that were sent for objects which it does not name."""
+        words, row = self.words[number], self.list.rows[number]
+        if "#" not in words.frame:
+            row.frame = self._pdos.frame(words.frame)
+            self._pdos.remember(words.frame)
 
     def tick(self, now_us: int, records: Sequence[DecodedFrame], /) -> transmit.AnyFrames:
         """Return what is due."""

@@ -167,7 +167,7 @@ def test_arrows_choose_a_node_and_enter_shows_its_objects() -> None:
 
 def test_where_there_is_no_node_or_no_objects_tab_enter_does_nothing() -> None:
     async def act(desk: Desk[NodesPanel]) -> None:
-        assert desk.lines() == ["no node was heard"]
+        assert desk.lines()[0].startswith("no node was heard")
         await desk.press("enter")
         desk.session.run(10_000)
         desk.lines()
