@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import threading
 import time
 from collections import deque
@@ -191,6 +192,7 @@ class Session:
         trouble: why a frame could not be sent; empty if all could.
         notes: lines for people, until they are shown.
         stamp: how all tabs write times.
+        words: options and SOURCE words that name the buses on a command line.
     """
 
     def __init__(
@@ -207,6 +209,7 @@ class Session:
         self.armed, self.trouble = False, ""
         self.sent = self.withheld = 0
         self.stamp = Stamp.ZERO
+        self.words: tuple[str, ...] = ()
         self.notes: deque[str] = deque(maxlen=_MARKS_KEPT)
         model.eds.notify = self.notes.append
         self._clock, self._watch = clock, Stopwatch()
@@ -225,6 +228,12 @@ class Session:
         """Whether nothing came on a bus for some seconds since it was opened."""
         waited_us = self._clock() - self._begun_us
         return self.source.live and not self.model.frames and waited_us > _SILENT_US
+
+    @property
+    def scan_command(self) -> str:
+        """The command that finds the nodes of the first bus."""
+        bus = next(iter(self.buses), "")
+        return shlex.join(["canmon", "net", *(self.words or (bus,)), "scan"])
 
     @property
     def can_send(self) -> bool:
@@ -265,7 +274,9 @@ class Session:
 
     def over(self, model: Model) -> Session:
         """Return another session on this source, once this one is closed."""
-        return Session(self.source, model, self.buses, self._clock)
+        session = Session(self.source, model, self.buses, self._clock)
+        session.words = self.words
+        return session
 
     def resume(self, source: AnySource[AnyRecord], buses: Mapping[str, _Send]) -> None:
         """Go on after `close`, on a source that was opened again."""
@@ -371,7 +382,10 @@ def open_session(words: Sequence[str], options: BusOptions, model: Model) -> Ses
     if not lines:
         buses = buses or [BusSpec()]
     source, opened = open_live(buses, lines, options)
-    return Session(source, model, {name: partial(_send, bus) for name, bus in opened.items()})
+    sends = {name: partial(_send, bus) for name, bus in opened.items()}
+    session = Session(source, model, sends)
+    session.words = (*options.arguments(), *words[:1])
+    return session
 
 
 def _send(bus: OpenBus, frame: CanFrame | FdFrame) -> None:

@@ -406,7 +406,7 @@ class NodesPanel(Panel):
             return "all node-IDs are asked..."
         if not self.session.can_send:
             return "no node was heard"
-        return f"no node was heard: f asks all node-IDs, as canmon net {self._bus} scan does"
+        return f"no node was heard; f asks all node-IDs, as {self.session.scan_command}"
 
     @property
     def _bus(self) -> str:

@@ -162,8 +162,8 @@ _BOOKMARK: Final = "black on yellow"
 _BOOKMARKS: Final = 1_000
 """As many are kept in a workspace."""
 SILENT: Final = (
-    "no frame comes: check bit rate and cable (F2); 2, then f asks all node-IDs, as"
-    " canmon net BUS scan does"
+    "no frame comes: bit rate, cable, termination, power? F2 changes the settings.",
+    "To ask all node-IDs: A, then f in the tab nodes; or in another terminal",
 )
 
 
@@ -246,8 +246,9 @@ class TracePanel(Panel):
         rows = passed.rows(begin, view.rows)
         self._lines = [self._marked_line(row, number) for number, row in enumerate(rows, begin)]
         if not self._total and self.session.silent:
-            self._lines = [plain(SILENT)]
-            self._total = 1
+            command = self.session.scan_command
+            self._lines = [*map(plain, SILENT), plain(f"    {command}", "bold")]
+            self._total = len(self._lines)
 
     def _marked_line(self, row: TraceRow, number: int) -> Line:
         line = self._layout.line(row)

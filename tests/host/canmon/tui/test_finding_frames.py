@@ -11,6 +11,7 @@ from textual.widgets import Input
 from tests.host.canmon.tui.panel_pilot import Desk, at_desk, kept
 from tests.host.canmon.tui.pilot import drive_session, on_monitor, screen_text, shown, until
 from tests.host.canmon.tui.rig_session import BUS, NODE, RigSession
+from tests.host.canmon.wire import Wire
 from tickrig.host.canmon.model.check.checker import Alarms
 from tickrig.host.canmon.model.check.rules import Rules
 from tickrig.host.canmon.model.frames import Record
@@ -19,7 +20,9 @@ from tickrig.host.canmon.tui.panels.alarms_panel import AlarmsPanel
 from tickrig.host.canmon.tui.panels.nodes_panel import NodesPanel
 from tickrig.host.canmon.tui.panels.trace_panel import TracePanel
 from tickrig.host.canmon.tui.panels.transmit_panel import TransmitPanel
+from tickrig.host.canmon.tui.session import Model, open_session
 from tickrig.host.canmon.workspace import SettingError
+from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.tui import LineView
 from tickrig.wire.can import CanFrame
 
@@ -249,10 +252,8 @@ def test_a_silent_bus_leads_to_a_scan_and_the_scan_finds_the_nodes() -> None:
     session = RigSession(eds=False)
 
     async def act(desk: Desk[NodesPanel]) -> None:
-        assert (
-            desk.lines()[0]
-            == f"no node was heard: f asks all node-IDs, as canmon net {BUS} scan does"
-        )
+        hint = f"f asks all node-IDs, as canmon net {BUS} scan"
+        assert desk.lines()[0] == f"no node was heard; {hint}"
         await desk.press("f")
         assert not desk.asked  # it is not armed
         desk.session.arm()
@@ -279,7 +280,8 @@ def test_a_trace_of_a_silent_bus_says_what_to_do() -> None:
     session._begun_us -= 10_000_000
 
     async def act(desk: Desk[TracePanel]) -> None:
-        assert desk.lines()[0].startswith("no frame comes: check bit rate and cable (F2)")
+        assert desk.lines()[0].startswith("no frame comes: bit rate, cable,")
+        assert desk.lines()[2] == f"    canmon net {BUS} scan"
         desk.session.run(10_000)
         assert "no frame comes" not in desk.lines()[0]
 
@@ -326,3 +328,13 @@ def test_transmit_remembers_what_was_sent_of_a_pdo() -> None:
         assert "205#060064000000" in desk.lines()[1]
 
     at_desk(TransmitPanel, act, settings={"row": rows})
+
+
+def test_the_scan_that_is_proposed_names_the_bus_as_a_command_line_does(wire: Wire) -> None:
+    options = BusOptions(bitrate=500_000, bus_kwargs=("rx_queue_size=9",))
+    session = open_session([wire.word], options, Model())
+    words = f"--bitrate=500000 --bus-kwargs rx_queue_size=9 {wire.word}"
+    assert session.scan_command == f"canmon net {words} scan"
+    assert session.over(Model()).scan_command == session.scan_command
+    session.close()
+    session.source.close()
