@@ -246,6 +246,8 @@ def run() -> None:
             panel.end()
 
         with taking_signals(received), _Stepper(pilot, panel.end) as stepper:
+            if ended.number:  # it came while the port was opened
+                panel.end()
             panel.run()
         stepper.raise_failure()
 

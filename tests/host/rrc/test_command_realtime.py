@@ -286,6 +286,31 @@ def test_the_end_of_the_panel_stops_the_chair(
     assert (live.read("out_v_pct"), live.read("state")) == (0, "Output")
 
 
+IMPATIENT = """
+import signal
+from tickrig.host.rrc.chair import Chair
+enter = Chair.__enter__
+def entered(chair):
+    enter(chair)
+    signal.raise_signal({number})
+    return chair
+Chair.__enter__ = entered
+from tickrig.commands import rrc
+rrc()
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_before_the_panel_is_shown_ends_it(number: signal.Signals, bench: Bench) -> None:
+    live, port = bench
+    program = IMPATIENT.format(number=int(number))
+    words = ["-u", "-c", program, port.path, "--panel"]
+    child = pexpect.spawn(sys.executable, words, timeout=PATIENCE_S, echo=False)
+    child.expect(pexpect.EOF)
+    assert status_of(child) == 128 + number
+    assert live.read("state") == "Standby"
+
+
 def test_a_device_that_is_gone_ends_the_panel(bench: Bench) -> None:
     live, port = bench
     child = spawned(port, "--panel")
