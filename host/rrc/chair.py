@@ -54,6 +54,9 @@ _TAKEN_US: Final = 200_000
 """After so long a status line shows what was commanded."""
 
 _STOP_TRIES: Final = 3
+_MEET_TRIES: Final = 3
+"""How often an RRC is asked that has answered once: a busy machine hands answers on late."""
+
 _KEPT_BYTES: Final = 4_096
 _SHOWN_BYTES: Final = 40
 _OK: Final = Ok("device").encode()
@@ -190,12 +193,19 @@ class Chair(Closing):
     def _meet(self, opening: _OpeningLink) -> None:
         """Talk to the RRC for the first time; a line that echoes says no OK:device."""
         failure: Exception | None = None
-        try:
-            self.client.start()
-        except (LinkTimeout, DeviceRefused) as error:
-            failure = error
+        for _ in range(_MEET_TRIES):
+            try:
+                self.client.start()
+            except (LinkTimeout, DeviceRefused) as error:
+                failure = error
+            else:
+                failure = None
+            if failure is None or _OK not in opening.received:
+                break
         if failure is None and (self.client.stable or _OK in opening.received):
             return
+        if _OK in opening.received:
+            raise LinkTimeout(f"an RRC answered once, then not in time: {failure}") from failure
         if opening.received:
             raise NotAnRrc(f"no RRC: {opening.received[:_SHOWN_BYTES]!r} came") from failure
         raise LinkTimeout("no answer: is an RRC connected, and has it power?") from failure

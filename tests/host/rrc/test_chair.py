@@ -6,6 +6,14 @@ import pytest
 
 from tests.host.rigs import ScriptedLink
 from tests.host.rrc.chair_bench import Bench
+from tests.host.spy_link import SpyLink
+from tickrig.device.rrc.machine import Rrc
+from tickrig.emulators.rig.faults import FaultyPort
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.sim_link import SimLink
+from tickrig.emulators.rig.station import Station
+from tickrig.emulators.serial.byte_faults import BYTE_FAULTS
+from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.host.links.link import LinkTimeout
 from tickrig.host.rrc.chair import DEAD_MAN_US, Chair, ChairStopped, DeadMan, Guard, NotAnRrc
 from tickrig.wire.rrc.commands import BadParameters, Limit
@@ -37,6 +45,32 @@ def test_the_guard_is_set_before_anything_moves() -> None:
     bench = Bench()
     assert bench.link.lines[-2:] == [b"watchdog32", b"stablemode1"]
     assert (bench.chair.client.watchdog_us, bench.chair.client.stable) == (500_000, True)
+
+
+class LateLink(SpyLink):
+    """An RRC whose answers come after half a second, to commands of some numbers."""
+
+    def __init__(self, late: range) -> None:
+        line = SerialLine()
+        self._port, self._late = FaultyPort(line.a, BYTE_FAULTS), late
+        super().__init__(SimLink(Rig(Station(Rrc(), self._port)), line.b))
+
+    def send(self, traffic: bytes, /) -> None:
+        if len(self.lines) in self._late:
+            self._port.arm("delay", "500ms")
+        else:
+            self._port.clear("delay")
+        super().send(traffic)
+
+
+def test_an_rrc_that_answers_late_is_asked_again() -> None:
+    with Chair(LateLink(range(1, 2)), Guard()) as chair:
+        assert chair.client.stable
+
+
+def test_an_rrc_that_always_answers_late_is_not_taken_for_another_device() -> None:
+    with pytest.raises(LinkTimeout, match="an RRC answered once, then not in time: "):
+        Chair(LateLink(range(1, 99)), Guard())
 
 
 def test_without_a_guard_nothing_is_set() -> None:

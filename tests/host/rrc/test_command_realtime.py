@@ -305,7 +305,9 @@ def test_a_signal_before_the_panel_is_shown_ends_it(number: signal.Signals, benc
     live, port = bench
     program = IMPATIENT.format(number=int(number))
     words = ["-u", "-c", program, port.path, "--panel"]
-    child = pexpect.spawn(sys.executable, words, timeout=PATIENCE_S, echo=False)
+    child: pexpect.spawn[bytes] = pexpect.spawn(
+        sys.executable, words, timeout=PATIENCE_S, echo=False
+    )
     child.expect(pexpect.EOF)
     assert status_of(child) == 128 + number
     assert live.read("state") == "Standby"
