@@ -39,17 +39,19 @@ from tickrig.host.canmon.verbs import decode_options
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.messages import Refused, refuse_path, refusing, until_unread
 from tickrig.host.cli.options import PATH, Decorator, add_options
-from tickrig.host.text.page_text import json_text
+from tickrig.host.text.page_text import json_text, one_line
+from tickrig.host.text.toml_reader import read_toml
 from tickrig.host.text.values import counted
 from tickrig.host.text.whole_file import write_whole
 
 if TYPE_CHECKING:
-    from tickrig.host.canmon.model.check import column_check, diagnosis
+    from tickrig.host.canmon.model.check import column_check, diagnosis, learnt
     from tickrig.host.canmon.model.columns.columns import Columns
     from tickrig.host.canmon.model.decode.node_memory import EdsObjects
 else:  # numpy; decoders
     column_check = LazyModule("tickrig.host.canmon.model.check.column_check")
     diagnosis = LazyModule("tickrig.host.canmon.model.check.diagnosis")
+    learnt = LazyModule("tickrig.host.canmon.model.check.learnt")
 
 
 # What `check` finds, shown as it comes: as text, or as objects in JSON.
@@ -217,6 +219,34 @@ def _read_rules(files: Sequence[Path], options: Mapping[str, object]) -> Rules:
     return rules
 
 
+def _read_learnt(
+    files: Sequence[Path], options: Mapping[str, object], *, init: bool
+) -> learnt.Learnt | None:
+    """Return what was learnt from a good log; None if the files have other rules.
+
+    Raises:
+        Refused: it is wrong, or not alone.
+    """
+    others = [f"--{name.replace('_', '-')}" for name in (*SWITCHES, *VALUES) if options.get(name)]
+    if init and (files or others):
+        raise Refused(f"--init learns all rules: leave {(*map(str, files), *others)[0]} out")
+    found = None
+    for path in files:
+        try:
+            text = path.read_text("utf-8")
+            found = learnt.parse_learnt(text) or found
+        except OSError:
+            return None  # told by who reads it as other rules, as what is no TOML
+        except ValueError as error:
+            if read_toml(text).mistakes:
+                return None
+            raise Refused(f"rules {path}: {error}") from None
+    if found is not None and (others or len(files) > 1):
+        rest = others[0] if others else "another file"
+        raise Refused(f"learnt rules are held alone: leave {rest} out, or check twice")
+    return found
+
+
 def _is_empty(rules: Rules) -> bool:
     return rules == Rules(bit_rate=rules.bit_rate)
 
@@ -252,6 +282,10 @@ _MOST_AROUND: Final = 1_000
         help="Frames before and after what a RULE finds.",
     ),
     click.option(
+        "--init", is_flag=True, help="Learn rules from a good log, and write them to -o or stdout."
+    ),
+    click.option("-o", "output", type=PATH, metavar="FILE", help="The rules of --init: good.toml."),
+    click.option(
         "--max",
         "most",
         type=click.IntRange(1),
@@ -277,6 +311,8 @@ def command(  # noqa: PLR0913 - options
     dbc: Sequence[Path],
     span_us: int | None,
     around: int,
+    init: bool,
+    output: Path | None,
     most: int,
     report_path: Path | None,
     sarif_path: Path | None,
@@ -293,13 +329,19 @@ def command(  # noqa: PLR0913 - options
     grouped by rule and node, each with its frames. The rules that were held are
     listed on standard error. Exit status 5 if nothing could be judged.
 
-    With rules, only these are held. They are options, or a TOML file with the
+    --init learns what is usual in a good log: nodes, identities, CAN-IDs,
+    lengths, periods, load, order of boot-ups, EMCYs. Given to the next check,
+    its file is held beside the rules that need no parameter.
+
+    With other rules, only these are held. They are options, or a TOML file with the
     same names: no_emcy = true, heartbeat = ["3=100ms±20%"].
 
     \b
     canmon check run.log
     canmon check can0 -b 500000 --for 60s
     canmon check run.log --eds 3=drive.eds --max 5
+    canmon check --init good.log -o good.toml
+    canmon check next.log good.toml
     canmon check run.log --no-emcy --no-sdo-abort --nodes 3,16-18
     canmon check run.log rules.toml --junit out.xml
     canmon check can0 -b 500000 --for 60s --max-load 60 --heartbeat 3=100ms±20%
@@ -308,13 +350,19 @@ def command(  # noqa: PLR0913 - options
     {source}
     """  # noqa: D301 - click wants the backspace
     words = [word for word in source if not word.endswith(_RULE_FILE)]
-    rules = _read_rules([Path(word) for word in source if word.endswith(_RULE_FILE)], options)
+    files = [Path(word) for word in source if word.endswith(_RULE_FILE)]
+    known = _read_learnt(files, options, init=init)
+    rules = Rules() if known or init else _read_rules(files, options)
     bus = BusOptions(**{name: options[name] for name in _NAMES})
     bit_rate = _bit_rate(rules, words, bus)
     objects = decode_options.read_eds_files(eds)
     if _is_empty(rules):
-        held_frames = _Usual(words, bus, bit_rate or rules.bit_rate, objects, reopen=reopen)
+        held_frames = _Usual(words, bus, bit_rate or rules.bit_rate, objects, known, reopen=reopen)
         held_frames.listen(span_us)
+        if init:
+            held_frames.learn(output)
+            listening.report(held_frames.source, strict)
+            return
         held_frames.show(jsonl=jsonl, stamp=Stamp(stamp) if stamp else None, most=most)
         held_frames.write(report_path, sarif_path)
         held_frames.end(strict)
@@ -365,7 +413,11 @@ class _Usual:
         bus: options of buses.
         bit_rate: bits a second, None if it is not known.
         eds: what EDS files say, by node-ID.
+        known: what was learnt from a good log, None for nothing.
         reopen: wait for a bus that goes away.
+
+    Attributes:
+        source: where the frames came from.
     """
 
     def __init__(
@@ -374,13 +426,14 @@ class _Usual:
         bus: BusOptions,
         bit_rate: int | None,
         eds: Mapping[int, EdsObjects],
+        known: learnt.Learnt | None,
         *,
         reopen: bool,
     ) -> None:
         self._words, self._bus, self._reopen = words, bus, reopen
-        self._make = partial(diagnosis.Diagnoser, bit_rate, eds)
+        self._make = partial(diagnosis.Diagnoser, bit_rate, eds, rules=known)
         self._diagnoser = self._make()
-        self._source: AnySource[Columns] | Source
+        self.source: AnySource[Columns] | Source
 
     def listen(self, span_us: int | None) -> None:
         """Take all that comes, until somebody interrupts it or the time is over."""
@@ -388,13 +441,13 @@ class _Usual:
         if log is not None:
             with closing(log):
                 if listening.take_blocks(log, self._diagnoser.take):
-                    self._source = log
+                    self.source = log
                     return
             self._diagnoser = self._make()  # CAN FD: read it again, frame by frame
         source = open_source(self._words, self._bus)
         if self._reopen:
             source.reopen()
-        self._source = source
+        self.source = source
         with closing(source), listening.until_interrupted():
             listening.listen(source, self._take, span_us)
 
@@ -404,7 +457,7 @@ class _Usual:
 
     def show(self, *, jsonl: bool, stamp: Stamp | None, most: int) -> None:
         """Show what was found."""
-        source = self._source
+        source = self.source
         lost = [f"{source.lost} frames were lost"] if source.lost else []
         self._diagnoser.without_errors = source.without_errors
         self._found = found = self._diagnoser.diagnosis(lost, source.errors())
@@ -421,6 +474,28 @@ class _Usual:
             left
         )
 
+    def learn(self, output: Path | None) -> None:
+        """Write what is usual as rules."""
+        frames, words = self._diagnoser.kept.frames, " ".join(self._words)
+        if not frames:
+            raise NothingJudged(_no_frame(self.source, self._words).replace("judged", "learnt"))
+        summaries = self._diagnoser.summaries()
+        head = [
+            f"Learnt from {one_line(words)}, {counted(frames, 'frame')}, by canmon check --init.",
+            "canmon check NEXT.log THIS.toml holds the next log against it, and against the rules",
+            "that need no parameter. Change what you know better.",
+        ]
+        text = learnt.learnt_text(summaries, head)
+        if output is None:
+            with until_unread():
+                click.echo(text, nl=False)
+        else:
+            with refusing("-o"):
+                write_whole(output, text)
+        for bus in summaries:
+            for found in bus.found:
+                click.echo(f"{bus.name}: taken for usual: {found}", err=True)
+
     def write(self, junit_path: Path | None, sarif_path: Path | None) -> None:
         """Write reports."""
         found = self._found
@@ -428,14 +503,14 @@ class _Usual:
             TrafficFinding(fault.first_us, fault.rule, str(fault).partition(": ")[2])
             for fault in found.faults
         ]
-        why = self._source.failed or self._nothing()
+        why = self.source.failed or self._nothing()
         suite = " ".join(self._words)
         judged = suite, list(diagnosis.RULES), findings, why, found.unjudged
         _write("--junit", junit_path, junit, judged)
         _write("--sarif", sarif_path, sarif, judged)
 
     def _nothing(self) -> str:
-        return "" if self._found.frames else _no_frame(self._source, self._words)
+        return "" if self._found.frames else _no_frame(self.source, self._words)
 
     def end(self, strict: bool) -> None:
         """Say what was judged, and end with the exit status."""
@@ -448,7 +523,7 @@ class _Usual:
         counts = Counter(fault.rule for fault in found.faults)
         rules = ", ".join(f"{rule}: {count}" for rule, count in sorted(counts.items()))
         said.append(f"{counted(counts.total(), 'finding')}{': ' * bool(rules)}{rules}")
-        listening.report(self._source, strict, [] if nothing else said)
+        listening.report(self.source, strict, [] if nothing else said)
         if found.faults:
             click.get_current_context().exit(_BROKEN)
         if nothing:

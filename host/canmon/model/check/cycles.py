@@ -48,6 +48,7 @@ _CALM: Final = 0.12
 """Gaps that usually differ by more have no rhythm that could be judged."""
 _STEADY: Final = 0.15
 _SAME: Final = 0.12
+_NEAR: Final = 0.2
 _ON_LEVEL: Final = 0.6
 _MOST_LEVELS: Final = 5
 _MOST_ODD: Final = 0.12
@@ -82,6 +83,7 @@ class Rhythm(NamedTuple):
         extra: frames that come between two that are right.
         noisy: gaps from and to which jitter is large, with the usual and the large jitter in us.
         spread_us: distance of the quartiles of the gaps, where it is usual.
+        share: of the gaps that have the period.
     """
 
     levels: tuple[Level, ...]
@@ -89,6 +91,7 @@ class Rhythm(NamedTuple):
     extra: tuple[int, ...] = ()
     noisy: tuple[tuple[int, int, int, int], ...] = ()
     spread_us: int = 0
+    share: float = 1.0
 
     @property
     def period_us(self) -> int:
@@ -133,7 +136,9 @@ def rhythm_of(times: Sequence[int]) -> Rhythm | None:
         most = max(3, _MOST_ODD * (level.end - level.begin))
         missing += lost if len(lost) <= most else []
         extra += doubled if len(doubled) <= most and events <= len(doubled) + 2 else []
-    return Rhythm(tuple(levels), tuple(missing), tuple(extra), tuple(noisy), quiet)
+    off = max(_NEAR * main, 4 * quiet)
+    share = 1 - len(_outside(gaps, 0, len(gaps), main - off, main + off)) / len(gaps)
+    return Rhythm(tuple(levels), tuple(missing), tuple(extra), tuple(noisy), quiet, share)
 
 
 def gaps_of(times: Sequence[int]) -> Sequence[int]:
@@ -203,7 +208,7 @@ def _odd(
         with events.
     """
     period = level.period_us
-    off = max(0.2 * period, 4 * quiet, min(_FLOOR_US, period / 3))
+    off = max(_NEAR * period, 4 * quiet, min(_FLOOR_US, period / 3))
     missing: list[tuple[int, int]] = []
     extra: list[int] = []
     events, taken = 0, -1

@@ -38,7 +38,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from tickrig._lazy import LazyModule
-from tickrig.host.canmon.model.check import cycles, node_events
+from tickrig.host.canmon.model.check import cycles, learnt, node_events
 from tickrig.host.canmon.model.check.bus_frames import (
     BusFrames,
     FrameKeeper,
@@ -58,9 +58,11 @@ from tickrig.wire.canopen import nmt, sdo_frame
 if TYPE_CHECKING:
     import numpy as np
 
+    from tickrig.host.canmon.model.columns import column_traffic
     from tickrig.host.canmon.model.columns.columns import Columns
 else:  # an extra
     np = LazyModule("numpy")
+    column_traffic = LazyModule("tickrig.host.canmon.model.columns.column_traffic")
 
 NO_LOSS: Final = "no-loss"
 
@@ -82,6 +84,7 @@ RULES: Final[Mapping[str, str]] = MappingProxyType(
         "silence": "a bus that is silent",
         "time-back": "a time that goes back",
         NO_LOSS: "frames that were lost",
+        **learnt.RULES,
         "max-load": "half a second with a load above 80 %",
     }
 )
@@ -95,6 +98,10 @@ _TIMED: Final = (
     *(f"sync-{what}" for what in ("missing", "doubled", "period")),
 )
 """Rules that a log without times cannot break."""
+_SURE_SHARE: Final = 0.9
+"""Frames have a period to be learnt if so many gaps have it."""
+_IDENTITY: Final = 0x1018
+_NEAR_US: Final = 100_000
 _KEPT_FRAMES: Final = 1_000
 _KEPT_TEXTS: Final = 3
 _LOST_AFTER: Final = 1.5
@@ -174,6 +181,7 @@ class Diagnoser:
         bit_rate: bits a second, for the load; None if it is not known.
         eds: what EDS files say, by node-ID.
         without_errors: why the source has no error frames whatever happened.
+        rules: what was learnt from a good log; None for nothing.
 
     Attributes:
         kept: the frames that came.
@@ -184,7 +192,9 @@ class Diagnoser:
         bit_rate: int | None = None,
         eds: Mapping[int, node_memory.EdsObjects] = _NO_NODES,
         without_errors: str = "",
+        rules: learnt.Learnt | None = None,
     ) -> None:
+        self._rules = rules
         self._bit_rate, self._eds, self.without_errors = bit_rate, eds, without_errors
         self.kept = FrameKeeper()
 
@@ -203,7 +213,8 @@ class Diagnoser:
         judged: set[str] = set()
         why: dict[str, str] = {}
         for bus in self.kept:
-            one = _BusJudge(bus, self._bit_rate, self._eds)
+            known = learnt.bus_of(self._rules or {}, bus.name, len(self.kept.buses))
+            one = _BusJudge(bus, self._bit_rate, self._eds, known)
             faults += one.faults()
             judged |= one.judged
             why |= one.unjudged
@@ -220,8 +231,20 @@ class Diagnoser:
             why = dict.fromkeys(RULES, "no frame came")
         faults.sort(key=lambda fault: (fault.first_us, fault.channel, fault.rule))
         names = tuple(name for name in RULES if name in judged)
+        if self._rules is None:
+            why |= dict.fromkeys(learnt.RULES, "nothing was learnt: see --init")
         unjudged = {name: why.get(name, "") for name in RULES if name not in judged}
         return Diagnosis(tuple(faults), names, unjudged, self.kept.frames)
+
+
+    def summaries(self) -> list[learnt.BusSummary]:
+        """Return what is usual on each bus."""
+        found = []
+        for bus in self.kept:
+            one = _BusJudge(bus, self._bit_rate, self._eds)
+            one.faults()
+            found.append(one.summary())
+        return found
 
 
 def diagnose(
@@ -250,8 +273,9 @@ class _BusJudge:
         bus: BusFrames,
         bit_rate: int | None,
         eds: Mapping[int, node_memory.EdsObjects],
+        rules: learnt.LearntBus | None = None,
     ) -> None:
-        self._bus, self._bit_rate, self._eds = bus, bit_rate, eds
+        self._bus, self._bit_rate, self._eds, self._rules = bus, bit_rate, eds, rules
         self.judged = {"no-error-frames", "time-back"}
         self.unjudged: dict[str, str] = {}
         self._hits: list[Hit] = []
@@ -266,9 +290,9 @@ class _BusJudge:
         bus, rows = self._bus, self._rows
         self._time()
         self._load()
-        decoder = Decoder(self._eds)
-        events = node_events.BusEvents(bus, self._times, decoder, rows)
-        canopen = node_events.is_canopen(bus, rows)
+        decoder = self._decoder = Decoder(self._eds)
+        self._events = events = node_events.BusEvents(bus, self._times, decoder, rows)
+        self._canopen = canopen = node_events.is_canopen(bus, rows)
         for row in _merged(
             found
             for ident, found in rows.items()
@@ -280,11 +304,10 @@ class _BusJudge:
                 dict.fromkeys(RULES.keys() - _ANY_BUS, "no CANopen was heard") | self.unjudged
             )
             return self._grouped(events.hits)
-        self._events = events
         events.end(self._end_us)
         self._cuts = sorted(events.cuts)
         self.unjudged = self._without() | self.unjudged
-        self.judged |= RULES.keys() - _ANY_BUS - self.unjudged.keys()
+        self.judged |= RULES.keys() - learnt.RULES.keys() - _ANY_BUS - self.unjudged.keys()
         self._lengths(decoder)
         if "time-back" not in self.unjudged:
             self._rhythms()
@@ -342,10 +365,8 @@ class _BusJudge:
             self.unjudged["max-load"] = "no bit rate is known: give -b, as -b 500000"
             return
         self.judged.add("max-load")
-        steps: Counter[int] = Counter()
         first_us, most = self._times[0], MOST_LOAD / 100 * self._bit_rate * _LOAD_US / 1_000_000
-        for at_us, bits in zip(self._times, self._bits(), strict=True):
-            steps[(at_us - first_us) // _LOAD_STEP_US] += bits
+        steps = self._bits_by_step(first_us)
         width, total, over_us = _LOAD_US // _LOAD_STEP_US, 0, first_us
         window: deque[int] = deque()
         for step in sorted(steps) if self._end_us - first_us >= _LOAD_US else ():
@@ -361,24 +382,27 @@ class _BusJudge:
                 text = f"load {percent:.1f} % in {_LOAD_US // 1_000} ms, at most {MOST_LOAD:g} %"
                 self._hit("max-load", None, f"{text} is right", [begin, end - 1])
 
-    def _bits(self) -> Sequence[int]:
-        """Return the bits of each classic frame on the bus, 0 for others."""
+    def _bits_by_step(self, first_us: int) -> dict[int, int]:
+        """Return the bits of classic frames in each step of time."""
         bus = self._bus
         if bus.is_large:
-            from tickrig.host.canmon.model.columns.column_traffic import column_bits  # noqa: PLC0415 - numpy
-
             ident = np.frombuffer(bus.ident, np.uint64)
             plain = np.flatnonzero((ident >> np.uint64(33) == 0) & (ident & np.uint64(ERROR) == 0))
-            out = np.zeros(len(bus), np.int64)
-            out[plain] = column_bits(
+            bits = column_traffic.column_bits(
                 ident[plain].astype(np.uint32),
                 np.frombuffer(bus.dlc, np.uint8)[plain],
                 np.frombuffer(bus.payload, np.uint64)[plain],
             )
-            found: Sequence[int] = out.tolist()
-            return found
-        frames = (bus.frame(row) if bus.ident[row] < FD else None for row in range(len(bus)))
-        return [frame_bits(one) if isinstance(one, CanFrame) else 0 for one in frames]
+            times = np.frombuffer(self._times, np.int64)[plain]
+            found, places = np.unique((times - first_us) // _LOAD_STEP_US, return_inverse=True)
+            sums = np.bincount(places, bits).astype(np.int64).tolist()
+            return dict(zip(found.tolist(), sums, strict=True))
+        steps: Counter[int] = Counter()
+        for row in range(len(bus)):
+            frame = bus.frame(row) if bus.ident[row] < FD else None
+            if isinstance(frame, CanFrame):
+                steps[(self._times[row] - first_us) // _LOAD_STEP_US] += frame_bits(frame)
+        return steps
 
     # Lengths
 
@@ -724,10 +748,79 @@ class _BusJudge:
                 )
             )
 
+    # What is usual
+
+    def summary(self) -> learnt.BusSummary:
+        """Return what is usual, once `faults` was called."""
+        bus, frames = self._bus, {}
+        sync = self._rhythm_of(node_events.SYNC_ID)
+        for ident, rows in self._rows.items():
+            if ident & ERROR and ident < FD:
+                continue
+            lengths = tuple(sorted(set(_plain(bus.picked(bus.dlc, rows)))))
+            ends = int(rows[0]), int(rows[-1])
+            frame = learnt.FrameSummary(ident, _name(ident), ends, lengths)
+            rhythm = self._rhythm_of(ident) if _has_rhythm(ident) else None
+            frame = frame._replace(irregular=rhythm is None)
+            if rhythm is not None and rhythm.share >= _SURE_SHARE:
+                period = rhythm.period_us
+                times = sync.period_us if sync and ident != node_events.SYNC_ID else 0
+                on_sync = bool(times) and abs(period / times - round(period / times)) < 0.02
+                kind = learnt.ON_SYNC if on_sync and ident in node_events.PDO_IDS else learnt.CYCLIC
+                frame = frame._replace(kind=kind, period_us=period, jitter_us=rhythm.spread_us)
+            frames[ident] = frame._replace(few=len(self._longest(ident)) <= 2 * cycles.LEAST_GAPS)
+        boots = {node: one.boots[0] for node, one in self._events.nodes.items() if one.boots}
+        return learnt.BusSummary(
+            *(bus.name, frames, self._node_summaries(), self._boot_order(boots), boots),
+            self._peak_bits(),
+            tuple(dict.fromkeys(map(learnt.usual_text, self._hits))),
+        )
+
+    def _longest(self, ident: int) -> Sequence[int]:
+        """Return the longest run of frames of an identifier without a cut."""
+        return max(self._pieces(ident, self._rows.get(ident, [])), key=len, default=[])
+
+    def _rhythm_of(self, ident: int) -> cycles.Rhythm | None:
+        piece = self._longest(ident)
+        return cycles.rhythm_of(self._bus.picked(self._times, piece)) if len(piece) else None
+
+    def _node_summaries(self) -> dict[int, learnt.NodeSummary]:
+        nodes, memory = {}, self._decoder.memory
+        heard = node_events.first_rows(self._rows) if self._canopen else {}
+        for node, row in sorted(heard.items()):
+            words = tuple(
+                memory(self._bus.name, node).number(_IDENTITY, sub)
+                for sub in range(1, len(learnt.IDENTITY) + 1)
+            )
+            codes = tuple(sorted(self._events.nodes[node].emcy))
+            nodes[node] = learnt.NodeSummary(row, words, codes)
+        return nodes
+
+    def _boot_order(self, boots: Mapping[int, int]) -> list[list[int]]:
+        """Return the nodes in the order of their boot-ups; those that are near are together."""
+        groups: list[list[int]] = []
+        latest_us = None
+        for node, row in sorted(boots.items(), key=lambda item: item[1]):
+            near = latest_us is not None and self._times[row] - latest_us <= _NEAR_US
+            groups[-1:] = [[*groups[-1], node]] if near else [*groups[-1:], [node]]
+            latest_us = self._times[row]
+        return [sorted(group) for group in groups]
+
+    def _peak_bits(self) -> int:
+        steps = self._bits_by_step(self._times[0])
+        width = _LOAD_US // _LOAD_STEP_US
+        sums = (sum(steps.get(at + off, 0) for off in range(width)) for at in steps)
+        return max(sums, default=0) * 1_000_000 // _LOAD_US
+
     def _grouped(self, hits: Iterable[Hit]) -> list[BusFault]:
         """Put hits of one rule and node, or CAN-ID, together."""
+        self._hits += hits
+        if self._rules is not None:
+            self.judged |= learnt.RULES.keys()
+            self._hits += learnt.broken(self._rules, self.summary(), len(self._bus) - 1)
+            self._hits = [hit for hit in self._hits if not self._rules.is_usual(hit)]
         groups: dict[tuple[str, int | None], list[Hit]] = {}
-        for hit in (*hits, *self._hits):
+        for hit in self._hits:
             key = hit.node if hit.node is not None else -1 if hit.ident is None else ~hit.ident
             groups.setdefault((hit.rule, key), []).append(hit)
         return [self._fault(group) for group in groups.values()]
@@ -779,6 +872,12 @@ class _TimesOf(Sequence[int]):
 
     def __getitem__(self, at: Any) -> Any:
         return self._times[self._rows[at]]
+
+
+def _has_rhythm(ident: int) -> bool:
+    return ident in (node_events.SYNC_ID, node_events.TIME_ID) or any(
+        ident in ids for ids in (node_events.PDO_IDS, node_events.ERROR_CONTROL_IDS)
+    )
 
 
 def _name(ident: int) -> str:

@@ -103,6 +103,7 @@ class NodeEvents:
     told_since: int = 0
     reset: bool = False
     fault: bool = False
+    emcy: set[str] = field(default_factory=set)
     requests: int = 0
     latest_request: bytes = b""
     latest_answer: tuple[int, bytes, int] | None = None
@@ -189,7 +190,7 @@ class BusEvents:
         self.hits: list[Hit] = []
         self.cuts: list[Cut] = []
         self.commanded = any(ident == nmt.NMT_COB_ID for ident in rows)
-        self._first = _first_rows(rows)
+        self._first = first_rows(rows)
         self._requests: dict[tuple[int, int], int] = {}
         self._silent: list[tuple[int, str, int]] = []
         self._row = 0
@@ -212,6 +213,7 @@ class BusEvents:
         elif can_id in EMCY_IDS and not frame.remote and len(data) >= 2:
             code = int.from_bytes(data[:2], "little")
             if code:
+                self.nodes[node].emcy.add(f"{code:04X}h")
                 self._hit("no-emcy", node, can_id, f"EMCY {code:04X}h {describe(code)}")
         elif can_id in REQUEST_IDS and not frame.remote:
             one = self.nodes[node]
@@ -423,7 +425,7 @@ class BusEvents:
             self.hits.append(Hit("sdo-unanswered", None, None, text, tuple(absent.values())))
 
 
-def _first_rows(rows: Mapping[int, Sequence[int]]) -> dict[int, int]:
+def first_rows(rows: Mapping[int, Sequence[int]]) -> dict[int, int]:
     """Return the first row in which each node sends anything."""
     first: dict[int, int] = {}
     for ident, found in rows.items():

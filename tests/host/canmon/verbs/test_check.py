@@ -106,6 +106,56 @@ def test_where_no_frame_came_nothing_is_judged_without_a_rule(tmp_path: Path) ->
     assert result.stderr.splitlines()[-1].startswith("Error: nothing was judged: no frame in")
 
 
+def test_rules_are_learnt_from_a_good_log_and_held_against_the_next(tmp_path: Path) -> None:
+    good, rules = write(tmp_path / "good.log", SOUND), tmp_path / "good.toml"
+    result = check("--init", good, "-o", str(rules))
+    assert (result.exit_code, result.output) == (0, "")
+    assert check("--init", good).stdout == rules.read_text("utf-8")
+    assert "[learnt.can0.frame.703] # error control (703)" in rules.read_text("utf-8")
+    again = check(good, str(rules))
+    assert (again.exit_code, again.stdout) == (0, "")
+    assert "learnt-period" in again.stderr.partition("\n")[0]
+    slow = "".join(f"({at / 4:.6f}) can1 703#05\n" for at in range(4, 40))
+    result = check(write(tmp_path / "next.log", slow), str(rules))
+    assert result.exit_code == 1
+    assert "error control (703) has a period of 250.000 ms, 100.000 is right" in result.stdout
+
+
+def test_what_a_good_log_has_is_told_to_be_usual(tmp_path: Path) -> None:
+    result = check("--init", write(tmp_path / "run.log", LOG), "-o", str(tmp_path / "a.toml"))
+    assert result.stderr == (
+        "can0: taken for usual: no-emcy: node 3: EMCY 8130h life guard error or heartbeat error\n"
+    )
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        (("--init", "--no-emcy"), "--init learns all rules: leave --no-emcy out"),
+        (("learnt.toml", "--no-emcy"), "learnt rules are held alone: leave --no-emcy out"),
+        (("learnt.toml", "other.toml"), "learnt rules are held alone: leave another file out"),
+        (("bad.toml",), "rules bad.toml: learnt.can0: 'nodes' is none of"),
+    ],
+)
+def test_learnt_rules_stand_alone(
+    words: tuple[str, ...], reason: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write(tmp_path / "run.log", LOG)
+    write(tmp_path / "learnt.toml", "[learnt.can0]\n")
+    write(tmp_path / "other.toml", "no_emcy = true\n")
+    write(tmp_path / "bad.toml", "[learnt.can0]\nnodes = 3\n")
+    result = check("run.log", *words)
+    assert result.exit_code == 2
+    assert reason in result.stderr
+
+
+def test_nothing_is_learnt_of_no_frame(tmp_path: Path) -> None:
+    result = check("--init", write(tmp_path / "run.log", ""))
+    assert (result.exit_code, result.stdout) == (5, "")
+    assert result.stderr.splitlines()[-1].startswith("Error: nothing was learnt: no frame in")
+
+
 def test_a_file_without_a_rule_is_refused(log: str, tmp_path: Path) -> None:
     rules = write(tmp_path / "rules.toml", "bitrate = 500000\n")
     result = check(log, rules)

@@ -2,10 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import cache
+from random import Random
+
 import pytest
 
-from tests.host.canmon.model.check.sound_log import FAULTS, Plan, faulty, sound
-from tickrig.host.canmon.model.check import bus_frames
+from tests.host.canmon.model.check.sound_log import (
+    FAULTS,
+    Plan,
+    faulty,
+    frame_of,
+    places,
+    put,
+    sound,
+    without,
+)
+from tickrig.host.canmon.model.check import bus_frames, learnt
 from tickrig.host.canmon.model.check.diagnosis import RULES, Diagnoser, diagnose
 from tickrig.host.canmon.model.frames import Record
 from tickrig.wire.can import CanFrame
@@ -29,8 +42,8 @@ def both_ways(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -
 def test_a_sound_log_has_no_finding(plan: Plan) -> None:
     found = diagnose([sound(plan)], plan.bit_rate)
     assert [str(fault) for fault in found.faults] == []
-    known = {*found.judged, *found.unjudged}
-    assert known == RULES.keys()
+    assert {*found.judged, *found.unjudged} == RULES.keys()
+    assert {rule for rule, _, _ in FAULTS.values()} - {"guard-toggle"} <= set(found.judged)
     assert ("guard-toggle" in found.unjudged) is not plan.guarded
 
 
@@ -100,3 +113,162 @@ def test_without_times_nothing_is_judged_by_them() -> None:
 def test_an_emcy_before_the_first_boot_up_is_no_sign_of_life() -> None:
     (fault,) = diagnose([lines("081#0050010000000000 701#00 701#7F 701#7F")]).faults
     assert fault.rule == "no-emcy"
+
+
+# Sources that are not exact: stamps and masters with jitter, frames that are late, events.
+
+
+def noisy(seed: int, length_us: int, jitter_us: int = 200, late: float = 0.002) -> list[Record]:
+    """Return traffic of two nodes and a master that keep no time exactly."""
+    chance, texts = Random(seed), list[tuple[float, str]]()
+    texts += [(1_000.0, "701#00"), (1_900.0, "702#00"), (300_000.0, "000#0100")]
+    for node in (1, 2):
+        begin_us = chance.randrange(50_000, 250_000)
+        for at in range(begin_us, length_us, 200_000):
+            state = "7F" if at < 300_000 else "05"
+            texts.append((at + chance.gauss(0, jitter_us), f"70{node}#{state}"))
+    for cycle, at in enumerate(range(400_000, length_us, 10_000)):
+        at_us = at + chance.gauss(0, jitter_us) + 6_000 * chance.random() * (chance.random() < late)
+        texts.append((at_us, "080#"))
+        for node in (1, 2):
+            off_us = 300 + 130 * node + abs(chance.gauss(0, 30))
+            texts.append((at_us + off_us, f"18{node}#3706{cycle:04X}0000"))
+            texts.append((at_us + 1_500 + 130 * node, f"20{node}#0F00{cycle:04X}0000"))
+    event_us = 400_000.0
+    while event_us < length_us:  # an event timer of 100 ms, and events
+        texts.append((event_us, f"482#{chance.randrange(256):02X}00"))
+        event_us += 100_000 if chance.random() < 0.7 else chance.randrange(5_000, 100_000)
+    return [Record(int(at_us), "can0", CanFrame.parse(text)) for at_us, text in sorted(texts)]
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_sources_that_are_not_exact_have_no_finding(seed: int) -> None:
+    chance = Random(seed)
+    jitter_us, late = chance.choice([0, 200, 500]), chance.choice([0, 0.002, 0.02])
+    records = noisy(seed, chance.choice([3, 8]) * 1_000_000, jitter_us, late)
+    assert [str(fault) for fault in diagnose([records]).faults] == []
+    assert [str(fault) for fault in diagnose([records[len(records) // 3 :]]).faults] == []
+
+
+@pytest.mark.parametrize(("rule", "can_id"), [("pdo-missing", 0x181), ("sync-missing", 0x080)])
+def test_a_frame_that_an_inexact_source_leaves_out_is_found(rule: str, can_id: int) -> None:
+    records = noisy(3, 6_000_000)
+    gone = places(records, can_id)[300]
+    (fault,) = diagnose([without(records, gone)]).faults
+    assert (fault.rule, fault.amount) == (rule, 1)
+    before, behind = fault.frames
+    assert before.number <= gone < behind.number
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        # Cars and trucks use the CAN-IDs of CANopen for other things.
+        "701#0102030405060708 080#1122334455667788 581#0102030405060708 181#01 0F1#1C0500",
+        "18FEF100#FFFFFFFFFFFFFFFF 0CF00400#0102030405060708 18EAFFFE#00EE00",
+        "7DF#02010C0000000000 7E8#04410C0B54000000 7E0#0322F19000000000 7E8#037F227800000000",
+    ],
+)
+def test_what_is_no_canopen_is_not_judged_as_if_it_were(text: str) -> None:
+    records = lines(" ".join([text] * 40))
+    found = diagnose([[*records[:70], *records[75:]]])
+    assert found.faults == ()
+    assert set(found.judged) == {"no-error-frames", "no-loss", "time-back"}
+    assert found.unjudged["pdo-missing"] == "no CANopen was heard"
+
+
+# What is learnt from a good log.
+
+
+@cache
+def rules_of(plan: Plan) -> learnt.Learnt:
+    """Learn the rules of a sound log, from what is written of them."""
+    one = Diagnoser()
+    one.take(sound(plan))
+    rules = learnt.parse_learnt(learnt.learnt_text(one.summaries(), ["of a test"]))
+    assert rules is not None
+    return rules
+
+
+def held(plan: Plan, records: list[Record]) -> set[str]:
+    """Return the rules that a log breaks, with what was learnt from a good one."""
+    one = Diagnoser(rules=rules_of(plan))
+    one.take(records)
+    return {fault.rule for fault in one.diagnosis().faults}
+
+
+@pytest.mark.parametrize("plan", PLANS.values(), ids=PLANS)
+@pytest.mark.parametrize("seed", [7, 8])
+def test_another_good_log_keeps_what_was_learnt(plan: Plan, seed: int) -> None:
+    assert held(plan, list(sound(replace(plan, seed=seed, length_ms=3_400 + 150 * seed)))) == set()
+
+
+@pytest.mark.parametrize("plan", list(PLANS.values())[:2], ids=list(PLANS)[:2])
+@pytest.mark.parametrize("name", FAULTS)
+def test_each_fault_breaks_what_was_learnt(name: str, plan: Plan) -> None:
+    rule = FAULTS[name][0]
+    assert ("learnt-load" if rule == "max-load" else rule) in held(plan, faulty(name, plan))
+
+
+def test_what_differs_from_a_good_log_is_found() -> None:
+    plan, records = PLANS["usual"], list(sound())
+    node = 0x180 + 5, 0x700 + 5, 0x580 + 5
+    gone = [one for one in records if frame_of(one).can_id not in node]
+    assert {"learnt-nodes", "learnt-frames"} <= held(plan, gone)
+    assert held(plan, put(records, 2_000_000, "1A3#00")) >= {"learnt-frames", "learnt-nodes"}
+    assert held(plan, list(sound(replace(plan, sync_ms=20)))) == {"learnt-period"}
+    assert held(plan, list(sound(replace(plan, heartbeat_ms=300)))) == {"learnt-period"}
+    shorter = [
+        one._replace(frame=CanFrame(0x185, bytes(4))) if frame_of(one).can_id == 0x185 else one
+        for one in records
+    ]
+    assert "learnt-length" in held(plan, shorter)
+
+
+def test_another_identity_and_order_of_boot_ups_is_found() -> None:
+    good = lines("701#00 601#4018100100000000 581#4318100178563412 701#7F " * 1, 200_000)
+    good += [one._replace(at_us=one.at_us + 800_000) for one in lines("702#00 702#7F", 200_000)]
+    one = Diagnoser()
+    one.take(good)
+    rules = learnt.parse_learnt(learnt.learnt_text(one.summaries(), []))
+    assert rules is not None
+    assert rules["can0"].boot_order == ((1,), (2,))
+    assert rules["can0"].nodes[1].identity[0] == 0x12345678
+    other = Diagnoser(rules=rules)
+    other.take(
+        lines("702#00 702#7F 701#00 601#4018100100000000 581#4318100179563412 701#7F", 200_000)
+    )
+    assert {fault.rule for fault in other.diagnosis().faults} == {"learnt-identity", "learnt-order"}
+
+
+def test_what_a_good_log_has_is_usual() -> None:
+    usual = put(list(sound()), 2_030_000, "091#1023020000000000")
+    one = Diagnoser()
+    one.take(usual)
+    rules = learnt.parse_learnt(learnt.learnt_text(one.summaries(), []))
+    again = Diagnoser(rules=rules)
+    again.take(put(list(sound()), 1_030_000, "091#1023020000000000"))
+    assert again.diagnosis().faults == ()
+    other = Diagnoser(rules=rules)
+    other.take(put(list(sound()), 1_030_000, "091#2023020000000000"))
+    assert [fault.rule for fault in other.diagnosis().faults] == ["no-emcy"]
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("learnt = 3", "learnt is not a table"),
+        ("no_emcy = true\n[learnt.can0]", "'no_emcy' beside [learnt]"),
+        ("[learnt.can0]\nboot_orders = []", "did you mean 'boot_order'?"),
+        ("[learnt.can0.node.128]", "'128' is not a node-ID from 1 to 127"),
+        ("[learnt.can0.frame.18]", "'18' is not a CAN-ID"),
+        ('[learnt.can0.frame.181]\nperiod = "10"', "is not like 10ms±20%"),
+        ('[learnt.can0.frame.181]\nkind = "often"', "is none of cyclic, sync, event"),
+        ("[learnt.can0.frame.181]\nlengths = [65]", "65 is not a whole number from 0 to 64"),
+    ],
+)
+def test_what_is_wrong_in_learnt_rules_is_said(text: str, reason: str) -> None:
+    with pytest.raises(ValueError, match="learnt") as caught:
+        learnt.parse_learnt(text)
+    assert reason in str(caught.value)
+    assert "\n" not in str(caught.value)

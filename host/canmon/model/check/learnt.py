@@ -1,0 +1,448 @@
+"""Rules that are learnt from a good log, as TOML, and what breaks them in another log.
+
+>>> rules = parse_learnt('[learnt.can0.frame.185]\\nlengths = [6]\\nperiod = "10ms±20%"\\n')
+>>> rules["can0"].frames[0x185].period
+(10000, 2000)
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Final, NamedTuple
+
+from tickrig.host.canmon.model.check.bus_frames import Hit
+from tickrig.host.canmon.model.frames import ident_text, ms_text, node_of, parse_ident
+from tickrig.host.text.names import closest
+from tickrig.host.text.toml_reader import load_toml
+from tickrig.host.text.values import parse_time_with_unit_us
+
+RULES: Final = {
+    "learnt-nodes": "a node that is missing, or that is new",
+    "learnt-identity": "a node with another identity",
+    "learnt-frames": "a CAN-ID that is missing, or that is new",
+    "learnt-length": "a length that was not seen before",
+    "learnt-period": "another period, or none",
+    "learnt-jitter": "a larger jitter",
+    "learnt-load": "more bits a second than before",
+    "learnt-order": "another order of boot-ups",
+}
+"""Rules beside those that need no parameter, and what each finds."""
+
+IDENTITY: Final = ("vendor", "product", "revision", "serial")
+"""Sub-indices 1 to 4 of 1018h."""
+
+CYCLIC, ON_SYNC, EVENT = "cyclic", "sync", "event"
+_KINDS: Final = (CYCLIC, ON_SYNC, EVENT)
+_MORE_LOAD: Final = 1.25
+_MORE_BITS: Final = 5_000
+_TOLERANCE: Final = 20
+_JITTERS: Final = 4
+_LEAST_JITTER_US: Final = 500
+_PERIOD: Final = re.compile(r"([^±+]+)(?:±|\+-)([0-9]{1,3})%")
+_MOST_USUAL: Final = 50
+
+
+class FrameSummary(NamedTuple):
+    """How the frames of an identifier come.
+
+    Attributes:
+        ident: CAN-ID with flags.
+        name: for people.
+        rows: of the first and of the last frame.
+        lengths: bytes of data.
+        kind: cyclic, sync or event.
+        period_us: None if they have no rhythm.
+        jitter_us: distance of the quartiles of the gaps.
+        few: they are too few to tell a rhythm.
+        irregular: they have none at all.
+    """
+
+    ident: int
+    name: str
+    rows: tuple[int, int]
+    lengths: tuple[int, ...]
+    kind: str = EVENT
+    period_us: int | None = None
+    jitter_us: int = 0
+    few: bool = False
+    irregular: bool = False
+
+
+class NodeSummary(NamedTuple):
+    """What was heard of a node.
+
+    Attributes:
+        row: of its first frame.
+        identity: what SDO traffic tells of 1018h, None for what it does not.
+        emcy: error codes, as 8130h.
+    """
+
+    row: int
+    identity: tuple[int | None, ...] = (None,) * len(IDENTITY)
+    emcy: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class BusSummary:
+    """What is usual on a bus.
+
+    Attributes:
+        name: of the bus.
+        frames: by identifier.
+        nodes: by node-ID.
+        boot_order: node-IDs in the order of their first boot-ups; those within 100 ms together.
+        boots: rows of these boot-ups.
+        bits_per_second: of the busiest half second.
+        found: findings of rules that need no parameter, as texts.
+    """
+
+    name: str
+    frames: Mapping[int, FrameSummary]
+    nodes: Mapping[int, NodeSummary]
+    boot_order: Sequence[Sequence[int]] = ()
+    boots: Mapping[int, int] = field(default_factory=dict)
+    bits_per_second: int = 0
+    found: tuple[str, ...] = ()
+
+
+class LearntFrame(NamedTuple):
+    """What the frames of an identifier must keep.
+
+    Attributes:
+        lengths: bytes of data that may come; empty for any.
+        kind: cyclic, sync or event.
+        period: in us, and by how much it may differ; None for any.
+        jitter_us: distance of the quartiles of the gaps; None for any.
+        required: they must come.
+    """
+
+    lengths: tuple[int, ...] = ()
+    kind: str = EVENT
+    period: tuple[int, int] | None = None
+    jitter_us: int | None = None
+    required: bool = False
+
+
+class LearntNode(NamedTuple):
+    """What a node must keep.
+
+    Attributes:
+        identity: of 1018h; None for any.
+        emcy: error codes that are usual.
+    """
+
+    identity: tuple[int | None, ...] = (None,) * len(IDENTITY)
+    emcy: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class LearntBus:
+    """What a bus must keep; see `BusSummary`.
+
+    Attributes:
+        frames: by identifier.
+        nodes: by node-ID.
+        boot_order: groups of node-IDs.
+        bits_per_second: at most; None for any.
+        usual: findings that are none.
+    """
+
+    frames: Mapping[int, LearntFrame]
+    nodes: Mapping[int, LearntNode]
+    boot_order: tuple[tuple[int, ...], ...] = ()
+    bits_per_second: int | None = None
+    usual: frozenset[str] = frozenset()
+
+    def is_usual(self, hit: Hit) -> bool:
+        """Say whether a finding is usual."""
+        if hit.rule == "no-emcy" and hit.node is not None:
+            codes = self.nodes.get(hit.node, LearntNode()).emcy
+            if any(hit.text.startswith(f"EMCY {code} ") for code in codes):
+                return True
+        return usual_text(hit) in self.usual
+
+
+Learnt = Mapping[str, LearntBus]
+"""What buses must keep, by their names."""
+
+
+def usual_text(hit: Hit) -> str:
+    """Write a finding as a rule file has it among what is usual."""
+    where = f"node {hit.node}: " if hit.node is not None else ""
+    return f"{hit.rule}: {where}{hit.text}"
+
+
+def bus_of(learnt: Learnt, name: str, buses: int) -> LearntBus | None:
+    """Return the rules of a bus; where there is one bus only, its name does not count."""
+    if len(learnt) == buses == 1:
+        return next(iter(learnt.values()))
+    return learnt.get(name)
+
+
+# Writing
+
+
+def learnt_text(summaries: Iterable[BusSummary], head: Sequence[str]) -> str:
+    """Write rules as TOML.
+
+    Args:
+        summaries: of all buses of the good log.
+        head: lines of the comment at the beginning.
+    """
+    lines = [f"# {one}" for one in head]
+    for bus in summaries:
+        lines += ["", *_bus_lines(bus)]
+    return "\n".join(lines) + "\n"
+
+
+def _bus_lines(bus: BusSummary) -> Iterator[str]:
+    table = f"learnt.{_key(bus.name)}"
+    yield f"[{table}]"
+    if bus.bits_per_second:
+        most = int(bus.bits_per_second * _MORE_LOAD) + _MORE_BITS
+        yield f"bits_per_second = {most} # at most; the log had {bus.bits_per_second}"
+    if len(bus.boot_order) > 0:
+        groups = ", ".join(str(list(group)) for group in bus.boot_order)
+        yield f"boot_order = [{groups}] # within 100 ms: together, in any order"
+    if bus.found:
+        yield "# Findings of the good log; delete those that are not usual."
+        yield "usual = ["
+        yield from (f"  {json.dumps(text)}," for text in bus.found[:_MOST_USUAL])
+        yield "]"
+    for node, one in sorted(bus.nodes.items()):
+        yield ""
+        yield f"[{table}.node.{node}]"
+        for name, value in zip(IDENTITY, one.identity, strict=True):
+            if value is not None:
+                yield f"{name} = 0x{value:08X}"
+        if one.emcy:
+            yield f"emcy = {json.dumps(one.emcy)} # usual"
+    for ident, frame in sorted(bus.frames.items()):
+        yield ""
+        yield f"[{table}.frame.{ident_text(ident).removesuffix('#')}] # {frame.name}"
+        yield f"lengths = {list(frame.lengths)}"
+        yield f'kind = "{frame.kind}"'
+        if frame.period_us is not None:
+            yield f'period = "{_time(frame.period_us)}±{_TOLERANCE}%"'
+            yield f'jitter = "{_time(frame.jitter_us)}"'
+            yield "required = true"
+
+
+def _key(text: str) -> str:
+    if re.fullmatch(r"[A-Za-z0-9_-]+", text):
+        return text
+    return json.dumps(text.encode("utf-8", "replace").decode("utf-8"))
+
+
+def _time(us: int) -> str:
+    return f"{us // 1_000}ms" if us % 1_000 == 0 else f"{us}us"
+
+
+# Reading
+
+
+def parse_learnt(text: str) -> Learnt | None:
+    """Read rules that were learnt; None if a file has others.
+
+    Raises:
+        ValueError: what is wrong, with its place in the file.
+    """
+    words = load_toml(text)
+    if "learnt" not in words:
+        return None
+    others = [name for name in words if name != "learnt"]
+    if others:
+        raise ValueError(f"{others[0]!r} beside [learnt]: give other rules in a check of their own")
+    table = _table(words["learnt"], "learnt")
+    return {name: _bus(_table(one, f"learnt.{name}"), f"learnt.{name}") for name, one in table.items()}
+
+
+def _bus(words: Mapping[str, Any], place: str) -> LearntBus:
+    _known(words, ("bits_per_second", "boot_order", "usual", "node", "frame"), place)
+    most = words.get("bits_per_second")
+    if most is not None:
+        most = _whole(most, f"{place}.bits_per_second", 1 << 40)
+    nodes = {
+        _number(name, 1, 127, f"{place}.node"): _node(one, f"{place}.node.{name}")
+        for name, one in _table(words.get("node", {}), f"{place}.node").items()
+    }
+    frames = {}
+    for name, one in _table(words.get("frame", {}), f"{place}.frame").items():
+        try:
+            ident = parse_ident(name)
+        except ValueError as error:
+            raise ValueError(f"{place}.frame: {error}") from None
+        frames[ident] = _frame(one, f"{place}.frame.{name}")
+    order = tuple(
+        tuple(_whole(node, f"{place}.boot_order", 127) for node in _list(group, f"{place}.boot_order"))
+        for group in _list(words.get("boot_order", []), f"{place}.boot_order")
+    )
+    usual = frozenset(_texts(words.get("usual", []), f"{place}.usual"))
+    return LearntBus(frames, nodes, order, most, usual)
+
+
+def _node(value: object, place: str) -> LearntNode:
+    words = _table(value, place)
+    _known(words, (*IDENTITY, "emcy"), place)
+    identity = tuple(
+        _whole(words[name], f"{place}.{name}", 1 << 32) if name in words else None
+        for name in IDENTITY
+    )
+    return LearntNode(identity, _texts(words.get("emcy", []), f"{place}.emcy"))
+
+
+def _frame(value: object, place: str) -> LearntFrame:
+    words = _table(value, place)
+    _known(words, ("lengths", "kind", "period", "jitter", "required"), place)
+    lengths = tuple(
+        _whole(one, f"{place}.lengths", 64) for one in _list(words.get("lengths", []), f"{place}.lengths")
+    )
+    kind, required = words.get("kind", EVENT), words.get("required", False)
+    if kind not in _KINDS:
+        raise ValueError(f"{place}.kind = {kind!r} is none of {', '.join(_KINDS)}")
+    if not isinstance(required, bool):
+        raise ValueError(f"{place}.required = {required!r} is not true or false")
+    period = _period(words["period"], f"{place}.period") if "period" in words else None
+    jitter = _us(words["jitter"], f"{place}.jitter") if "jitter" in words else None
+    return LearntFrame(lengths, kind, period, jitter, required)
+
+
+def _period(value: object, place: str) -> tuple[int, int]:
+    match = _PERIOD.fullmatch(value) if isinstance(value, str) else None
+    if match is None:
+        raise ValueError(f"{place} = {value!r} is not like 10ms±20%")
+    period_us = _us(match[1], place)
+    return period_us, period_us * int(match[2]) // 100
+
+
+def _us(value: object, place: str) -> int:
+    if not isinstance(value, str):
+        raise ValueError(f"{place} = {value!r} is not a time, as 10ms")
+    try:
+        return parse_time_with_unit_us(value.strip())
+    except ValueError as error:
+        raise ValueError(f"{place}: {error}") from None
+
+
+def _known(words: Mapping[str, Any], known: Sequence[str], place: str) -> None:
+    for name in words:
+        if name not in known:
+            meant = "".join(f"; did you mean {word!r}?" for word in closest(name, known))
+            raise ValueError(f"{place}: {name!r} is none of {', '.join(known)}{meant}")
+
+
+def _table(value: object, place: str) -> Mapping[str, Any]:
+    if not isinstance(value, dict):
+        raise ValueError(f"{place} is not a table")
+    return value
+
+
+def _list(value: object, place: str) -> list[Any]:
+    if not isinstance(value, list):
+        raise ValueError(f"{place} = {value!r} is not a list")
+    return value
+
+
+def _texts(value: object, place: str) -> tuple[str, ...]:
+    texts = _list(value, place)
+    for one in texts:
+        if not isinstance(one, str):
+            raise ValueError(f"{place}: {one!r} is not a text")
+    return tuple(texts)
+
+
+def _whole(value: object, place: str, most: int) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= most:
+        raise ValueError(f"{place}: {value!r} is not a whole number from 0 to {most}")
+    return value
+
+
+def _number(text: str, low: int, high: int, place: str) -> int:
+    if not re.fullmatch(r"[0-9]{1,3}", text, re.ASCII) or not low <= int(text) <= high:
+        raise ValueError(f"{place}: {text!r} is not a node-ID from {low} to {high}")
+    return int(text)
+
+
+# Holding
+
+
+def broken(learnt: LearntBus, bus: BusSummary, last_row: int) -> Iterator[Hit]:
+    """Give what a bus does not keep.
+
+    Args:
+        learnt: what it must keep.
+        bus: what it does.
+        last_row: of its last frame, which shows what is missing.
+    """
+    for node in sorted(learnt.nodes.keys() - bus.nodes.keys()):
+        yield Hit("learnt-nodes", node, None, "is missing", (last_row,))
+    for node, one in sorted(bus.nodes.items()):
+        if node not in learnt.nodes:
+            yield Hit("learnt-nodes", node, None, "is new", (one.row,))
+            continue
+        for name, right, value in zip(
+            IDENTITY, learnt.nodes[node].identity, one.identity, strict=True
+        ):
+            if right is not None and value is not None and value != right:
+                text = f"its {name} is {value:08X}h, {right:08X}h is right"
+                yield Hit("learnt-identity", node, None, text, (one.row,))
+    for ident, wanted in sorted(learnt.frames.items()):
+        if wanted.required and ident not in bus.frames:
+            text = f"{ident_text(ident)} is missing"
+            yield Hit("learnt-frames", node_of(ident), ident, text, (last_row,))
+    for ident, frame in sorted(bus.frames.items()):
+        if ident not in learnt.frames:
+            text = f"{ident_text(ident)} is new"
+            yield Hit("learnt-frames", node_of(ident), ident, text, (frame.rows[0],))
+        else:
+            yield from _frame_broken(learnt.frames[ident], frame)
+    most = learnt.bits_per_second
+    if most is not None and bus.bits_per_second > most:
+        text = f"{bus.bits_per_second} bits a second, at most {most} is right"
+        yield Hit("learnt-load", None, None, text, (last_row,))
+    yield from _order_broken(learnt.boot_order, bus.boots)
+
+
+def _frame_broken(right: LearntFrame, frame: FrameSummary) -> Iterator[Hit]:
+    ident = frame.ident
+    node, name = node_of(ident), frame.name
+    odd = [str(one) for one in frame.lengths if right.lengths and one not in right.lengths]
+    if odd:
+        wanted = " or ".join(map(str, right.lengths))
+        text = f"{name} has {' or '.join(odd)} B, {wanted} is right"
+        yield Hit("learnt-length", node, ident, text, frame.rows)
+    if right.period is None or frame.few:
+        return
+    period, off = right.period
+    if frame.period_us is None and not frame.irregular:
+        return
+    if frame.period_us is None:
+        text = f"{name} has no period, {ms_text(period)} ms is right"
+        yield Hit("learnt-period", node, ident, text, frame.rows)
+    elif abs(frame.period_us - period) > off:
+        text = f"{name} has a period of {ms_text(frame.period_us)} ms, {ms_text(period)} is right"
+        yield Hit("learnt-period", node, ident, text, frame.rows)
+    elif right.jitter_us is not None and frame.jitter_us > max(
+        _JITTERS * right.jitter_us, _LEAST_JITTER_US, period // 10
+    ):
+        text = f"{name} has a jitter of {ms_text(frame.jitter_us)} ms,"
+        text += f" {ms_text(right.jitter_us)} is right"
+        yield Hit("learnt-jitter", node, ident, text, frame.rows)
+
+
+def _order_broken(order: Sequence[Sequence[int]], boots: Mapping[int, int]) -> Iterator[Hit]:
+    """Compare the order of boot-ups, where all nodes boot."""
+    if not order or not all(node in boots for group in order for node in group):
+        return
+    latest, row = -1, -1
+    for group in order:
+        first = min(group, key=lambda node: boots[node], default=None)
+        if first is not None and boots[first] < row:
+            text = f"boots before node {latest}"
+            yield Hit("learnt-order", first, None, text, (boots[first], row))
+            return
+        latest = max(group, key=lambda node: boots[node], default=latest)
+        row = max([row, *(boots[node] for node in group)])
