@@ -117,6 +117,7 @@ _LONG_US: Final = 1_000_000
 _LEAST_FRAMES: Final = 100
 _SOON_US: Final = 1_500_000
 """What comes once within so long of a boot-up or NMT command belongs to the start."""
+_NO_BUS: Final = "nothing was learnt of this bus"
 _NO_NODES: Final[Mapping[int, node_memory.EdsObjects]] = MappingProxyType({})
 
 
@@ -231,9 +232,10 @@ class Diagnoser:
             why = dict.fromkeys(RULES, "no frame came")
         faults.sort(key=lambda fault: (fault.first_us, fault.channel, fault.rule))
         names = tuple(name for name in RULES if name in judged)
-        if self._rules is None:
-            why |= dict.fromkeys(learnt.RULES, "nothing was learnt: see --init")
-        unjudged = {name: why.get(name, "") for name in RULES if name not in judged}
+        held = RULES if self._rules is not None else RULES.keys() - learnt.RULES.keys()
+        unjudged = {
+            name: why.get(name, _NO_BUS) for name in RULES if name in held and name not in judged
+        }
         return Diagnosis(tuple(faults), names, unjudged, self.kept.frames)
 
 
@@ -761,7 +763,9 @@ class _BusJudge:
             ends = int(rows[0]), int(rows[-1])
             frame = learnt.FrameSummary(ident, _name(ident), ends, lengths)
             rhythm = self._rhythm_of(ident) if _has_rhythm(ident) else None
-            frame = frame._replace(irregular=rhythm is None)
+            frame = frame._replace(
+                irregular=rhythm is None, service=node_events.is_event(ident)
+            )
             if rhythm is not None and rhythm.share >= _SURE_SHARE:
                 period = rhythm.period_us
                 times = sync.period_us if sync and ident != node_events.SYNC_ID else 0

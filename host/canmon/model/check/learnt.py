@@ -58,6 +58,7 @@ class FrameSummary(NamedTuple):
         jitter_us: distance of the quartiles of the gaps.
         few: they are too few to tell a rhythm.
         irregular: they have none at all.
+        service: NMT, EMCY, SDO or error control.
     """
 
     ident: int
@@ -69,6 +70,7 @@ class FrameSummary(NamedTuple):
     jitter_us: int = 0
     few: bool = False
     irregular: bool = False
+    service: bool = False
 
 
 class NodeSummary(NamedTuple):
@@ -394,6 +396,8 @@ def broken(learnt: LearntBus, bus: BusSummary, last_row: int) -> Iterator[Hit]:
             text = f"{ident_text(ident)} is missing"
             yield Hit("learnt-frames", node_of(ident), ident, text, (last_row,))
     for ident, frame in sorted(bus.frames.items()):
+        if ident not in learnt.frames and frame.service and node_of(ident) in learnt.nodes:
+            continue  # an EMCY, or SDO: rules of their own
         if ident not in learnt.frames:
             text = f"{ident_text(ident)} is new"
             yield Hit("learnt-frames", node_of(ident), ident, text, (frame.rows[0],))

@@ -12,12 +12,19 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
+from tests.emulators.testing.conformance.test_page import ThisEnvironment
+from tests.environment import ROOT
+from tests.host.canmon.model.check.sound_log import candump, eight_faults, sound
+from tests.host.canmon.net.test_net_page import Here
 from tests.host.canmon.wire import new_wire
 from tickrig.host.canmon.cli import main
+from tickrig.host.canmon.model.check.diagnosis import RULES
+from tickrig.host.canmon.model.check.learnt import RULES as LEARNT
 from tickrig.host.canmon.sources import source as block_log
 
 DRIVE_EDS = Path(__file__).parents[4] / "examples/eds/epos.eds"
 PAGE = (Path(__file__).parents[4] / "docs/reference/canmon/canmon-model.md").read_text("utf-8")
+WRONG = ROOT / "docs/howto/wrong-on-the-bus.md"
 CANMON = (sys.executable, "-c", "from tickrig.host.canmon.cli import main; main()")
 LOG = """\
 (1.000000) can0 703#05
@@ -163,6 +170,18 @@ def test_a_file_without_a_rule_is_refused(log: str, tmp_path: Path) -> None:
         2,
         f"Error: no rule in {rules}: leave it out for the usual ones\n",
     )
+
+
+def test_what_the_page_shows_happens(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    write(tmp_path / "run.log", candump(eight_faults()))
+    write(tmp_path / "good.log", candump(sound()))
+    Here(ThisEnvironment(tmp_path), tmp_path).run(WRONG)
+
+
+def test_the_page_has_all_rules() -> None:
+    page = WRONG.read_text("utf-8")
+    assert [rule for rule in RULES if f"`{rule}`" not in page and rule not in LEARNT] == []
 
 
 @pytest.fixture

@@ -305,3 +305,25 @@ FAULTS: Final[dict[str, tuple[str, int | None, Change]]] = {
 def faulty(name: str, plan: Plan = Plan()) -> list[Record]:
     """Return a sound log with a fault."""
     return FAULTS[name][2](list(sound(plan)), plan)
+
+
+EIGHT: Final = (
+    *("EMCY", "lost heartbeat", "PDO missing", "SYNC doubled", "SDO aborted", "CAN-ID once"),
+    *("remote frame", "drive fault"),
+)
+"""The faults of `eight_faults`."""
+
+
+def eight_faults() -> list[Record]:
+    """Return a sound log with eight faults."""
+    records = list(sound())
+    for name in EIGHT:
+        records = FAULTS[name][2](records, Plan())
+    return records
+
+
+def candump(records: Iterable[Record]) -> str:
+    """Write a log as candump does."""
+    return "".join(
+        f"({1_700_000_000 + one.at_us / 1e6:.6f}) {one.channel} {one.frame}\n" for one in records
+    )
