@@ -31,6 +31,7 @@ KINDS: Final = {
     "eds": "tests.host.canopen.data_sheet.mutations",
     "logs": "tests.host.canmon.model.logs.mutations",
     "net": "tests.host.canmon.net.net_mutations",
+    "report": "tests.host.canmon.output.mutations",
     "rig-files": "tests.emulators.testing.rig_file.mutations",
     "rrc": "tests.emulators.rrc.fuzzing",
 }

@@ -272,18 +272,25 @@ class Survey(NodeBoard):
         if self.first_us is None:
             self.first_us = self.last_us = at_us
 
+    def reach(self, since_us: int) -> int:
+        """Make room for a time in all bins, which are alike; return its place in them."""
+        for bins in (self.counts, self.bits, self.errors, self.values):
+            bins.reach(since_us)
+        return since_us // self.bits.width_us
+
     def count(self, record: Record) -> None:
         """Count a frame."""
         at_us, channel, frame, _ = record
         self.begin(at_us)
         self.last_us, since_us = max(self.last_us, at_us), self.since(at_us)
         self.frames[channel] = self.frames.get(channel, 0) + 1
+        place = self.reach(since_us)
         if isinstance(frame, ErrorFrame):
-            self.errors.add(channel, since_us, 1)
+            self.errors.add_at(channel, place, 1)
             return
         bits = self._rates.bits(frame) if isinstance(frame, FdFrame) else frame_bits(frame)
-        self.counts.add((channel, any_ident(frame)), since_us, 1)
-        self.bits.add(channel, since_us, bits)
+        self.counts.add_at((channel, any_ident(frame)), place, 1)
+        self.bits.add_at(channel, place, bits)
 
     def take(self, record: Record, decoded: Decoded) -> None:
         """Take a frame for the lanes of nodes; it may be counted elsewhere."""
@@ -380,7 +387,7 @@ class Survey(NodeBoard):
             track.states = Bands()  # an enumerated signal: its values have names
         track.take(1, float(value), float(value))
         if track.states is None:
-            self.values.reach(since_us)
+            self.reach(since_us)
             self.values.spread_at(name, since_us // self.values.width_us, value, value)
         elif name.name == "statusword" and source != "dbc":
             track.states.take(since_us, drive_state(int(value)) or "?")

@@ -66,8 +66,7 @@ class ColumnSurvey:
     def _count(self, channel: str, frames: Columns) -> None:
         survey, since_us = self._survey, self._since(frames)
         survey.frames[channel] = survey.frames.get(channel, 0) + len(frames)
-        for bins in (survey.counts, survey.bits, survey.errors):
-            bins.reach(int(since_us.max()))
+        survey.reach(int(since_us.max()))
         errors = frames.ident & np.uint32(ERROR) != 0
         _add(survey.errors, channel, since_us[errors], np.ones(int(errors.sum()), np.int64))
         if errors.any():
@@ -121,9 +120,7 @@ class ColumnSurvey:
     def _take_values(
         self, channel: str, layouts: Mapping[int, PdoDecoder], frames: Columns
     ) -> None:
-        survey, since_us = self._survey, self._since(frames)
-        if layouts and len(frames):
-            survey.values.reach(int(since_us.max()))
+        since_us = self._since(frames)
         for can_id, layout in layouts.items():
             rows = np.flatnonzero((frames.ident == can_id) & (frames.dlc >= layout.size))
             if not len(rows):
