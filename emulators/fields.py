@@ -1,8 +1,9 @@
-"""What can be set of a device: declared once, for command lines, rig files and traces.
+"""Options of a device, declared once for command lines, rig files and traces.
 
-A `DeviceType` has a `DeviceField` for each of its options. The command line is made of them
-(`commands/run_options.py`), a rig file is read by them, and a trace of a device type that has no
-`configure` may have no other keys. Command lines and rig files refuse a value with the same words.
+A `DeviceType` has a `DeviceField` for each of its options. The command line is made from them
+(`commands/run_options.py`), a rig file is read with them, and a trace of a device type without
+`configure` may have no other keys. Command lines and rig files refuse a value with the same
+message.
 """
 
 from __future__ import annotations
@@ -26,17 +27,17 @@ class DeviceField(NamedTuple):  # a dataclass takes 2 ms more to import
     """One option of a device; give its attributes by name.
 
     Attributes:
-        name: its key in the configuration that `DeviceType.build` is given.
+        name: its key in the configuration for `DeviceType.build`.
         kind: `str`, `int`, `float`, or `bool` for a flag.
-        option: its name on command lines (without the dashes) and in rig files; `name` with
-            dashes unless given.
-        low: the least value of a number, None for any.
-        high: the greatest value of a number, None for any.
-        choices: the texts that it can be, empty for any.
+        option: its name on command lines (without the dashes) and in rig files; by default `name`
+            with dashes.
+        low: smallest value of a number, None for any.
+        high: largest value of a number, None for any.
+        choices: allowed texts, empty for any.
         proposals: texts that the shell completes; others are allowed.
-        unit: unit of a number, or form of a text, as help shows it: `M`, `X,Y,RADIUS`.
-        default: its value where nobody sets it.
-        many: it can be given several times; its value is a tuple then.
+        unit: unit of a number, or form of a text, shown in help: `M`, `X,Y,RADIUS`.
+        default: its value if not set.
+        many: whether it can be given several times; its value is then a tuple.
         help: one sentence.
     """
 
@@ -59,16 +60,16 @@ class DeviceField(NamedTuple):  # a dataclass takes 2 ms more to import
 
     @property
     def unset(self) -> Any:
-        """Its value where nobody sets it."""
+        """Its value if not set."""
         if self.many:
             return tuple(self.default or ())
         return self.default if self.kind is not bool else bool(self.default)
 
     def read(self, value: str | float) -> Any:
-        """Return a value of a rig file as the command line would.
+        """Return a value of a rig file, converted as on the command line.
 
         Raises:
-            ValueError: it is out of range, or not of this kind.
+            ValueError: the value is out of range, or not of this kind.
 
         >>> DeviceField(name="baud", kind=int, low=300).read("9600")
         9600
@@ -109,10 +110,10 @@ def read_config(
         owner: the device type, for messages.
         fields: its fields.
         config: values by the names of command lines, without their dashes: `run-s` or `run_s`; a
-            list for a field of several values. What is left out has its default.
+            list for a field of several values. Missing options have their default.
 
     Raises:
-        ValueError: no such field, or not with this value; the text begins with the field.
+        ValueError: unknown field, or invalid value; the message starts with the field.
     """
     known = {field.word: field for field in fields}
     given: dict[str, Any] = {}
@@ -135,7 +136,7 @@ def read_config(
 
 
 def _plain(key: str, field: DeviceField, value: object) -> list[Any]:
-    """Return what a file gives for a field as a list; ValueError if it is of another kind."""
+    """Return the values of a field in a file as a list; ValueError for another kind."""
     if field.kind is bool:
         if not isinstance(value, bool):
             raise ValueError(f"{key}: {value!r} is not true or false")
@@ -151,7 +152,7 @@ def _plain(key: str, field: DeviceField, value: object) -> list[Any]:
 
 @contextmanager
 def named(option: str) -> Iterator[None]:
-    """Put the name of an option before the text of a ValueError."""
+    """Prefix the message of a ValueError with the name of an option."""
     try:
         yield
     except ValueError as error:
@@ -159,9 +160,9 @@ def named(option: str) -> Iterator[None]:
 
 
 def field_of_option(option: click.Option) -> DeviceField:
-    """Return the field of a `click.Option`, as device types of tickrig 0.1 declare theirs.
+    """Return the field of a `click.Option`, which device types of tickrig 0.1 declare.
 
-    A type of values that is none of click's numbers and choices becomes a text here.
+    Types other than click's numbers and choices become texts.
     """
     kinds: dict[str, type[str | int | float]] = {"integer": int, "float": float}
     kind = bool if option.is_flag else kinds.get(option.type.name.partition(" ")[0], str)

@@ -1,4 +1,4 @@
-"""Scenarios, what is done to a device at which time (docs/reference/bench/scenario.md)."""
+"""Scenarios: timed actions on a device (docs/reference/bench/scenario.md)."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ from tickrig.host.text.steps import Condition, Step, StepError, content_lines
 from tickrig.host.text.trace import Mark
 from tickrig.host.text.values import Setting, format_time, parse_setting, parse_time_us
 
-# Scenarios: what is done to a device at which time (docs/reference/bench/scenario.md).
+# Scenarios: timed actions on a device (docs/reference/bench/scenario.md).
 
 Encoder = Callable[[bytes], bytes]
-"""Makes a line for the wire of the text that a scenario gives."""
+"""Converts the text in a scenario to a line for the wire."""
 
 
 @dataclass(frozen=True, slots=True)
 class Send:
-    """Send bytes as the host; `shown` is what the transcript shows."""
+    """Send bytes as the host; the transcript shows `shown`."""
 
     data: bytes
     shown: bytes
 
 
 Sender = Callable[[str], Send]
-"""Reads what stands behind a verb that sends."""
+"""Reads the argument of a verb that sends."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,14 +55,14 @@ class Press:
 
 @dataclass(frozen=True, slots=True)
 class _Release:
-    """Let a button go."""
+    """Release a button."""
 
     name: str
 
 
 @dataclass(frozen=True, slots=True)
 class Clear:
-    """Let a fault go."""
+    """Clear a fault."""
 
     name: str
 
@@ -83,11 +83,11 @@ _Action = Send | Set | Press | _Release | FaultSpec | Clear | _ExpectWatch | Sce
 
 
 ScenarioStep = Step[_Action, str]
-"""An action at a time, or a line of the device that is wanted from then on."""
+"""A timed action, or a line of the device expected from then on."""
 
 
 class _Wanted(NamedTuple):
-    """A line of the device that must come in time; `*` stands for any characters."""
+    """An expected line of the device with a time limit; `*` matches any characters."""
 
     line: Condition[str]
     within_us: int
@@ -99,13 +99,13 @@ _EXPECT: Final = re.compile(r"(.*\S)\s+within\s+(\S+)")
 
 
 class ScenarioParser:
-    """Reads scenarios for one device; what it lets through can be carried out.
+    """Reads and checks scenarios for one device.
 
     Args:
         device: for the names of inputs and outputs.
         operator: for what can be done to it.
-        encoders: further verbs that send a line, beside `send`.
-        senders: the verbs that send, on a wire that carries no lines.
+        encoders: further verbs that send a line, besides `send`.
+        senders: the sending verbs of a wire without lines.
     """
 
     def __init__(
@@ -133,7 +133,7 @@ class ScenarioParser:
         """Read a whole scenario.
 
         Raises:
-            StepError: `FILE:LINE: what came, what is allowed`.
+            StepError: `FILE:LINE: the text, and what is allowed`.
         """
         steps: list[ScenarioStep] = []
         for number, content in content_lines(text):
@@ -216,10 +216,10 @@ def _line_sender(encode: Encoder) -> Sender:
 
 
 def parse_raw(rest: str) -> Send:
-    """Read what stands behind `raw`: bytes in hex.
+    """Read the argument of `raw`: bytes in hex.
 
     Raises:
-        ValueError: something else.
+        ValueError: not bytes in hex.
     """
     try:
         data = bytes.fromhex(rest)
@@ -249,17 +249,17 @@ def _parse_end(rest: str) -> ScenarioEnd:
 
 
 class ScenarioPlayer:
-    """Carries out a scenario as the emulator's time passes.
+    """Runs a scenario as the time of the emulator advances.
 
     Args:
         emulator: the emulator; it must not have run yet.
-        scenario: what to do.
-        transcript: where misses are told and outputs are watched.
-        stays: let the emulator run on when the scenario has no `end`.
+        scenario: the scenario.
+        transcript: receives missed expectations and watched outputs.
+        stays: keep the emulator running if the scenario has no `end`.
 
     Attributes:
-        met: how many expectations were met.
-        missed: how many were not.
+        met: number of met expectations.
+        missed: number of missed ones.
     """
 
     def __init__(
@@ -287,7 +287,7 @@ class ScenarioPlayer:
             self._emulator.event_queue.drop(item)
 
     def _carry_out(self, step: ScenarioStep, now_us: int) -> None:
-        """Do it; what the device itself refuses counts as missed."""
+        """Run an action; a refusal by the device counts as missed."""
         try:
             self._do(step, now_us)
         except ValueError as error:

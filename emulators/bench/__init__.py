@@ -1,1 +1,1 @@
-"""A running emulator and what can be done to it: operator, faults, requests, transcript."""
+"""Control of a running emulator: operator, faults, requests, transcript."""

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Final
 
 _START_S: Final = 60.0
-"""How long an emulator may take to come up on a busy machine; one that ends is seen at once."""
+"""Time-out for the start of an emulator on a busy machine; if it ends, that is detected at once."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,9 +22,9 @@ class Child:
 
     Attributes:
         process: the process.
-        link: the terminal that it serves, if it has one.
+        link: the terminal that it serves, if any.
         control: its control socket.
-        log: what it said so far.
+        log: its output so far.
     """
 
     process: subprocess.Popen[bytes]
@@ -35,15 +35,15 @@ class Child:
 
 @contextmanager
 def running(module: str, *options: str, linked: bool = True) -> Iterator[Child]:
-    """Run the emulator whose command is `main` of a module; end it on the way out.
+    """Run the emulator whose command is `main` of a module; end it on exit.
 
     Args:
-        module: where the command is.
-        options: of the command, beside `--control`.
-        linked: it has an option `--link` for a terminal.
+        module: the module with the command.
+        options: of the command, besides `--control`.
+        linked: whether it has an option `--link` for a terminal.
 
     Raises:
-        RuntimeError: it does not come up; the text is the last line that it said.
+        RuntimeError: it does not start; the message is its last line of output.
     """
     with tempfile.TemporaryDirectory(prefix="tickrig-") as name:
         link, control, log = (Path(name, part) for part in ("tty", "control", "log"))

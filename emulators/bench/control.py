@@ -1,4 +1,4 @@
-"""What can be asked of a running emulator (docs/reference/bench/control.md)."""
+"""Requests to a running emulator (docs/reference/bench/control.md)."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from tickrig.host.text.values import Setting
 _MAX_LINES: Final = 100
 _MAX_PRESS_US: Final = 10**15
 _MAX_SINCE: Final = 2**63 - 1
-"""As long as a command line can say."""
+"""Longest duration, as on a command line."""
 
 
 class _Controlled(Protocol):
-    """What requests are answered about: a `RunningEmulator`, or a thing without a wire.
+    """The target of requests: a `RunningEmulator`, or an object without a wire.
 
     Attributes:
-        name: what it is called.
-        operator: does what is asked for.
+        name: its name.
+        operator: executes the actions.
     """
 
     name: str
@@ -40,21 +40,21 @@ class _Controlled(Protocol):
 
     @property
     def wire(self) -> WireFaults:
-        """Where faults of its wire are armed."""
+        """The wire on which faults are armed."""
         ...
 
     @property
     def effective_us(self) -> int:
-        """When what is done now takes effect."""
+        """The time at which an action takes effect."""
         ...
 
     def status(self) -> Mapping[str, object]:
-        """Return how it is going."""
+        """Return its status."""
         ...
 
     @property
     def stop(self) -> Callable[[], None]:
-        """End it."""
+        """End the emulator."""
         ...
 
 
@@ -62,8 +62,8 @@ class EmulatorControl(RequestDispatcher):
     """Answers requests about one emulator.
 
     Args:
-        emulator: what is controlled. It must not be stepping meanwhile. One that is no
-            `RunningEmulator` has no lines to show.
+        emulator: the controlled emulator. It must not be stepped at the same time. Only a
+            `RunningEmulator` has lines to show.
     """
 
     def __init__(self, emulator: _Controlled) -> None:
@@ -199,11 +199,11 @@ _Answers = Future[list[Object]]
 
 
 class EmulatorEnded(Exception):  # noqa: N818 - no error
-    """Nobody is there to answer any more."""
+    """The emulator has ended and no longer answers."""
 
 
 class RequestInbox:
-    """Takes requests from any thread; the emulator's own thread answers them.
+    """Accepts requests from any thread; the emulator's own thread answers them.
 
     Args:
         control: answers the requests, as those of the control socket.
@@ -215,10 +215,10 @@ class RequestInbox:
         self._closed = False
 
     def post(self, requests: Sequence[Object]) -> _Answers:
-        """Hand in requests; they are answered together, between two steps.
+        """Submit requests; they are answered together, between two steps.
 
-        The future raises EmulatorEnded if the emulator ends first. It is not cancelled: an event
-        loop would take that for the end of the task that waits.
+        The future raises EmulatorEnded if the emulator ends first. It is not cancelled, because an
+        event loop would treat that as the end of the waiting task.
         """
         answers: _Answers = Future()
         self._posted.put((requests, answers))
@@ -227,7 +227,7 @@ class RequestInbox:
         return answers
 
     def serve(self) -> None:
-        """Answer what was handed in, or refuse it after the end."""
+        """Answer the submitted requests, or refuse them after the end."""
         while True:
             try:
                 requests, answers = self._posted.get_nowait()
@@ -241,6 +241,6 @@ class RequestInbox:
                 answers.set_result([self._control.answer(request) for request in requests])
 
     def close(self) -> None:
-        """Answer nothing any more."""
+        """Stop answering."""
         self._closed = True
         self.serve()

@@ -1,4 +1,4 @@
-"""The hands at a device: everything that can be done to it, by name."""
+"""The operator of a device: inputs, buttons and faults by name."""
 
 from __future__ import annotations
 
@@ -17,20 +17,21 @@ from tickrig.host.text.names import near
 from tickrig.host.text.values import Setting, parse_time_us
 from tickrig.wire.instant import NEVER
 
-# A fault in one word: `NAME[=ARGUMENT[,ARGUMENT]][@FROM[-TO]]`, as people write it everywhere.
+# A fault in one word: `NAME[=ARGUMENT[,ARGUMENT]][@FROM[-TO]]`, as written in commands, rig files
+# and tests.
 
 _SPEC: Final = re.compile(r"([\w/]+)(?:=([^@]*))?(?:@([^-]*)(?:-(.*))?)?", re.ASCII)
 
 
 @dataclass(frozen=True, slots=True)
 class FaultSpec:
-    """Which fault, with which arguments, and when.
+    """A fault with its arguments and times.
 
     Attributes:
         name: a fault of the wire, or a physical fault of the device.
-        arguments: as they were written; `bind_arguments` of rig/faults.py reads them.
-        from_us: when it begins, in the rig's time.
-        to_us: when it ends; `NEVER` if it stays.
+        arguments: as written; `bind_arguments` of rig/faults.py reads them.
+        from_us: start, in the rig's time.
+        to_us: end; `NEVER` if it stays.
     """
 
     name: str
@@ -39,13 +40,13 @@ class FaultSpec:
     to_us: int = NEVER
 
     def __post_init__(self) -> None:
-        """Refuse a time span that is empty."""
+        """Raise ValueError if the time span is empty."""
         if self.to_us <= self.from_us:
             raise ValueError(f"fault {self.name} ends before it begins")
 
     @property
     def text(self) -> str:
-        """Name and arguments as people write them.
+        """Name and arguments in the notation of users.
 
         >>> FaultSpec("sdo_slow", ("1s", "rate=0.1")).text
         'sdo_slow=1s,rate=0.1'
@@ -54,19 +55,19 @@ class FaultSpec:
 
 
 def _any_name(name: str) -> None:
-    """Take any name."""
+    """Accept any name."""
 
 
 def parse_fault_spec(text: str, check_name: Callable[[str], object] = _any_name) -> FaultSpec:
     """Read a fault.
 
     Args:
-        text: as `flip=0.001@5s-7s`.
-        check_name: called with the name before the times are read; raises ValueError unless there
-            is such a fault.
+        text: such as `flip=0.001@5s-7s`.
+        check_name: called with the name before the times are read; raises ValueError for an unknown
+            fault.
 
     Raises:
-        ValueError: not of the form, or not a name.
+        ValueError: wrong form, or unknown name.
 
     >>> parse_fault_spec("flip=0.001@5s-7s")
     FaultSpec(name='flip', arguments=('0.001',), from_us=5000000, to_us=7000000)
@@ -100,20 +101,20 @@ def _is_named(name: str, check_name: Callable[[str], object]) -> bool:
     return True
 
 
-# A fault that a test ordered, and when it is to come.
+# A scheduled fault, and its start.
 
 
 @dataclass(slots=True)
 class FaultOrder:
-    """A fault, ordered for a time or for what it waits for.
+    """A fault scheduled for a time or for a condition.
 
     Attributes:
         spec: the fault, by its full name.
-        ordered_us: when it was ordered.
-        for_us: how long it stays; as `spec` says if None.
-        when: what it waits for, for people; empty if it waits for a time.
-        due_us: when it begins; None as long as it waits.
-        to_us: when it ends; `NEVER` if it stays.
+        ordered_us: when it was scheduled.
+        for_us: its duration; None for that of `spec`.
+        when: description of the condition; empty if it waits for a time.
+        due_us: its start; None while it waits.
+        to_us: its end; `NEVER` if it stays.
     """
 
     spec: FaultSpec
@@ -124,22 +125,22 @@ class FaultOrder:
     to_us: int = NEVER
 
     def begin(self, now_us: int) -> FaultSpec:
-        """Note that it has waited long enough; return the fault with its end."""
+        """Start the fault after its wait; return it with its end."""
         self.due_us = max(now_us, self.spec.from_us)
         self.to_us = self.spec.to_us if self.for_us is None else self.due_us + self.for_us
         return replace(self.spec, to_us=self.to_us)
 
 
 PRESS_US: Final = 100_000
-"""How long a button is pressed unless told otherwise."""
+"""Default duration of a button press."""
 
 
 _PHYSICAL: Final = FaultForm("", rated=False)
-"""A fault of a device is there or not."""
+"""Arguments of a device fault: none, it is on or off."""
 
 
 class WireFaults(Protocol):
-    """Where faults of a wire are armed by name: `FaultyPort`, or a whole bus."""
+    """An object on which wire faults are armed by name: `FaultyPort`, or a whole bus."""
 
     @property
     def fault_types(self) -> Mapping[str, FaultForm]:
@@ -148,31 +149,31 @@ class WireFaults(Protocol):
 
     @property
     def armed(self) -> Collection[str]:
-        """Names of those that are."""
+        """Names of the armed faults."""
         ...
 
     def check(self, name: str, *arguments: str) -> None:
-        """Raise ValueError unless the fault can be armed like this."""
+        """Raise ValueError unless the fault can be armed with these arguments."""
 
     def arm(self, name: str, *arguments: str) -> None:
-        """Let a fault begin; one of the same name is replaced."""
+        """Arm a fault; one of the same name is replaced."""
 
     def acted(self, name: str) -> int:
-        """Return how often a fault has acted since it was armed last."""
+        """Return how often a fault has acted since it was last armed."""
         ...
 
     def clear(self, name: str) -> None:
-        """Let a fault end; one that is not armed is no error."""
+        """Clear a fault; does nothing if it is not armed."""
 
 
-# The faults of several wires, and of nodes on them, under one roof.
+# The faults of several wires and of their nodes in one table.
 
 
 class AssemblyFaults(Copyable):
-    """The faults of several wires, and of CANopen nodes on them.
+    """The faults of several wires, and of the CANopen nodes on them.
 
-    Those of a lone wire are called as they are, else `WIRE/fault`; those of a node `NODE/fault`,
-    but of a lone device those that its wire has not are called as they are.
+    Faults of a single wire have their plain name, else `WIRE/fault`. Faults of a node are
+    `NODE/fault`; those of a single device have their plain name unless the wire has the same.
 
     Args:
         wires: by name.
@@ -193,18 +194,18 @@ class AssemblyFaults(Copyable):
 
     @property
     def wires(self) -> tuple[str, ...]:
-        """Their names."""
+        """Names of the faults."""
         return tuple(self._wires)
 
     def of_wire(self, wire: str) -> dict[str, str]:
-        """Return the full names of the faults of a wire, by those that people use there."""
+        """Return the full names of the faults of a wire, by their names on that wire."""
         bare = self._bare is not None
         return {
             fault: fault if bare else f"{wire}/{fault}" for fault in self._wires[wire].fault_types
         }
 
     def of_node(self, node: str) -> dict[str, str]:
-        """Return the full names of the faults of a node, by those that people use there."""
+        """Return the full names of the faults of a node, by their names on that node."""
         held = self._nodes.get(node)
         if held is None:
             return {}
@@ -216,7 +217,7 @@ class AssemblyFaults(Copyable):
         }
 
     def names(self) -> Iterator[str]:
-        """Give the full names of all."""
+        """Yield all full names."""
         for wire in self._wires:
             yield from self.of_wire(wire).values()
         for node in self._nodes:
@@ -224,33 +225,33 @@ class AssemblyFaults(Copyable):
 
     @property
     def armed(self) -> tuple[str, ...]:
-        """Names of those that are."""
+        """Names of the armed faults."""
         of_wires = [self.of_wire(name)[x] for name, one in self._wires.items() for x in one.armed]
         of_nodes = [self.of_node(name)[x] for name, one in self._nodes.items() for x in one.armed]
         return (*of_wires, *of_nodes)
 
     def check(self, name: str, *arguments: str) -> None:
-        """Raise ValueError unless the fault can be armed like this."""
+        """Raise ValueError unless the fault can be armed with these arguments."""
         holder, fault = self.find(name)
         holder.check(fault, *arguments)
 
     def arm(self, name: str, *arguments: str) -> None:
-        """Let a fault begin; one of the same name is replaced."""
+        """Arm a fault; one of the same name is replaced."""
         holder, fault = self.find(name)
         holder.arm(fault, *arguments)
 
     def acted(self, name: str) -> int:
-        """Return how often a fault has acted since it was armed last."""
+        """Return how often a fault has acted since it was last armed."""
         holder, fault = self.find(name)
         return holder.acted(fault)
 
     def clear(self, name: str) -> None:
-        """Let a fault end; one that is not armed is no error."""
+        """Clear a fault; does nothing if it is not armed."""
         holder, fault = self.find(name)
         holder.clear(fault)
 
     def find(self, name: str) -> tuple[WireFaults, str]:
-        """Return where a fault of a full name is armed, and its name there; KeyError for none."""
+        """Return the owner of a fault by full name, and its name there; KeyError if unknown."""
         owner, slash, fault = name.rpartition("/")
         holders = [self._bare, self._alone]
         if slash:
@@ -263,7 +264,7 @@ class AssemblyFaults(Copyable):
 
 
 class _FaultTable(Mapping[str, FaultForm]):
-    """The faults by their full names, made when they are asked for: there may be many nodes."""
+    """The faults by their full names, created on request: there may be many nodes."""
 
     def __init__(self, faults: AssemblyFaults) -> None:
         self._faults = faults
@@ -280,25 +281,25 @@ class _FaultTable(Mapping[str, FaultForm]):
 
 
 def _ignore(text: str) -> None:
-    """Tell nobody."""
+    """Notify no callback."""
 
 
 def _at(action: Callable[[], None], now_us: int) -> None:
-    """Do something that is the same whenever it is done."""
+    """Run an action that does not depend on the time."""
     action()
 
 
 class FaultRow(NamedTuple):
-    """What is to be known of a fault of a running emulator.
+    """The status of a fault of a running emulator.
 
     Attributes:
         name: of the fault.
-        text: what it does.
-        arguments: those with which it was armed, or its defaults, by name.
-        on: whether it is present.
-        since_us: since when; None if it is not, or nobody ordered it.
-        acted: how often it has acted since it was armed last; None for one of the device, which
-            is there all the time.
+        text: description.
+        arguments: those of the latest arming, or its defaults, by name.
+        on: whether it is active.
+        since_us: start; None if it is off, or was not ordered.
+        acted: how often it has acted since it was last armed; None for a fault of the device, which
+            acts continuously.
     """
 
     name: str
@@ -310,18 +311,17 @@ class FaultRow(NamedTuple):
 
 
 class Operator(Copyable):
-    """Sets inputs, presses buttons, makes faults come and go.
+    """Sets inputs, presses buttons, and starts and clears faults.
 
-    What is done between two ticks is seen by the next one; a press is seen by
-    at least one tick, however short. `now_us` is the earliest time that a tick
-    which sees it could have.
+    The next tick sees actions done between two ticks; at least one tick sees a press, however
+    short. `now_us` is the earliest time of a tick that sees an action.
 
     Args:
         inputs: the physical inputs of the device.
         tick_us: the device's control period.
-        event_queue: where releases and faults of a later time are entered.
-        wire: the port at which wire faults are armed.
-        note: called with each change, as `power_button=1`.
+        event_queue: queue for releases and scheduled faults.
+        wire: the port on which wire faults are armed.
+        note: called with each change, such as `power_button=1`.
     """
 
     _new_in_twins: ClassVar[Mapping[str, object]] = {"note": _ignore}
@@ -342,16 +342,16 @@ class Operator(Copyable):
         )
         self.note = note
         self._begun: dict[str, tuple[int, tuple[str, ...]]] = {}
-        """When each fault that is present began, and its arguments."""
+        """Start and arguments of each active fault."""
 
         self._spans: dict[str, dict[int, int]] = {}
-        """When each fault that was ordered begins and ends, by its name."""
+        """Start and end of each scheduled fault, by its name."""
 
     def set(self, name: str, *values: Setting) -> None:
         """Set an input, or all inputs of a group.
 
         Raises:
-            ValueError: no such input or group, a value too many, too few or out of range.
+            ValueError: unknown input or group, wrong number of values, or a value out of range.
         """
         for member, value in self.check_set(name, *values):
             self._event_queue.drop(("release", member))
@@ -359,7 +359,7 @@ class Operator(Copyable):
             self._put(member, value)
 
     def check_set(self, name: str, *values: Setting) -> list[tuple[str, Setting]]:
-        """Return which inputs `set` would set to what, or raise as it does."""
+        """Return the values that `set` would set, by input, or raise as `set` does."""
         groups = self._inputs.groups
         if name not in groups and name not in self._inputs.table:
             raise ValueError(f"no input {name!r}; {near(name, [*groups, *self._inputs.table])}")
@@ -373,7 +373,7 @@ class Operator(Copyable):
         return pairs
 
     def press(self, now_us: int, name: str, duration_us: int = PRESS_US) -> None:
-        """Press a button and let it go after `duration_us`; ValueError if it is none."""
+        """Press a button and release it after `duration_us`; ValueError if it is not a button."""
         self.check_press(name, duration_us)
         self._put(name, 1)
         tick_us = self._tick_us_of(name)
@@ -387,7 +387,7 @@ class Operator(Copyable):
         return self._tick_us
 
     def check_press(self, name: str, duration_us: int = PRESS_US) -> None:
-        """Raise ValueError unless `press` can be done."""
+        """Raise ValueError unless `press` is possible."""
         buttons = self._inputs.names(SignalType.BUTTON)
         if name not in buttons:
             raise ValueError(f"no button {name!r}; {near(name, buttons)}")
@@ -395,14 +395,14 @@ class Operator(Copyable):
             raise ValueError(f"a press lasts at least 1 us, not {duration_us} us")
 
     def release(self, name: str) -> None:
-        """Let a button go; ValueError if it is none."""
+        """Release a button; ValueError if it is not a button."""
         self.check_press(name)
         self.set(name, 0)
 
     def fault(self, now_us: int, spec: FaultSpec) -> None:
-        """Let a fault come, now or when its time comes; ValueError if it cannot.
+        """Start a fault, now or at its time; ValueError if that is impossible.
 
-        It takes the place of those of its name whose time it shares.
+        It replaces faults of the same name at overlapping times.
         """
         spec = replace(spec, name=self.full_name_of(spec.name))
         self.check_fault(spec)
@@ -421,7 +421,7 @@ class Operator(Copyable):
             self._event_queue.put(("end", *key), spec.to_us, end)
 
     def check_fault(self, spec: FaultSpec) -> None:
-        """Raise ValueError unless there is such a fault and it takes these arguments."""
+        """Raise ValueError unless the fault exists and accepts these arguments."""
         self.check_clear(spec.name)
         if self.full_name_of(spec.name) in self._wire.fault_types:
             self._wire.check(spec.name, *spec.arguments)
@@ -429,36 +429,36 @@ class Operator(Copyable):
             bind_arguments(spec.name, _PHYSICAL, spec.arguments)
 
     def clear(self, name: str) -> None:
-        """Let a fault go, and its future too; ValueError if there is none of this name."""
+        """Clear a fault, also a scheduled one; ValueError if there is no fault of this name."""
         self.check_clear(name)
         name = self.full_name_of(name)
         self._drop_fault(name)
         self._end(name)
 
     def check_clear(self, name: str) -> None:
-        """Raise ValueError unless there is a fault of this name."""
+        """Raise ValueError unless a fault of this name exists."""
         if self.full_name_of(name) not in self.faults:
             raise ValueError(f"no fault {name!r}; {near(name, self.faults)}")
 
     def full_name_of(self, name: str) -> str:
-        """Return how a fault is called; the name of a lone node need not stand before it."""
+        """Return the full name of a fault; the name of a single node may be omitted."""
         bare = name.rpartition("/")[2]
         more = bare != name and name in self._wire.fault_types and name not in self.faults
         return bare if more else name
 
     @property
     def faults(self) -> tuple[str, ...]:
-        """Names of all faults there are, of the wire and of the device."""
+        """Names of all faults of the wire and of the device."""
         return (*self._wire.fault_types, *self._inputs.names(SignalType.FAULT))
 
     @property
     def active_faults(self) -> tuple[str, ...]:
-        """Names of the faults that are present now."""
+        """Names of the active faults."""
         armed = self._wire.armed
         return tuple(f for f in self.faults if f in armed or self._inputs_fault(f))
 
     def fault_rows(self) -> list[FaultRow]:
-        """Return what is to be known of each fault."""
+        """Return the status of each fault."""
         present = frozenset(self.active_faults)
         return [self._row(name, on=name in present) for name in self.faults]
 
@@ -475,7 +475,7 @@ class Operator(Copyable):
         return name in self._inputs.table and bool(self._inputs[name])
 
     def _drop_fault(self, name: str, from_us: int = 0, to_us: int = NEVER) -> None:
-        """Forget what is to become of a fault, or only what shares a time."""
+        """Cancel the scheduled occurrences of a fault, or only the overlapping ones."""
         spans = self._spans.get(name, {})
         for begin_us, end_us in tuple(spans.items()):
             if begin_us < to_us and from_us < end_us:
@@ -492,7 +492,7 @@ class Operator(Copyable):
             self._put(spec.name, 1)
 
     def _end_span(self, spec: FaultSpec) -> None:
-        """Let a fault end, unless it begins again at once."""
+        """Clear a fault, unless it starts again at once."""
         spans = self._spans[spec.name]
         del spans[spec.from_us]
         if spec.to_us not in spans:

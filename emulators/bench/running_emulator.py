@@ -20,15 +20,15 @@ from tickrig.host.text.trace import Mark
 from tickrig.host.text.values import Setting, format_time
 from tickrig.wire.instant import NEVER
 
-# What a process can do by itself to keep time: no thread of it holds up the others for long.
+# Measures of a process to keep time: no thread delays the others for long.
 
 _SWITCH_S: Final = 0.0005
-"""A thread that computes lets others come to their turn after this time (Python: 5 ms)."""
+"""Switch interval of threads (the default of Python is 5 ms)."""
 
 
 @contextmanager
 def keeping_time() -> Iterator[None]:
-    """Let threads switch soon, and search no old objects for garbage: that takes 50 ms at once."""
+    """Shorten the switch interval, and freeze old objects: collecting them takes 50 ms."""
     before_s = sys.getswitchinterval()
     sys.setswitchinterval(_SWITCH_S)
     gc.freeze()
@@ -40,22 +40,22 @@ def keeping_time() -> Iterator[None]:
 
 
 UNSEEN_US: Final = 100_000
-"""So far ahead devices may work where nobody looks after each step (32 drives: 2 times as fast)."""
+"""How far devices may compute ahead without an observer of each step (32 drives: twice as fast)."""
 
 
 class RunningEmulator(ABC):
-    """A rig, the hands at its devices, and what is to be done and seen.
+    """A rig with its operator, event queue and log.
 
     Args:
-        name: what the device is called.
+        name: name of the device.
         device: the physical side.
-        wire: where faults of the wire are armed.
-        link: where the host finds it, for people.
-        trace: where the run is recorded, to be closed in the end.
+        wire: object on which wire faults are armed.
+        link: address for the host, as text.
+        trace: the recording, closed at the end.
 
     Attributes:
-        operator: sets inputs, presses buttons, makes faults.
-        event_queue: what is to be done between ticks, by whoever makes the rig's time pass.
+        operator: sets inputs, presses buttons, starts faults.
+        event_queue: actions between ticks, run by the code that advances the rig's time.
         log: the latest lines or frames on the wire.
         rig: the rig.
         after_step: called with the time after each step.
@@ -85,14 +85,14 @@ class RunningEmulator(ABC):
 
     @property
     def effective_us(self) -> int:
-        """When what is done now takes effect: at once in an action, else at the next tick."""
+        """The time at which an action takes effect: at once in an action, else at the next tick."""
         if self.rig.acting_us is not None:
             return self.rig.acting_us
         now_us, tick_us = self.rig.now_us, self.device.tick_us
         return now_us - now_us % tick_us + tick_us if now_us else 0
 
     def step(self) -> None:
-        """Go to the next time at which something happens, and let it happen."""
+        """Advance to the next event and run it."""
         next_us = min(self.rig.next_us, self._host_due_us)
         if self.event_queue.due_us <= min(next_us, NEVER - 1):
             self.rig.step()  # the actions alone; the tick of their time is the next step
@@ -105,28 +105,28 @@ class RunningEmulator(ABC):
     @property
     @abstractmethod
     def _host_due_us(self) -> int:
-        """When something arrives at a host that is the caller; `NEVER` if it is outside."""
+        """Arrival time of the next data for a host in this process; `NEVER` for one outside."""
 
     @abstractmethod
     def _listen(self, now_us: int) -> None:
-        """Take what has arrived there."""
+        """Return the data that have arrived for the host."""
 
     @abstractmethod
     def send(self, now_us: int, data: bytes) -> None:
-        """Put something on the wire, as the host would."""
+        """Send on the wire as the host."""
 
     @property
     @abstractmethod
     def lost(self) -> dict[str, int]:
-        """What found a buffer full."""
+        """Counts of lost data by buffer."""
 
     @property
     def trace_error(self) -> str:
-        """Why the recording ended early, empty while all is well."""
+        """Reason for the early end of the recording, empty if there was no error."""
         return self._trace.error if self._trace else ""
 
     def stop(self) -> None:
-        """Let whoever runs it end after this step."""
+        """Stop the run after this step."""
         self.running = False
 
     def close(self) -> None:
@@ -135,7 +135,7 @@ class RunningEmulator(ABC):
             self._trace.close(self.rig.now_us)
 
     def status(self) -> dict[str, str | int]:
-        """Return how the run is going."""
+        """Return the status of the run."""
         return {
             "device": self.name,
             "link": self.link,
@@ -148,19 +148,19 @@ class RunningEmulator(ABC):
         }
 
 
-# What happens in a run, line by line, for people and golden files.
+# Transcript of a run, line by line, for people and golden files.
 
 STATE: Final = "state"
-"""The output that is watched unasked, where a device has one."""
+"""The output that is watched by default, if the device has it."""
 
 
 class Transcript:
     """Writes lines of the wire as the host sees them, actions of the operator, watched outputs.
 
     Args:
-        emulator: what is watched.
-        write: takes the lines.
-        wanted: which lines of the wire are worth it.
+        emulator: the emulator to watch.
+        write: receives the lines.
+        wanted: selects lines of the wire.
     """
 
     def __init__(
@@ -189,7 +189,7 @@ class Transcript:
         self._write_changes(now_us)
 
     def send(self, now_us: int, data: bytes, shown: bytes) -> None:
-        """Send as the host, and show it at once, line or not."""
+        """Send as the host, and show the data at once even if not a complete line."""
         self.write(now_us, Mark.TO_DEVICE, escape(shown))
         self._sending = True
         self._emulator.send(now_us, data)
@@ -210,8 +210,8 @@ class FrameTranscript(Transcript):
     """Actions of the operator, watched outputs and missed expectations, without the frames.
 
     Args:
-        emulator: what is watched.
-        write: takes the lines.
+        emulator: the emulator to watch.
+        write: receives the lines.
     """
 
     def __init__(self, emulator: RunningEmulator, write: Callable[[str], None]) -> None:

@@ -15,13 +15,13 @@ if TYPE_CHECKING:
 _NUMBER_BITS: Final = 24
 _NUMBER_MASK: Final = (1 << _NUMBER_BITS) - 1
 _FIRST_NUMBER: Final = -1
-"""Of the node that the fault `babble` adds; the others are counted from 0."""
+"""Number of the node of the fault `babble`; other nodes are numbered from 0."""
 
 
 def priority(frame: CanFrame) -> int:
     """Return the arbitration field as a number; the smallest wins, dominant bits being 0.
 
-    With equal identifiers data come before remote frames, and 11-bit before
+    With equal identifiers data frames come before remote frames, and 11-bit before
     29-bit identifiers (ISO 11898-1, arbitration).
 
     >>> frames = [CanFrame.parse(t) for t in ("101#", "100#", "100#R", "04000000#", "04000000#R")]
@@ -35,7 +35,7 @@ def priority(frame: CanFrame) -> int:
 
 
 def first_difference(frames: Sequence[CanFrame]) -> int:
-    """Return at which bit, counted without stuff bits, frames of one priority begin to differ."""
+    """Return the bit, counted without stuff bits, at which frames of one priority first differ."""
     control = 39 if frames[0].extended else 19
     if len({frame.dlc for frame in frames}) > 1:
         return control
@@ -44,7 +44,7 @@ def first_difference(frames: Sequence[CanFrame]) -> int:
 
 
 def dominant(frames: Sequence[CanFrame]) -> CanFrame:
-    """Return the frame that would be heard if the other senders gave way."""
+    """Return the frame that wins if the other senders give way."""
     return min(frames, key=lambda frame: (frame.dlc, frame.data))
 
 
@@ -68,16 +68,16 @@ class CanArbiter(ArbiterFields):
         self._ends: dict[int, CanEnd] = {}
 
     def join(self, end: CanEnd) -> None:
-        """Know a node, which may then take part."""
+        """Add a node to the arbitration."""
         self._ends[end.number - _FIRST_NUMBER] = end
 
     def leave(self, end: CanEnd) -> None:
-        """Know a node no longer."""
+        """Remove a node."""
         self._remove(end)
         del self._ends[end.number - _FIRST_NUMBER]
 
     def enter(self, end: CanEnd, now: int) -> None:
-        """Let a node whose queue was empty take part from now on."""
+        """Let a node take part whose queue was empty."""
         end.held = max(end.held, now)
         self.push(end)
 
@@ -94,7 +94,7 @@ class CanArbiter(ArbiterFields):
         heappush(self.heads, head)
 
     def take(self) -> list[CanEnd]:
-        """Take the winner out; several nodes with the same identifier all win."""
+        """Remove and return the winner; several nodes with the same identifier all win."""
         heads = self.heads
         head = heappop(heads)
         winners = [self._ends[head & _NUMBER_MASK]]
@@ -103,7 +103,7 @@ class CanArbiter(ArbiterFields):
         return winners
 
     def take_waiting(self, *, everybody: bool = False) -> tuple[int, list[CanEnd]]:
-        """Take the winner of those that wait least, or all of them; the start comes first."""
+        """Return the start, then the winner, or winners, of the nodes with the shortest wait."""
         waiting = {head: self._ends[head & _NUMBER_MASK] for head in sorted(self.heads)}
         start = max(self.free, min(end.held for end in waiting.values()))
         able = [head for head, end in waiting.items() if end.held <= start]
@@ -115,7 +115,7 @@ class CanArbiter(ArbiterFields):
         return start, winners
 
     def _remove(self, end: CanEnd) -> None:
-        """Let a node take part no longer."""
+        """Exclude a node from the arbitration."""
         number = end.number - _FIRST_NUMBER
         self.heads = [head for head in self.heads if head & _NUMBER_MASK != number]
         heapify(self.heads)

@@ -1,4 +1,4 @@
-"""What a CAN bus tells a device and asks it, if it answers; looked for at run time."""
+"""Optional interface between a CAN bus and a device, detected at run time."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from typing import Protocol, TypeGuard
 from tickrig.wire.can import ErrorState
 
 Accepted = frozenset[int] | None
-"""CAN-IDs that an end listens to, 29-bit ones with bit 29 set; None for all."""
+"""CAN-IDs that an end accepts, 29-bit ones with bit 29 set; None for all."""
 
 
 class Filtering(Protocol):
-    """A device that says which CAN-IDs it listens to.
+    """A device that declares the CAN-IDs it accepts.
 
-    A filter may pass more than the device wants, never less: the device itself
-    decides, frame by frame. So a frame that could change what it listens to lets
-    all that follow it pass, until the device has handled it.
+    A filter may pass more frames than the device needs, never fewer: the device decides frame by
+    frame. After a frame that may change the accepted CAN-IDs, all frames pass until the device has
+    handled it.
     """
 
     @property
@@ -31,22 +31,22 @@ class Filtering(Protocol):
 
     @property
     def on_accepts(self) -> list[Callable[[], None]]:
-        """Whom to call when `accepts` or `reconfigured_by` has changed, in a tick or between."""
+        """Callback for a change of `accepts` or `reconfigured_by`, in a tick or between ticks."""
         ...
 
 
 class ErrorAware(Protocol):
-    """A device that is told the error state of its CAN controller."""
+    """A device that receives the error state of its CAN controller."""
 
     def bus_state(self, state: ErrorState, /) -> None:
-        """Hear of a change; it is seen to in the next tick."""
+        """Accept a change, which takes effect in the next tick."""
 
 
 def is_filtering(device: object) -> TypeGuard[Filtering]:
-    """Say whether a device has the members of `Filtering`, by `__getattr__` too."""
+    """Return whether a device has the members of `Filtering`, by `__getattr__` too."""
     return all(hasattr(device, name) for name in ("accepts", "reconfigured_by", "on_accepts"))
 
 
 def is_error_aware(device: object) -> TypeGuard[ErrorAware]:
-    """Say whether a device has `bus_state`, by `__getattr__` too."""
+    """Return whether a device has `bus_state`, by `__getattr__` too."""
     return hasattr(device, "bus_state")

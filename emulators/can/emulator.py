@@ -1,4 +1,4 @@
-"""Emulated devices on a CAN bus, with all that can be done to them while they run."""
+"""Emulated devices on a CAN bus, with their operator."""
 
 from __future__ import annotations
 
@@ -23,21 +23,21 @@ from tickrig.wire.instant import NEVER
 class CanEmulator(RunningEmulator):
     """Devices, their bus, their operator, and a rig that runs them.
 
-    One more end of the bus belongs to the caller: what it sends is heard by all
-    devices and by the bus outside, and it hears all. The bus outside, or in its
-    stead an end that only acknowledges, sees to it that the caller is never alone.
+    One more end of the bus belongs to the caller; it sends to all devices and to the bus outside,
+    and receives all frames. The bus outside, or an end that only acknowledges, ensures that the
+    caller is never alone.
 
     Args:
-        name: what the devices are called.
+        name: name of the devices.
         physical: the physical side of all devices.
         stations: the devices, each on its end of the bus.
         wire: the bus.
-        couplings: what joins the devices beside the bus.
-        outside: the bus where the host is, if it is outside.
-        clock: a `VirtualClock` unless given.
-        trace: the record, to be closed in the end.
-        link: how people call the bus outside.
-        faults: where faults are armed; those of the bus unless given.
+        couplings: connections of the devices besides the bus.
+        outside: the host's bus, if it is outside.
+        clock: by default a `VirtualClock`.
+        trace: the recording, closed at the end.
+        link: name of the bus outside, as text.
+        faults: object on which faults are armed; by default the bus.
     """
 
     def __init__(  # noqa: PLR0913 - options, by keyword
@@ -69,7 +69,7 @@ class CanEmulator(RunningEmulator):
         )
 
     def _open_end(self, accepts: Accepted = None) -> CanEnd:
-        """Connect an end that comes back from bus-off at once."""
+        """Connect an end that recovers from bus-off at once."""
         end = self._wire.end(accepts)
         end.auto_recovery = True
         self._ends.append(end)
@@ -84,7 +84,7 @@ class CanEmulator(RunningEmulator):
             self._hear(at_us, Mark.FROM_DEVICE, frame)
 
     def send(self, now_us: int, data: bytes) -> None:
-        """Put a frame, given in candump's notation, on the bus, as a host would."""
+        """Send a frame in candump's notation on the bus, as a host does."""
         frame = CanFrame.parse(data.decode("ascii"))
         self._hear(now_us, Mark.TO_DEVICE, frame)
         self._host.send(now_us, (frame,))
@@ -94,6 +94,6 @@ class CanEmulator(RunningEmulator):
 
     @property
     def lost(self) -> dict[str, int]:
-        """Frames that found a queue full, at an end of the bus or outside."""
+        """Frames lost because of a full queue, at an end of the bus or outside."""
         ends = sum(end.lost for end in self._ends if isinstance(end, CanEnd))
         return {"lost_frames": ends + (self._outside.lost if self._outside else 0)}

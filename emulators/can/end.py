@@ -18,19 +18,19 @@ if TYPE_CHECKING:
     from tickrig.emulators.can.wire import CanWire
 
 _QUEUE_FRAMES: Final = 4_096
-"""Frames that an end keeps, going out and as many coming in; more are lost and counted."""
+"""Capacity of each queue of an end, out and in; further frames are lost and counted."""
 
 
 @in_kernel
 def _ignore(at_us: int) -> None:
-    """Wake nobody: nobody ticks at this end."""
+    """Wake nothing: no device ticks at this end."""
 
 
 _NEW_IN_TWINS: Final[Mapping[str, object]] = {
     **dict.fromkeys(("on_error_state", "_device", "_error_aware")),
     "wake": _ignore,
 }
-"""A rig attaches its devices anew."""
+"""Attributes of an end in a twin; a rig attaches its devices again."""
 
 
 class CanEnd(EndFields):
@@ -41,17 +41,17 @@ class CanEnd(EndFields):
 
     Attributes:
         wire: the bus.
-        number: place among the ends of the bus.
+        number: index among the ends of the bus.
         controller: error counters and error state.
-        waiting: how many frames have not left.
-        next: the first of them, if there are any.
-        room: how many may wait; none while the node is bus-off.
-        held: no frame of it starts before this, in units of the segment.
-        arrived_us: when the first frame that waits here had ended, `NEVER` if none does.
-        lost: frames that found a queue or inbox full, or the node bus-off.
-        unfiltered: its filter is out of use until it is polled.
+        waiting: number of frames not yet sent.
+        next: the first of them, if any.
+        room: how many more may wait; 0 while the node is bus-off.
+        held: no frame of it starts before this time, in units of the segment.
+        arrived_us: end of the first received frame that waits here, `NEVER` without one.
+        lost: frames lost because a queue or inbox was full, or the node was bus-off.
+        unfiltered: whether its filter is disabled until it is polled.
         on_error_state: called with the time and the new state when the error state changes.
-        auto_recovery: it leaves bus-off by itself, as most drivers let it.
+        auto_recovery: whether it leaves bus-off automatically, as with most drivers.
     """
 
     __slots__ = ()
@@ -75,20 +75,20 @@ class CanEnd(EndFields):
         self._error_aware: bus_device.ErrorAware | None = None
 
     def __getstate__(self) -> object:
-        """Return the state that a twin begins with."""
+        """Return the initial state of a twin."""
         return state_of(self, _NEW_IN_TWINS)
 
     def __copy__(self) -> NoReturn:
-        """Refuse: a shallow copy would share its parts with the original."""
+        """Raise TypeError, because a shallow copy would share its parts with the original."""
         raise TypeError("CanEnd cannot be copied by copy.copy: use copy.deepcopy")
 
     def __deepcopy__(self, memo: dict[int, Any]) -> CanEnd:
-        """Return a twin, which has in common with other twins what the originals have."""
+        """Return a twin; twins of one deepcopy share what their originals share."""
         return twin(self, memo)
 
     @property
     def accepts(self) -> bus_device.Accepted:
-        """CAN-IDs that are received; a change holds for frames that end after it."""
+        """Accepted CAN-IDs; a change applies to frames that end after it."""
         return self._accepts
 
     @accepts.setter
@@ -103,11 +103,11 @@ class CanEnd(EndFields):
 
     @property
     def inbox(self) -> Frames:
-        """The frames that wait here."""
+        """The received frames that wait here."""
         return self._first + tuple([frame for _, frame in self._more or ()])
 
     def attach(self, device: Device[Any], wake: Callable[[int], None], /) -> None:
-        """Take the filter from a device, tell it the error state, say when a frame has arrived."""
+        """Connect a device: use its filter, report error states, wake it when a frame arrives."""
         self.wake = wake
         if bus_device.is_filtering(device):
             self._device = device
@@ -118,7 +118,7 @@ class CanEnd(EndFields):
 
     @in_kernel
     def poll(self, now_us: int, /) -> Frames:
-        """Take the frames that had ended by `now_us`."""
+        """Return the frames that ended by `now_us`."""
         if self.segment.now_us < now_us:
             self.wire.advance(now_us)
         if self.unfiltered:
@@ -132,7 +132,7 @@ class CanEnd(EndFields):
         return frames
 
     def poll_stamped(self, now_us: int) -> tuple[tuple[int, CanFrame], ...]:
-        """Take the same frames, each with the time at which it had ended."""
+        """Return the same frames, each with the time at which it ended."""
         self.wire.advance(now_us)
         if not self._first and not self.unfiltered:  # mostly: a fifth of what a host's wait costs
             return ()
@@ -141,13 +141,13 @@ class CanEnd(EndFields):
 
     @in_kernel
     def send(self, now_us: int, traffic: Frames, /) -> None:
-        """Queue frames behind those that have not left."""
+        """Queue frames for sending."""
         if traffic:
             self.segment.send(self, now_us, traffic)
 
     @in_kernel
     def enqueue(self, frames: Frames) -> None:
-        """Let frames wait behind those that do."""
+        """Append frames to the queue."""
         behind = frames
         if not self.waiting:  # mostly one: without a queue two objects less are touched
             self.next, behind = frames[0], frames[1:]
@@ -157,7 +157,7 @@ class CanEnd(EndFields):
         self.waiting += len(frames)
 
     def take(self) -> CanFrame:
-        """Take the first of the frames that wait: it was sent."""
+        """Remove the first frame of the queue after sending."""
         frame = self.next
         self.waiting -= 1
         if self._behind:
@@ -165,7 +165,7 @@ class CanEnd(EndFields):
         return frame
 
     def drop(self) -> None:
-        """Lose what waits to be sent."""
+        """Drop the frames that wait to be sent."""
         self.waiting, self._behind = 0, None
 
     def recover(self, now_us: int) -> None:
@@ -174,7 +174,7 @@ class CanEnd(EndFields):
 
     @in_kernel
     def receive(self, at_us: int, frame: CanFrame, alone: Frames) -> None:
-        """Take a frame from the bus; `alone` are it and no other, made once for all who take it."""
+        """Receive a frame from the bus; `alone` is a tuple of it, shared by all receivers."""
         if not self._first:  # one of all ends' objects is touched, not six: 5 % of eight buses
             self._first, self.arrived_us = alone, at_us
             self.wake(at_us)
@@ -185,7 +185,7 @@ class CanEnd(EndFields):
             self.pass_all()
 
     def _take_more(self, at_us: int, frame: CanFrame) -> bool:
-        """Take a frame behind others that wait, if it fits."""
+        """Append a received frame, if there is room."""
         if self._more is None:
             self._more = []
         elif len(self._more) >= _QUEUE_FRAMES - 1:
@@ -198,31 +198,31 @@ class CanEnd(EndFields):
         self._first, self._more, self.arrived_us = (), None, NEVER
 
     def pass_all(self) -> None:
-        """Open the filter until the next poll: the device will listen to nobody knows what."""
+        """Disable the filter until the next poll, because the device may change its CAN-IDs."""
         if not self.unfiltered:
             self.unfiltered = True
             self.segment.routes.unfiltered.append(self)
 
     def _refilter(self) -> None:
-        """Follow what the device listens to."""
+        """Update the filter from the device."""
         if self._device is not None:
             self.accepts = self._device.accepts
             self._reconfigured_by = self._device.reconfigured_by
 
     def forget(self) -> None:
-        """Lose what waits to be sent and to be polled, as a node without power does."""
+        """Drop sent and received frames that wait, as a node without power does."""
         self.drop()
         self._empty()
 
     def open(self, *, on_bus: bool) -> None:
-        """Let it send, or not; then what waits is lost."""
+        """Enable or disable sending; disabling drops the waiting frames."""
         self.room = _QUEUE_FRAMES if on_bus else 0
         if not on_bus:
             self.lost += self.waiting
             self.drop()
 
     def error_state_changed(self, at_us: int) -> None:
-        """Tell whoever wants to know."""
+        """Report a change of the error state."""
         if self._error_aware is not None:
             self._error_aware.bus_state(self.controller.state)
         if self.on_error_state is not None:
@@ -234,7 +234,7 @@ class CanEnd(EndFields):
 
 
 class Babbler(CanEnd):
-    """A node that always has its frame to send: it does not care for its error state either.
+    """A node that always has a frame to send and ignores its error state.
 
     It is here, for no compiled class derives from one whose fields are those of the kernel.
     """
@@ -242,8 +242,8 @@ class Babbler(CanEnd):
     __slots__ = ()
 
     def take(self) -> CanFrame:
-        """Keep the frame."""
+        """Keep the frame in the queue."""
         return self.next
 
     def drop(self) -> None:
-        """Keep it too."""
+        """Keep the frame in the queue."""

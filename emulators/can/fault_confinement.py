@@ -16,14 +16,14 @@ _PASSIVE_LIMIT: Final = 128
 _BUS_OFF_LIMIT: Final = 256
 _TRANSMIT_ERROR: Final = 8
 _BACK_FROM_PASSIVE: Final = 119
-"""REC after a good frame in a passive receiver; 119 to 127 is allowed."""
+"""REC after a good frame in a passive receiver; the standard allows 119 to 127."""
 
 
 class ErrorCounters(Part):
     """The two error counters of one node (ISO 11898-1, fault confinement).
 
     Not emulated: the receiver's further 8 for a dominant bit after its error
-    flag, and the warning limit of 96, which is no state.
+    flag, and the warning limit of 96, which is not a state.
 
     Attributes:
         tec: transmit error counter.
@@ -43,17 +43,17 @@ class ErrorCounters(Part):
 
     @property
     def clean(self) -> bool:
-        """Whether a good frame would change nothing."""
+        """Whether a good frame leaves the counters unchanged."""
         return not (self.tec or self.rec)
 
     def transmitted(self) -> None:
-        """Count a frame that went well."""
+        """Count a successful transmission."""
         if self.tec:
             self.tec -= 1
             self._note()
 
     def received(self) -> None:
-        """Count a frame that came well."""
+        """Count a successful reception."""
         if self.rec:
             self.rec = (
                 min(self.rec - 1, _BACK_FROM_PASSIVE) if self._receiver_passive else self.rec - 1
@@ -71,13 +71,13 @@ class ErrorCounters(Part):
         self._note()
 
     def receive_failed(self) -> None:
-        """Count an error while receiving; a passive receiver's counter stays where it is."""
+        """Count an error while receiving; the counter of a passive receiver is unchanged."""
         if not self._receiver_passive:
             self.rec += 1
             self._note()
 
     def not_acknowledged(self) -> None:
-        """Count a frame that nobody acknowledged; it makes nobody bus-off (exception A)."""
+        """Count an unacknowledged frame, which never leads to bus-off (exception A)."""
         if self.state is ErrorState.ACTIVE:
             self.transmit_failed()
 
@@ -95,7 +95,7 @@ class ErrorCounters(Part):
 
 
 class FaultConfinement(Part):
-    """Counts what went well and what failed; a good frame costs nothing on a sound bus.
+    """Counts successes and errors of all nodes; a good frame costs nothing on an intact bus.
 
     Args:
         ends: all ends of the bus.
@@ -129,12 +129,12 @@ class FaultConfinement(Part):
             self.count(at_us, end, ErrorCounters.transmit_failed)
 
     def unheard(self, at_us: int, senders: list[CanEnd]) -> None:
-        """Count a frame that nobody acknowledged."""
+        """Count an unacknowledged frame."""
         for end in senders:
             self.count(at_us, end, ErrorCounters.not_acknowledged)
 
     def count(self, at_us: int, end: CanEnd, event: Callable[[ErrorCounters], None]) -> None:
-        """Let something happen to one node's counters, and tell if its state changed."""
+        """Apply a change to the counters of one node, and report a change of state."""
         controller = end.controller
         state = controller.state
         if state is ErrorState.BUS_OFF and event is not ErrorCounters.restart:
@@ -146,12 +146,12 @@ class FaultConfinement(Part):
             self._changed(at_us, end)
 
     def join(self, end: CanEnd) -> None:
-        """Take an end up that comes from elsewhere, with its counters."""
+        """Add an end from another segment, with its counters."""
         if not end.controller.clean:
             self.marked.append(end)
 
     def leave(self, end: CanEnd) -> None:
-        """Forget an end that is no longer on the bus."""
+        """Remove an end that is no longer on the bus."""
         if end in self.marked:
             self.marked.remove(end)
 
@@ -162,10 +162,10 @@ _SEQUENCE_BITS: Final = 11
 
 
 class Recovery(Part):
-    """Counts, for each node that was asked to return, the sequences it has seen.
+    """Counts the recessive sequences for each node that waits to return.
 
     Args:
-        bit: length of a bit, in the units in which all times here are.
+        bit: length of a bit, in the units of all times here.
 
     Attributes:
         active: whether any node waits.
@@ -177,12 +177,12 @@ class Recovery(Part):
         self.active = False
 
     def begin(self, end: CanEnd, now: int) -> None:
-        """Let a node wait; asking twice changes nothing."""
+        """Let a node wait for its return; a second call has no effect."""
         self._waiting.setdefault(end.number, (end, _SEQUENCES, now))
         self.active = True
 
     def leave(self, end: CanEnd) -> None:
-        """Let a node wait no longer."""
+        """Cancel the wait of a node."""
         self._waiting.pop(end.number, None)
         self.active = bool(self._waiting)
 
@@ -195,13 +195,13 @@ class Recovery(Part):
         )
 
     def interrupt(self, at: int, until: int) -> None:
-        """Count what was seen before a dominant bit `at`; the bus is recessive again at `until`."""
+        """Count the sequences before a dominant bit `at`; the bus is recessive again at `until`."""
         for number, (end, left, since) in self._waiting.items():
             seen = max(0, at - since) // self._sequence
             self._waiting[number] = (end, left - seen, max(since, until))
 
     def take(self, now: int) -> list[CanEnd]:
-        """Take the nodes that are back by `now`."""
+        """Return the nodes that are back by `now`."""
         back = [
             end
             for end, left, since in self._waiting.values()

@@ -13,11 +13,11 @@ from tickrig.emulators.rig.faults import FaultArguments, FaultForm, FaultTally, 
 from tickrig.wire.can import CanFrame
 
 _DELAY_US: Final = 10_000
-"""How long a delayed node sends nothing."""
+"""How long a delayed node does not send."""
 
 
 class FaultVerdict(Enum):
-    """What becomes of a frame on the bus."""
+    """Effect of a fault on a frame."""
 
     SENT = auto()
     DROPPED = auto()
@@ -30,7 +30,7 @@ class CanFaultType(FaultForm):
     """A fault that can be armed by name.
 
     Attributes:
-        verdict: what it makes of a frame that it hits.
+        verdict: its effect on a frame that it hits.
     """
 
     verdict: FaultVerdict | None = None
@@ -42,29 +42,29 @@ CAN_FAULTS: Final[Mapping[str, CanFaultType]] = {
         verdict=FaultVerdict.DROPPED,
     ),
     "corrupt": CanFaultType(
-        "a bit of each frame is turned over: an error frame, and it is sent again",
+        "a bit of each frame is inverted: an error frame follows, and the frame is sent again",
         verdict=FaultVerdict.CORRUPTED,
     ),
     "duplicate": CanFaultType(
-        "each frame is sent again, because its sender saw the last bit wrong",
+        "each frame is sent twice, because its sender sees the last bit wrong",
         verdict=FaultVerdict.DUPLICATED,
     ),
-    "delay": CanFaultType("each time a node sends, it is held for 10 ms"),
+    "delay": CanFaultType("each time a node sends, it is delayed by 10 ms"),
     "babble": CanFaultType("a broken node sends 000# without a pause", rated=False),
-    "short": CanFaultType("the lines touch: no node can send", rated=False),
+    "short": CanFaultType("the lines are shorted: no node can send", rated=False),
 }
 
 
 NARROWED: Final = ("drop", "corrupt", "duplicate", "delay")
-"""Those of a bus that can hit the frames of one node alone."""
+"""Bus faults that can be limited to the frames of one node."""
 
 
 class _ArmedFault(Copyable):
-    """A fault of a bus that is armed, for all nodes or for one.
+    """An armed fault of a bus, for all nodes or for one.
 
     Attributes:
         number: of the node whose frames it hits; None for all.
-        hits: whether it hits the frame that is planned; None until somebody asks.
+        hits: whether it hits the planned frame; None until this is drawn.
     """
 
     __slots__ = ("hits", "number", "tally", "threshold", "verdict")
@@ -77,26 +77,25 @@ class _ArmedFault(Copyable):
         self.hits: bool | None = None
 
     def concerns(self, senders: Sequence[int]) -> bool:
-        """Say whether it can hit frames of these nodes."""
+        """Return whether it can hit frames of these nodes."""
         return self.number is None or self.number in senders
 
 
 class CanFaults(Copyable):
-    """The faults of one bus; those with a rate have a chance of their own.
+    """The faults of one bus; each fault with a rate draws independently.
 
-    Chance is drawn once for each frame on the bus, and once for each time a
-    node sends, so it is the same in every run. A fault of one node draws for
-    its frames alone.
+    One random number is drawn for each frame on the bus, and one each time a node sends, so every
+    run is the same. A fault of one node draws only for its frames.
 
     Args:
-        seed: seed of all chance in it.
-        changed: called with each fault that begins (True) or ends (False).
+        seed: seed of its random numbers.
+        changed: called with each fault that starts (True) or ends (False).
 
     Attributes:
-        seed: seed of all chance in it; a new one counts for what was not drawn yet.
+        seed: seed of its random numbers; a new one applies to later draws.
         fault_types: the faults that can be armed, by name.
         active: whether any is armed.
-        place: a number from which the place of a turned bit is taken.
+        place: a number that determines the position of the inverted bit.
         listeners: called with the time and each frame that no node takes.
     """
 
@@ -118,20 +117,20 @@ class CanFaults(Copyable):
         return tuple(name for name, one in self._armed.items() if one.number is None)
 
     def check(self, name: str, *arguments: str) -> None:
-        """Raise ValueError unless the fault can be armed like this."""
+        """Raise ValueError unless the fault can be armed with these arguments."""
         bind_arguments(name, self.fault_types[name], arguments)
 
     def arm(self, name: str, *arguments: str, number: int | None = None) -> None:
-        """Let a fault begin, at the time the bus has reached; one of the same name is replaced.
+        """Arm a fault at the present time of the bus; one of the same name is replaced.
 
         Args:
-            name: which.
-            *arguments: as people write them behind `NAME=`, split at commas.
-            number: of the node's end whose frames alone it hits, for one of `NARROWED`.
+            name: of the fault.
+            *arguments: the texts after `NAME=`, split at commas.
+            number: of the end of the only node whose frames it hits, for one of `NARROWED`.
 
         Raises:
             KeyError: no fault has this name.
-            ValueError: an argument that it does not take, or out of range.
+            ValueError: an unknown argument, or a value out of range.
         """
         fault_type, key = self.fault_types[name], _key(name, number)
         bound = bind_arguments(name, fault_type, arguments)
@@ -142,7 +141,7 @@ class CanFaults(Copyable):
         self._changed(key, True)
 
     def clear(self, name: str, number: int | None = None) -> None:
-        """Let a fault end; clearing one that is not armed is no error."""
+        """Clear a fault; does nothing if it is not armed."""
         key = _key(name, number)
         if self._armed.pop(key, None) is not None:
             self.active = bool(self._armed)
@@ -150,12 +149,12 @@ class CanFaults(Copyable):
             self._changed(key, False)
 
     def acted(self, name: str, number: int | None = None) -> int:
-        """Return how often a fault has acted since it was armed last."""
+        """Return how often a fault has acted since it was last armed."""
         key = _key(name, number)
         return self._tallies[key].acted if key in self._tallies else 0
 
     def judge(self, senders: Sequence[int]) -> FaultVerdict:
-        """Say what becomes of the next frame of these nodes; the same until `spend`."""
+        """Return the effect on the next frame of these nodes; the same until `spend`."""
         if self._planned is None:
             self.place = self.chance("place").draw()
         self._planned, self._hitting = senders, None
@@ -170,7 +169,7 @@ class CanFaults(Copyable):
         return verdict or FaultVerdict.SENT
 
     def spend(self) -> None:
-        """Note that the frame judged last has been on the bus."""
+        """Note that the latest judged frame has been on the bus."""
         if self._hitting is not None:
             self._hitting.tally.allow()
         self._forget(self._planned or ())
@@ -182,7 +181,7 @@ class CanFaults(Copyable):
                 one.hits = None
 
     def delay_us(self, number: int) -> int:
-        """Draw how long a node that sends is held."""
+        """Draw the delay of a node that sends."""
         for key, stream in (("delay", f"delay {number}"), (_key("delay", number),) * 2):
             one = self._armed.get(key)
             if one and self.chance(stream).hit(one.threshold) and one.tally.allow():
@@ -190,12 +189,12 @@ class CanFaults(Copyable):
         return 0
 
     def chance(self, stream: str) -> Chance:
-        """Return the chance of a name; what it draws is the same in every run."""
+        """Return the random generator of a name; its numbers are the same in every run."""
         return self._chances.setdefault(stream, Chance(self.seed, stream))
 
     @property
     def drawn(self) -> bool:
-        """Whether anything was drawn by chance."""
+        """Whether any random number was drawn."""
         return bool(self._chances)
 
 

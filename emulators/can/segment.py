@@ -1,4 +1,4 @@
-"""A stretch of CAN bus on which all hear each other: what is sent next, and when."""
+"""A segment of a CAN bus: which frame is sent next, and when."""
 
 # Theory of operation.
 #
@@ -11,17 +11,17 @@
 #
 # A segment has one plan: which frame is on the bus, or goes next, when it starts and ends, and in
 # which method (`_finish`; None is `_deliver`). The plan holds as long as `_stale` is False.
-# `_due_us` is when its end of frame has passed. Whoever moves the bus on (`advance`) ends the plan,
-# tells whose error state has changed, and makes the next one.
+# `_due_us` is when its end of frame has passed. `advance` ends the plan, reports changed error
+# states, and makes the next one.
 #   - A plan may be withdrawn until its first bit is out: who sends at that very time still takes
 #     part in the arbitration. From then on nothing changes it; a node that leaves breaks it off.
 #   - `CanArbiter.heads` is a heap of the first frames of all queues: priority, then node. Nodes
 #     that send the same identifier win together. `free` is when the bus is free; a node that has to
 #     wait longer (`held`: a delay, a passive node behind its frame) makes the arbiter `slow`.
 #   - `_plan` takes the short way where one frame wins on a bus without faults; `_judge` finds out
-#     what else can happen: nobody can send, a collision, nobody to acknowledge, an armed fault.
+#     what else can happen: sending is impossible, a collision, no acknowledgement, an armed fault.
 #     Chance is drawn once for a frame, however often it is planned (`CanFaults.judge`, `spend`).
-#   - A node alone and error-passive repeats for ever: `_repeating` stops planning until something
+#   - A node alone and error-passive repeats endlessly: `_repeating` stops planning until something
 #     changes (`_recount`).
 #   - A return from bus-off is a plan, too: what ends next may be 128 sequences of recessive bits.
 # `_deliver` is the short way again: without counters, faults and recovery a frame goes straight to
@@ -32,13 +32,13 @@
 # change what a device listens to (`reconfigured_by`) opens the filter of its end until the next
 # poll.
 #
-# A disconnected end is on a segment of its own (`CanWire._apart`): nobody acknowledges it there.
+# A disconnected end is on a segment of its own (`CanWire._apart`): no node acknowledges it there.
 #
 # The fields of segment, arbiter, routes and ends are those of the kernel, which
 # `emulators/rig/kernel.py` describes. Where it was built, `_plan`, `advance` and `send` run in C
-# while `_sound` is True and come back to the methods here for all else. What may end soundness sets
-# `_sound` to False: `_recount`, and each plan that does not end in `_deliver`. `_is_sound` is asked
-# before the next plan.
+# while `_sound` is True and return to the methods here for everything else. What may end soundness
+# sets `_sound` to False: `_recount`, and each plan that does not end in `_deliver`. `_is_sound` is
+# asked before the next plan.
 
 from __future__ import annotations
 
@@ -68,23 +68,23 @@ KEPT_LENGTHS: Final = 8_192
 
 
 class CanSegment(TransmissionOutcomes):
-    """A bus in virtual time, moved on by whoever looks at it.
+    """A bus in virtual time, advanced by each access.
 
     Which frame goes next is a plan until its first bit is out: a frame sent at
     that very time still takes part in the arbitration.
 
     Args:
         bit_rate: bits a second.
-        start_us: when it begins.
-        faults: what is armed.
-        observers: called with all that ends on it.
-        on_traffic: called when something may end on it earlier than it said.
+        start_us: start time.
+        faults: the armed faults.
+        observers: called with each frame that ends.
+        on_traffic: called when a frame may end earlier than `due_us` was.
 
     Attributes:
-        now_us: how far the bus was moved on.
-        shorted: nobody can send.
-        received: a frame woke a station since `advance_until_received` was called.
-        whole: no end of its wire is on another segment.
+        now_us: present time of the bus.
+        shorted: whether sending is impossible.
+        received: whether a frame has woken a station since `advance_until_received` was called.
+        whole: whether no end of its wire is on another segment.
     """
 
     __slots__ = ()
@@ -105,7 +105,7 @@ class CanSegment(TransmissionOutcomes):
 
     @property
     def due_us(self) -> int:
-        """When the frame that is on the bus, or goes next, will have ended."""
+        """End of the present or next frame."""
         if self._stale:
             self._plan()
         if self._due_us == NEVER:
@@ -114,19 +114,19 @@ class CanSegment(TransmissionOutcomes):
 
     @property
     def present(self) -> tuple[int, int]:
-        """From when to when the frame that is on the bus keeps it busy, in units."""
+        """Start and end of the busy time of the present frame, in units."""
         return (self._start, self._free) if self._winners else (0, 0)
 
     @in_kernel
     def advance(self, now_us: int) -> None:
-        """Let everything end that ends by `now_us`."""
+        """Advance to `now_us`."""
         while self.advance_until_received(now_us):
             pass
         self.now_us = max(self.now_us, now_us)
 
     @in_kernel
     def advance_until_received(self, until_us: int) -> bool:
-        """Let everything end up to the first frame that wakes a station; False if none did."""
+        """Advance to the first frame that wakes a station; return False if none did."""
         self.received = False
         if self._stale:
             self._plan()
@@ -161,7 +161,7 @@ class CanSegment(TransmissionOutcomes):
             self._enter(end, now)
 
     def join(self, end: CanEnd, now_us: int) -> None:
-        """Let an end take part from now on."""
+        """Add an end."""
         self.routes.ends.append(end)
         if end.unfiltered:
             self.routes.unfiltered.append(end)
@@ -174,7 +174,7 @@ class CanSegment(TransmissionOutcomes):
             self._enter(end, now_us * self.unit)
 
     def leave(self, end: CanEnd, now_us: int) -> None:
-        """Let an end take part no longer; a frame of it on the bus is broken off."""
+        """Remove an end; its frame on the bus is aborted."""
         self.disturb(now_us)
         if end in self._winners:
             self._withdraw()
@@ -188,7 +188,7 @@ class CanSegment(TransmissionOutcomes):
         self._recount(now_us)
 
     def force_off(self, end: CanEnd, now_us: int) -> None:
-        """Let a node go bus-off, as after 32 errors in a row; its frame on the bus breaks off."""
+        """Force a node bus-off, as after 32 errors in a row; its frame on the bus is aborted."""
         self.disturb(now_us)
         if end in self._winners:
             self._withdraw()
@@ -199,7 +199,7 @@ class CanSegment(TransmissionOutcomes):
         self._notify_changes()
 
     def recover(self, end: CanEnd, now_us: int) -> None:
-        """Let a node that is bus-off wait for its return."""
+        """Start the recovery of a node from bus-off."""
         self.disturb(now_us)
         if end.controller.state is ErrorState.BUS_OFF:
             now = now_us * self.unit
@@ -207,7 +207,7 @@ class CanSegment(TransmissionOutcomes):
             self._recovery.begin(end, quiet)
 
     def disturb(self, now_us: int) -> None:
-        """Plan anew what has not begun at `now_us`: something around it has changed."""
+        """Plan again what has not started at `now_us`, after a change."""
         self.advance(now_us)
         if self._start >= now_us * self.unit:
             self._withdraw()
@@ -220,20 +220,20 @@ class CanSegment(TransmissionOutcomes):
         arbiter.enter(end, now)
 
     def _withdraw(self) -> None:
-        """Take the plan back."""
+        """Withdraw the plan."""
         self._arbiter.put_back(self._winners)
         self._winners, self._start = [], NEVER
         self._plan_anew()
 
     def _is_sound(self) -> bool:
-        """Say whether frames are delivered, one after the other, and nothing else can happen."""
+        """Return whether only plain deliveries are possible."""
         unsound = self._faults.active or self._confinement.marked or self._recovery.active
         slow = self._arbiter.slow or self.shorted or self._repeating
         return self._on_bus > 1 and not (unsound or slow)
 
     @in_kernel
     def _plan(self) -> None:
-        """Find out what ends next, and when."""
+        """Determine what ends next, and when."""
         self._stale = False
         arbiter = self._arbiter
         if arbiter.heads and not self._repeating:
@@ -258,7 +258,7 @@ class CanSegment(TransmissionOutcomes):
             self._plan_return()
 
     def _plan_return(self) -> None:
-        """Let the node that is back first be what ends next."""
+        """Plan the earliest return from bus-off if it ends next."""
         self._arbiter.put_back(self._winners)
         self._winners, self._start = [], self._recovery.due
         self._finish, self._due_us = self._come_back, -(-self._start // self.unit)
@@ -296,7 +296,7 @@ class CanSegment(TransmissionOutcomes):
                 self._settle(self._fail, turned + _ECHO_BITS + _ERROR_BITS)
 
     def _collide(self) -> None:
-        """Plan what happens when several send one identifier with different contents."""
+        """Plan the collision of nodes that send one identifier with different contents."""
         frames = [end.next for end in self._winners]
         received = dominant(frames)
         losers = [end for end in self._winners if end.next != received]
@@ -306,7 +306,7 @@ class CanSegment(TransmissionOutcomes):
             self._settle(self._fail, first_difference(frames) + _ECHO_BITS + _ERROR_BITS)
 
     def _settle(self, finish: Callable[[], None] | None, bits: int) -> None:
-        """Enter what the plan ends in, and how long it keeps the bus busy."""
+        """Store the outcome of the plan, and its busy time."""
         self._finish = finish
         self._free = free = self._start + bits * self.bit
         self._due_us = -((INTERFRAME_BITS * self.bit - free) // self.unit)

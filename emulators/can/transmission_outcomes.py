@@ -1,4 +1,4 @@
-"""What a transmission on a CAN bus ends in: delivery, error frames, return from bus-off."""
+"""Outcomes of a transmission on a CAN bus: delivery, error frames, return from bus-off."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ if TYPE_CHECKING:
     from tickrig.emulators.can.end import CanEnd
 
 
-# When a bus was busy, and how much of its time.
+# Busy times and load of a bus.
 
 KEPT_SPANS: Final = 32_768
 
 
 class BusyTime(BusyFields):
-    """The latest spans of time in which a bus was busy; frames behind each other are one span.
+    """The latest busy times of a bus; consecutive frames are one span.
 
     Times are whole numbers of any unit.
     """
@@ -37,7 +37,7 @@ class BusyTime(BusyFields):
         self._spans: deque[tuple[int, int]] = deque(maxlen=KEPT_SPANS)
 
     def note(self, since: int, until: int) -> None:
-        """Add a span that begins at the end of the latest one, or later."""
+        """Add a span that starts at the end of the latest one, or later."""
         if since != self._until:
             self._spans.append((self._since, self._until))
             self._since = since
@@ -47,9 +47,9 @@ class BusyTime(BusyFields):
         """Return the share of the time from `first` to `now`, in 0.1 %.
 
         Args:
-            first: when it begins.
-            now: when it ends.
-            present: the span of the frame that is on the bus.
+            first: start.
+            now: end.
+            present: the span of the present frame.
         """
         spans = (*self._spans, (self._since, self._until), present)
         busy = sum(max(0, min(until, now) - max(since, first)) for since, until in spans)
@@ -59,7 +59,7 @@ class BusyTime(BusyFields):
 # Delivery by table: which ends of a bus receive which CAN-ID.
 
 _EXTENDED: Final = 1 << 29
-"""Marks a 29-bit CAN-ID in a filter, as it does in a COB-ID (CiA 301)."""
+"""Flag of a 29-bit CAN-ID in a filter, as in a COB-ID (CiA 301)."""
 
 _CACHED_ROUTES: Final = 4_096
 
@@ -69,7 +69,7 @@ class _CanRoutes(RoutesFields):
 
     Attributes:
         ends: all ends, in the order in which they joined.
-        unfiltered: those of them whose filter is out of use until they are polled.
+        unfiltered: those whose filter is disabled until they are polled.
     """
 
     __slots__ = ()
@@ -80,7 +80,7 @@ class _CanRoutes(RoutesFields):
         self._table: Cache[int, tuple[CanEnd, ...]] = Cache()
 
     def forget(self) -> None:
-        """Begin anew: an end joined, left or has another filter."""
+        """Clear the cache after an end joined, left or changed its filter."""
         self._table.clear()
 
     def receivers(self, frame: CanFrame) -> tuple[CanEnd, ...]:
@@ -92,7 +92,7 @@ class _CanRoutes(RoutesFields):
         return (*found, *self._passing(key)) if self.unfiltered else found
 
     def _passing(self, key: int) -> Iterator[CanEnd]:
-        """Give the unfiltered ends that a CAN-ID would not reach by the filters."""
+        """Yield the unfiltered ends whose filter does not accept a CAN-ID."""
         for end in self.unfiltered:
             if end.accepts is not None and key not in end.accepts:
                 yield end
@@ -104,24 +104,24 @@ class _CanRoutes(RoutesFields):
 
 
 Observer = Callable[[int, CanFrame | ErrorFrame], None]
-"""Called with each frame and each error frame with the time at which it had ended."""
+"""Called with each frame and error frame, and its end."""
 
 RECESSIVE_BITS: Final = 8 + INTERFRAME_BITS  # from the ACK or error delimiter to the next frame
 _SUSPEND_BITS: Final = 8  # a passive node's wait after it has sent
 
 
 class TransmissionOutcomes(SegmentFields):
-    """What a transmission on the bus can end in, and what all nodes make of it.
+    """Outcomes of a transmission on the bus, applied to all nodes.
 
-    Times are in units of which a bit and a microsecond are whole multiples; only time
-    stamps are rounded, up to the next microsecond. Which transmission it is, and in which
-    of these methods it ends, is planned by `CanSegment`.
+    Times are in units of which a bit and a microsecond are whole multiples; only time stamps are
+    rounded, up to the next microsecond. `CanSegment` plans the transmission and chooses the method
+    for its outcome.
 
     Attributes:
         unit: units in a microsecond.
         bit: units in a bit.
-        routes: the ends and who of them receives what.
-        busy: when the latest frames kept the bus busy, in units.
+        routes: the ends and their filters.
+        busy: the latest busy times of the bus, in units.
     """
 
     __slots__ = ()
@@ -153,7 +153,7 @@ class TransmissionOutcomes(SegmentFields):
 
     @in_kernel
     def _deliver(self) -> None:
-        """Hand a frame to all that accept it: from one sender, on a sound bus, without detours."""
+        """Deliver a frame of one sender on an intact bus to all receivers, on a short path."""
         winners, confinement = self._winners, self._confinement
         if len(winners) > 1 or confinement.marked or self._faults.active or self._recovery.active:
             self._deliver_and_count()
@@ -174,7 +174,7 @@ class TransmissionOutcomes(SegmentFields):
                     end.receive(at_us, frame, alone)
 
     def _deliver_and_count(self) -> None:
-        """Hand a frame to all that accept it, and count it in error counters and recovery."""
+        """Deliver a frame to all receivers, and update error counters and recovery."""
         at_us, winners = self._due_us, self._winners
         frame = winners[0].next
         self._take_off(frame)
@@ -183,14 +183,14 @@ class TransmissionOutcomes(SegmentFields):
                 end.receive(at_us, frame, (frame,))
 
     def _drop(self) -> None:
-        """Let a frame be acknowledged, and lost."""
+        """Acknowledge a frame, but deliver it to no node."""
         at_us, frame = self._due_us, self._winners[0].next
         self._take_off(frame)
         for hear in self._faults.listeners:
             hear(at_us, frame)
 
     def _duplicate(self) -> None:
-        """Hand a frame out that its sender will send again."""
+        """Deliver a frame that its sender will send again."""
         at_us, winners = self._due_us, self._winners
         frame = winners[0].next
         for end in self.routes.receivers(frame):
@@ -201,7 +201,7 @@ class TransmissionOutcomes(SegmentFields):
         self._end_attempt()
 
     def _override(self) -> None:
-        """Let the dominant frame through; the error flags of passive nodes are not received."""
+        """Deliver the dominant frame; error flags of passive nodes are not seen."""
         frame = dominant([end.next for end in self._winners])
         losers = [end for end in self._winners if end.next != frame]
         self._winners = [end for end in self._winners if end not in losers]
@@ -211,19 +211,19 @@ class TransmissionOutcomes(SegmentFields):
         self._deliver()
 
     def _fail(self) -> None:
-        """Tell all that a frame was broken; its senders will send again."""
+        """Signal an error frame to all nodes; its senders will send again."""
         self._confinement.failed(self._due_us, self._winners)
         self._notify(BIT_ERROR)
         self._end_attempt()
 
     def _fail_alone(self) -> None:
-        """The same, but nobody else hears anything."""
+        """The same, but seen only by the senders."""
         self._confinement.failed_to_send(self._due_us, self._winners)
         self._notify(BIT_ERROR)
         self._end_attempt()
 
     def _go_unheard(self) -> None:
-        """Find nobody to acknowledge; once that changes nothing more, it is not looked at."""
+        """Handle a missing acknowledgement; stop planning once repeats change nothing."""
         passive = all(end.controller.state is ErrorState.PASSIVE for end in self._winners)
         self._confinement.unheard(self._due_us, self._winners)
         self._notify(NO_ACK)
@@ -236,7 +236,7 @@ class TransmissionOutcomes(SegmentFields):
             self._confinement.count(self._due_us, end, ErrorCounters.restart)
 
     def _take_off(self, frame: CanFrame) -> None:
-        """Take a frame that went well from its queues."""
+        """Remove a successful frame from its queues."""
         for end in self._winners:
             end.take()
         if self._confinement.marked:
@@ -245,7 +245,7 @@ class TransmissionOutcomes(SegmentFields):
         self._end_attempt()
 
     def _end_attempt(self) -> None:
-        """Let the bus be free for the next frame."""
+        """Mark the bus free for the next frame."""
         self._arbiter.free = self._free
         self.busy.note(self._start, self._free)
         if self._confinement.marked:
@@ -258,7 +258,7 @@ class TransmissionOutcomes(SegmentFields):
         self._winners = []
 
     def _suspend(self, senders: list[CanEnd]) -> None:
-        """Let passive nodes that have sent wait for the others."""
+        """Delay passive nodes that have sent."""
         for end in senders:
             if end.controller.state is ErrorState.PASSIVE:
                 end.held = max(end.held, self._free + _SUSPEND_BITS * self.bit)
@@ -279,7 +279,7 @@ class TransmissionOutcomes(SegmentFields):
             end.error_state_changed(at_us)
 
     def _recount(self, now_us: int) -> None:
-        """Count who acknowledges; a node that was alone begins anew."""
+        """Count the acknowledging ends; a node that was alone starts again."""
         states = [end.controller.state for end in self.routes.ends]
         self._sound = False
         self._on_bus = len(states) - states.count(ErrorState.BUS_OFF)
@@ -290,7 +290,7 @@ class TransmissionOutcomes(SegmentFields):
             self._plan_anew()
 
     def _plan_anew(self) -> None:
-        """Find out anew what ends next when somebody asks; tell that it may be earlier."""
+        """Discard the plan; report that the next event may be earlier."""
         self._stale = True
         if not self._announced:
             self._announced = True

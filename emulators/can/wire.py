@@ -23,29 +23,27 @@ _BABBLER: Final = -1  # number of the node that the fault `babble` adds
 class CanWire(Copyable):
     r"""A classic CAN bus (ISO 11898-1); each node has a `CanEnd`.
 
-    A frame takes exactly the bits that it has, stuff bits included; it is
-    received, and stamped, when its end of frame has passed. Among several that
-    wait the arbitration field decides. Nodes that send the very same frame at
-    the same time send it together; with different contents they collide. A
-    frame that nobody acknowledges, and one that a fault breaks, is sent again,
-    after the error frame. TEC and REC count as in ISO 11898-1.
+    A frame takes exactly the bits that it has, stuff bits included; it is received and time-stamped
+    after its end of frame. If several wait, the arbitration field decides. Nodes that send the very
+    same frame at the same time send it together; with different contents they collide. An
+    unacknowledged frame, or one broken by a fault, is sent again after the error frame. TEC and REC
+    count as in ISO 11898-1.
 
-    Not emulated: propagation and bit timing (all see a bit at once), overload
-    frames, errors that only one receiver sees, reception while a node's own
-    frame is sent (a controller does not hear itself), CAN FD. A node alone and
-    error-passive repeats its frame for ever: nobody is told each time, and the
-    bus load leaves it out.
+    Not emulated: propagation and bit timing (all see a bit at once), overload frames, errors that
+    only one receiver sees, reception of a node's own frames (a controller does not receive itself),
+    CAN FD. A node that is alone and error-passive repeats its frame endlessly: observers are not
+    called each time, and the bus load does not include it.
 
     Args:
         bit_rate: 10 000 to 1 000 000 bit/s.
-        seed: seed of the chance in faults.
+        seed: seed of the random numbers in faults.
 
     Attributes:
         bit_rate: bits a second.
-        bus: what all connected ends hear.
-        faults: what is armed; `arm` and `clear` act at the time the bus has reached.
+        bus: the bus of all connected ends.
+        faults: the armed faults; `arm` and `clear` act at the present time of the bus.
         observers: called with each frame and each error frame on the bus with its time.
-        on_traffic: called when something may end earlier than `due_us` said.
+        on_traffic: called when a frame may end earlier than `due_us` was.
 
     >>> wire = CanWire(bit_rate=500_000)
     >>> node, host = wire.end(), wire.end()
@@ -84,18 +82,18 @@ class CanWire(Copyable):
 
     @property
     def _kernel_bus(self) -> CanSegment | None:
-        """The bus, for who moves it on without the wire; None from a class that derives from it."""
+        """The bus, for code that advances it without the wire; None in a derived class."""
         return self.bus if type(self) is CanWire else None
 
     @property
     def due_us(self) -> int:
-        """When the next frame will have ended."""
+        """End of the next frame."""
         if not self._apart:
             return self.bus.due_us
         return min(self.bus.due_us, *(apart.due_us for apart in self._apart.values()))
 
     def advance(self, now_us: int) -> None:
-        """Let everything end that ends by a time.
+        """Advance the bus to a time.
 
         Args:
             now_us: the time.
@@ -106,13 +104,13 @@ class CanWire(Copyable):
                 apart.advance(now_us)
 
     def advance_until_received(self, until_us: int) -> bool:
-        """Let everything end up to the first frame that somebody heard.
+        """Advance to the first frame that a station has received.
 
         Args:
-            until_us: no further than this.
+            until_us: latest time.
 
         Returns:
-            Whether there was one.
+            Whether there was such a frame.
         """
         if not self._apart:
             return self.bus.advance_until_received(until_us)
@@ -135,7 +133,7 @@ class CanWire(Copyable):
         return bus.busy.permille(first, now, bus.present)
 
     def disconnect(self, end: CanEnd) -> None:
-        """Pull a node's plug: it is alone, and nobody acknowledges what it sends.
+        """Unplug a node: it is alone, and its frames are not acknowledged.
 
         Args:
             end: the node's end.
@@ -150,7 +148,7 @@ class CanWire(Copyable):
             apart.join(end, now_us)
 
     def reconnect(self, end: CanEnd) -> None:
-        """Put the plug back in.
+        """Plug a node in again.
 
         Args:
             end: the node's end.
@@ -162,7 +160,7 @@ class CanWire(Copyable):
             self.bus.whole = not self._apart
 
     def cut_power(self, end: CanEnd) -> None:
-        """Take a node off the bus: what it had to send or had received is lost, all begins anew.
+        """Cut the power of a node: its frames are lost, and its controller is reset.
 
         Args:
             end: the node's end.
@@ -176,7 +174,7 @@ class CanWire(Copyable):
         apart.join(end, now_us)
 
     def force_off(self, end: CanEnd) -> None:
-        """Let a node go bus-off and stay so until `release`.
+        """Force a node bus-off until `release`.
 
         Args:
             end: the node's end.
@@ -185,7 +183,7 @@ class CanWire(Copyable):
         end.segment.force_off(end, self.bus.now_us)
 
     def release(self, end: CanEnd) -> None:
-        """Let a node that was forced off come back as most drivers let it.
+        """Let a node that was forced off recover, as with most drivers.
 
         Args:
             end: the node's end.
@@ -212,4 +210,4 @@ class CanWire(Copyable):
 
 
 def _ignore(name: str, armed: bool) -> None:
-    """Nothing is armed on the stump of a line."""
+    """Ignore changes of faults: a disconnected segment has none."""

@@ -1,1 +1,1 @@
-"""CANopen slaves out of files: EDS, DCF and what survives a power cut."""
+"""CANopen slaves from files: EDS, DCF, bus.yml, and their non-volatile memory."""

@@ -1,4 +1,4 @@
-"""Robots' bodies on emulated drives: as a rig file has them, and as a coupling of their rig."""
+"""Robot bodies on emulated drives: from rig files, and as a coupling of the rig."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from tickrig.wire.instant import NEVER
 # A body on the shafts of drives, as a coupling of their rig.
 
 _FAR_M: Final = 1e6
-"""As far as a body can be put."""
+"""Largest coordinate of a body."""
 
 _MOST_FRICTION: Final = 10
 
 
 class _PoseSignal:
-    """One coordinate of a body; setting it puts the body elsewhere, wheels and speed as they are.
+    """One coordinate of a body; setting it moves the body without changing wheels and speed.
 
     Args:
         body: the body.
         name: `x_m`, `y_m` or `heading_deg`.
-        text: what it is, for people.
+        text: description for people.
         unit: its unit.
     """
 
@@ -39,7 +39,7 @@ class _PoseSignal:
         self._body, self._bank = body, QuantityBank([self.item])
 
     def read(self) -> float:
-        """Return where it is now."""
+        """Return the present coordinate."""
         pose = self._body.pose
         match self.item.name:
             case "x_m":
@@ -53,7 +53,7 @@ class _PoseSignal:
         return self._bank.check(self.item.name, value)
 
     def write(self, value: Setting) -> None:
-        """Put it there."""
+        """Set the coordinate."""
         number, pose = float(self.check(value)), self._body.pose
         match self.item.name:
             case "x_m":
@@ -66,7 +66,7 @@ class _PoseSignal:
 
 
 class _FrictionSignal:
-    """The ground's friction, of a body that can slip."""
+    """The friction of the ground, for a body that can slip."""
 
     def __init__(self, body: WheeledBody) -> None:
         text = "coefficient of friction between wheels and ground"
@@ -82,7 +82,7 @@ class _FrictionSignal:
         return self._bank.check(self.item.name, value)
 
     def write(self, value: Setting) -> None:
-        """Change the ground below all wheels."""
+        """Set the friction of all wheels."""
         friction = float(self.check(value))
         for contact in self._body.contacts.values():
             contact.friction = friction
@@ -103,7 +103,7 @@ SHAFTS: Final = (
     ("shaft_deg", "load_nm", "load_kg_m2"),
     ("angle_deg", "shaft_load_nm", "load_kg_m2"),
 )
-"""What drives call the angle of their shaft, the torque on it, and the inertia on it."""
+"""Names of drives for the angle of the shaft, its torque and its inertia."""
 
 
 class DrivenWheel(NamedTuple):
@@ -121,7 +121,7 @@ class DrivenWheel(NamedTuple):
 
 
 class BodyOnDrives:
-    """Lets a body go as the shafts of its drives turn, and lets them feel it.
+    """Moves a body by the shafts of its drives, and loads the shafts.
 
     Args:
         body: the body.
@@ -153,16 +153,16 @@ class BodyOnDrives:
 
     @property
     def due_us(self) -> int:
-        """Whether it moves although nothing drives it: it slides."""
+        """Whether it slides, that is moves without a drive."""
         return NEVER if self.body.resting else 0
 
     def act(self, now_us: int, /) -> None:
-        """Go on, and load the shafts."""
+        """Advance the body, and load the shafts."""
         self.body.step({name: shaft.angle_rad for name, shaft in self._shafts.items()})
         self._load()
 
     def signal(self, name: str) -> NodeSignal | None:
-        """Return the thing of this name, None if there is none."""
+        """Return the signal of this name, None if there is none."""
         return self.physical.get(name)
 
     def signal_names(self) -> list[str]:
@@ -202,13 +202,13 @@ class _Shaft:
         return self._forward * radians(float(self._application.read(self._angle)))
 
     def load(self, torque_nm: float, inertia_kg_m2: float) -> None:
-        """Let it feel a torque, positive forward, and an inertia."""
+        """Apply a torque, positive forward, and an inertia."""
         _set(self._bank, self._torque, self._forward * torque_nm)
         _set(self._bank, self._inertia, inertia_kg_m2)
 
 
 def _set(bank: QuantityBank, name: str, value: float) -> None:
-    """Set an input as far as it goes; an ideal motor has none and feels nothing."""
+    """Set an input, limited to its range; an ideal motor has none and is not loaded."""
     item = bank.table.get(name)
     if item is not None and bank[name] != (value := min(max(value, item.low), item.high)):
         bank.set(name, value)
@@ -216,13 +216,13 @@ def _set(bank: QuantityBank, name: str, value: float) -> None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BodyPlan:
-    """What drives move, as a rig file says.
+    """A body on drives, as described in a rig file.
 
     Attributes:
         kind: of `wheeled_body.SIDES`.
-        drives: for each wheel the name of its device.
+        drives: device name of each wheel.
         mirrored: wheels whose drive is mounted the other way round.
-        parameters: the other arguments of `BodyParameters` that are given.
+        parameters: the given arguments of `BodyParameters`.
     """
 
     kind: str

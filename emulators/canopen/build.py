@@ -1,4 +1,4 @@
-"""Make nodes of their files and models and put them on a bus."""
+"""Make nodes from files and models, and put them on a bus."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Described:
-    """A node of which all is known.
+    """A fully described node.
 
     Attributes:
-        name: what its things are called after, and its memory in a store file.
+        name: prefix of its signals, and key of its memory in a store file.
         node_id: 1..127, or `UNCONFIGURED`.
-        description: what its file or model says.
-        about: what it moves, for people; empty where nothing is known of it.
+        description: description in its file or model.
+        about: what it moves, for people; empty if unknown.
     """
 
     name: str
@@ -54,11 +54,11 @@ class Described:
 
 
 def describe_nodes(specs: Iterable[NodeSpec], profile: str = AUTO) -> list[Described]:
-    """Read the files; ValueError if one cannot be used, or a node-ID is missing or there twice.
+    """Read the files; ValueError if one is unusable, or a node-ID is missing or duplicate.
 
     Args:
         specs: the nodes.
-        profile: of `choices.PROFILES`, for nodes of files that name none.
+        profile: of `choices.PROFILES`, for nodes of files without one.
     """
     cache, found = EdsCache(), dict[str, Described]()
     for spec in specs:
@@ -91,7 +91,7 @@ def make_nodes(
     store: StoreFile | None = None,
     sdo: SdoLimits = USUAL,
 ) -> list[Node]:
-    """Make the nodes, with what they stored in an earlier life."""
+    """Make the nodes, with their memory from an earlier run."""
     nodes = []
     for item in described:
         description = item.description
@@ -104,7 +104,7 @@ def make_nodes(
 
 
 def describe(cache: EdsCache, device: Path | str, profile: str = AUTO) -> DeviceDescription:
-    """Describe the node that a file, a model or a user's class stands for; ValueError if none.
+    """Describe the node of a file, a model or a user's class; ValueError for anything else.
 
     Args:
         cache: of files.
@@ -122,12 +122,12 @@ def read_bus_file(file: Path, urdf: Path | None, cache: EdsCache, profile: str =
 
     Args:
         file: the bus.yml.
-        urdf: the robot with its joints, None for that which it names.
+        urdf: the robot with its joints, None for the one named in the file.
         cache: of EDS files.
-        profile: of `choices.PROFILES`, for nodes that name none.
+        profile: of `choices.PROFILES`, for nodes without one.
 
     Raises:
-        ValueError: all that is wrong, a line each.
+        ValueError: all errors, one line each.
     """
     from tickrig.emulators.canopen.bus_file.bus_nodes import read_bus  # noqa: PLC0415 - slow
 
@@ -144,7 +144,7 @@ def _unreadable(error: OSError) -> str:
 
 
 def _bus_node(cache: EdsCache, spec: str) -> DeviceDescription:
-    """Describe the node that `FILE.yml:NODE` stands for."""
+    """Describe the node of `FILE.yml:NODE`."""
     file, _, name = spec.rpartition(":")
     nodes = read_bus_file(Path(file), None, cache).nodes
     found = next((node for node in nodes if node.name == name), None)
@@ -172,10 +172,10 @@ ANY_ID: Final = 1
 
 
 def describe_rtc(spec: str) -> DeviceDescription:
-    """Describe the component that `FILE.py:Class` stands for.
+    """Describe the component of `FILE.py:Class`.
 
     Raises:
-        ValueError: its file cannot be run, or it cannot be a DeviceRTC.
+        ValueError: its file cannot be run, or it is not a valid DeviceRTC.
     """
     kind: type[CanopenComponent] = find_class(spec, CanopenComponent)
     for item in kind.physical:
@@ -210,7 +210,7 @@ def make_bench(  # noqa: PLR0913 - options, by keyword
     faults: WireFaults | None = None,
     node_faults: Sequence[NodeFaults] = (),
 ) -> CanEmulator:
-    """Put nodes together with bodies, the bus outside, if there are such, a clock, and faults."""
+    """Assemble nodes, bodies, the bus outside, a clock and faults into an emulator."""
     stations = [Station(node, node.port) for node in nodes]
     for one, station in zip(node_faults, stations, strict=False):
         one.station = station
@@ -229,9 +229,9 @@ def make_bench(  # noqa: PLR0913 - options, by keyword
 
 
 def store_keeper(store: StoreFile) -> Callable[[int], None]:
-    """Return what writes the file whenever a node has stored something.
+    """Return a function that writes the file whenever a node has stored something.
 
-    Where writing fails there is one warning, and it is tried again.
+    If writing fails there is one warning, and writing is retried.
     """
     failed = False
 

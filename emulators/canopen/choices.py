@@ -1,4 +1,4 @@
-"""What a command line can name; here, so that no device is imported to complete a word."""
+"""Names on command lines, for shell completion without importing devices."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ NODE_FAULTS: Final = (
     *("heartbeat_late", "boot_late", "boots_twice", "boots_again", "pdo_short", "pdo_long"),
     *("pdo_mute", "pdo_stale", "emcy_storm", "id_doubled", "sync_lost", "bus_off"),
 )
-"""Names of the faults of every node that its bus does not have."""
+"""Names of the faults of every node, without those of its bus."""
 
 _DRIVE: Final = ("short_circuit", "encoder_unplugged", "shaft_blocked", "motor_phase_open")
 MODEL_FAULTS: Final[Mapping[str, tuple[str, ...]]] = {

@@ -32,20 +32,20 @@ def _complete_node(
 
 
 def _device_faults(context: click.Context) -> tuple[str, ...]:
-    """Give the faults of the node, those of its model too where --model is given."""
+    """Return the faults of the node, with those of its model if --model is given."""
     return (*NODE_FAULTS, *MODEL_FAULTS.get(context.params.get("model") or "", ()))
 
 
 @click.command(cls=BusCommand)
-@click.option("--eds", type=PATH, help="EDS that the node is made of.")
-@click.option("--dcf", type=PATH, help="DCF that it is made of; it may give the node-ID.")
+@click.option("--eds", type=PATH, help="EDS of the node.")
+@click.option("--dcf", type=PATH, help="DCF of the node; it may contain the node-ID.")
 @click.option(
     "--model",
     type=click.Choice(MODELS),
     metavar="NAME",
-    help=f"Device that needs no file: {', '.join(MODELS)}.",
+    help=f"Model, which needs no file: {', '.join(MODELS)}.",
 )
-@click.option("--rtc", metavar="FILE.py:Class", help="DeviceRTC: the component of a file of yours.")
+@click.option("--rtc", metavar="FILE.py:Class", help="DeviceRTC: a component in your own file.")
 @click.option("--node-id", metavar="N", help="1..127, or lss for a node that waits for LSS.")
 @click.option(
     "--node",
@@ -53,29 +53,29 @@ def _device_faults(context: click.Context) -> tuple[str, ...]:
     multiple=True,
     metavar="N=FILE|MODEL",
     shell_complete=_complete_node,
-    help="One more node, as 5=a.eds or 5=epos; 1-20=a.eds makes twenty; may be repeated.",
+    help="One more node, such as 5=a.eds or 5=epos; 1-20=a.eds makes twenty; may be repeated.",
 )
 @click.option("--rig", type=PATH, help="Rig file: its nodes, and the body that they move.")
 @click.option(
     "--bus",
     "bus_file",
     type=PATH,
-    help="bus.yml of ros2_canopen or dcfgen: a node for each of it, with motor and switches.",
+    help="bus.yml of ros2_canopen or dcfgen: emulate each of its nodes, with motor and switches.",
 )
 @click.option("--urdf", type=PATH, help="Robot with the joints of --bus, expanded by xacro.")
 @click.option(
     "--profile",
     type=click.Choice(PROFILES),
     default=AUTO,
-    help="CiA profile of nodes of an EDS or DCF; auto takes that of its device type.  [auto]",
+    help="CiA profile of nodes of an EDS or DCF; auto uses the one of the device type. [auto]",
 )
 @click.option(
     "--write-eds",
     type=PATH,
-    help="Write the EDS of --model or --rtc to a file (- is standard output), and end.",
+    help="Write the EDS of --model or --rtc to a file (- is standard output), and exit.",
 )
 @bus_options
-@click.option("--store", type=PATH, help="File for what is stored by 1010h and LSS.")
+@click.option("--store", type=PATH, help="File for the parameters stored by 1010h and LSS.")
 @click.option(
     "--sdo-timeout",
     default="5s",
@@ -86,7 +86,7 @@ def _device_faults(context: click.Context) -> tuple[str, ...]:
     "--sdo-memory",
     default="64M",
     metavar="SIZE",
-    help="What the strings and domains of a node hold together, as 4096, 64k, 16M.  [64M]",
+    help="Memory for all strings and domains of a node, such as 4096, 64k, 16M. [64M]",
 )
 @click.option("--trace", type=PATH, help="File to record the bus in, as a candump log.")
 @run_options("drop, corrupt, duplicate, delay, babble, short", _device_faults)
@@ -103,13 +103,12 @@ def main(  # noqa: PLR0913 - options
     write_eds: Path | None,
     **options: Any,
 ) -> None:
-    """Emulate CANopen slaves, made of their EDS, DCF or XDD or out of the box, on a CAN bus.
+    """Emulate CANopen slaves on a CAN bus, from EDS, DCF or XDD files or built-in models.
 
-    The bus is one of python-can's, named by -i and -c, by its environment
-    variables or its configuration files. It runs in real time until Ctrl-C. A
-    scenario alone runs in virtual time: as fast as it goes, with the same
-    candump log each time, exit status 1 if something expected did not come.
-    Together with -i, -c or --control it is played in real time.
+    The bus is a python-can bus, selected by -i and -c, its environment variables or its
+    configuration files. The emulator runs in real time until Ctrl-C. A scenario alone runs in
+    virtual time: as fast as possible, with the same candump log each time, and with exit status 1
+    if an expectation was missed. Together with -i, -c or --control it is played in real time.
 
     \b
     canopen-slave-emu --model epos --node-id 5 -i socketcan -c vcan0

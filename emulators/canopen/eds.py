@@ -1,4 +1,4 @@
-"""Dictionaries out of EDS and DCF files."""
+"""Object dictionaries from EDS and DCF files."""
 
 from __future__ import annotations
 
@@ -24,20 +24,20 @@ from tickrig.wire.canopen.eds.eds_file import EdsError, EdsFile, Finding
 from tickrig.wire.canopen.eds.eds_value import format_value
 from tickrig.wire.canopen.eds.object_table import DeviceInfo, EntryDescription
 
-# What a node does with its objects: the device profiles that are here, and which one it has.
+# Device profiles of nodes, and their selection.
 
 _DEVICE_TYPE: Final = 0x1000
 
 PROFILES: Final[dict[str, ServiceMaker]] = {"none": Application, "401": Ds401, "402": Ds402}
-"""Device profiles by the number that the low word of 1000h holds."""
+"""Device profiles by the number in the low word of 1000h."""
 
 PROFILE_AREA: Final = range(0x6000, 0xA000)
 _AXIS: Final = 0x800
-"""How far the objects of two axes, or logical devices, are apart (CiA 301)."""
+"""Offset between the objects of two axes, or logical devices (CiA 301)."""
 _PDO_PARAMETERS: Final = (*range(0x1400, 0x1600), *range(0x1800, 0x1A00))
 _TRANSMISSION_TYPE: Final = 2
 _EVENT_DRIVEN: Final = 255
-"""The transmission type that CiA 401 and CiA 402 give their PDOs."""
+"""The transmission type of PDOs in CiA 401 and CiA 402."""
 
 _DRIVE_DEFAULTS: Final = {**indices.DEFAULTS, (indices.SUPPORTED_MODES, 0): supported(MODES)}
 _DRIVE_OBJECTS: Final = (*(indices.CONTROLWORD, indices.STATUSWORD, indices.MODES_OF_OPERATION),)
@@ -45,11 +45,11 @@ _MODULE_OBJECTS: Final = (
     *(families.READ_INPUT.by_8, families.WRITE_OUTPUT.by_8),
     *(families.ANALOGUE_INPUT.integers[1], families.ANALOGUE_OUTPUT.integers[1]),
 )
-"""Arrays of the usual inputs and outputs."""
+"""Arrays of common inputs and outputs."""
 
 
 def application_of(dictionary: Dictionary, profile: str = AUTO) -> ServiceMaker:
-    """Return a profile of `choices.PROFILES`; `auto` takes that of the device type, if it is there.
+    """Return a profile of `choices.PROFILES`; `auto` selects that of the device type, if available.
 
     >>> application_of(Dictionary([])).__name__
     'Application'
@@ -62,7 +62,7 @@ def application_of(dictionary: Dictionary, profile: str = AUTO) -> ServiceMaker:
 
 
 def profile_name(application: ServiceMaker) -> str:
-    """Return the name of a profile, `none` for what is none of `PROFILES`.
+    """Return the name of a profile, `none` if it is not in `PROFILES`.
 
     >>> profile_name(Ds401)
     '401'
@@ -71,7 +71,7 @@ def profile_name(application: ServiceMaker) -> str:
 
 
 def _looks_like(dictionary: Dictionary) -> str:
-    """Return the name of the profile that the objects of a dictionary are of, empty if none is.
+    """Return the name of the profile that the objects of a dictionary belong to, empty if none.
 
     >>> _looks_like(Dictionary([]))
     ''
@@ -82,7 +82,7 @@ def _looks_like(dictionary: Dictionary) -> str:
 
 
 def _default_of(application: ServiceMaker, index: int, sub: int) -> int | None:
-    """Return the default that a profile gives an entry, -1 for all bits; None if it gives none.
+    """Return the default of an entry in a profile, -1 for all bits; None if it has none.
 
     >>> _default_of(Ds402, 0x6081, 0), _default_of(Ds401, 0x6206, 1), _default_of(Ds402, 0x2000, 0)
     (10000, -1, None)
@@ -103,18 +103,18 @@ def _default_of(application: ServiceMaker, index: int, sub: int) -> int | None:
 
 @dataclass(frozen=True, slots=True)
 class DeviceDescription:
-    """A device that slaves can be made of.
+    """Description of a device, from which slaves can be made.
 
     Attributes:
         file: the EDS or DCF, or the name of the model.
         info: vendor, product, bit rates.
         template: the objects with default values; never given to a slave.
-        node_id: of a DCF or model, None if it gives none.
-        bit_rate: of a DCF in bit/s, None if it gives none.
-        application: what the device does with its objects.
-        warnings: what is not by the standard in its file, and which values it leaves open.
-        start: inputs that are not as usual when a slave of it begins, by name.
-        files: of a node of a bus.yml: its EDS or DCF, and the URDF that has its joint.
+        node_id: of a DCF or model, None if missing.
+        bit_rate: of a DCF in bit/s, None if missing.
+        application: factory of the application.
+        warnings: deviations of the file from the standard, and values that it leaves open.
+        start: inputs with other than the usual initial values, by name.
+        files: of a node of a bus.yml: its EDS or DCF, and the URDF with its joint.
     """
 
     file: str
@@ -128,7 +128,7 @@ class DeviceDescription:
     files: tuple[Path, ...] = ()
 
     def make_dictionary(self) -> Dictionary:
-        """Make the dictionary of one more slave."""
+        """Make the dictionary of a new slave."""
         return self.template.copy()
 
 
@@ -148,11 +148,11 @@ _COB_IDS: Final = (
     (range(0x1404, 0x1600), (1,)),
     (range(0x1804, 0x1A00), (1,)),
 )
-"""Objects that are not valid until somebody gives them a COB-ID, and its sub-indices."""
+"""Objects that are invalid until they get a COB-ID, and its sub-indices."""
 
 
 def _predefined(index: int, sub: int) -> tuple[int, bool] | None:
-    """Return a default, and whether the node-ID is added to it; None if there is none.
+    """Return a default, and whether to add the node-ID; None if there is none.
 
     >>> _predefined(0x1800, 1), _predefined(0x1809, 1), _predefined(0x2000, 0)
     ((384, True), (2147483648, False), None)
@@ -170,12 +170,12 @@ def read_eds(path: Path, profile: str = AUTO) -> DeviceDescription:
     """Read an EDS or DCF file (CiA 306).
 
     Args:
-        path: the file; what its name ends with does not matter.
-        profile: whose defaults count where the file gives none: `auto` for that of the device
+        path: the file, with any name.
+        profile: profile for defaults that are missing in the file: `auto` for that of the device
             type, `401`, `402` or `none`.
 
     Returns:
-        What it says of the device; `make_dictionary()` of it is what `make_slave` takes.
+        The description of the device; pass its `make_dictionary()` to `make_slave`.
 
     Raises:
         OSError: the file cannot be read.
@@ -187,18 +187,17 @@ def read_eds(path: Path, profile: str = AUTO) -> DeviceDescription:
 def describe(file: EdsFile, profile: str = AUTO) -> DeviceDescription:
     """Describe the device of an EDS or DCF.
 
-    What is not by the standard is a warning of the description where it has one
-    meaning. Where no default is given, a COB-ID gets that of the pre-defined
-    connection set, a sub-index 0 the number of entries, what the device profile
-    knows its default, and all else the value of its limits that is next to 0.
+    A deviation from the standard with a clear meaning is a warning of the description. Missing
+    defaults: a COB-ID gets that of the pre-defined connection set, a sub-index 0 the number of
+    entries, an object of the device profile its default there, and all others the value nearest to
+    0 within their limits.
 
     Args:
         file: the EDS or DCF.
         profile: of `choices.PROFILES`.
 
     Raises:
-        EdsError: something has no meaning: it would be another device. All that is
-            wrong stands in it.
+        EdsError: the file has errors that would change the device; the message lists all of them.
     """
     return in_profile(_describe(file, read_device(file)), profile)
 
@@ -209,7 +208,7 @@ def _description_of(name: str, data: bytes) -> DeviceDescription:
 
 
 def _describe(file: EdsFile, device: EdsDevice) -> DeviceDescription:
-    """Describe what the file alone says of a device; its values may be open."""
+    """Describe a device by its file only; values may be open."""
     if file.errors:
         raise EdsError(file.errors)
     return DeviceDescription(
@@ -225,15 +224,15 @@ def _describe(file: EdsFile, device: EdsDevice) -> DeviceDescription:
 def in_profile(
     description: DeviceDescription, profile: str, defaults: Mapping[tuple[int, int], int] = _OPEN
 ) -> DeviceDescription:
-    """Return a device with its profile, whose defaults count where its file gives none.
+    """Return a device with its profile, which supplies defaults missing in the file.
 
     Args:
-        description: what the file alone says, of `EdsCache.read`.
+        description: the device by its file only, of `EdsCache.read`.
         profile: of `choices.PROFILES`.
-        defaults: those that come before the ones of the profile, by (index, sub-index).
+        defaults: defaults with priority over those of the profile, by (index, sub-index).
 
     Returns:
-        The device; its warnings say which values were chosen.
+        The device; its warnings list the chosen values.
     """
     given = description.template.description
     application = application_of(description.template, profile)
@@ -268,7 +267,7 @@ def _in_profile(
 
 
 def fitting(row: EntryDescription, value: int) -> Value:
-    """Return the value next to a number that an entry takes; -1 is all bits of an unsigned one."""
+    """Return the value of an entry nearest to a number; -1 means all bits of an unsigned one."""
     low, high = row.low, row.high
     nearest: int | float = value
     if row.data_type.is_integer:
@@ -282,11 +281,11 @@ def fitting(row: EntryDescription, value: int) -> Value:
 
 
 _SHOWN: Final = 3
-"""Entries that a warning names."""
+"""Number of entries that a warning names."""
 
 
 def _told_of_values(rows: Sequence[EntryDescription], what: str) -> Iterator[str]:
-    """Say once which values were chosen."""
+    """Return one warning with the chosen values."""
     if rows:
         named = (
             f"{_place(row)}={format_value(row.data_type, row.default)}" for row in rows[:_SHOWN]
@@ -301,7 +300,7 @@ def _place(row: EntryDescription) -> str:
 
 
 def _told_of_type(dictionary: Dictionary, application: ServiceMaker, profile: str) -> Iterator[str]:
-    """Say that a device has no profile and looks like one, or serves other modes than it says."""
+    """Warn that a device looks like one with a profile, or serves other modes than listed."""
     row, likely = dictionary.find(_DEVICE_TYPE), _looks_like(dictionary)
     if profile == AUTO and likely and (row is None or not row.number & 0xFFFF):
         said = "has no value" if row and not row.description.has_default else "names none"
@@ -342,7 +341,7 @@ class EdsCache:
     """Reads each EDS or DCF once, and again when the file has changed.
 
     Attributes:
-        others: what else was read, by what it was read of, with the versions of its files.
+        others: other results by their source, with the versions of their files.
     """
 
     def __init__(self) -> None:
@@ -350,7 +349,7 @@ class EdsCache:
         self.others: dict[object, tuple[Mapping[Path, Version], object]] = {}
 
     def read(self, path: Path, profile: str | None = AUTO) -> DeviceDescription:
-        """Return what a file describes, see `read_eds`; with None what it says alone.
+        """Return the description of a file, see `read_eds`; None as profile for the file only.
 
         Raises:
             OSError: the file cannot be read.
@@ -366,6 +365,6 @@ class EdsCache:
 
 
 def version_of(path: Path) -> Version:
-    """Return what tells whether a file has changed; OSError if it cannot be looked at."""
+    """Return a stamp that changes with the file; OSError if the file is not accessible."""
     status = path.stat()
     return status.st_mtime_ns, status.st_size

@@ -58,7 +58,7 @@ from tickrig.wire.canopen.emcy import ErrorRegister
 from tickrig.wire.canopen.nmt import CAN_ID_MASK, ERROR_CONTROL_COB_ID, NmtState
 from tickrig.wire.instant import NEVER
 
-# Which frames there are.
+# Kinds of frames.
 
 _EMCY_COB_ID: Final = 0x080
 _SYNC_COB_ID: Final = 0x080
@@ -71,7 +71,7 @@ _SHORTEST_BITS: Final = 47
 
 
 class NodeFrames(Flag):
-    """What a frame of a node, or one for it, is."""
+    """Kinds of frames from and to a node."""
 
     OTHER = auto()
     BOOT_UP = auto()
@@ -115,7 +115,7 @@ class _SdoBlocks(Copyable):
         self._last = 0  # sequence number of the last segment of all, if it has passed
 
     def received(self, data: bytes) -> NodeFrames:
-        """Say what a request is."""
+        """Return the kind of a request."""
         first = data[0] if data else sdo_frame.ClientCommand.ABORT
         specifier = first & sdo_frame.SPECIFIER
         if self._of_client and first != sdo_frame.ClientCommand.ABORT:
@@ -136,7 +136,7 @@ class _SdoBlocks(Copyable):
         return NodeFrames.FOR_SDO_START if starts else NodeFrames.FOR_SDO
 
     def sent(self, data: bytes) -> NodeFrames:
-        """Say what an answer is."""
+        """Return the kind of an answer."""
         first = data[0] if data else sdo_frame.ServerCommand.ABORT
         if first == sdo_frame.ServerCommand.ABORT:
             self._of_client = self._of_server = False
@@ -165,18 +165,18 @@ class _SdoBlocks(Copyable):
 # How faults are declared.
 
 _Sent = tuple[tuple[int, CanFrame], ...]
-"""What comes instead of a frame, each with how much later in us."""
+"""The frames sent instead of a frame, each with its delay in us."""
 
 
 class ArmedNodeFault(Copyable):
-    """A fault of a node that is armed.
+    """An armed fault of a node.
 
     Attributes:
         fault_type: its declaration.
-        arguments: with which it was armed.
+        arguments: arguments of the arming.
         trigger: decides when it acts.
-        kept: data that it keeps, by CAN-ID.
-        next_us: when it acts by itself; 0 for at once.
+        kept: stored data, by CAN-ID.
+        next_us: its next own action; 0 for at once.
     """
 
     __slots__ = ("arguments", "fault_type", "kept", "next_us", "trigger")
@@ -202,14 +202,14 @@ class NodeFaultType(FaultForm):
     """A fault of a node that can be armed by name.
 
     Attributes:
-        frames: what it acts on.
-        instead: returns what comes instead of a frame.
-        matches: says whether it acts on a frame of that kind.
-        by_itself: what it does each `period` (an argument; each tick without it).
-        abort: it answers the request itself, with this function's frame.
-        controller: it is done to the CAN controller.
-        silent: the node neither sends nor receives until the frame that it holds has left.
-        boots: the node that it pretends to be sends a boot-up first.
+        frames: the frames it acts on.
+        instead: returns the frames sent instead of a frame.
+        matches: returns whether it acts on a frame of that kind.
+        by_itself: action of each `period` (an argument; each tick without it).
+        abort: answers the request itself, with the frame of this function.
+        controller: acts on the CAN controller.
+        silent: the node neither sends nor receives until the held frame has been sent.
+        boots: the second node sends a boot-up first.
     """
 
     frames: NodeFrames = field(default=_NO_FRAMES, kw_only=True)
@@ -228,7 +228,7 @@ class NodeFaultType(FaultForm):
     boots: bool = field(default=False, kw_only=True)
 
 
-# What each fault does to a frame.
+# Effect of each fault on a frame.
 
 
 def _late(fault: ArmedNodeFault, frame: CanFrame) -> _Sent:
@@ -273,12 +273,12 @@ def _stale(fault: ArmedNodeFault, frame: CanFrame) -> _Sent:
     return _with(frame, fault.kept.setdefault(frame.can_id, frame.data))
 
 
-# Of which object, of which PDO.
+# Arguments that select an object or a PDO.
 
 
 @dataclass(frozen=True, slots=True)
 class _Target:
-    """Objects whose transfer is aborted, and by which code.
+    """Objects whose transfers are aborted, and the abort code.
 
     Attributes:
         index: None for all objects.
@@ -317,7 +317,7 @@ def _parse_target(word: str) -> _Target:
 
 
 def _number(word: str) -> int | None:
-    """Read a number as CiA writes it, `8110h`, or as Python does; None for none."""
+    """Read a number in CiA notation, `8110h`, or Python notation; None if invalid."""
     try:
         return int(word[:-1], 16) if word[-1:] in ("h", "H") else int(word, 0)
     except ValueError:
@@ -342,7 +342,7 @@ _READS: Final = (sdo_frame.ClientCommand.UPLOAD, sdo_frame.ClientCommand.BLOCK_U
 
 
 def _is_object(faults: NodeFaults, fault: ArmedNodeFault, frame: CanFrame) -> bool:
-    """Say whether a request begins a transfer that is to be aborted."""
+    """Return whether a request starts a transfer to be aborted."""
     target, access = fault["object"], fault["access"]
     reads = frame.data[0] & sdo_frame.SPECIFIER in _READS
     if access not in ("both", "read" if reads else "write"):
@@ -365,7 +365,7 @@ def _aborted(faults: NodeFaults, fault: ArmedNodeFault, frame: CanFrame) -> CanF
     return data_frame(faults.sdo_answer_id, data)
 
 
-# What some do by themselves.
+# Own actions of some faults.
 
 
 def _restarted(faults: NodeFaults, fault: ArmedNodeFault) -> Frames:
@@ -535,7 +535,7 @@ NODE_FAULTS: Final[Mapping[str, NodeFaultType]] = {
         instead=_again,
         boots=True,
     ),
-    "sync_lost": NodeFaultType("the node hears no SYNC", frames=NodeFrames.SYNC),
+    "sync_lost": NodeFaultType("the node receives no SYNC", frames=NodeFrames.SYNC),
     "bus_off": NodeFaultType(
         "its CAN controller is bus-off, and does not come back until the fault ends",
         rated=False,
@@ -552,12 +552,12 @@ class NodeFaults(Copyable):
 
     Args:
         node: the node.
-        wire: its bus, whose faults are narrowed to its frames; chance comes from there too.
+        wire: its bus, whose faults are limited to its frames; it also supplies the random numbers.
 
     Attributes:
         station: the station of the node, once it has one.
-        listeners: called with the time, the direction, what was sent and what faults left of it
-            at once, where that differs. Nobody listens to a twin.
+        listeners: called with the time, the direction, the sent frames and the frames left by
+            faults, if these differ. A twin has no listeners.
     """
 
     fault_types: Mapping[str, FaultForm] = {
@@ -582,15 +582,15 @@ class NodeFaults(Copyable):
         return (*self._narrowed, *self._armed)
 
     def check(self, name: str, *arguments: str) -> None:
-        """Raise ValueError unless the fault can be armed like this."""
+        """Raise ValueError unless the fault can be armed with these arguments."""
         bind_arguments(name, self.fault_types[name], arguments)
 
     def arm(self, name: str, *arguments: str) -> None:
-        """Let a fault begin; one of the same name is replaced.
+        """Arm a fault; one of the same name is replaced.
 
         Raises:
             KeyError: no fault has this name.
-            ValueError: an argument that it does not take, or out of range.
+            ValueError: an unknown argument, or a value out of range.
         """
         self.clear(name)
         if name in NARROWED:
@@ -612,7 +612,7 @@ class NodeFaults(Copyable):
             self.station.device = _FaultyNode(self.station.device, self)
 
     def clear(self, name: str) -> None:
-        """Let a fault end; clearing one that is not armed is no error. What is late comes now."""
+        """Clear a fault; does nothing if it is not armed. Delayed frames are sent now."""
         if name in self._narrowed:
             self.wire.faults.clear(name, self.node.port.number)
             self._narrowed = tuple(each for each in self._narrowed if each != name)
@@ -627,14 +627,14 @@ class NodeFaults(Copyable):
         self._held = [(0, count, frame) for _, count, frame in sorted(self._held)]
 
     def acted(self, name: str) -> int:
-        """Return how often a fault has acted since it was armed last."""
+        """Return how often a fault has acted since it was last armed."""
         if name in NARROWED:
             return self.wire.faults.acted(name, self.node.port.number)
         return self._tallies[name].acted if name in self._tallies else 0
 
     @property
     def due_us(self) -> int:
-        """When a fault acts by itself, or a late frame leaves."""
+        """The time of the next own action of a fault, or of a delayed frame."""
         due_us = self._held[0][0] if self._held else NEVER
         return min([due_us, *(armed.next_us for armed in self._armed.values())])
 
@@ -644,7 +644,7 @@ class NodeFaults(Copyable):
         return not (self._armed or self._held)
 
     def cob_id(self, index: int, sub: int, otherwise: int) -> int:
-        """Return the CAN-ID that an object of the node has, or another without the object."""
+        """Return the CAN-ID in an object of the node, or a default without the object."""
         entry = self.node.slave.dictionary.find(index, sub)
         return otherwise if entry is None else entry.number & CAN_ID_MASK
 
@@ -663,12 +663,12 @@ class NodeFaults(Copyable):
         return ERROR_CONTROL_COB_ID + self.node.slave.node_id
 
     def restart(self) -> None:
-        """Let the node begin anew."""
+        """Restart the node."""
         if self.station is not None:
             self.station.device.reset()
 
     def before(self, now_us: int, received: Frames) -> tuple[Frames, Frames]:
-        """Return what the node receives in a tick, and what it sends apart from its own frames."""
+        """Return the frames that the node receives in a tick, and additional frames to send."""
         self._now_us = now_us
         if not self.node.is_on:
             self._held.clear()
@@ -687,7 +687,7 @@ class NodeFaults(Copyable):
         return tuple(left), tuple(sent)
 
     def after(self, now_us: int, sent: Frames) -> Frames:
-        """Return what leaves in a tick of what the node sends, with what was late."""
+        """Return the frames sent in a tick: the node's own after faults, and delayed ones."""
         left = list[CanFrame]()
         for frame in sent:
             left += self._send(frame)
@@ -769,11 +769,11 @@ class NodeFaults(Copyable):
 
 
 class _FaultyNode(Copyable):
-    """A node whose frames suffer faults; a `Device[Frames]` that stands before it.
+    """A node with faults on its frames; a `Device[Frames]` around the node.
 
     Args:
-        device: the node, or what records it.
-        faults: what is armed.
+        device: the node, or its recorder.
+        faults: the armed faults.
     """
 
     def __init__(self, device: Any, faults: NodeFaults) -> None:
@@ -786,12 +786,12 @@ class _FaultyNode(Copyable):
 
     @property
     def due_us(self) -> int:
-        """When the device is due, or a fault acts."""
+        """When the device is due or a fault acts."""
         return min(int(self._device.due_us), self._faults.due_us)
 
     @property
     def horizon(self) -> Horizon | None:
-        """How far the device may work ahead."""
+        """How far the device may compute ahead."""
         horizon: Horizon | None = self._device.horizon
         return horizon
 
@@ -830,12 +830,12 @@ class _FaultyNode(Copyable):
 
     @property
     def on_accepts(self) -> list[Callable[[], None]]:
-        """Whom to call when these two have changed."""
+        """Callback for a change of these two."""
         listeners: list[Callable[[], None]] = self._device.on_accepts
         return listeners
 
     def bus_state(self, state: ErrorState, /) -> None:
-        """Hand on what the CAN controller reports."""
+        """Forward a state of the CAN controller."""
         self._device.bus_state(state)
 
     def reset(self) -> None:
@@ -843,7 +843,7 @@ class _FaultyNode(Copyable):
         self._device.reset()
 
     def tick(self, now_us: int, rx: Frames, /) -> Frames:
-        """Let the device have what faults leave, and send what they leave of its frames."""
+        """Tick the device with the received frames after faults; return its frames after faults."""
         received, extra = self._faults.before(now_us, rx)
         sent: Frames = ()
         if received or self._device.due_us <= now_us:

@@ -1,6 +1,6 @@
-"""What makes CANopen nodes, imported when the first node is made (PEP 562).
+"""Functions that make CANopen nodes, imported when the first node is made (PEP 562).
 
-A bench of serial devices makes none: without the slaves, EDS files and bus.yml `import Bench`
+A bench of serial devices needs none: without the slaves, EDS files and bus.yml `import Bench`
 takes two thirds of its time. Write `late.describe(...)`; a `from` import would load it at once.
 """
 

@@ -1,4 +1,4 @@
-"""The devices that are emulated out of the box."""
+"""Built-in device models."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ _PRODUCT: Final = 0x1008
 
 @dataclass(frozen=True, slots=True)
 class EmulatedModel:
-    """A device that needs no file.
+    """A device model that needs no file.
 
     Attributes:
-        name: what command lines and rig files call it.
-        text: what it is, for people.
-        node_id: its node-ID unless told otherwise.
+        name: its name on command lines and in rig files.
+        text: description for people.
+        node_id: its default node-ID.
         dictionary: makes the objects with default values.
-        application: what it does with them.
+        application: factory of its application.
     """
 
     name: str
@@ -37,7 +37,7 @@ class EmulatedModel:
     application: ServiceMaker
 
     def describe(self) -> DeviceDescription:
-        """Return what an EDS would say, and what none can."""
+        """Return its description, including properties that an EDS cannot express."""
         template = self.dictionary()
         return DeviceDescription(
             self.name,
@@ -79,7 +79,7 @@ _MODELS: Final = (
     ),
     EmulatedModel(
         "rtc-echo",
-        "DeviceRTC whose out-port says what its in-port heard, both Long",
+        "DeviceRTC whose out-port repeats the value of its in-port, both Long",
         48,
         partial(make_dictionary, CanopenEcho),
         application_of(CanopenEcho),
@@ -87,4 +87,4 @@ _MODELS: Final = (
 )
 
 MODELS: Final = {model.name: model for model in _MODELS}
-"""By name."""
+"""Models by name."""

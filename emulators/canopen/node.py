@@ -1,4 +1,4 @@
-"""An emulated CANopen node with power, a plug and a hand inside, and several under one roof."""
+"""Emulated CANopen nodes with power supply, CAN plug and named signals."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from tickrig.wire.can import CanFrame, ErrorState, Frames
 from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID, NmtState
 from tickrig.wire.instant import NEVER
 
-# One emulated CANopen node: a slave with power, a plug and a hand inside.
+# One emulated CANopen node: a slave with power supply, CAN plug and signals.
 
 _STATE_NAMES: Final = {
     NmtState.INITIALISING: "Initialising",
@@ -38,7 +38,7 @@ _ERROR_STATE_NAMES: Final = {
 _OFF: Final = "Off"
 
 NODE_INPUTS: Final = ("power_off", "unplugged", "emergency")
-"""Every node has these beside those of its device."""
+"""Outputs of every node, besides those of its device."""
 
 NODE_OUTPUTS: Final = (
     OutputSignal("state", "NMT state, or Off"),
@@ -50,27 +50,26 @@ NODE_OUTPUTS: Final = (
 class Node(Copyable):
     """A `Device[Frames]` around a slave, with the physical side of its application.
 
-    Without power it neither sends nor receives, and begins anew when power is back.
-    What is done to it from the inside, and what its CAN controller reports,
-    takes effect at the beginning of its next tick. A controller that is bus-off is
-    told to recover at once, as most drivers do.
+    Without power it neither sends nor receives, and restarts when power returns. Changes from the
+    inside and reports of its CAN controller take effect at the start of its next tick. A bus-off
+    controller starts its recovery at once, as with most drivers.
 
-    Not emulated: LSS switches the bit rate of the node alone; the bus keeps its own.
+    Not emulated: LSS switches the bit rate of the node only; the bus keeps its own.
 
     Args:
-        name: prefix of the names of its things among those of other nodes.
+        name: prefix of its signals among those of other nodes.
         slave: the slave.
         wire: its bus.
 
     Attributes:
-        application: what the device does with its objects.
+        application: the application of the device.
         port: its end of the bus.
-        physical: what the world does to it, by name.
+        physical: its physical inputs, by name.
         groups: names of several of these that are set together.
-        outputs: what the world sees of it, by name.
+        outputs: its physical outputs, by name.
         on_set: called with each input or object that was set by name, and its value.
-        on_crash: called with what the program of the slave raises, which then begins anew, as
-            after a watchdog; without it that is raised here.
+        on_crash: called with an exception from the slave's program, which then restarts, as after a
+            watchdog; without it the exception is raised here.
     """
 
     _new_in_twins: ClassVar[Mapping[str, object]] = {"on_set": None, "on_crash": None}
@@ -111,7 +110,7 @@ class Node(Copyable):
 
     @property
     def inputs(self) -> QuantityBank:
-        """The physical inputs of its application, whoever sets them."""
+        """The physical inputs of its application."""
         return self.application.inputs
 
     @property
@@ -123,7 +122,7 @@ class Node(Copyable):
 
     @property
     def horizon(self) -> Horizon | None:
-        """How far the slave may work ahead."""
+        """How far the slave may compute ahead."""
         return self.slave.horizon
 
     @horizon.setter
@@ -142,11 +141,11 @@ class Node(Copyable):
 
     @property
     def on_accepts(self) -> list[Callable[[], None]]:
-        """Whom to call when these two have changed."""
+        """Callback for a change of these two."""
         return self.slave.on_accepts
 
     def bus_state(self, state: ErrorState, /) -> None:
-        """Hear of a change of its CAN controller; the slave hears of it in the next tick."""
+        """Accept a change of its CAN controller; the slave gets it in the next tick."""
         self._defer(partial(self.slave.bus_state, state))
 
     def reset(self) -> None:
@@ -173,7 +172,7 @@ class Node(Copyable):
             return ()
 
     def signal(self, name: str) -> signals.NodeSignal | None:
-        """Return the thing of this name, None if there is none."""
+        """Return the signal of this name, None if there is none."""
         signal = self.physical.get(name) or self._object(name)
         return signals.NotedSignal(signal, self.on_set) if signal and self.on_set else signal
 
@@ -191,7 +190,7 @@ class Node(Copyable):
         return [*self.physical, *(signals.object_name(dictionary, entry) for entry in dictionary)]
 
     def begin_with(self, start: Mapping[str, Setting]) -> None:
-        """Set inputs and objects that are not as usual when it begins; ValueError if it cannot."""
+        """Set initial values of inputs and objects; ValueError if a value is not accepted."""
         for name, value in start.items():
             if (signal := self.signal(name)) is None:
                 raise ValueError(f"{self.name} has no input {name!r}")
@@ -209,18 +208,18 @@ class Node(Copyable):
         return self.application.read(name)
 
     def _defer(self, action: Callable[[], None]) -> None:
-        """Act at the beginning of the next tick: what is heard in it may then be another."""
+        """Schedule an action for the start of the next tick; it may change the accepted CAN-IDs."""
         self._pending.append(action)
         self.port.pass_all()
 
     def _catch_up(self, now_us: int) -> None:
-        """Let what was done since the last tick take effect."""
+        """Apply the actions since the last tick."""
         self.slave.now_us = now_us
         while self._pending:
             self._pending.pop(0)()
 
     def _begin_anew(self, on_crash: Callable[[Exception], object]) -> None:
-        """Reset the slave; one that cannot begin anew is dead until its power is switched."""
+        """Reset the slave; if that fails it is dead until its power is switched."""
         self._pending.clear()
         try:
             self.slave.reset()
@@ -238,7 +237,7 @@ class Node(Copyable):
         self._plug(self.physical["unplugged"].read())
 
     def _coast(self) -> None:
-        """Let the application go on, if it is without power."""
+        """Advance the application while it is without power."""
         self._coasts_us = 0
 
     def _plug(self, pulled: Setting) -> None:
@@ -248,17 +247,17 @@ class Node(Copyable):
             self._wire.reconnect(self.port)
 
 
-# The physical side of several nodes, and of what they are part of: all under one roof.
+# The physical side of several nodes and bodies in one table.
 
 
 class NodePart(Protocol):
-    """A node, or a body on nodes: something with a name and a physical side.
+    """A node, or a body on nodes: an object with a name and a physical side.
 
     Attributes:
         name: of the part.
-        physical: what the world does to it, by name.
+        physical: its physical inputs, by name.
         groups: names of several of these that are set together.
-        outputs: what the world sees of it, by name.
+        outputs: its physical outputs, by name.
     """
 
     name: str
@@ -267,7 +266,7 @@ class NodePart(Protocol):
     outputs: Mapping[str, OutputSignal]
 
     def signal(self, name: str) -> signals.NodeSignal | None:
-        """Return the thing of this name, None if there is none."""
+        """Return the signal of this name, None if there is none."""
 
     def signal_names(self) -> list[str]:
         """Return all names."""
@@ -281,13 +280,12 @@ class NodePart(Protocol):
 class Nodes:
     """All nodes of a bus, with the signals of each.
 
-    The things of one node are called as they are, `0x6000:1`, `state`; those of
-    several have the node before them, `5/0x6000:1`, `5/state`, those of a body too,
-    `body/x_m`, unless it is all there is.
+    Signals of a single node have their plain name, `0x6000:1`, `state`; with several nodes the node
+    comes first, `5/0x6000:1`, `5/state`, likewise a body, `body/x_m`, unless it is the only part.
 
     Args:
-        nodes: some, or none.
-        bodies: what is joined to them, or is seen by itself.
+        nodes: any number of nodes.
+        bodies: bodies on the nodes, or separate ones.
     """
 
     def __init__(self, nodes: Sequence[Node], bodies: Sequence[NodePart] = ()) -> None:
@@ -314,7 +312,7 @@ class Nodes:
         return part.read(rest)
 
     def full_name(self, part: NodePart, name: str) -> str:
-        """Return what a thing of a part is called."""
+        """Return the full name of a signal of a part."""
         return name if part is self._alone else f"{part.name}/{name}"
 
     def find(self, name: str) -> tuple[NodePart | None, str]:
@@ -326,7 +324,7 @@ class Nodes:
 
     @property
     def lost(self) -> int:
-        """Frames that found a buffer full."""
+        """Frames lost because of a full buffer."""
         return sum(node.port.lost for node in self.nodes)
 
 
@@ -353,15 +351,15 @@ class _NodeInputs:
         return self._signal(name).read()
 
     def set(self, name: str, value: Setting) -> None:
-        """Set an input; ValueError if there is none, or it does not take the value."""
+        """Set an input; ValueError if it does not exist or does not accept the value."""
         self._signal(name).write(value)
 
     def check(self, name: str, value: Setting) -> Setting:
-        """Return the value, or raise ValueError as `set` would, as far as can be known before."""
+        """Return the value, or raise ValueError as `set` would, if known in advance."""
         return self._signal(name).check(value)
 
     def find(self, name: str, signal_type: SignalType | None = None) -> InputSignal:
-        """Return the description of an input; ValueError if there is none of this type."""
+        """Return the description of an input; ValueError if there is no input of this type."""
         item = self.table.get(name)
         if item is None or signal_type not in (None, item.type):
             wanted = signal_type.value if signal_type else "input"
@@ -389,7 +387,7 @@ class _NodeInputs:
 
 
 class _Table(Mapping[str, InputSignal]):
-    """The descriptions, made when they are asked for: nodes have many objects."""
+    """The descriptions, created on request: nodes have many objects."""
 
     def __init__(self, nodes: Nodes) -> None:
         self._nodes = nodes
@@ -413,7 +411,7 @@ class _Table(Mapping[str, InputSignal]):
         return sum(len(part.signal_names()) for part in self._nodes.parts)
 
 
-# A bus outside on which a node may be a second time.
+# Detection of duplicate nodes on a bus outside.
 
 _ERROR_CONTROL: Final = range(ERROR_CONTROL_COB_ID + 1, ERROR_CONTROL_COB_ID + UNCONFIGURED)
 
@@ -421,14 +419,14 @@ _logger = log_of(__name__)
 
 
 class SecondNodeAlarm(PortBefore):
-    """A port that warns, once for each node, of somebody outside who has its node-ID.
+    """A port that warns, once for each node, of another node outside with its node-ID.
 
-    It hears boot-ups, heartbeats and answers to guarding. A second node that sends none of them
-    is not noticed; nor is one while ours is without power.
+    It checks boot-ups, heartbeats and answers to guarding. A second node that sends none of these
+    is not detected, nor is one while ours is without power.
 
     Args:
-        port: the port behind it.
-        nodes: ours.
+        port: the port on the bus.
+        nodes: our nodes.
     """
 
     def __init__(self, port: CountingPort, nodes: Sequence[Node]) -> None:
@@ -450,6 +448,6 @@ class SecondNodeAlarm(PortBefore):
         for node in self._alone:
             if node.slave.node_id == node_id and node.is_on:
                 self._alone.remove(node)
-                text = "node-ID %d is on the bus twice: somebody else sent %s; end one of the two"
+                text = "node-ID %d is on the bus twice: another node sent %s; stop one of the two"
                 _logger.warning(text, node_id, frame)
                 return

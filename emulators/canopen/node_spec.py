@@ -1,4 +1,4 @@
-"""Which nodes there shall be, as command lines say it."""
+"""Node specifications of command lines."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tickrig.emulators.canopen.choices import MODELS
 from tickrig.host.text.user_file import SUFFIX
 
 LSS: Final = "lss"
-"""Instead of a node-ID: the node waits for LSS to give it one."""
+"""In place of a node-ID: the node waits for LSS to assign one."""
 
 _IDS: Final = re.compile(r"([0-9]{1,3})(?:-([0-9]{1,3}))?")
 
@@ -25,7 +25,7 @@ class NodeSpec:
     Attributes:
         device: its EDS or DCF, the name of a model, or `FILE.py:Class` of a DeviceRTC.
         node_id: 1..127, `UNCONFIGURED`, or None for that of the DCF or model.
-        profile: of `choices.PROFILES`, None for what holds for all nodes.
+        profile: of `choices.PROFILES`, None for the profile of all nodes.
     """
 
     device: Path | str
@@ -36,7 +36,7 @@ class NodeSpec:
 def parse_node(text: str) -> Iterator[NodeSpec]:
     """Read `5=a.eds`, `1-20=a.eds`, `5=epos`, `5=a.py:Class`, `lss=a.eds` or `a.dcf`.
 
-    ValueError if it is none of them. A name is that of a model, unless there is such a file.
+    ValueError for any other text. A name is that of a model, unless there is such a file.
 
     >>> [spec.node_id for spec in parse_node("5-7=a.eds")]
     [5, 6, 7]

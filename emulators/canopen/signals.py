@@ -1,4 +1,4 @@
-"""Signals of a node of which it is noted what they are set to."""
+"""Signals of a node: objects and physical inputs by name."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tickrig.wire.errors import FieldError
 # Named signals of a CANopen node: dictionary entries and physical inputs, set without the bus.
 
 _HEX: Final = "hex:"
-"""Begins the bytes of an octet string, a time or a domain."""
+"""Prefix of the bytes of an octet string, a time or a domain."""
 
 _REAL32_MAX: Final = 3.4028234663852886e38
 _REAL64_MAX: Final = 1.7976931348623157e308
@@ -33,7 +33,7 @@ class NodeSignal(Protocol):
 
     @property
     def item(self) -> InputSignal:
-        """What it is."""
+        """Description of the signal."""
         ...
 
     def read(self) -> Setting:
@@ -41,15 +41,15 @@ class NodeSignal(Protocol):
         ...
 
     def check(self, value: Setting) -> Setting:
-        """Return the value that `write` would leave; ValueError if it cannot be set to it."""
+        """Return the value that `write` would set; ValueError if it is not accepted."""
         ...
 
     def write(self, value: Setting) -> None:
-        """Set it."""
+        """Set the value."""
 
 
 def object_name(dictionary: Dictionary, entry: Entry) -> str:
-    """Return what an entry is called: `0x6000:1`, a variable `0x1017`.
+    """Return the name of an entry: `0x6000:1`, a variable `0x1017`.
 
     The sub-index is decimal.
     """
@@ -69,21 +69,20 @@ def find_object(dictionary: Dictionary, name: str) -> Entry | None:
 
 
 _DeferredCall = Callable[[Callable[[], None]], None]
-"""Takes what is to be done at the beginning of the node's next tick."""
+"""Schedules an action for the start of the node's next tick."""
 
 
 class ObjectSignal:
-    """An object of the dictionary, from the inside.
+    """An object of the dictionary, set from the inside.
 
-    Access is not asked for, except that a constant stays what it is. The service
-    that owns an object judges a new value and acts on it as if it had come over
-    the bus, so that a heartbeat time that is set here takes effect. The value
-    changes at the beginning of the node's next tick.
+    Access rights are ignored, except that a constant cannot be changed. The service that owns an
+    object checks a new value and acts on it as if it had come over the bus, so that a heartbeat
+    time set here takes effect. The value changes at the start of the node's next tick.
 
     Args:
-        name: as `object_name` gives it.
+        name: as returned by `object_name`.
         entry: the object.
-        later: where the change is left.
+        later: schedules the change.
     """
 
     def __init__(self, name: str, entry: Entry, defer: _DeferredCall) -> None:
@@ -120,7 +119,7 @@ class ObjectSignal:
         return value
 
     def write(self, value: Setting) -> None:
-        """Set it; ValueError if its owner refuses."""
+        """Set the value; ValueError if its owner refuses it."""
         entry, data = self._entry, self._encode(value)
         try:
             entry.check_owner(data)
@@ -144,7 +143,7 @@ class ObjectSignal:
         return data
 
     def _limits(self) -> tuple[float, float]:
-        """Return the limits of a number, those of its type where the object has none."""
+        """Return the limits of a number, or those of its type."""
         low, high = _range(self._entry.data_type)
         entry = self._entry.description
         return low if entry.low is None else entry.low, high if entry.high is None else entry.high
@@ -172,7 +171,7 @@ def _range(data_type: DataType) -> tuple[float, float]:
 
 
 def _value(data_type: DataType, value: Setting) -> Value:
-    """Return what the data type takes; FieldError if this is no value of it."""
+    """Return the value in the form of the data type; FieldError if it does not fit."""
     if data_type in _TEXTS:
         return str(value)
     if _is_number(data_type):
@@ -196,8 +195,8 @@ class SwitchSignal:
     """A physical fault of every node; see `NodeSignal`.
 
     Args:
-        name: what it is called.
-        text: what it is, for people.
+        name: name of the fault.
+        text: description for people.
         switch: called with the new value.
     """
 
@@ -206,7 +205,7 @@ class SwitchSignal:
         self._switch, self._value = switch, 0
 
     def read(self) -> int:
-        """Return 1 while the fault is there."""
+        """Return 1 while the fault is present."""
         return self._value
 
     def check(self, value: Setting) -> int:
@@ -216,26 +215,26 @@ class SwitchSignal:
         return int(value)
 
     def write(self, value: Setting) -> None:
-        """Let the fault come or go."""
+        """Start or clear the fault."""
         self._value = self.check(value)
         self._switch(self._value)
 
 
 class Emergency:
-    """An error that the application sees: its emergency error code, 0 when it is gone.
+    """An error seen by the application: its emergency error code, 0 after its end.
 
     Args:
         slave: the slave.
-        later: where it is left.
+        later: schedules the change.
     """
 
     def __init__(self, slave: CanopenSlave, defer: _DeferredCall) -> None:
-        text = "error seen by the application: emergency error code, 0 when it is gone"
+        text = "error seen by the application: emergency error code, 0 for none"
         self.item = InputSignal("emergency", text, high=0xFFFF)
         self._slave, self._defer, self._code = slave, defer, 0
 
     def read(self) -> int:
-        """Return the code that was set last."""
+        """Return the latest code."""
         return self._code
 
     def check(self, value: Setting) -> int:
@@ -245,7 +244,7 @@ class Emergency:
         return value
 
     def write(self, value: Setting) -> None:
-        """Clear the error before, raise this one."""
+        """Clear the previous error, raise this one."""
         old, self._code = self._code, self.check(value)
         if old and old != self._code:
             self._defer(partial(self._slave.emergency_clear, old))
@@ -258,7 +257,7 @@ class Quantity:
 
     Args:
         bank: the inputs of the node's application.
-        item: which of them.
+        item: the input.
         on_change: called after each change.
     """
 
@@ -276,7 +275,7 @@ class Quantity:
         return self._bank.check(self.item.name, value)
 
     def write(self, value: Setting) -> None:
-        """Set it; the device's next tick sees it."""
+        """Set the value; the device's next tick sees it."""
         self._bank.set(self.item.name, value)
         self._on_change()
 
@@ -288,15 +287,15 @@ def _register_bit(code: int) -> int:
 
 
 OnSet = Callable[[str, Setting], None]
-"""Hears what was set, by name."""
+"""Called with the name and value of each set signal."""
 
 
 class NotedSignal:
-    """A signal of which is noted what it is set to; see `NodeSignal`.
+    """A signal that reports its new values; see `NodeSignal`.
 
     Args:
         signal: the signal.
-        note: called after each time.
+        note: called after each change.
     """
 
     def __init__(self, signal: NodeSignal, note: OnSet) -> None:
@@ -304,7 +303,7 @@ class NotedSignal:
 
     @property
     def item(self) -> InputSignal:
-        """What it is."""
+        """Description of the signal."""
         return self._signal.item
 
     def read(self) -> Setting:
@@ -316,6 +315,6 @@ class NotedSignal:
         return self._signal.check(value)
 
     def write(self, value: Setting) -> None:
-        """Set it."""
+        """Set the value."""
         self._signal.write(value)
         self._note(self._signal.item.name, value)

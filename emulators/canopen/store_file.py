@@ -19,19 +19,19 @@ _log = log_of(__name__)
 
 
 class StoreError(ValueError):
-    """A file that is no store; it is left as it is."""
+    """The file is not a store file; it is not changed."""
 
 
 class StoreFile:
-    """Keeps what slaves stored (1010h, LSS) over the end of the emulator.
+    """Keeps the stored data of slaves (1010h, LSS) between runs of the emulator.
 
-    The file is replaced as a whole, so that it is never half written.
+    The file is replaced as a whole, so it is never half written.
 
     Args:
-        path: the file; it need not be there.
+        path: the file; it may be missing.
 
     Raises:
-        StoreError: the file is something else, or damaged.
+        StoreError: the file has another format, or is damaged.
         OSError: it cannot be read.
     """
 
@@ -41,9 +41,9 @@ class StoreFile:
         self._written = self._versions()
 
     def nonvolatile(self, name: str, dictionary: Dictionary) -> Nonvolatile:
-        """Return the memory of a node, empty if it is new; the node works on it.
+        """Return the memory of a node, empty for a new one; the node changes it in place.
 
-        Values that the dictionary has no room for, because the EDS has changed, are dropped.
+        Values that do not fit the dictionary, because the EDS has changed, are dropped.
         """
         memory = self._nodes.setdefault(name, Nonvolatile())
         self._written.setdefault(name, memory.version)
@@ -52,10 +52,10 @@ class StoreFile:
         return memory
 
     def save(self) -> bool:
-        """Write the file if a node has stored something; say whether it did.
+        """Write the file if a node has stored something; return whether it did.
 
         Raises:
-            OSError: it cannot be written; the old file is still there.
+            OSError: it cannot be written; the old file is kept.
         """
         versions = self._versions()
         if versions == self._written:
@@ -88,10 +88,10 @@ def _multiplexer(key: int) -> str:
 
 
 def parse_memory(node: Mapping[str, Any]) -> Nonvolatile:
-    """Read what a node has stored.
+    """Read the stored data of a node.
 
     Raises:
-        AttributeError, KeyError, TypeError, ValueError: it is not what `memory_values` gives.
+        AttributeError, KeyError, TypeError, ValueError: it is not in the format of `memory_values`.
     """
     parameters = {}
     for name, data in node["parameters"].items():
@@ -107,7 +107,7 @@ def parse_memory(node: Mapping[str, Any]) -> Nonvolatile:
 
 
 def memory_values(memory: Nonvolatile) -> dict[str, Any]:
-    """Return what a node has stored, as JSON has it."""
+    """Return the stored data of a node as JSON values."""
     program = {} if memory.program is None else {"program": memory.program.hex().upper()}
     return {
         **program,
@@ -120,7 +120,7 @@ def memory_values(memory: Nonvolatile) -> dict[str, Any]:
 
 
 def drop_misfits(memory: Nonvolatile, dictionary: Dictionary) -> list[str]:
-    """Drop values that a dictionary has no room for; return which, as `1017:00`."""
+    """Drop values that do not fit a dictionary; return their names, such as `1017:00`."""
     misfits = [
         key
         for key, data in memory.parameters.items()

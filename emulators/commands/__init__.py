@@ -1,1 +1,1 @@
-"""The command `tickrig` and what the command lines of all emulators share."""
+"""The command `tickrig`, and common parts of the command lines of all emulators."""

@@ -64,7 +64,7 @@ DEMOS: Final = {
 def demo(context: click.Context) -> None:
     """Show an emulated device and a host at work; each ends by itself.
 
-    Without a name it lists them.
+    Without a name, list the demonstrations.
     """
     if context.invoked_subcommand is None:
         for name, (_, what) in DEMOS.items():
@@ -103,15 +103,15 @@ _TESTING: Final = "tickrig.emulators.testing.commands"
 _COMMANDS: Final = {
     "campaign": (
         f"{_TESTING}.campaign_cli:campaign",
-        "Run tests that have a bench with many seeds and parameters, on all cores or a cluster.",
+        "Run bench tests with many seeds and parameters, on all cores or a cluster.",
     ),
     "check": (
         f"{_TESTING}.check_cli:check",
-        "Check rig files and bus.yml: say what is on the bench, or all that is wrong.",
+        "Check rig files and bus.yml: list the devices on the bench, or all errors.",
     ),
     "compare": (
         f"{_TESTING}.compare_cli:compare_command",
-        "Let the host of a recorded run talk to an emulator; say where it answers otherwise.",
+        "Replay the host of a recorded run against an emulator; report different answers.",
     ),
     "ctl": (
         f"{_HERE}.ctl_cli:ctl",
@@ -125,17 +125,17 @@ _COMMANDS: Final = {
     "emu": (f"{_HERE}.emu_cli:emu", "Emulate a device, ours or that of an installed package."),
     "init": (
         f"{_TESTING}.init_cli:init",
-        "Write a rig file to begin with: devices, and all that can be said of them.",
+        "Write an initial rig file with devices and all their options.",
     ),
-    "new": (f"{_HERE}.new_cli:new", "Begin a package that adds something to tickrig."),
+    "new": (f"{_HERE}.new_cli:new", "Create a package that extends tickrig."),
     "record": (
         f"{_TESTING}.record_cli:record_command",
-        "Record what passes between a host and the device at PORT, for `tickrig compare`.",
+        "Record the traffic between a host and the device at PORT, for `tickrig compare`.",
     ),
     "replay": (f"{_TESTING}.replay_cli:replay_command", "Replay the trace FILE on fresh devices."),
     "report": (
         f"{_TESTING}.report_cli:report_command",
-        "Make one HTML page of test runs that were kept as JSON.",
+        "Make one HTML page from JSON reports of test runs.",
     ),
     "run": (
         f"{_TESTING}.run_cli:run",
@@ -143,7 +143,7 @@ _COMMANDS: Final = {
     ),
     "rtc": (
         "tickrig.host.rtc.commands.cli:rtc",
-        "Run RT components, and work with them while they run.",
+        "Run RT components, and operate them while they run.",
     ),
 }
 

@@ -29,42 +29,42 @@ _PATIENCE_S: Final = 1.0
 
 _Complete = Callable[[click.Context, click.Parameter, str], list[str]]
 _Names = Callable[[Any], Iterator[str]]
-"""Gives names of what an emulator says to `describe`."""
+"""Returns names from the answer of an emulator to `describe`."""
 
 
 def _buttons(described: Any) -> Iterator[str]:
-    """Give what can be pressed."""
+    """Return the names of buttons."""
     return (each["name"] for each in described.get("inputs", ()) if each["kind"] == "button")
 
 
 def faults(described: Any) -> Iterator[str]:
-    """Give faults of the wire, then of the device."""
+    """Yield faults of the wire, then of the device."""
     yield from (each["name"] for each in described.get("wire_faults", ()))
     yield from (each["name"] for each in described.get("inputs", ()) if each["kind"] == "fault")
 
 
 def _settable(described: Any) -> Iterator[str]:
-    """Give groups and inputs."""
+    """Yield the names of groups and inputs."""
     yield from described.get("groups", ())
     yield from (each["name"] for each in described.get("inputs", ()))
 
 
 def _seen(described: Any) -> Iterator[str]:
-    """Give inputs and outputs."""
+    """Yield the names of inputs and outputs."""
     yield from (
         each["name"] for each in [*described.get("inputs", ()), *described.get("outputs", ())]
     )
 
 
 def _complete(names: _Names) -> _Complete:
-    """Return what completes a word to one of these names."""
+    """Return a completion function for these names."""
 
     def completed(context: click.Context, parameter: click.Parameter, begun: str) -> list[str]:
         assert context.parent is not None
         try:
             with ControlClient(context.parent.params["socket"], _PATIENCE_S) as client:
                 described = client.request("describe")
-        except (OSError, ValueError):  # nobody is there, or somebody else
+        except (OSError, ValueError):  # no server, or another one
             return []
         return [name for name in names(described) if name.startswith(begun)]
 
@@ -147,11 +147,11 @@ def _describe(answer: Any) -> list[str]:
 def verb(
     show: Callable[[Any], list[str]] = _nothing, whom: str = _EMULATOR, **settings: Any
 ) -> Callable[[Callable[..., Object]], click.Command]:
-    """Return a decorator that makes a command of what gives the fields of its request.
+    """Return a decorator that makes a command from a function that returns its request fields.
 
     Args:
-        show: makes lines for people of the answer.
-        whom: who answers, for people.
+        show: formats the answer as lines for people.
+        whom: the answering program, for messages.
         settings: of the command.
     """
 
@@ -180,7 +180,7 @@ def describe() -> Object:
 @verb(_values)
 @click.argument("names", nargs=-1, shell_complete=_complete(_seen))
 def get(names: tuple[str, ...]) -> Object:
-    """Show inputs and outputs by NAME, all if none is named."""
+    """Show inputs and outputs by NAME; without names, show all."""
     return {"names": list(names)} if names else {}
 
 
@@ -188,7 +188,7 @@ def get(names: tuple[str, ...]) -> Object:
 @click.argument("name", shell_complete=_complete(_settable))
 @click.argument("values", nargs=-1, required=True)
 def set_(name: str, values: tuple[str, ...]) -> Object:
-    """Set the input or group NAME to VALUES, as 'set stick 100 -20'."""
+    """Set the input or group NAME to VALUES, such as 'set stick 100 -20'."""
     return {"name": name, "value": [parse_setting(value) for value in values]}
 
 
@@ -196,21 +196,21 @@ def set_(name: str, values: tuple[str, ...]) -> Object:
 @click.argument("name", shell_complete=_complete(_buttons))
 @click.option("--for", "duration", default="100ms", help="How long, as 500ms.  [100ms]")
 def press(name: str, duration: str) -> Object:
-    """Press the button NAME; it is let go by itself. To hold it: set NAME 1."""
+    """Press the button NAME; it is released automatically. To hold it: set NAME 1."""
     return {"name": name, "duration_us": time_us("--for", duration)}
 
 
 @verb()
 @click.argument("spec", shell_complete=_complete(faults))
 def fault(spec: str) -> Object:
-    """Let a fault come: NAME[=ARGUMENT[,ARGUMENT]][@FROM[-TO]], times since its start."""
+    """Start a fault: NAME[=ARGUMENT[,ARGUMENT]][@FROM[-TO]], times since the start."""
     return {"spec": spec}
 
 
 @verb()
 @click.argument("name", shell_complete=_complete(faults))
 def clear(name: str) -> Object:
-    """Let the fault NAME go."""
+    """Clear the fault NAME."""
     return {"name": name}
 
 
@@ -229,7 +229,7 @@ def lines(since: int) -> Object:
 
 @verb(_status)
 def status() -> Object:
-    """Show how the run is going: time, late ticks, lost bytes, faults."""
+    """Show the status of the run: time, late ticks, lost bytes, faults."""
     return {}
 
 
@@ -248,14 +248,14 @@ _NUMBERS: Final = {"ignore_unknown_options": True}
 @click.argument("y", type=float)
 @click.argument("deg", type=float)
 def goal(x: float, y: float, deg: float) -> Object:
-    """Let the cart of 'rh3 serve' drive to X and Y in metres, and turn to DEG in degrees."""
+    """Drive the cart of 'rh3 serve' to X and Y in metres, and turn it to DEG degrees."""
     return {"pose": [x, y, deg]}
 
 
 @verb(whom=_CART)
 @click.argument("file", type=PATH, required=False)
 def path(file: Path | None) -> Object:
-    """Let it drive along the points of FILE, as 'rh3 path', or along its defined path."""
+    """Drive it along the points of FILE, as 'rh3 path', or along its defined path."""
     if file is None:
         return {}
     try:
@@ -267,7 +267,7 @@ def path(file: Path | None) -> Object:
 
 @verb(whom=_CART)
 def end() -> Object:
-    """Let PositionInput go into Error when the last command has finished."""
+    """Put PositionInput into Error after the last command has finished."""
     return {}
 
 

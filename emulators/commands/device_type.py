@@ -1,4 +1,4 @@
-"""Device types: what builds, connects and shows a device on a line (docs/howto/extending.md)."""
+"""Device types: build, connect and show a device on a serial line (docs/howto/extending.md)."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ if TYPE_CHECKING:
     import click
 
 _SEED: Final = "seed"
-"""In a trace, that of the wire's faults: a replay has none, what came through is recorded."""
+"""Key in traces for wire faults, which a replay does not need: it has the resulting traffic."""
 
 _MEMBERS: Final = ("tick_us", "due_us", "reset", "tick", "inputs", "outputs", "read")
-"""What a device on a line has (docs/howto/extending.md)."""
+"""Interface of a device on a serial line (docs/howto/extending.md)."""
 
 
 def by_miniterm(link: str, baud: int) -> str:
-    """Say how to talk to a device of lines of text; miniterm comes with pyserial."""
+    """Return how to talk to a text-line device; miniterm comes with pyserial."""
     return f" Talk to it with\n  python -m serial.tools.miniterm --eol LF -e {link} {baud}"
 
 
@@ -35,23 +35,23 @@ class DeviceType:
     """A type of device on a serial line: an entry point of the group `tickrig.devices`.
 
     Attributes:
-        name: what traces and `tickrig emu` call it.
+        name: its name in traces and for `tickrig emu`.
         title: for people.
-        build: makes a device of the configuration that a trace carries; ValueError if it cannot be.
+        build: makes a device from the configuration in a trace; ValueError if it is invalid.
         text: one sentence for `tickrig emu --help`.
-        fields: what can be set of it, on its command line and in rig files; their values are the
+        fields: its options on its command line and in rig files; their values are the
             configuration.
-        options: the same as options of click, as before `fields`; they become fields.
-        configure: what else a command line makes of them; see `Configure`.
-        line: baud rate, wire faults, and how the log cuts what passes.
+        options: the same as click options, used before `fields` existed; they become fields.
+        configure: further processing of a command line; see `Configure`.
+        line: baud rate, wire faults, and splitting of the traffic for the log.
         encoders: further verbs of its scenarios that send a line.
-        senders: the verbs of its scenarios that send, where the line carries no text.
-        is_event: which lines -v shows.
-        panel: runs the operator panel until it is left.
-        talk: says how to talk to it at a path and a baud rate.
-        config_of: the configuration of a device that a program has made itself, None if it cannot
-            be made again of one.
-        user_code: `FILE.py:Class` whose mistakes are told in a line, if it runs such.
+        senders: the sending verbs of its scenarios, if the line carries no text.
+        is_event: selects the lines that -v shows.
+        panel: runs the operator panel until it is closed.
+        talk: returns how to talk to it at a path and a baud rate.
+        config_of: the configuration of a device made by a program, None if the device cannot be
+            rebuilt from one.
+        user_code: `FILE.py:Class` whose errors are reported in one line, if it runs such code.
     """
 
     name: str
@@ -71,18 +71,18 @@ class DeviceType:
     user_code: str = ""
 
     def __post_init__(self) -> None:
-        """Make fields of what is declared as options of click."""
+        """Convert options of click to fields."""
         object.__setattr__(self, "fields", (*self.fields, *map(field_of_option, self.options)))
 
     def of_options(self, options: Mapping[str, Any], seed: int) -> ConfiguredDevice:
-        """Make the device that a command line or a rig file asks for.
+        """Make the device for a command line or a rig file.
 
         Args:
             options: the values of its fields.
-            seed: of all chance.
+            seed: of all random numbers.
 
         Raises:
-            ValueError: it cannot be made.
+            ValueError: the device cannot be made.
         """
         if self.configure is not None:
             return self.configure(self, options, seed)
@@ -98,16 +98,16 @@ class DeviceType:
         return ConfiguredDevice(self, device, options)
 
     def of_trace(self, config: Config) -> Emulated[bytes]:
-        """Make the device that a trace was recorded on.
+        """Make the device on which a trace was recorded.
 
         Args:
-            config: what the trace says of it.
+            config: its configuration in the trace.
 
         Returns:
-            The device, as it was when the recording began.
+            The device in its state at the start of the recording.
 
         Raises:
-            ValueError: it cannot be made of that.
+            ValueError: invalid configuration.
         """
         settings = {name: value for name, value in config.items() if name != _SEED}
         if self.configure is None:
@@ -118,10 +118,10 @@ class DeviceType:
 
 @dataclass(frozen=True)
 class ConfiguredDevice:
-    """A device as a command line asks for it.
+    """A device as configured on a command line.
 
     Attributes:
-        type: its type, with what its options change of that.
+        type: its type, after changes by its options.
         device: the device.
         config: all its settings, for the trace.
     """
@@ -132,7 +132,7 @@ class ConfiguredDevice:
 
 
 Configure = Callable[[DeviceType, Mapping[str, Any], int], ConfiguredDevice]
-"""Makes a device of its type, its options and a seed."""
+"""Makes a device from its type, its options and a seed."""
 
 DEVICES: Final = ExtensionGroup[DeviceType](
     name="tickrig.devices",
@@ -147,20 +147,20 @@ DEVICES: Final = ExtensionGroup[DeviceType](
     accepts=lambda found: isinstance(found, DeviceType),
     wanted="a DeviceType",
 )
-"""The device types that there are."""
+"""The available device types."""
 
 
 def configure(name: str, config: Mapping[str, object], seed: int = 0) -> ConfiguredDevice:
-    """Make a device of its type and of values for its fields, as a rig file gives them.
+    """Make a device from its type and the values of its fields, as in a rig file.
 
     Args:
         name: of the device type.
         config: values by the names of command lines, without their dashes; see `read_config`.
-        seed: of all chance in it.
+        seed: of its random numbers.
 
     Raises:
-        ExtensionError: there is no such type, or it cannot be loaded.
-        ValueError: no such field, or not with this value; the text begins with the field.
+        ExtensionError: unknown type, or it cannot be loaded.
+        ValueError: unknown field, or invalid value; the message starts with the field.
 
     >>> configure("rtc-lite", {"node": "lite-a"}).config["node"]
     'lite-a'
@@ -170,19 +170,19 @@ def configure(name: str, config: Mapping[str, object], seed: int = 0) -> Configu
 
 
 def option_names(name: str) -> tuple[str, ...]:
-    """Return the options of a device type without their dashes; ExtensionError if there is none."""
+    """Return the options of a device type without their dashes; ExtensionError if it is unknown."""
     return tuple(field.word for field in DEVICES.load(name).fields)
 
 
 def build_recorded(header: Header, *, run_code: bool = False) -> Emulated[bytes]:
-    """Build the device that a trace was recorded on.
+    """Build the device on which a trace was recorded.
 
     Args:
         header: of the trace.
         run_code: whether to run a Python file that it names.
 
     Raises:
-        ValueError: there is none of this name, or its configuration cannot be.
+        ValueError: unknown device type, or invalid configuration.
     """
     check_no_code(header.config.values(), run_code=run_code)
     if header.device not in DEVICES.built_in and header.device not in DEVICES.names():
@@ -192,10 +192,10 @@ def build_recorded(header: Header, *, run_code: bool = False) -> Emulated[bytes]
 
 
 def check_no_code(named: Iterable[object], *, run_code: bool) -> None:
-    """Refuse Python files that a trace names: who replays a trace does not expect to run a program.
+    """Refuse Python files named in a trace: replaying a trace must not run a program unasked.
 
     Raises:
-        ValueError: there is a `FILE.py:Class`, and `run_code` does not allow it.
+        ValueError: the trace names a `FILE.py:Class`, and `run_code` does not allow it.
     """
     for name in named:
         if isinstance(name, str) and f"{SUFFIX}:" in name and not run_code:
@@ -203,13 +203,13 @@ def check_no_code(named: Iterable[object], *, run_code: bool) -> None:
 
 
 def check_config(config: Config, defaults: Config, owner: str, *, typed: bool = True) -> None:
-    """Raise ValueError unless a configuration has settings of a device alone.
+    """Raise ValueError unless a configuration has only settings of a device.
 
     Args:
-        config: as a trace carries it.
-        defaults: all settings that there are.
-        owner: what has them, for people: `an RRC has no setting`.
-        typed: whether a value has to be of the type of its default.
+        config: as in a trace.
+        defaults: all settings.
+        owner: start of the message: `an RRC has no setting`.
+        typed: whether a value must have the type of its default.
     """
     for name, value in config.items():
         if name not in defaults:

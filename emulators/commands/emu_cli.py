@@ -1,4 +1,4 @@
-"""The command `tickrig emu`: every device type there is, ours and those of other packages."""
+"""The command `tickrig emu`: all device types, built-in and of other packages."""
 
 from __future__ import annotations
 
@@ -37,20 +37,19 @@ _OURS: Final = {
         "Emulate CANopen slaves, as canopen-slave-emu.",
     ),
 }
-"""Our devices have command lines of their own."""
+"""Built-in devices, with their own command lines."""
 
 _HELP: Final = """\
-It runs in real time until Ctrl-C. A scenario alone runs in virtual time: as
-fast as it goes, with the same transcript each time, exit status 1 if something
-expected did not come. Together with --link, --serve or --control it is
-played in real time."""
+The emulator runs in real time until Ctrl-C. A scenario alone runs in virtual time: as fast as
+possible, with the same transcript each time, and with exit status 1 if an expectation was missed.
+Together with --link, --serve or --control it is played in real time."""
 
 
 class _DeviceGroup(LazyGroup):
-    """Our command lines, and one made for each device type of another package."""
+    """Built-in command lines, and one generated for each device type of another package."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Return the names, ours first; a device type that cannot be loaded is told in a line."""
+        """Return the names, built-in ones first; report each device type that cannot be loaded."""
         self.commands.update(
             (name, device_command(each)) for name, each in device_types().load_foreign(say).items()
         )
@@ -71,7 +70,7 @@ class _DeviceGroup(LazyGroup):
 
 
 def device_command(device_type: DeviceType) -> click.Command:
-    """Make the command line of a device type: its own options and those of all devices."""
+    """Make the command line of a device type: its own options and the common ones."""
     declared = {option.name: option for option in device_type.options}
 
     @device_options(field for field in device_type.fields if field.name not in declared)
@@ -94,4 +93,4 @@ def _inputs(device_type: DeviceType) -> Iterable[InputSignal]:
 
 @click.group(cls=_DeviceGroup, commands=_OURS)
 def emu() -> None:
-    """Emulate a device, ours or that of an installed package."""
+    """Emulate a built-in device or one of an installed package."""

@@ -1,4 +1,4 @@
-"""Pictures of curves in files; needs matplotlib (the extra `plot`)."""
+"""Plots of curves in files; needs matplotlib (the extra `plot`)."""
 
 from __future__ import annotations
 

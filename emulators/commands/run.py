@@ -1,4 +1,4 @@
-"""Run emulated devices as a command line asks: in real time, or a scenario."""
+"""Run emulated devices for a command line: in real time, or a scenario."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ from tickrig.host.links.link import LinkClosed
 from tickrig.host.text.user_file import explain_error
 
 _RECORDING_ENDED: Final = 3
-"""Exit status where the recording is not whole."""
+"""Exit status for an incomplete recording."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunOptions:
-    """What the command lines of all emulators share (`run_options`)."""
+    """Common options of the command lines of all emulators (`run_options`)."""
 
     control: Path | None = None
     scenario: Path | None = None
@@ -40,7 +40,7 @@ class RunOptions:
 
     @property
     def in_real_time(self) -> bool:
-        """Whether time is that of this machine."""
+        """Whether it runs in real time."""
         raise NotImplementedError
 
 
@@ -64,8 +64,8 @@ class EmulatorRun(ABC, Generic[OptionsT]):
         """Run, and return the exit status.
 
         Raises:
-            Refused: the command line asks for something that cannot be done.
-            BusFailed: its CAN bus cannot be read any more.
+            Refused: the options cannot be carried out.
+            BusFailed: its CAN bus can no longer be read.
         """
         with ExitStack() as stack:
             if self._shows_warnings:
@@ -113,24 +113,24 @@ class EmulatorRun(ABC, Generic[OptionsT]):
 
     @abstractmethod
     def _make(self) -> tuple[Operator, ScenarioParser]:
-        """Make the devices, and what faults and scenario are checked against; open nothing."""
+        """Make the devices, and all that faults and scenario are checked against; open nothing."""
 
     @abstractmethod
     def _open(self, stack: ExitStack) -> RunningEmulator:
-        """Open the outside world for the devices; each thing is given back at the end."""
+        """Open links and files for the devices; they are closed at the end."""
 
     @abstractmethod
     def _greet(self, bench: RunningEmulator) -> None:
-        """Say where it is and how to talk to it."""
+        """Print its address and how to talk to it."""
 
     @abstractmethod
     def _attend(
         self, bench: RunningEmulator, scenario: tuple[ScenarioStep, ...]
     ) -> ScenarioPlayer | None:
-        """Have the run written down as far as that is wanted."""
+        """Start the requested transcripts of the run."""
 
     def _checked(self) -> tuple[list[FaultSpec], tuple[ScenarioStep, ...]]:
-        """Read all that can be wrong before anything is opened."""
+        """Check all inputs before anything is opened."""
         hands, parser = self._make()
         with messages.refused_at("--fault"):
             faults = [parse_fault_spec(text, hands.check_clear) for text in self._options.faults]
@@ -142,12 +142,12 @@ class EmulatorRun(ABC, Generic[OptionsT]):
             raise messages.Refused(str(error)) from None
 
     def _say_how(self, otherwise: str) -> None:
-        """Say how to operate it, or which option is needed for that."""
+        """Print how to operate it, or the option needed for that."""
         control = self._options.control
         messages.say(f"  tickrig ctl {control} describe" if control else otherwise)
 
     def _go_on(self, bench: RunningEmulator) -> None:
-        """Step until somebody stops it."""
+        """Step until it is stopped."""
         while bench.running and not self._stopped:
             bench.step()
 
@@ -157,7 +157,7 @@ class EmulatorRun(ABC, Generic[OptionsT]):
             self._running.stop()
 
     def _sum_up(self, bench: RunningEmulator, player: ScenarioPlayer | None) -> int:
-        """Say how it went; 3 if it was not recorded to the end, 1 if an expectation was missed."""
+        """Print the summary; return 3 for an incomplete recording, 1 for a missed expectation."""
         rig = bench.rig
         worst = f" (up to {rig.worst_late_us / 1_000:.1f} ms)" if rig.late_ticks else ""
         late = f"; late ticks: {rig.late_ticks}{worst}" if self._in_real_time else ""
@@ -172,7 +172,7 @@ class EmulatorRun(ABC, Generic[OptionsT]):
 
 
 def _read(scenario: Path | None) -> tuple[str, str]:
-    """Return the text of a scenario and what it is called."""
+    """Return the text of a scenario and its name."""
     if scenario is None:
         return "", ""
     try:
@@ -186,10 +186,10 @@ def _read(scenario: Path | None) -> tuple[str, str]:
 
 @contextmanager
 def mistakes_in(specs: Iterable[object]) -> Iterator[None]:
-    """Say in a line what a callback of a user's file raised; other errors pass.
+    """Report in one line an exception of a callback in a user's file; re-raise others.
 
     Args:
-        specs: what runs, of which each `FILE.py:Class` is the user's.
+        specs: the devices; each `FILE.py:Class` is user code.
     """
     files = {spec.rpartition(":")[0]: spec for spec in specs if isinstance(spec, str)}
     try:

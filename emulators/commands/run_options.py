@@ -1,4 +1,4 @@
-"""What the command lines of all emulators share: their options, and how a device is run."""
+"""Common options of the command lines of all emulators, and the run of a device."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 _Faults = Callable[[click.Context], Iterable[str]]
-"""Gives the faults of a device as the command line has it so far."""
+"""Returns the faults of a device with the options so far."""
 
 
 def device_options(fields: Iterable[DeviceField]) -> Decorator:
@@ -61,8 +61,8 @@ def run_options(wire_faults: str, device_faults: _Faults) -> Decorator:
     """Return a decorator that adds the fields of `run.RunOptions`, and --version.
 
     Args:
-        wire_faults: names with commas between.
-        device_faults: for the shell to complete.
+        wire_faults: names, separated by commas.
+        device_faults: for shell completion.
     """
 
     def complete(context: click.Context, option: click.Parameter, begun: str) -> list[str]:
@@ -80,7 +80,7 @@ def run_options(wire_faults: str, device_faults: _Faults) -> Decorator:
             shell_complete=complete,
             help=f"Fault of the wire ({wire_faults}) or of the device; may be repeated.",
         ),
-        click.option("--seed", type=int, default=0, help="Seed of the wire faults' chance.  [0]"),
+        click.option("--seed", type=int, default=0, help="Seed of the random wire faults. [0]"),
         click.option("-v", "--verbose", count=True, help="Show events; -vv shows every line."),
         version_option(),
     )
@@ -90,7 +90,7 @@ SERIAL_FAULTS: Final = (
     "flip, drop, dup, cut, delay, jitter, split, swap, garbage, repeat, truncate, break, framing,"
     " parity"
 )
-"""The names of `BYTE_FAULTS`, which takes time to load."""
+"""The names in `BYTE_FAULTS`, which is slow to load."""
 
 
 panel_option: Final[Decorator] = click.option(
@@ -102,9 +102,9 @@ def line_options(wire_faults: str, inputs: str | Callable[[], Iterable[InputSign
     """Return a decorator that adds the options of a device on a serial line, and --version.
 
     Args:
-        wire_faults: names with commas between.
-        inputs: gives its physical inputs, for the shell to complete; or where it is, as
-            `MODULE:NAME` of a table.
+        wire_faults: names, separated by commas.
+        inputs: returns its physical inputs for shell completion, or the place of a table of them,
+            `MODULE:NAME`.
     """
 
     def device_faults(context: click.Context) -> list[str]:
@@ -130,14 +130,14 @@ def _complete_serve(context: click.Context, option: click.Parameter, begun: str)
 
 
 def run_named(name: str, options: Mapping[str, Any]) -> int:
-    """Run a device as a command line asks, and return the exit status.
+    """Run a device for a command line, and return the exit status.
 
     Args:
         name: of one of `device_type.DEVICES`.
         options: its own, and those of `line_options`.
 
     Raises:
-        Refused: it cannot be run like this.
+        Refused: it cannot be run with these options.
     """
     with loading():
         run_device = load("tickrig.emulators.commands.serial_run:run_device")
@@ -161,7 +161,7 @@ def serial_command(
         name: of one of `device_type.DEVICES`.
         fields: of the device.
         inputs: where the table of its physical inputs is, as `MODULE:NAME`.
-        wire_faults: names with commas between.
+        wire_faults: names, separated by commas.
         panel: whether it has an operator panel.
     """
 
@@ -181,7 +181,7 @@ def serial_command(
 
 
 def device_types() -> ExtensionGroup[DeviceType]:
-    """Return the device types, `device_type.DEVICES`; help and completion do without them."""
+    """Return the device types, `device_type.DEVICES`; not needed for help and completion."""
     with loading():
         found: ExtensionGroup[DeviceType] = load("tickrig.emulators.commands.device_type:DEVICES")
     return found

@@ -1,4 +1,4 @@
-"""Run one device on a serial line as its command line asks."""
+"""Run one device on a serial line for its command line."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ else:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Options(RunOptions):
-    """What the command lines of all serial emulators share (`line_options`)."""
+    """Common options of the command lines of all serial emulators (`line_options`)."""
 
     link: Path | None = None
     serve: tuple[str, ...] = ()
@@ -47,14 +47,14 @@ class _Options(RunOptions):
 
 
 def run_device(device_type: DeviceType, options: Mapping[str, Any]) -> int:
-    """Run a device as a command line asks, and return the exit status.
+    """Run a device for a command line, and return the exit status.
 
     Args:
         device_type: its type.
         options: all options, its own and those of `line_options`.
 
     Raises:
-        Refused: the command line asks for something that cannot be done.
+        Refused: the options cannot be carried out.
     """
     names = {item.name for item in fields(_Options)}
     own = {name: value for name, value in options.items() if name not in names}
@@ -123,7 +123,7 @@ class _SerialRun(EmulatorRun[_Options]):
         return self._emulator
 
     def _open_ports(self, stack: ExitStack) -> list[pty_port.PtyPort | NetworkPort]:
-        """Open where hosts come in: a pty if one is named or there is nothing else."""
+        """Open the ports for hosts: a pty if requested or nothing else is."""
         ports: list[pty_port.PtyPort | NetworkPort] = []
         if self._options.link or not self._urls:
             ports.append(self._open_pty(stack))
@@ -153,7 +153,7 @@ class _SerialRun(EmulatorRun[_Options]):
         return port
 
     def _show_setting(self, passes: bool, setting: str) -> None:
-        """Tell that host and device differ; a pty passes the bytes unchanged, RFC 2217 does not."""
+        """Warn of different settings of host and device; a pty hides them, RFC 2217 does not."""
         if not self._options.panel and self._emulator is not None:
             own = self._emulator.line.b.uart.setting
             ends = "on a real line they would" if passes else "they do"

@@ -1,4 +1,4 @@
-"""Compare what a device said with what an emulator says to the same host."""
+"""Comparison of a recorded device with an emulator for the same host."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from typing import Final, NamedTuple
 
-# What still counts as the same when a recording is compared with an emulator.
+# Tolerances for the comparison of a recording with an emulator.
 
 _DRIFT: Final = 2_000
-"""Two clocks part by less than one in so many: 500 ppm."""
+"""Reciprocal of the largest drift between two clocks: 500 ppm."""
 
 _ROUNDING: Final = 1e-9
 """1.1 - 1.0 is a little more than 0.1."""
@@ -25,14 +25,14 @@ _KIND: Final = re.compile(r"[A-Za-z]\w*:|[0-9A-F]{3}#|[0-9A-F]{8}#", re.ASCII)
 
 @dataclass(frozen=True, slots=True)
 class NumberRule:
-    """Numbers in lines of a pattern may differ.
+    """A tolerance for numbers in lines that match a pattern.
 
     Attributes:
-        pattern: as file names have it: `EV:batt*`, `181#*`.
-        least: by how much at most; of 100, where it is a share.
-        share: it is in percent of the recorded number.
-        place: of the field, None for all decimal numbers of the line: characters of a line of
-            text, which are hex digits; data bytes of a frame, the lowest first.
+        pattern: a shell pattern: `EV:batt*`, `181#*`.
+        least: largest difference; in percent if `share`.
+        share: whether it is a percentage of the recorded number.
+        place: of the field, None for all decimal numbers of the line: characters of a text line
+            (hex digits), or data bytes of a frame, the lowest first.
     """
 
     pattern: str
@@ -41,7 +41,7 @@ class NumberRule:
     place: tuple[int, int] | None = None
 
     def allows(self, recorded: str, emulated: str) -> bool:
-        """Say whether two lines differ in such numbers alone, and by no more."""
+        """Return whether two lines differ only in these numbers and within the tolerance."""
         if not (fnmatchcase(recorded, self.pattern) and fnmatchcase(emulated, self.pattern)):
             return False
         split = _split_numbers if self.place is None else self._split_field
@@ -55,7 +55,7 @@ class NumberRule:
         return abs(recorded - emulated) <= least + _ROUNDING
 
     def _split_field(self, text: str) -> tuple[str, list[float]]:
-        """Return a line without its field, and the number in that."""
+        """Return a line without its field, and the number in the field."""
         assert self.place is not None
         first, last = self.place
         head, hash_, data = text.partition("#")
@@ -78,7 +78,7 @@ def _little_endian(digits: str) -> list[float]:
 
 
 def _split_numbers(text: str) -> tuple[str, list[float]]:
-    """Return a line with its decimal numbers taken out, and these."""
+    """Return a line without its decimal numbers, and the numbers."""
     return _NUMBER.sub("_", text), [float(number) for number in _NUMBER.findall(text)]
 
 
@@ -86,7 +86,7 @@ def parse_number_rule(text: str) -> NumberRule:
     """Read `PATTERN=TOLERANCE`, `PATTERN[FROM:TO]=TOLERANCE`, with % for a share.
 
     Raises:
-        ValueError: it is none.
+        ValueError: invalid form.
 
     >>> parse_number_rule("EV:batt*=5").allows("EV:batt 98", "EV:batt 95")
     True
@@ -102,14 +102,14 @@ def parse_number_rule(text: str) -> NumberRule:
 
 @dataclass(frozen=True, slots=True)
 class Tolerance:
-    """What counts as the same.
+    """Tolerances of a comparison.
 
     Attributes:
-        time_us: how far a time may be off; the drift of two clocks is added.
-        numbers: how far numbers may be.
+        time_us: tolerance of times; the drift of two clocks is added.
+        numbers: tolerances of numbers.
         ignored: patterns of lines that are not compared.
-        kinds: patterns of lines that are independent of all others: they need not come in the
-            order in which they were recorded.
+        kinds: patterns of lines that are independent of all others: they may come in another order
+            than recorded.
     """
 
     time_us: int
@@ -118,19 +118,19 @@ class Tolerance:
     kinds: Sequence[str] = ()
 
     def allowed_us(self, at_us: int) -> int:
-        """Return how far a time may be off, so long after the begin."""
+        """Return the tolerance of a time this long after the start."""
         return self.time_us + at_us // _DRIFT
 
     def same(self, recorded: str, emulated: str) -> bool:
-        """Say whether two lines say the same."""
+        """Return whether two lines are equal within the tolerances."""
         return recorded == emulated or any(rule.allows(recorded, emulated) for rule in self.numbers)
 
     def ignores(self, text: str) -> bool:
-        """Say whether a line is not compared."""
+        """Return whether a line is ignored."""
         return any(fnmatchcase(text, pattern) for pattern in self.ignored)
 
     def kind(self, text: str) -> str:
-        """Return what keeps its order: lines up to a colon, frames of a CAN-ID, or a pattern."""
+        """Return the kind within which order counts: text up to a colon, a CAN-ID, or a pattern."""
         for pattern in self.kinds:
             if fnmatchcase(text, pattern):
                 return pattern
@@ -139,12 +139,12 @@ class Tolerance:
 
 
 class Said(NamedTuple):
-    """A line or frame that a device said.
+    """A line or frame sent by a device.
 
     Attributes:
-        at_us: when it had passed, from the begin of the recording.
-        text: as a trace has it.
-        line: of the trace, 0 if it is not of one.
+        at_us: its end, since the start of the recording.
+        text: as in a trace.
+        line: line number in the trace, 0 without one.
     """
 
     at_us: int
@@ -154,13 +154,13 @@ class Said(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """What was recorded, and what the emulator says there.
+    """A recorded line and the corresponding line of the emulator.
 
     Attributes:
-        kind: within which the order counts.
-        recorded: None if it is of the emulator alone.
-        emulated: None if the emulator does not say it.
-        difference: what differs, in words; empty if it is the same.
+        kind: kind within which order counts.
+        recorded: None if only the emulator sent it.
+        emulated: None if the emulator did not send it.
+        difference: description of the difference; empty if equal.
     """
 
     kind: str
@@ -170,14 +170,14 @@ class Pair:
 
     @property
     def at_us(self) -> int:
-        """When it was, first in the recording."""
+        """Its time, in the recording if possible."""
         said = self.recorded or self.emulated
         assert said is not None
         return said.at_us
 
     @property
     def late_us(self) -> int:
-        """By how much the emulator is later; 0 if one of the two is missing."""
+        """Delay of the emulator; 0 if one of the two is missing."""
         if self.recorded is None or self.emulated is None:
             return 0
         return self.emulated.at_us - self.recorded.at_us
@@ -188,17 +188,17 @@ def compare(
 ) -> list[Pair]:
     """Compare two runs, kind by kind.
 
-    What an emulator says within the tolerance of the begin and of the end of the recording may
-    be missing there.
+    Lines of the emulator within the tolerance of the start or the end of the recording may be
+    missing in the recording.
 
     Args:
-        recorded: what was recorded, in the order of time.
-        emulated: what the emulator says, in the order of time.
-        until_us: how long the recording lasted.
-        tolerance: what counts as the same.
+        recorded: recorded lines in order of time.
+        emulated: lines of the emulator in order of time.
+        until_us: duration of the recording.
+        tolerance: the tolerances.
 
     Returns:
-        All that was said, in the order of time.
+        All lines, in order of time.
     """
     sides: dict[str, tuple[list[Said], list[Said]]] = {}
     for side, run in enumerate((recorded, emulated)):
@@ -224,7 +224,7 @@ class _Alignment:
         self._kind, self._then, self._now, self._tolerance = kind, then, now, tolerance
 
     def pairs(self) -> Iterator[Pair]:
-        """Give both runs, in order."""
+        """Yield both runs, in order."""
         place = other = 0
         while place < len(self._then) or other < len(self._now):
             pair = self._next(place, other)
@@ -233,7 +233,7 @@ class _Alignment:
             other += pair.emulated is not None
 
     def _next(self, place: int, other: int) -> Pair:
-        """Return what comes next: of one of them, or of both."""
+        """Return the next line of one run, or the next pair."""
         if place < len(self._then) and other < len(self._now):
             return self._both(place, other)
         return self._missing(place) if place < len(self._then) else self._extra(other)
@@ -251,16 +251,16 @@ class _Alignment:
         return self._missing(place) if old.at_us < new.at_us else self._extra(other)
 
     def _difference(self, old: Said, new: Said) -> str:
-        """Return how two differ that belong together; empty if they do not."""
+        """Return the difference of a pair; empty if there is none."""
         if self._near(old, new):
-            return "the emulator says something else"
+            return "the emulator answers differently"
         if not self._tolerance.same(old.text, new.text):
             return ""
         late_ms = (new.at_us - old.at_us) / 1_000
         return f"the emulator is {abs(late_ms):.1f} ms {'later' if late_ms > 0 else 'earlier'}"
 
     def _fits(self, place: int, other: int) -> bool:
-        """Say whether two of them are the same at the same time."""
+        """Return whether two lines are equal and at the same time."""
         if place >= len(self._then) or other >= len(self._now):
             return False
         old, new = self._then[place], self._now[other]
@@ -270,7 +270,7 @@ class _Alignment:
         return abs(old.at_us - new.at_us) <= self._tolerance.allowed_us(old.at_us)
 
     def _missing(self, place: int) -> Pair:
-        return Pair(self._kind, self._then[place], None, "the emulator does not say it")
+        return Pair(self._kind, self._then[place], None, "the emulator does not send it")
 
     def _extra(self, other: int) -> Pair:
-        return Pair(self._kind, None, self._now[other], "the emulator alone says it")
+        return Pair(self._kind, None, self._now[other], "only the emulator sends it")

@@ -1,4 +1,4 @@
-"""Frames of a binary protocol: where they end on a serial line, and how people read them."""
+"""Frames of a binary protocol: splitting of the byte stream, and readable descriptions."""
 
 # Theory of operation
 # ===================
@@ -8,13 +8,13 @@
 # (`LineSettings(splitter=rule)`), which calls the rule for each direction and shows the frames
 # in transcripts, failure reports and HTML pages.
 #
-# Every byte is in exactly one piece. What is no frame is a piece as well, because people have
-# to see it, and a device refuses it by its check. So a rule never raises and never loses bytes.
-# Bytes before a header end with that header, not with what came at once: pieces do not depend
-# on how the bytes arrived.
+# Every byte is in exactly one piece. Bytes that are not a frame are a piece as well, because people
+# have to see it, and a device refuses it by its check. So a rule never raises and never loses
+# bytes. Bytes before a header end with that header, not with what came at once: pieces do not
+# depend on how the bytes arrived.
 #
 # There are four rules. Three know where a frame ends: `by_size`, `by_delimiter`, `by_length`.
-# A silence of `gap` ends a frame that has only begun, so a lost byte costs one frame. `by_gap`
+# A silence of `gap` ends an incomplete frame, so a lost byte costs one frame. `by_gap`
 # knows the silence alone: its frame is whole when the silence is over, which is later than its
 # last byte. `due_us` says when; `WireLog` asks it before it takes anything later, so request
 # and answer stand in the order and with the times in which they passed; and it lets the rig
@@ -43,11 +43,11 @@ _REASON_CHARACTERS: Final = 80
 
 
 class _HasParse(Protocol):
-    """What a description may be: a Struct of construct is one."""
+    """Interface of a description object, such as a Struct of construct."""
 
     @property
     def parse(self) -> Callable[[bytes], Any]:
-        """Return the fields of a frame; raises an exception if it is none."""
+        """Return the fields of a frame; raise an exception if it is invalid."""
         ...
 
 
@@ -55,21 +55,21 @@ FrameFields = Callable[[bytes], Mapping[str, Any]] | _HasParse
 """Describes frames: returns the fields of one by name, or raises an exception."""
 
 _Cut = Callable[[bytes], int]
-"""Returns how long the first piece of some bytes is, 0 if it is not whole yet."""
+"""Returns the length of the first piece of some bytes, 0 if it is incomplete."""
 
 
 @dataclass(frozen=True, slots=True)
 class FrameFormat(Immutable):
-    """How the bytes of a serial line are cut into frames, and how a log shows them.
+    """Rule for splitting the bytes of a serial line into frames, and for showing them in a log.
 
     Made by `by_gap`, `by_length`, `by_size` and `by_delimiter`.
 
     Attributes:
-        cut: returns the length of the first piece of some bytes, 0 if it is not whole yet.
-        gap_us: a silence of this length ends a frame that has begun; `NEVER` if none does.
-        delimiter: what ends each frame and is not part of it.
-        request: describes what the host sends, see `described`.
-        answer: describes what the device sends.
+        cut: returns the length of the first piece of some bytes, 0 if it is incomplete.
+        gap_us: a silence of this length ends an incomplete frame; `NEVER` without a limit.
+        delimiter: the bytes after each frame, not part of it.
+        request: describes frames of the host, see `described`.
+        answer: describes frames of the device.
     """
 
     cut: Callable[[bytes], int]
@@ -79,13 +79,13 @@ class FrameFormat(Immutable):
     answer: FrameFields | None = None
 
     def described(self, request: FrameFields, answer: FrameFields | None = None) -> FrameFormat:
-        """Return the same rule, whose log shows frames field by field.
+        """Return the same rule with descriptions, so that logs show frames field by field.
 
         Args:
-            request: describes what the host sends: a function that returns the fields of a frame
-                by name, or an object with such a method `parse`, as a Struct of construct. It
-                raises an exception if the bytes are no frame.
-            answer: describes what the device sends; the same unless given.
+            request: describes frames of the host: a function that returns the fields of a frame by
+                name, or an object with such a method `parse`, such as a Struct of construct. It
+                raises an exception for an invalid frame.
+            answer: describes frames of the device; by default the same.
 
         Returns:
             The rule.
@@ -93,11 +93,11 @@ class FrameFormat(Immutable):
         return replace(self, request=request, answer=answer or request)
 
     def splitter(self) -> FrameSplitter:
-        """Return what cuts the bytes of one direction, for a device."""
+        """Return a splitter for the bytes of one direction, for a device."""
         return FrameSplitter(self)
 
     def shown(self, mark: Mark, frame: bytes) -> bytes:
-        """Return a frame as a log shows it.
+        """Return a frame as shown in a log.
 
         Args:
             mark: its direction.
@@ -118,26 +118,26 @@ class FrameFormat(Immutable):
             return f"{hex_text(frame)} ({reason})".encode()
 
     def __call__(self, mark: Mark) -> FrameLog:
-        """Return what cuts one direction for a log.
+        """Return a splitter for one direction of a log.
 
         Args:
             mark: the direction.
 
         Returns:
-            What takes bytes and returns the frames as text.
+            A splitter that returns the frames as text.
         """
         return FrameLog(self, mark)
 
 
 class FrameSplitter(Copyable):
-    """Takes bytes in and gives frames out; chunking makes no difference.
+    """Collects bytes into frames, however they are split into chunks.
 
     Args:
-        rule: where frames end.
+        rule: the splitting rule.
 
     Attributes:
-        begun: the bytes of a frame that is not whole.
-        last_us: when they came.
+        begun: the bytes of an incomplete frame.
+        last_us: time of the latest of them.
     """
 
     def __init__(self, rule: FrameFormat) -> None:
@@ -146,7 +146,7 @@ class FrameSplitter(Copyable):
 
     @property
     def due_us(self) -> int:
-        """When a silence ends the frame that has begun; `NEVER` if none does."""
+        """When a silence ends the incomplete frame; `NEVER` without a limit."""
         return self.last_us + self._rule.gap_us if self.begun and self._ends else NEVER
 
     @property
@@ -154,14 +154,15 @@ class FrameSplitter(Copyable):
         return self._rule.gap_us < NEVER
 
     def push(self, now_us: int, data: bytes) -> list[bytes]:
-        """Take bytes in, and give whole frames out.
+        """Add received bytes and return completed frames.
 
         Args:
-            now_us: the present.
-            data: what came since the last call; call it without bytes when `due_us` is over.
+            now_us: the present time.
+            data: bytes received since the last call; call it without bytes when `due_us` has
+                passed.
 
         Returns:
-            The frames that have ended, and pieces that are no frame.
+            The completed frames, and pieces that are not frames.
         """
         out = []
         if self.due_us <= now_us:
@@ -180,15 +181,15 @@ class FrameSplitter(Copyable):
         return out
 
     def clear(self) -> None:
-        """Forget a frame that has only begun."""
+        """Discard an incomplete frame."""
         self.begun = b""
 
 
 class FrameLog:
-    """Cuts one direction for a log, and returns the frames as text.
+    """Splits one direction for a log, and returns the frames as text.
 
     Args:
-        rule: where frames end, and how they are shown.
+        rule: the rule with its descriptions.
         mark: the direction.
     """
 
@@ -198,12 +199,12 @@ class FrameLog:
 
     @property
     def due_us(self) -> int:
-        """When a silence ends the frame that has begun."""
+        """When a silence ends the incomplete frame."""
         return self._splitter.due_us
 
     @property
     def last_us(self) -> int:
-        """When the latest byte came."""
+        """Time of the latest byte."""
         return self._splitter.last_us
 
     @property
@@ -218,22 +219,22 @@ class FrameLog:
 
     @property
     def begun(self) -> bytes:
-        """A frame that is not whole, as text."""
+        """The incomplete frame as text."""
         begun = self._splitter.begun
         return self._rule.shown(self._mark, begun) if begun else b""
 
     def __call__(self, at_us: int, data: bytes) -> list[bytes]:
-        """Take bytes; return the frames that have ended, as text."""
+        """Add received bytes; return the completed frames as text."""
         frames = self._splitter.push(at_us, data)
         return [self._rule.shown(self._mark, frame) for frame in frames]
 
 
 def by_gap(gap: str | int) -> FrameFormat:
-    """Cut where the line is silent.
+    """Split at silences of the line.
 
     Args:
-        gap: the silence that ends a frame, as `"2ms"` or in us. It is longer than a byte takes, and
-            than the control period of the device.
+        gap: the silence that ends a frame, such as `"2ms"`, or in us. It must be longer than a byte
+            and than the control period of the device.
 
     Returns:
         The rule.
@@ -252,12 +253,11 @@ def by_gap(gap: str | int) -> FrameFormat:
 
 
 def by_size(size: int, gap: str | int | None = None) -> FrameFormat:
-    """Cut into frames of one size.
+    """Split into frames of one size.
 
     Args:
         size: in bytes, 1 or more.
-        gap: a silence that ends a frame that has only begun, as `"20ms"` or in us; None if none
-            does.
+        gap: a silence that ends an incomplete frame, such as `"20ms"`, or in us; None for no limit.
 
     Returns:
         The rule.
@@ -274,11 +274,11 @@ def by_size(size: int, gap: str | int | None = None) -> FrameFormat:
 
 
 def by_delimiter(delimiter: bytes, gap: str | int | None = None) -> FrameFormat:
-    """Cut behind a delimiter, which is not part of the frame.
+    """Split after a delimiter, which is not part of the frame.
 
     Args:
         delimiter: the bytes that end each frame.
-        gap: a silence that ends a frame that has only begun; None if none does.
+        gap: a silence that ends an incomplete frame; None for no limit.
 
     Returns:
         The rule. A log shows printable ASCII as text and other frames in hex.
@@ -303,24 +303,24 @@ def by_length(  # noqa: PLR0913 - all but three by keyword
     order: Literal["big", "little"] = "big",
     gap: str | int | None = None,
 ) -> FrameFormat:
-    """Cut by a length that each frame carries.
+    """Split by a length field in each frame.
 
     Args:
-        header: the bytes with which each frame begins; may be empty. Bytes before it are a piece
-            of their own.
-        at: where the length is, in bytes from the start of the frame.
+        header: the bytes at the start of each frame; may be empty. Bytes before it are a separate
+            piece.
+        at: position of the length, in bytes from the start of the frame.
         extra: bytes of the frame that the length does not count; below 0 if it counts more than
             the frame.
         size: bytes of the length, 1 to 4.
         order: byte order of the length.
-        gap: a silence that ends a frame that has only begun; None if none does.
+        gap: a silence that ends an incomplete frame; None for no limit.
 
     Returns:
-        The rule. A length that gives more than 4096 bytes, or less than up to itself, makes its
-        first byte no frame.
+        The rule. If the length gives more than 4096 bytes, or ends before the length field, the
+        first byte is not a frame.
 
     Raises:
-        ValueError: a place or size that cannot be, or not a time above 0.
+        ValueError: invalid position or size, or not a time above 0.
 
     >>> splitter = by_length(bytes([0x55]), at=1, extra=3).splitter()
     >>> [piece.hex(" ") for piece in splitter.push(0, bytes.fromhex("00 55 02 AA BB CC 55"))]
@@ -377,7 +377,7 @@ class _ByLength(Immutable):
 
 
 def hex_text(data: bytes) -> str:
-    """Write bytes in hex, in groups of four; long ones are cut, with their count.
+    """Write bytes in hex, in groups of four; long data are truncated, with their count.
 
     >>> hex_text(bytes.fromhex("0103 0452 4801"))
     '01030452 4801'

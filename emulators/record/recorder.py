@@ -1,4 +1,4 @@
-"""Record what a device hears, says and suffers."""
+"""Record the traffic, inputs and faults of devices."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from tickrig.wire.uart import UartSetting
 class TraceFile(NonCopyable):
     """A trace on its way to a file; each tick is written at once, so a kill loses nothing.
 
-    Where writing fails the recording ends with one warning, and the run goes on.
+    If writing fails, the recording ends with one warning, and the run continues.
 
     Args:
         path: the file; one that exists is replaced.
@@ -44,7 +44,7 @@ class TraceFile(NonCopyable):
 
     @property
     def error(self) -> str:
-        """Why the recording ended early, empty while all is well."""
+        """Reason for the early end of the recording, empty if there was no error."""
         return self._file.error
 
     def hear(self, now_us: int, done: Sequence[str], received: bytes, sent: bytes) -> None:
@@ -61,7 +61,7 @@ class TraceFile(NonCopyable):
         self._file.write([record.encode() for record in records])
 
     def close(self, now_us: int) -> None:
-        """Write how long the run lasted, and close the file."""
+        """Write the duration of the run, and close the file."""
         self._file.close(Record(now_us, Mark.END).encode())
 
 
@@ -69,27 +69,26 @@ W_contra = TypeVar("W_contra", contravariant=True)
 
 
 class Trace(Protocol[W_contra]):
-    """Where the ticks of a device are recorded."""
+    """Storage of the recorded ticks of a device."""
 
     @property
     def keeps(self) -> bool:
-        """Whether a copy of the device is recorded as well, in memory."""
+        """Whether a copy of the device is also recorded, in memory."""
         ...
 
     def hear(self, now_us: int, done: Sequence[str], received: W_contra, sent: W_contra) -> None:
-        """Take what was done to the device before a tick, and its traffic in it."""
+        """Record the actions on the device before a tick, and its traffic in the tick."""
 
 
 class TracedDevice(Generic[W]):
-    """A device that is recorded; nobody around it can tell.
+    """A recorded device with the same interface as the device itself.
 
-    What is recorded of it: its traffic, changes of its `inputs`, resets, what its CAN
-    controller tells it, and all that it tells itself to `on_set` if it has that, as a node
-    does of its objects.
+    Recorded are its traffic, changes of its `inputs`, resets, reports of its CAN controller, and
+    calls of its `on_set`, if it has that, as a node for its objects.
 
     Args:
         device: the device itself.
-        trace: where the ticks go.
+        trace: storage of the ticks.
     """
 
     def __init__(self, device: Device[W], trace: Trace[W]) -> None:
@@ -104,18 +103,18 @@ class TracedDevice(Generic[W]):
         self._follow()
 
     def _follow(self) -> None:
-        """Hear of what is set, also to the value that it has."""
+        """Receive each set value, even an unchanged one."""
         if hasattr(self._device, "on_set"):
             self._device.on_set = self._set
 
     def __reduce_ex__(self, protocol: SupportsIndex, /) -> Any:
-        """Copy the device alone where nobody records a copy."""
+        """Copy only the device if copies are not recorded."""
         if self._trace.keeps:
             return super().__reduce_ex__(protocol)
         return itself, (self._device,)
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """Go on recording, as a copy."""
+        """Continue recording in a copy."""
         vars(self).update(state)
         self._follow()
 
@@ -126,7 +125,7 @@ class TracedDevice(Generic[W]):
 
     @property
     def due_us(self) -> int:
-        """When the device is due; at once where a reset is to be recorded."""
+        """When the device is due; at once if a reset must be recorded."""
         if self._done:
             return 0  # a tick that is not due changes nothing, and a replay resets where it was
         return self._device.due_us  # type: ignore[no-any-return]  # a Device
@@ -147,12 +146,12 @@ class TracedDevice(Generic[W]):
 
     @property
     def uart(self) -> UartSetting | None:
-        """The setting of its UART, if it changes that."""
+        """The setting of its UART, if it can change."""
         return getattr(self._device, "uart", None)
 
     @property
     def horizon(self) -> Horizon | None:
-        """How far the device may work ahead."""
+        """How far the device may compute ahead."""
         return getattr(self._device, "horizon", None)
 
     @horizon.setter
@@ -172,11 +171,11 @@ class TracedDevice(Generic[W]):
 
     @property
     def on_accepts(self) -> list[Callable[[], None]]:
-        """Whom to call when these two have changed."""
+        """Callback for a change of these two."""
         return getattr(self._device, "on_accepts", [])
 
     def bus_state(self, state: ErrorState, /) -> None:
-        """Hand on what the CAN controller tells; it is recorded with the next tick."""
+        """Forward a report of the CAN controller; it is recorded with the next tick."""
         if hasattr(self._device, "bus_state"):
             self._done.append(_BUS_STATE[state])
             self._device.bus_state(state)
@@ -198,13 +197,13 @@ class TracedDevice(Generic[W]):
         return tx
 
     def _set(self, name: str, value: Setting) -> None:
-        """Note what was set."""
+        """Record a set value."""
         self._done.append(change_text(name, value))
         if name in self._seen:
             self._seen[name] = value
 
     def _look(self) -> None:
-        """Note what has changed in the bank."""
+        """Record the changes in the bank."""
         bank = self.inputs
         for name, seen in self._seen.items():
             if (value := bank[name]) != seen:
@@ -214,19 +213,19 @@ class TracedDevice(Generic[W]):
 _BUS_STATE = {state: text for text, state in BUS_STATE.items()}
 
 
-# Record a bench: what each of its devices receives, sends and suffers.
+# Record a bench: traffic, inputs and faults of each device.
 
 
 class Tick(NamedTuple):
-    """What a device met in a tick, or (mark `~`) a wire between ticks.
+    """The events of a device in a tick, or (mark `~`) of a wire between ticks.
 
     Attributes:
         at_us: the tick.
         name: of the device, or the wire.
-        done: what was done to it before, as `stick=5`.
+        done: actions before the tick, such as `stick=5`.
         received: bytes or frames.
         sent: bytes or frames.
-        mark: of what was done.
+        mark: mark of the actions.
     """
 
     at_us: int
@@ -237,11 +236,11 @@ class Tick(NamedTuple):
     mark: Mark = Mark.PHYSICAL
 
     def lines(self) -> Iterator[str]:
-        """Give its lines as text, without LF."""
+        """Return its lines as text, without LF."""
         return (record.encode() for record in self.records())
 
     def records(self) -> Iterator[BenchRecord]:
-        """Give the lines of it."""
+        """Yield its lines."""
         at_us, name = self.at_us, self.name
         for text in self.done:
             yield BenchRecord(at_us, name, self.mark, text=text)
@@ -254,15 +253,15 @@ class Tick(NamedTuple):
 class TraceRecorder(Copyable):
     r"""Records the devices of a bench, in memory or in a file.
 
-    Without a file it keeps all, for `save`: the latest ticks in memory, those before them as text
-    in a temporary file, which is gone with the recorder. So memory does not grow with the run. A
-    copy of the bench has what was recorded so far and goes on by itself. In a file each tick is
-    written at once, so that a kill loses nothing but the last tick; where writing fails the
-    recording ends with one warning, and the run goes on. Nobody records a copy then.
+    Without a file it keeps the recording for `save`: the latest ticks in memory, earlier ones as
+    text in a temporary file, which is deleted with the recorder. So memory does not grow with the
+    run. A copy of the bench has the recording so far and continues on its own. With a file each
+    tick is written at once, so that a kill loses only the last tick; if writing fails, the
+    recording ends with one warning, and the run continues. Copies are not recorded in this case.
 
     Args:
         path: the file, which is replaced; None to keep the lines for `save`.
-        header: what is on the bench.
+        header: describes the bench.
 
     Raises:
         OSError: the file cannot be opened.
@@ -289,12 +288,12 @@ class TraceRecorder(Copyable):
         self._last_us = 0
 
     def device(self, name: str, device: Device[W]) -> TracedDevice[W]:
-        """Return a device that is recorded, to be put on a rig instead of the one given.
+        """Return a recorded device, to be put on a rig instead of the given one.
 
         Args:
             name: one of the header.
-            device: the device, from its first tick on; what it has in `inputs`, and a node's
-                objects that are set from the inside, is recorded too.
+            device: the device, recorded from its first tick on, with its `inputs` and with objects
+                of a node that are set from the inside.
 
         Raises:
             KeyError: the header has no such device.
@@ -303,18 +302,18 @@ class TraceRecorder(Copyable):
         return TracedDevice(device, _Channel(name, self))
 
     def wire_fault(self, now_us: int, wire: str, text: str) -> None:
-        """Note that a fault of a wire began or ended.
+        """Record the start or end of a wire fault.
 
         Args:
-            now_us: when.
+            now_us: time of the change.
             wire: one of the header.
-            text: `cut`, `drop=0.1`; `cut=0` when it has ended.
+            text: `cut`, `drop=0.1`; `cut=0` for the end.
         """
         self.add(Tick(now_us, wire, (text,), mark=Mark.WIRE))
 
     @property
     def error(self) -> str:
-        """Why the recording ended early, empty while all is well."""
+        """Reason for the early end of the recording, empty if there was no error."""
         return self._file.error if self._file else ""
 
     @property
@@ -323,7 +322,7 @@ class TraceRecorder(Copyable):
         return not self._forgetful
 
     def add(self, tick: Tick) -> None:
-        """Record what happened; the run lasts at least as long."""
+        """Record events; the run lasts at least until their time."""
         self._last_us = max(self._last_us, tick.at_us)
         if not self._forgetful:
             self._ticks.append(tick)
@@ -334,7 +333,7 @@ class TraceRecorder(Copyable):
             self._file.write([*tick.lines()])
 
     def _write_down(self) -> None:
-        """Keep as text what is in memory."""
+        """Convert the ticks in memory to text."""
         parts = (*(part for part in self._shared if isinstance(part, _Ticks)), _Ticks(self._ticks))
         text = "".join(f"{line}\n" for part in parts for line in part.lines())
         written = tuple(part for part in self._shared if isinstance(part, _Lines))
@@ -342,7 +341,7 @@ class TraceRecorder(Copyable):
         self._ticks, self._in_memory = [], 0
 
     def lines(self, now_us: int) -> Iterator[str]:
-        """Give the lines of what was kept, as a run that lasted until now.
+        """Yield the lines of the recording, as a run that lasted until now.
 
         Args:
             now_us: time of the rig.
@@ -353,14 +352,14 @@ class TraceRecorder(Copyable):
         yield BenchRecord(max(now_us, self._last_us), "", Mark.END).encode()
 
     def save(self, path: Path, now_us: int) -> None:
-        """Write what was kept into a file.
+        """Write the recording to a file.
 
         Args:
             path: the file; one that exists is replaced.
             now_us: time of the rig.
 
         Raises:
-            ValueError: it records in a file already.
+            ValueError: it already records to a file.
             OSError: the file cannot be written.
         """
         if self._forgetful:
@@ -368,37 +367,37 @@ class TraceRecorder(Copyable):
         write_whole(path, "".join(f"{line}\n" for line in self.lines(now_us)))
 
     def close(self, now_us: int) -> None:
-        """Write into its file how long the run lasted, and close it."""
+        """Write the duration of the run to its file, and close it."""
         if self._file is not None:
             self._file.close(BenchRecord(max(now_us, self._last_us), "", Mark.END).encode())
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the state of a copy; what was recorded so far is shared."""
+        """Return the state of a copy; the recording so far is shared."""
         if self._ticks:
             self._shared, self._ticks = (*self._shared, _Ticks(tuple(self._ticks))), []
         return {**vars(self), "_file": None, "_spool": _Spool()}
 
 
 TICKS_KEPT: Final = 4_096
-"""So many ticks are kept in memory at most, before they are written as text."""
+"""Largest number of ticks in memory before they are written as text."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Ticks(Immutable):
-    """Ticks that a recorder shares with its copies."""
+    """Ticks shared by a recorder and its copies."""
 
     ticks: Sequence[Tick]
 
     def lines(self) -> Iterator[str]:
-        """Give their lines, without LF."""
+        """Yield their lines, without LF."""
         for tick in self.ticks:
             yield from tick.lines()
 
 
 class _Spool:
-    """A temporary file that only grows; where none can be written, what was to go there stays.
+    """An append-only temporary file; if none can be written, the text stays in memory.
 
-    Copies within the process share what was written; each copy writes into a file of its own.
+    Copies within the process share the written part; each copy appends to a file of its own.
     """
 
     shared_by_twins = True
@@ -408,7 +407,7 @@ class _Spool:
         self._size, self._failed = 0, False
 
     def keep(self, text: str) -> _Lines:
-        """Keep a text."""
+        """Append a text."""
         data = text.encode()
         if not self._failed:
             try:
@@ -430,7 +429,7 @@ class _Spool:
             self._file.close()
 
     def read(self, start: int, size: int) -> bytes:
-        """Return what was kept."""
+        """Return the stored text."""
         if self._file is None:
             return b""
         self._file.seek(start)
@@ -438,7 +437,7 @@ class _Spool:
 
 
 class _Lines(Immutable):
-    """Lines that a recorder shares with its copies; a pickle has them itself."""
+    """Lines shared by a recorder and its copies; a pickle contains them."""
 
     def __init__(
         self, data: bytes, spool: _Spool | None = None, start: int = 0, size: int = 0
@@ -452,16 +451,16 @@ class _Lines(Immutable):
         return self._spool.read(self._start, self._size)
 
     def lines(self) -> Iterator[str]:
-        """Give them, without LF."""
+        """Return the lines, without LF."""
         return iter(self._text.decode().split("\n")[:-1])
 
     def __reduce__(self) -> Any:
-        """Take the lines along into another process."""
+        """Pickle the lines themselves, for another process."""
         return _Lines, (self._text,)
 
 
 class _Channel(NamedTuple):
-    """Where a device is recorded."""
+    """Storage for the recording of a device."""
 
     name: str
     recorder: TraceRecorder
@@ -483,18 +482,18 @@ _logger = log_of(__name__)
 class CandumpFile:
     """A log on its way to a file; each line is written at once, so a kill loses nothing.
 
-    Where writing fails the recording ends with one warning, and the run goes
-    on. Its `hear` is an observer of a `CanWire`.
+    If writing fails, the recording ends with one warning, and the run continues. Use its `hear` as
+    observer of a `CanWire`.
 
     Args:
         path: the file; one that exists is replaced.
-        channel: what the bus is called in it.
+        channel: name of the bus in it.
 
     Attributes:
-        error: why the recording ended early, empty while all is well.
+        error: reason for the early end of the recording, empty if there was no error.
 
     Raises:
-        ValueError: a channel with blanks, or none.
+        ValueError: an empty channel, or one with blanks.
         OSError: the file cannot be opened.
     """
 
@@ -505,7 +504,7 @@ class CandumpFile:
         self._file = path.open("w", buffering=1, encoding="ascii")
 
     def hear(self, at_us: int, received: CanFrame | ErrorFrame) -> None:
-        """Write what was on the bus."""
+        """Write a frame of the bus."""
         if self.error:
             return
         try:
@@ -515,7 +514,7 @@ class CandumpFile:
             _logger.warning("recording ended: %s; the emulator goes on", self.error)
 
     def close(self, now_us: int = 0) -> None:
-        """Close the file, at a time that it has no line for; closing twice is no error."""
+        """Close the file at a time without a line; closing it again has no effect."""
         try:
             self._file.close()
         except OSError as error:

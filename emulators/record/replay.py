@@ -27,13 +27,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class ReplayDifference(Generic[W]):
-    """The first tick at which a replay did not say what was recorded.
+    """The first tick with another output than recorded.
 
     Attributes:
         at_us: the tick.
-        recorded: what the device said then.
-        replayed: what it says now.
-        line: the line of the trace, 0 if it said nothing then.
+        recorded: recorded output.
+        replayed: output of the replay.
+        line: line of the trace, 0 without recorded output.
     """
 
     at_us: int
@@ -44,7 +44,7 @@ class ReplayDifference(Generic[W]):
 
 @dataclass(frozen=True, slots=True)
 class _Change:
-    """What is done to a device before a tick."""
+    """An action on a device before a tick."""
 
     at_us: int
     act: Callable[[], None]
@@ -57,16 +57,15 @@ def _play(
     nothing: W,
     until_us: int,
 ) -> list[tuple[int, W]]:
-    """Give a device what it received and suffered; return what it says, with its ticks.
+    """Repeat traffic and changes on a device; return its output with the ticks.
 
-    It does what a `Rig` with this one station would do, without asking anything but the device:
-    only ticks with work are made. Between two changes nobody looks at the device, so a drive may
-    work ahead (`Horizon`).
+    It does the same as a `Rig` with this one station: only ticks with work are made. Nothing reads
+    the device between two changes, so a drive may compute ahead (`Horizon`).
 
     Args:
-        device: a fresh one.
+        device: a new one.
         received: the traffic with its times, sorted.
-        changes: what is done to it, sorted.
+        changes: the actions on it, sorted.
         nothing: empty traffic.
         until_us: the last tick.
     """
@@ -99,11 +98,11 @@ def _nothing() -> None:
 def _first_difference(
     recorded: Sequence[tuple[int, W, int]], replayed: Sequence[tuple[int, W]], nothing: W
 ) -> ReplayDifference[W] | None:
-    """Return the first tick at which something else was said, None if there is none.
+    """Return the first tick with different output, None if there is none.
 
     Args:
-        recorded: what was said, with its times and lines.
-        replayed: what is said now, with its times.
+        recorded: recorded output, with times and lines.
+        replayed: output of the replay, with times.
         nothing: empty traffic.
     """
     silence = (NEVER, nothing, 0)
@@ -117,14 +116,13 @@ def _first_difference(
 
 @dataclass(frozen=True, slots=True)
 class RecordedRun:
-    """A trace as it was read.
+    """A trace that has been read.
 
     Attributes:
-        header: which device, and how it was configured.
+        header: the device and its configuration.
         records: the lines in order.
-        ended: whether it says how long the run lasted.
-            Without that the writer was killed or its disk full, and the last
-            tick, which may not be whole, is left out.
+        ended: whether it contains the duration of the run. Otherwise the writer was killed or its
+            disk was full, and the last tick, which may be incomplete, is left out.
     """
 
     header: trace.Header
@@ -133,20 +131,20 @@ class RecordedRun:
 
     @property
     def until_us(self) -> int:
-        """How far the recording reaches."""
+        """Duration of the recording."""
         return self.records[-1].at_us if self.records else 0
 
     @property
     def ticks(self) -> int:
-        """How many ticks had traffic or a change."""
+        """Number of ticks with traffic or a change."""
         return len({record.at_us for record in self.records if record.mark is not trace.Mark.END})
 
 
 def read_recording(data: bytes) -> RecordedRun:
-    """Read a trace, also one whose writer was killed in the middle of a line.
+    """Read a trace; the writer may have been killed in the middle of a line.
 
     Raises:
-        TraceError: not a trace of this version, or a line of it is damaged.
+        TraceError: not a trace of this version, or a damaged line.
     """
     first, *lines = trace.trace_text(data).split("\n")
     header = trace.parse_header(first)
@@ -158,7 +156,7 @@ def read_recording(data: bytes) -> RecordedRun:
 
 
 def replay(recording: RecordedRun, device: Emulated[bytes]) -> ReplayDifference[bytes] | None:
-    """Feed a fresh device what was recorded; None if it said the same.
+    """Replay a recording on a new device; return None if its output is the same.
 
     Raises:
         TraceError: the trace names an input that the device does not have.
@@ -192,14 +190,13 @@ Traffic = bytes | Frames
 
 @dataclass(frozen=True)
 class BenchRecording:
-    """A trace as it was read.
+    """A trace that has been read.
 
     Attributes:
-        header: what was on the bench.
+        header: describes the bench.
         records: the lines in order.
-        ended: whether it says how long the run lasted.
-            Without that the writer was killed or its disk full, and the last
-            tick, which may not be whole, is left out.
+        ended: whether it contains the duration of the run. Otherwise the writer was killed or its
+            disk was full, and the last tick, which may be incomplete, is left out.
     """
 
     header: bench_header.BenchHeader
@@ -216,12 +213,12 @@ class BenchRecording:
 
     @property
     def until_us(self) -> int:
-        """How far the recording reaches."""
+        """Duration of the recording."""
         return self.records[-1].at_us if self.records else 0
 
     @property
     def at_port(self) -> bool:
-        """Whether its times are those of a host at its port, not of ticks."""
+        """Whether its times come from a port tap at a host, not from ticks."""
         return self.header.place is bench_header.Place.PORT
 
     def to_pandas(self) -> pandas.DataFrame:
@@ -319,10 +316,10 @@ def read_trace(path: Path | str) -> BenchRecording:
 
 
 def read_bench_recording(data: bytes) -> BenchRecording:
-    """Read a trace of either version, also one whose writer was killed in the middle of a line.
+    """Read a trace of either version; the writer may have been killed in the middle of a line.
 
     Raises:
-        TraceError: not a trace, or a line of it is damaged.
+        TraceError: not a trace, or a damaged line.
     """
     if not data.startswith(bench_header.PREFIX.encode()):
         return _as_bench(read_recording(data))
@@ -354,12 +351,12 @@ def _as_bench(recording: RecordedRun) -> BenchRecording:
 def replay_device(
     recording: BenchRecording, name: str, device: Device[Any]
 ) -> ReplayDifference[Any] | None:
-    """Feed a fresh device what one of the bench met; None if it said the same.
+    """Replay a device of the bench on a new one; return None if its output is the same.
 
     Args:
         recording: the run.
-        name: which device of it.
-        device: a fresh one.
+        name: of the device in it.
+        device: a new one.
 
     Raises:
         TraceError: the trace names an input that the device does not have.
@@ -370,7 +367,7 @@ def replay_device(
 
 
 def play_device(recording: BenchRecording, name: str, device: Device[Any]) -> list[tuple[int, Any]]:
-    """Feed a fresh device what one of the bench met; return what it says, with its ticks.
+    """Replay a device of the bench on a new one; return its output with the ticks.
 
     Raises:
         TraceError: the trace names an input that the device does not have.
@@ -389,7 +386,7 @@ def play_device(recording: BenchRecording, name: str, device: Device[Any]) -> li
 def traffic_of(
     records: Sequence[BenchRecord], mark: trace.Mark
 ) -> Iterator[tuple[int, Traffic, int]]:
-    """Give what passed one way: the time, all of that tick, the first line of it."""
+    """Yield the traffic of one direction: time, all data of the tick, its first line."""
     passed = (record for record in records if record.mark is mark)
     for at_us, group in groupby(passed, key=lambda record: record.at_us):
         first, *more = group
@@ -400,10 +397,10 @@ def traffic_of(
 
 
 def do(device: Any, record: BenchRecord) -> None:
-    """Do to a device what was done.
+    """Repeat the actions on a device.
 
     Raises:
-        TraceError: it has no such input, or cannot have that value.
+        TraceError: unknown input, or invalid value.
     """
     try:
         if record.text == trace.RESET:

@@ -1,4 +1,4 @@
-"""The latest lines, or frames, on a serial line, both ways."""
+"""The latest lines, or frames, on a serial line, in both directions."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from tickrig.wire.lines import LineSplitter
 
 @dataclass(frozen=True, slots=True)
 class WireLine:
-    """One line that passed.
+    """One line on the wire.
 
     Attributes:
         number: counts the lines of a run from 1.
-        at_us: when its last byte was heard.
-        mark: which way it went.
+        at_us: time of its last byte.
+        mark: its direction.
         data: the line without its line end.
-        source: the wire or device, where there are several.
+        source: the wire or device, if there are several.
     """
 
     number: int
@@ -36,29 +36,29 @@ class WireLine:
 
 
 _MOST_BEGUN: Final = 4_096
-"""Bytes that are kept of a line that does not end."""
+"""Largest number of bytes kept of a line without an end."""
 
 _LINE_ENDS: Final = b"\r\n"
 
 Splitter = Callable[[int, bytes], list[bytes]]
-"""Told when bytes were heard; gives what has become whole."""
+"""Called with received bytes and their time; returns the completed lines."""
 
 
 def line_splitter(mark: Mark) -> Splitter:
-    """Return what cuts one direction into lines."""
+    """Return a splitter of one direction into lines."""
     splitter = LineSplitter()
     return lambda at_us, data: splitter.push(data)
 
 
 class WireLog:
-    """Cuts what it hears into lines, keeps the latest, and tells its listeners.
+    """Splits traffic into lines, keeps the latest, and calls its listeners.
 
     Args:
-        keep: how many lines are kept.
-        splitter: makes what cuts the bytes of one direction, into lines unless given.
+        keep: number of lines to keep.
+        splitter: factory of the splitters of each direction; by default into lines.
 
     Attributes:
-        listeners: called with each line when it is whole.
+        listeners: called with each complete line.
     """
 
     def __init__(
@@ -85,7 +85,7 @@ class WireLog:
             rig.watchers.append(self._end_silent)
 
     def hear(self, at_us: int, mark: Mark, data: bytes) -> None:
-        """Take what passed, cut anywhere."""
+        """Add traffic, in chunks of any size."""
         self._end_silent(at_us)
         splitter = self._splitters[mark]
         if isinstance(splitter, FrameLog):
@@ -101,7 +101,7 @@ class WireLog:
         self._begun[mark] = at_us, begun
 
     def _end_silent(self, at_us: int) -> None:
-        """Take frames that a silence has ended, at the time of their last byte."""
+        """Add frames that a silence has ended, at the time of their last byte."""
         for mark, splitter in self._splitters.items():
             if isinstance(splitter, FrameLog) and splitter.due_us <= at_us:
                 for line in splitter(at_us, b""):
@@ -130,7 +130,7 @@ class WireLog:
     def add(
         self, at_us: int, mark: Mark, line: bytes | CanFrame | ErrorFrame, source: str = ""
     ) -> None:
-        """Take a whole line; a frame is written down when somebody looks: 5 % of a busy bus."""
+        """Add a complete line; frames are formatted on access, which saves 5 % of a busy bus."""
         self._count += 1
         whole = (self._count, at_us, mark, line, source)
         self._lines.append(whole)
@@ -138,7 +138,7 @@ class WireLog:
             listener(_written(*whole))
 
     def since(self, number: int) -> tuple[WireLine, ...]:
-        """Return the kept lines that came after the one of this number."""
+        """Return the kept lines after the one with this number."""
         return tuple(_written(*line) for line in self._lines if line[0] > number)
 
 

@@ -28,37 +28,36 @@ _BAUD: Final = 115_200
 _USB_BAUD: Final = 12_000_000
 
 _AHEAD_M: Final = 0.2
-"""From the middle of the axle to the sensor; a choice."""
+"""Distance from the middle of the axle to the sensor; a choice."""
 
 _OUTLINE_M: Final = 0.25
-"""How wide a robot looks to others: a post around the middle of its axle; a choice."""
+"""Size of a robot as seen by others: a post around the middle of its axle; a choice."""
 
 PLACE: Final = ("x_m", "y_m", "heading_rad")
 
 
 class Mounted:
-    """Something that a base carries, as a coupling of the rig."""
+    """An object carried by a base, as a coupling of the rig."""
 
     @property
     def tick_us(self) -> int:
-        """As often as the world looks at the base."""
+        """The update period of the base's outputs."""
         return LOOK_US
 
     @property
     def due_us(self) -> int:
-        """Never: a base that moves has work."""
+        """Always `NEVER`: a moving base has work itself."""
         return NEVER
 
 
 class MountedUrg(Mounted):
     """A sensor in front of the axle.
 
-    Not emulated: what it would see of its own robot, and the outline of others, which are
-    round.
+    Not emulated: its own robot in its view, and the outline of other robots, which are round.
 
     Args:
-        base: what carries it.
-        world: what is around.
+        base: the base that carries it.
+        world: the surroundings.
         others: bases that it sees.
 
     Attributes:
@@ -72,7 +71,7 @@ class MountedUrg(Mounted):
         self.urg, self.line = Urg(world=world), SerialLine(_USB_BAUD)
 
     def act(self, now_us: int, /) -> None:
-        """Put the sensor where the base has taken it, and others where they are."""
+        """Move the sensor with the base, and update the positions of other robots."""
         read, inputs = self._base.read, self.urg.inputs
         x_m, y_m, heading = read("x_m"), read("y_m"), read("heading_rad")
         place = (x_m + _AHEAD_M * cos(heading), y_m + _AHEAD_M * sin(heading), heading)
@@ -84,11 +83,11 @@ class MountedUrg(Mounted):
 
 
 class _Aboard(Coupling, Protocol):
-    """Something that a cart carries; it moves along as a coupling of the rig."""
+    """An object carried by a cart, as a coupling of the rig."""
 
     @property
     def station(self) -> Station[bytes]:
-        """It, on its line."""
+        """The station of the object."""
         ...
 
 
@@ -108,22 +107,22 @@ class Cart:
 
     @property
     def true_pose(self) -> Pose:
-        """Where it is."""
+        """Pose of the cart."""
         pose = self.base.ground.pose
         return Pose(pose.x_m, pose.y_m, pose.wrapped_rad)
 
 
 class ClosedLoop:
-    """Carts, their lines and one manager, moved on together.
+    """Carts, their lines and one manager, advanced together.
 
     Args:
         parameters: one for each base.
-        seed: of the wire faults' chance.
+        seed: of random wire faults.
         dense: run every tick of every base.
-        world: what is around them; with one, each carries a range finder that sees it.
-        aboard: makes what else the first cart carries.
-        pace: how many times as fast as the machine's its time passes; as it goes without one.
-        clock: what it waits by, with a pace.
+        world: the surroundings; with one, each cart carries a range finder that sees it.
+        aboard: makes further loads of the first cart.
+        pace: ratio of its time to real time; None for as fast as possible.
+        clock: the clock for waiting, with a pace.
 
     Attributes:
         rig: the bases on their lines.
@@ -164,7 +163,7 @@ class ClosedLoop:
 
     @property
     def pose(self) -> Pose:
-        """Where the first cart truly is."""
+        """True pose of the first cart."""
         return self.cart.true_pose
 
     @property
@@ -179,7 +178,7 @@ class ClosedLoop:
             cart.chain.activate()
 
     def run_to(self, t_us: int) -> None:
-        """Go on to a time."""
+        """Advance to a time."""
         if self._pace is not None:
             self._clock.wait_until(round(t_us / self._pace))
         while (due_us := self.manager.due_us) <= t_us:
@@ -189,7 +188,7 @@ class ClosedLoop:
             self.rig.run_to(t_us)
 
     def run_until(self, done: Callable[[], bool], timeout_us: int, step_us: int = 20_000) -> bool:
-        """Go on until something is so; False if it was not in time."""
+        """Advance until a condition is true; return False after the time-out."""
         until_us = self.now_us + timeout_us
         while not done() and self.now_us < until_us:
             self.run_to(min(self.now_us + step_us, until_us))
@@ -200,7 +199,7 @@ class ClosedLoop:
 
 
 def _range_finders(bases: Sequence[Rh3Base], world: World) -> tuple[MountedUrg, ...]:
-    """Return a range finder for each base; it sees the others too."""
+    """Return a range finder for each base; it also sees the other robots."""
     return tuple(
         MountedUrg(base, world, [other for other in bases if other is not base]) for base in bases
     )

@@ -1,4 +1,4 @@
-"""Robots that go together in one map frame: carts on two wheels, and on omni wheels."""
+"""Robots in one map frame: carts on two wheels and on omni wheels."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ _WIDE: Final = {"dataport.buffer.length": "64"}
 _STEP_US: Final = 1_000
 
 _WATCHDOG_US: Final = 500_000
-"""Silence after which it stops, as the base on two wheels does."""
+"""Silence after which it stops, as on two wheels."""
 
 
 class OmniCart(RtComponent):
-    """Takes IIS velocities with all three parts, and writes its pose, which is the true one.
+    """Accepts IIS velocities with all three parts, and writes its true pose.
 
-    A velocity with a number that is none means stop.
+    A velocity with NaN means stop.
 
-    Not emulated: a driver and its line, encoders, an odometry that errs.
+    Not emulated: a driver and its line, encoders, odometry errors.
 
     Attributes:
-        body: the wheels and where they are.
+        body: the wheels and their pose.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("OmniCart", "Robot on three omni wheels, emulated")
@@ -47,21 +47,21 @@ class OmniCart(RtComponent):
 
     @property
     def true_pose(self) -> Pose:
-        """Where it is."""
+        """Pose of the robot."""
         pose = self.body.pose
         return Pose(pose.x_m, pose.y_m, pose.wrapped_rad)
 
     def place(self, pose: Pose) -> None:
-        """Put it somewhere."""
+        """Set the pose."""
         self.body.pose = BodyPose(*pose)
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
-        """Begin at standstill."""
+        """Start at standstill."""
         self._wanted = Velocity()
         return ReturnCode.RTC_OK
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
-        """Go on for a period."""
+        """Run one period."""
         if (latest := read_newest(self.velocity)) is not None:
             numbers = (latest.data.vx, latest.data.vy, latest.data.va)
             self._wanted = Velocity(*numbers) if plausible(*numbers) else Velocity()
@@ -126,10 +126,10 @@ class _Robot:
     """One robot of a convoy, by the names of its ports.
 
     Attributes:
-        position: where its self-position leaves.
-        velocity: where its moving command arrives.
-        cart: it has the true pose.
-        sideways: it goes any way.
+        position: port of its self-position.
+        velocity: port of its moving command.
+        cart: has the true pose.
+        sideways: whether it can move in any direction.
     """
 
     position: str
@@ -139,7 +139,7 @@ class _Robot:
 
     @property
     def true_pose(self) -> Pose:
-        """Where it is."""
+        """Pose of the robot."""
         return self.cart.true_pose
 
 
@@ -168,7 +168,7 @@ class Convoy:
         self._leaders: dict[int, int] = {}
 
     def follow(self, robot: int, leader: int) -> None:
-        """Let a robot follow another from now on; whom it followed before is forgotten."""
+        """Let a robot follow another one from now on instead of the previous one."""
         manager, name = self.loop.manager, f"Follower{robot}"
         if robot not in self._leaders:
             self._add_follower(robot, name)
@@ -179,7 +179,7 @@ class Convoy:
         self._leaders[robot] = leader
 
     def command(self, source: str) -> None:
-        """Let all robots obey one OutPort of IIS velocities, in the place of their planners."""
+        """Drive all robots by one OutPort of IIS velocities instead of their planners."""
         manager = self.loop.manager
         manager.disconnect("PathFollower0.velocity", self.robots[0].velocity)
         for robot in self.robots:
@@ -212,7 +212,7 @@ class Convoy:
 
 
 def place(cart: Cart, pose: Pose) -> None:
-    """Put a cart somewhere, and let its odometry begin there."""
+    """Set the pose of a cart and of its odometry."""
     cart.base.ground.pose = BodyPose(*pose)
     configuration = cart.chain.odometry.configuration
     for name, number in zip(("x", "y", "theta"), pose, strict=True):

@@ -1,4 +1,4 @@
-"""The base of RH3 as a device type: `rh3-emu`, and the configuration that its traces carry."""
+"""The base of RH3 as a device type: `rh3-emu`, and its configuration in traces."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from tickrig.host.text.trace import Config
 from tickrig.wire import modbus
 from tickrig.wire.errors import WireError
 
-# Cut what passes on the line into frames, shown in hex without their CRC: `01 03 00 00 00 02`.
+# Split the traffic of the line into frames, shown in hex without their CRC: `01 03 00 00 00 02`.
 
 _CRC_BYTES = 2
 
 
 class _FrameSplitter:
-    """A frame is whole when its CRC matches; what silence leaves behind is shown as it is."""
+    """A frame is complete when its CRC matches; other bytes before a silence stay as they are."""
 
     def __init__(self) -> None:
         self._begun, self._received_us = b"", 0
@@ -50,14 +50,14 @@ def _hex(data: bytes) -> bytes:
     return data.hex(" ").encode()
 
 
-# What a scenario can send to a base: `read status`, `write target_speed_left 71534`, `raw`.
+# Requests of a scenario to a base: `read status`, `write target_speed_left 71534`, `raw`.
 
 _BY_NAME = {register.name: register for register in TABLE}
 _WORD = 0xFFFF
 
 
 def verbs(address: int) -> Mapping[str, Sender]:
-    """Return the verbs that send, to the slave of an address."""
+    """Return the sending verbs for a slave address."""
 
     def read(rest: str) -> Send:
         words = rest.split()
@@ -113,11 +113,11 @@ def _split(register: Register, value: int) -> tuple[int, ...]:
 
 
 _CYCLE: Final = b"01 17 "
-"""What -v leaves out: the traffic of each period."""
+"""Periodic traffic, which -v omits."""
 
 
 def _config_to_trace(parameters: BaseParameters) -> Config:
-    """Return all parameters, also those left alone: defaults may change one day."""
+    """Return all parameters, including unchanged ones, because defaults may change."""
     settings = asdict(parameters)
     return {"ground_seed" if name == "seed" else name: v for name, v in settings.items()}
 
@@ -134,10 +134,10 @@ def _parameters_of(settings: Mapping[str, Any]) -> BaseParameters:
 
 
 def read_parameters(options: Mapping[str, Any]) -> BaseParameters:
-    """Return a base of options, those left out as they are.
+    """Return a base with the given options and defaults for the others.
 
     Raises:
-        ValueError: there is no such base; a message that begins with a parameter names its option.
+        ValueError: invalid options; a message about a parameter names its option.
     """
     try:
         return _parameters_of({name: v for name, v in options.items() if v is not None})

@@ -1,4 +1,4 @@
-"""What can be set of a base of RH3."""
+"""Options of a base of RH3."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ PARAMETERS: Final = (
     _number("tread_m", "Effective distance between the wheels.  [0.464]"),
     _number("friction", "Coefficient between wheels and ground; without it they never slip."),
     _number("response_s", "Time constant of the speed loop.  [0.05]"),
-    DeviceField(name="delay_ms", kind=int, unit="MS", help="From a command to its effect.  [0]"),
-    _number("noise", "Spread of a wheel's way over the ground, as a share of it.  [0]"),
+    DeviceField(name="delay_ms", kind=int, unit="MS", help="Delay of a command's effect. [0]"),
+    _number("noise", "Spread of a wheel's distance over the ground, as a share of it. [0]"),
 )
-"""Of `BaseParameters`, for the verbs of `rh3` too."""
+"""Options of `BaseParameters`, also for the verbs of `rh3`."""
 
 FIELDS: Final = (
     DeviceField(

@@ -1,1 +1,1 @@
-"""The rig: stations, clocks, timetable, ports, links into virtual time; no wire in particular."""
+"""The rig: stations, clocks, timetable, ports, links into virtual time; for all kinds of wires."""

@@ -9,12 +9,12 @@ class Clock(Protocol):
     """Time since the rig was started, in microseconds."""
 
     def wait_until(self, t_us: int, /) -> int:
-        """Return when it is `t_us`; the answer is how late in microseconds, 0 if on time."""
+        """Wait until `t_us`; return the delay in microseconds, 0 if on time."""
         ...
 
 
 class VirtualClock:
-    """Time that passes as fast as the rig can compute: never late."""
+    """Virtual time, which passes as fast as the rig computes and is never late."""
 
     def wait_until(self, t_us: int, /) -> int:
         """Return at once: in virtual time it is already `t_us`."""

@@ -1,4 +1,4 @@
-"""What an emulator needs of a device: that it can be ticked, and has signals."""
+"""Interface of devices for emulators: ticks and signals."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from tickrig.host.text.values import Setting
 
 
 class Inputs(Protocol):
-    """What the world does to a device, by name; `InputBank` is one.
+    """Physical inputs of a device, by name; `InputBank` is one.
 
     Attributes:
-        changed: whether anything was set since the device last looked.
+        changed: whether an input was set since the device last checked.
     """
 
     changed: bool
@@ -34,10 +34,10 @@ class Inputs(Protocol):
         ...
 
     def set(self, name: str, value: Setting) -> None:
-        """Set an input; ValueError if there is none, or it does not take the value."""
+        """Set an input; ValueError if it does not exist or does not accept the value."""
 
     def check(self, name: str, value: Setting) -> Setting:
-        """Return the value that it would be set to, or raise as `set` would."""
+        """Return the value that `set` would store, or raise as `set` would."""
         ...
 
     def names(self, signal_type: SignalType) -> tuple[str, ...]:
@@ -45,7 +45,7 @@ class Inputs(Protocol):
         ...
 
     def find(self, name: str, signal_type: SignalType | None = None) -> InputSignal:
-        """Return the description of an input; ValueError if there is none of this type."""
+        """Return the description of an input; ValueError if there is no input of this type."""
         ...
 
 
@@ -59,12 +59,12 @@ class HasSignals(Protocol):
 
     @property
     def inputs(self) -> Inputs:
-        """What the world does to the device."""
+        """Physical inputs of the device."""
         ...
 
     @property
     def outputs(self) -> Mapping[str, OutputSignal]:
-        """What the world sees of the device."""
+        """Physical outputs of the device."""
         ...
 
     def read(self, name: str, /) -> Setting:

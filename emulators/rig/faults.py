@@ -1,11 +1,11 @@
-"""Faults by name: how they are declared, and what happens to traffic on its way."""
+"""Faults by name: their declarations, and their effect on traffic."""
 
 # Theory of operation.
 #
 # A fault is declared by one entry of a table, `NAME: FaultType(...)`: what it does, which arguments
-# it takes, and what it is made by. All else is derived from the entry: `bind_arguments` reads what
-# people write behind `NAME=`, `usage` says how to write it, `describe` and `tickrig ctl SOCKET
-# faults` list it, and the table of docs/reference/bench/faults.md is written of it.
+# it takes, and what it is made by. Everything else is derived from the entry: `bind_arguments`
+# reads what people write behind `NAME=`, `usage` says how to write it, `describe` and `tickrig ctl
+# SOCKET faults` list it, and the table of docs/reference/bench/faults.md is written of it.
 #
 # People write `NAME[=ARGUMENT[,ARGUMENT]]`. A bare argument is the next one of the declaration, or
 # `KEY=VALUE` names it. Each fault that is `rated` also takes `rate=` (how probable it is that it
@@ -38,18 +38,18 @@ _MOST: Final = 1_000_000
 
 @dataclass(frozen=True, slots=True)
 class FaultArgument(Immutable):
-    """An argument of a fault, as people write it.
+    """An argument of a fault.
 
     Attributes:
         name: keyword, `delay` of `delay=800ms`.
-        text: what it sets, for people.
-        default: what it is where nobody writes it, as people write it.
+        text: description for people.
+        default: its default, in the notation of users.
         unit: `time` for a duration (low and high in us), else the unit of a whole number, which
             may be written in hex; empty for a plain number.
         low: smallest value.
         high: largest value.
-        choices: the words that it takes instead of a number, if any.
-        read: reads the word instead, if it has a form of its own; raises ValueError.
+        choices: allowed words instead of a number, if any.
+        read: reads the word instead, for a special form; raises ValueError.
     """
 
     name: str
@@ -63,7 +63,7 @@ class FaultArgument(Immutable):
 
     @property
     def range(self) -> str:
-        """Which values it takes, for people."""
+        """The allowed values, for people."""
         if self.choices:
             return " or ".join(self.choices)
         if self.read is not None:
@@ -76,7 +76,7 @@ class FaultArgument(Immutable):
         """Read a value: microseconds of a time, a number, a word, or what `read` returns.
 
         Raises:
-            ValueError: not of its form, or out of range.
+            ValueError: wrong form, or out of range.
         """
         if self.read is not None:
             return self.read(word)
@@ -108,18 +108,18 @@ _WAYS: Final = {"answer": "<", "request": ">", "both": "><"}
 WAY: Final = FaultArgument(
     "way", "what the device sends or receives", "answer", choices=tuple(_WAYS)
 )
-"""For faults of a port that act in one direction unless somebody wants more."""
+"""Argument of port faults that act in one direction by default."""
 
 
 @dataclass(frozen=True, slots=True)
 class FaultForm(Immutable):
-    """How a fault is written, and what it does; a table of faults has a subclass as entries.
+    """Notation and description of a fault; entries of fault tables are subclasses.
 
     Attributes:
-        text: what it does, for people.
-        rated: whether it takes `rate=` and `count=`.
-        arguments: its own arguments, in the order in which they are written without keyword.
-        usual_rate: the rate where nobody writes one.
+        text: description for people.
+        rated: whether it accepts `rate=` and `count=`.
+        arguments: its own arguments, in the order without keywords.
+        usual_rate: the default rate.
     """
 
     text: str
@@ -129,7 +129,7 @@ class FaultForm(Immutable):
 
     @property
     def all_arguments(self) -> tuple[FaultArgument, ...]:
-        """Its arguments with those that each rated fault has, each with its default."""
+        """Its arguments, including those of each rated fault, with their defaults."""
         if not self.rated:
             return self.arguments
         rate = FaultArgument(_RATE, RATE.text, f"{self.usual_rate:g}", "above 0 to 1", read=float)
@@ -138,12 +138,12 @@ class FaultForm(Immutable):
 
 @dataclass(frozen=True, slots=True)
 class FaultArguments(Immutable):
-    """What was written behind the name of a fault, with all defaults.
+    """The arguments after the name of a fault, with all defaults.
 
     Attributes:
-        values: by name of the argument, as its `parse` returns them.
+        values: by name of the argument, as returned by its `parse`.
         rate: probability that it acts each time it could.
-        count: how often it acts at most; None for always.
+        count: how often it acts at most; None for no limit.
     """
 
     values: Mapping[str, Any] = field(default_factory=dict)
@@ -156,7 +156,7 @@ class FaultArguments(Immutable):
 
 
 def usage(name: str, form: FaultForm) -> str:
-    """Return how a fault is written.
+    """Return the notation of a fault.
 
     >>> usage("slow", FaultForm("", arguments=(FaultArgument("delay", "", "800ms", "time"),)))
     'slow[=DELAY]'
@@ -173,10 +173,10 @@ def bind_arguments(name: str, form: FaultForm, words: Sequence[str]) -> FaultArg
     Args:
         name: of the fault, for messages.
         form: its declaration.
-        words: what stands behind `NAME=`, split at commas.
+        words: the texts after `NAME=`, split at commas.
 
     Raises:
-        ValueError: an argument that it does not take, or out of range.
+        ValueError: an unknown argument, or a value out of range.
 
     >>> slow = FaultForm("", arguments=(FaultArgument("delay", "", "800ms", "time"),))
     >>> bind_arguments("slow", slow, ("5ms", "rate=0.1"))
@@ -195,7 +195,7 @@ def bind_arguments(name: str, form: FaultForm, words: Sequence[str]) -> FaultArg
 
 
 def spelled(name: str, form: FaultForm, words: Sequence[str]) -> dict[str, str]:
-    """Return the arguments that were written, each by its name; ValueError as `bind_arguments`."""
+    """Return the given arguments by name; ValueError as `bind_arguments`."""
     known = {each.name: each for each in form.all_arguments}
     if words and not known:
         hint = "; clear ends it" if tuple(words) == ("0",) else ""
@@ -227,10 +227,10 @@ def _parse_rate(name: str, text: str) -> float:
 
 
 class FaultTally(Copyable):
-    """How often a fault has acted, and how often it may.
+    """Counter of the actions of a fault, with a limit.
 
     Args:
-        count: how often it acts at most; None for always.
+        count: how often it acts at most; None for no limit.
 
     Attributes:
         acted: how often it has acted.
@@ -243,22 +243,22 @@ class FaultTally(Copyable):
 
     @property
     def left(self) -> int:
-        """How often it may act yet."""
+        """How often it may still act."""
         return _MOST if self.count is None else self.count - self.acted
 
     def allow(self, wanted: int = 1) -> int:
-        """Return how many of so many actions are left, and count them."""
+        """Return how many of some actions are still allowed, and count them."""
         allowed = min(wanted, self.left)
         self.acted += allowed
         return allowed
 
 
 class FaultTrigger(Copyable):
-    """Decides by chance, rate and count when a fault acts.
+    """Decides by random numbers, rate and count when a fault acts.
 
     Args:
-        chance: what it draws from; a fault may draw from it as well.
-        arguments: have the rate and the count.
+        chance: its random generator; a fault may also draw from it.
+        arguments: with the rate and the count.
         tally: shared by the triggers of a fault that acts in both directions.
     """
 
@@ -269,45 +269,45 @@ class FaultTrigger(Copyable):
         self.threshold = threshold_of(arguments.rate)
 
     def hit(self) -> bool:
-        """Say whether the fault acts this time, and count it."""
+        """Return whether the fault acts this time, and count it."""
         return self.chance.hit(self.threshold) and bool(self.tally.allow())
 
     def hits(self, draws: int) -> list[int]:
-        """Return at which of so many chances the fault acts, counted from 0, and count them."""
+        """Return at which of several opportunities the fault acts, from 0, and count them."""
         found = self.chance.hits(self.threshold, draws)
         return found[: self.tally.allow(len(found))]
 
 
-# Faults of a port: each makes something else of the traffic that passes.
+# Faults of a port: each changes the traffic that passes.
 
 Fault = Callable[[int, W], W]
-"""What a fault makes of the traffic that passes at a time in us; it is state, so no closure."""
+"""Changes the traffic that passes at a time in us; an object with state, not a closure."""
 
 
 class HoldingFault(ABC, Generic[W]):
-    """A fault that holds traffic back, and lets it go later."""
+    """A fault that holds traffic back and releases it later."""
 
     @property
     @abstractmethod
     def due_us(self) -> int:
-        """When `release` has something to give; `NEVER` if nothing is held."""
+        """When `release` has traffic to return; `NEVER` if nothing is held."""
 
     @abstractmethod
     def __call__(self, now_us: int, traffic: W, /) -> W:
-        """Take traffic in; return what passes at once."""
+        """Accept traffic; return the part that passes at once."""
 
     @abstractmethod
     def release(self, now_us: int) -> W | None:
-        """Return what was held until now, None if nothing was."""
+        """Return the traffic held until now, None if there is none."""
 
     is_late: ClassVar[bool] = False
-    """Whether it lets go all that it takes in, so that nobody has to be told of a loss."""
+    """Whether it loses no traffic, so that no loss needs to be reported."""
 
     def sent(self, until_us: int) -> None:
-        """Note when the line will have sent what the fault has let go last."""
+        """Note when the line will have sent the latest released traffic."""
 
     def pair(self, other: HoldingFault[W]) -> None:
-        """Share with the fault of the other direction what both directions have in common."""
+        """Share common state with the fault of the other direction."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -324,21 +324,21 @@ class FaultType(FaultForm, Generic[W]):
 
 
 class FaultyPort(Copyable, Generic[W]):
-    """A port whose traffic suffers the faults that are armed, in the order of arming.
+    """A port that applies armed faults to its traffic, in the order of arming.
 
-    Each direction has a chance of its own, drawn only for traffic that is
-    there: what happens one way, and ticks without traffic, change nothing.
+    Each direction has its own random numbers, drawn only for traffic: the other direction and ticks
+    without traffic do not affect them.
 
     Args:
-        port: the port behind it.
+        port: the port with the traffic.
         fault_types: the faults that can be armed, by name.
-        seed: seed of all chance in it.
+        seed: seed of its random numbers.
 
     Attributes:
-        seed: seed of all chance in it; a new one counts for faults that are armed from then on.
-        drawn: whether a fault by chance was ever armed.
-        listeners: called with the time, the direction, what was sent and what faults left of
-            it, where that differs. Nobody listens to a twin.
+        seed: seed of its random numbers; a new one applies to faults armed later.
+        drawn: whether a random fault was ever armed.
+        listeners: called with the time, the direction, the sent traffic and the traffic left by
+            faults, if these differ. A twin has no listeners.
     """
 
     def __init__(
@@ -354,23 +354,23 @@ class FaultyPort(Copyable, Generic[W]):
 
     @property
     def armed(self) -> tuple[str, ...]:
-        """Names of the faults that are armed."""
+        """Names of the armed faults."""
         return tuple(self._to_device)
 
     def check(self, name: str, *arguments: str) -> None:
-        """Raise ValueError unless the fault can be armed like this."""
+        """Raise ValueError unless the fault can be armed with these arguments."""
         bind_arguments(name, self.fault_types[name], arguments)
 
     def arm(self, name: str, *arguments: str) -> None:
-        """Let a fault begin; one of the same name is replaced.
+        """Arm a fault; one of the same name is replaced.
 
         Args:
-            name: which.
-            *arguments: as people write them behind `NAME=`, split at commas.
+            name: of the fault.
+            *arguments: the texts after `NAME=`, split at commas.
 
         Raises:
             KeyError: no fault has this name.
-            ValueError: an argument that it does not take, or out of range.
+            ValueError: an unknown argument, or a value out of range.
         """
         fault_type = self.fault_types[name]
         bound = bind_arguments(name, fault_type, arguments)
@@ -388,17 +388,17 @@ class FaultyPort(Copyable, Generic[W]):
         self._to_device[name], self._from_device[name] = there, back
 
     def acted(self, name: str) -> int:
-        """Return how often a fault has acted since it was armed last."""
+        """Return how often a fault has acted since it was last armed."""
         return self._tallies[name].acted if name in self._tallies else 0
 
     def clear(self, name: str) -> None:
-        """Let a fault end; what it holds is lost. Clearing one that is not armed is no error."""
+        """Clear a fault; held traffic is lost. Does nothing if it is not armed."""
         self._to_device.pop(name, None)
         self._from_device.pop(name, None)
 
     @property
     def due_us(self) -> int:
-        """When the next traffic reaches the port behind, or a fault lets traffic go."""
+        """When the next traffic arrives at the port, or a fault releases traffic."""
         due_us = self._port.due_us
         for faults in (self._to_device, self._from_device):
             for fault in faults.values():
@@ -407,7 +407,7 @@ class FaultyPort(Copyable, Generic[W]):
         return due_us
 
     def poll(self, now_us: int, /) -> W:
-        """Take what has arrived and survived."""
+        """Return the traffic that has arrived, after faults."""
         if (held := self._release(Mark.FROM_DEVICE, self._from_device, now_us)) is not None:
             self._port.send(now_us, held)
             self._report_sent(now_us)
@@ -418,24 +418,24 @@ class FaultyPort(Copyable, Generic[W]):
         return left if late is None else late + left  # type: ignore[operator] # bytes or frames
 
     def send(self, now_us: int, traffic: W, /) -> None:
-        """Send what the faults leave of one tick's traffic."""
+        """Send the traffic of one tick after faults."""
         left = self._suffer(Mark.FROM_DEVICE, self._from_device, now_us, traffic)
         self._port.send(now_us, left)
         if left and self._from_device:
             self._report_sent(now_us)
 
     def _report_sent(self, now_us: int) -> None:
-        """Tell the faults that hold traffic when the line will have sent what they let go."""
+        """Report to holding faults when the line will have sent their released traffic."""
         sent_us: int = getattr(self._port, "sent_us", NEVER)
         for fault in self._from_device.values():
             if isinstance(fault, HoldingFault):
                 fault.sent(now_us if sent_us == NEVER else sent_us)
 
     def use_uart(self, now_us: int, setting: UartSetting) -> None:
-        """Change the setting of the device, behind what faults hold of what it has sent.
+        """Change the setting of the device, after the sent traffic that faults still hold.
 
         Args:
-            now_us: the present.
+            now_us: the present time.
             setting: the new setting.
         """
         held = any(
@@ -467,7 +467,7 @@ class FaultyPort(Copyable, Generic[W]):
                 hear(mark, error, count)
 
     def _release(self, mark: Mark, faults: Mapping[str, Fault[W]], now_us: int) -> W | None:
-        """Return what faults let go now; it meets those behind them as well."""
+        """Return the traffic that faults release now; later faults also act on it."""
         released: W | None = None
         for name, fault in faults.items():
             if released:
@@ -489,7 +489,7 @@ class FaultyPort(Copyable, Generic[W]):
 
 
 def _unchanged(now_us: int, traffic: W) -> W:
-    """Let all pass: the direction in which a fault does not act."""
+    """Pass all traffic: for the direction in which a fault does not act."""
     return traffic
 
 

@@ -1,10 +1,10 @@
-"""The optional kernel: the short ways of a sound CAN bus and of its stations, in C.
+"""The optional kernel: the fast paths of an intact CAN bus and its stations, in C.
 
-Where `_kernel.c` was built, the classes below come from there. They hold the fields of `Station`,
-`Timetable`, `CanEnd`, `CanArbiter`, `CanRoutes`, `BusyTime` and `CanSegment`, and a method that is
-marked with `in_kernel` is replaced by the function in C of the same name. There is one state, in
-these fields: the C function calls the Python method for all that is not plain, in the middle of a
-run too, and snapshots, forks and pickles see the same fields with and without it.
+If `_kernel.c` was built, the classes below come from it. They have the fields of `Station`,
+`Timetable`, `CanEnd`, `CanArbiter`, `CanRoutes`, `BusyTime` and `CanSegment`, and a method marked
+with `in_kernel` is replaced by the C function of the same name. There is one state, in these
+fields: the C function calls the Python method for special cases, also in the middle of a run, and
+snapshots, forks and pickles see the same fields with and without the kernel.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ F = TypeVar("F", bound=Callable[..., object])
 
 
 def _load() -> Any:
-    """Return the module in C, None where it was not built."""
+    """Return the C module, None if it was not built."""
     try:
         return import_module("tickrig.emulators.rig._kernel")
     except ModuleNotFoundError:
@@ -31,7 +31,7 @@ kernel: bool = _KERNEL is not None
 
 
 def in_kernel(method: F) -> F:
-    """Let the kernel's function of the same name take the place of a method, if there is one."""
+    """Replace a method by the kernel's function of the same name, if there is one."""
     if _KERNEL is None:
         return method
     replaced: F = _KERNEL.method(method.__qualname__, method)
@@ -39,12 +39,12 @@ def in_kernel(method: F) -> F:
 
 
 def enable(wanted: bool) -> bool:
-    """Use the kernel or leave everything to Python, from now on; return what was before."""
+    """Switch the kernel on or off; return the previous setting."""
     return _KERNEL is not None and bool(_KERNEL.enable(wanted))
 
 
 def bits(frame: object) -> int | None:
-    """Return the bits of a frame as the kernel counts them; None for what it leaves to Python."""
+    """Return the number of bits of a frame counted by the kernel; None if Python must count."""
     counted: int | None = _KERNEL.frame_bits(frame)
     return counted
 
@@ -97,22 +97,22 @@ if TYPE_CHECKING or _KERNEL is None:
         )
 
     def run(rig: object, parts: object, until_us: int, unseen_us: int, /) -> bool:
-        """Let a rig run up to a time in C, as `Rig.run_to`; False if there is more to be done.
+        """Run a rig up to a time in C, as `Rig.run_to`; return False if more work is left.
 
         Args:
             rig: the rig.
             parts: its timetable, bus, event queue, horizon, watchers, hosts and stations.
             until_us: the time.
-            unseen_us: up to then nobody looks at a device.
+            unseen_us: until this time nothing reads a device.
         """
         return False
 
     def tick_stations(timetable: object, now_us: int, /) -> bool:
-        """Let the stations compute and send that have work; False if Python has to."""
+        """Run the stations with work; return False if Python must do it."""
         return False
 
     def enter_stations(timetable: object, stations: object, /) -> bool:
-        """Enter the stations that are due earlier than they stand; False if Python has to."""
+        """Enter stations that became due earlier; return False if Python must do it."""
         return False
 
 else:

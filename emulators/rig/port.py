@@ -1,4 +1,4 @@
-"""Ports: ends of wires, of devices and of whoever is outside."""
+"""Ports: ends of wires at devices and hosts."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from tickrig.wire.uart import UartSetting
 
 
 class Port(Protocol[W]):
-    """One end of a wire. It never blocks, and time is an argument."""
+    """One end of a wire. It never blocks, and gets the time as an argument."""
 
     @property
     def due_us(self) -> int:
-        """When the next traffic will have arrived, `NEVER` if none is on its way."""
+        """When the next traffic will have arrived, `NEVER` if there is none."""
         ...
 
     def poll(self, now_us: int, /) -> W:
-        """Take all that has arrived by `now_us` and was not taken before, in wire order."""
+        """Return the traffic arrived by `now_us` and not returned before, in wire order."""
         ...
 
     def send(self, now_us: int, traffic: W, /) -> None:
-        """Put one tick's traffic on the wire at `now_us`."""
+        """Send the traffic of one tick on the wire at `now_us`."""
 
 
 class LineUart(Part):
@@ -35,7 +35,7 @@ class LineUart(Part):
 
     Attributes:
         setting: the setting, with the latest change.
-        since_us: from when on it counts.
+        since_us: time from which it applies.
         listeners: called with that time and the new setting; they are copied with the line.
         error_listeners: called with characters that a fault has spoiled: which way they went, the
             error that a UART sees (`framing`, `parity`, `breaks`), and how many; copied, too.
@@ -56,33 +56,33 @@ class ByteEnd(Port[bytes], Protocol):
         ...
 
     def use_uart(self, now_us: int, setting: UartSetting) -> None:
-        """Change the setting of the device at this end, behind the last stop bit it has sent."""
+        """Change the setting of the device at this end, after the last stop bit it has sent."""
 
     def withdraw(self, now_us: int) -> list[tuple[int, int]]:
-        """Take bytes sent from here that have not arrived off the line: start in ps, value."""
+        """Remove the bytes sent from here that have not arrived; return start in ps and value."""
         ...
 
     @property
     def idle_us(self) -> int:
-        """When the last byte that is on its way here will have arrived."""
+        """When the last byte in transit to this end will have arrived."""
         ...
 
     @property
     def coming(self) -> bytes:
-        """What is on its way here and was not taken, as far as it is known to arrive."""
+        """The bytes in transit to this end that are known to arrive."""
         ...
 
     def arrival_us(self, count: int) -> int:
-        """Return when so many bytes will have arrived, or when to look again; `NEVER` for none."""
+        """Return when `count` bytes will have arrived, or when to check again; `NEVER` for none."""
         ...
 
     @property
     def lost(self) -> int:
-        """Bytes that found a buffer full."""
+        """Number of bytes lost because of a full buffer."""
         ...
 
     def room(self, now_us: int) -> int:
-        """Return how many bytes `send` takes at `now_us` without loss."""
+        """Return how many bytes `send` accepts at `now_us` without loss."""
         ...
 
     @property
@@ -95,7 +95,7 @@ class ByteEnd(Port[bytes], Protocol):
         ...
 
     def drop_unsent(self, now_us: int) -> None:
-        """Forget the bytes sent from here of which no bit is on the line yet."""
+        """Discard the bytes sent from here of which no bit is on the line yet."""
 
 
 class ByteLine(Protocol):
@@ -113,28 +113,28 @@ class ByteLine(Protocol):
 
 
 class Wire(Protocol):
-    """A wire that many stations share; it is moved on by the rig."""
+    """A wire shared by many stations and advanced by the rig."""
 
     @property
     def due_us(self) -> int:
-        """When something ends on it next, `NEVER` if nothing is on its way."""
+        """When the next transmission ends, `NEVER` if there is none."""
         ...
 
     @property
     def on_traffic(self) -> list[Callable[[], None]]:
-        """Whom to call when something may end on it earlier than it said."""
+        """Callback for a transmission that may end earlier than `due_us` was."""
         ...
 
     @property
     def observers(self) -> Sized:
-        """Who hears of all that ends on it."""
+        """Callbacks for each transmission that ends."""
         ...
 
     def advance(self, now_us: int, /) -> None:
-        """Let everything end that ends by `now_us`, and wake who received it."""
+        """Advance to `now_us`, and wake the receivers."""
 
     def advance_until_received(self, until_us: int, /) -> bool:
-        """Let things end until a station was woken; False if none was by `until_us`."""
+        """Advance until a station is woken; return False if none was by `until_us`."""
         ...
 
 
@@ -143,25 +143,25 @@ class OutsideBridge(Protocol):
 
     @property
     def due_us(self) -> int:
-        """When there is something to be handed out."""
+        """The time of the next delivery."""
         ...
 
     def take_in(self, now_us: int, /) -> None:
-        """Put on the wire what the outside sent."""
+        """Send the traffic of the outside on the wire."""
 
     def give_out(self, now_us: int, /) -> None:
-        """Hand out what has arrived."""
+        """Deliver the arrived traffic to the outside."""
 
 
 class Host(Protocol):
-    """An end of a wire at which no station is, but somebody who waits."""
+    """An end of a wire with a waiting host instead of a station."""
 
     @property
     def wire(self) -> Wire:
-        """The wire it is an end of."""
+        """The wire."""
         ...
 
     @property
     def arrived_us(self) -> int:
-        """When what waits there had arrived, `NEVER` if nothing does."""
+        """Arrival time of the waiting traffic, `NEVER` if there is none."""
         ...

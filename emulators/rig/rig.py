@@ -9,8 +9,8 @@
 # Things of one time happen in this order. `run_to`, `run_until` and `step` all keep it, so how a
 # run is cut into calls makes no difference.
 #
-# A step of the rig has two phases. First all devices poll and compute, then all send: what is sent
-# in a tick is heard in a later one, and the order of the stations makes no difference. On a shared
+# A step of the rig has two phases. First all devices poll and compute, then all send: data sent in
+# a tick are received in a later one, and the order of the stations makes no difference. On a shared
 # wire each station may send at once, because a frame takes time to end. Couplings act after that;
 # what they set counts in the next tick. Watchers come last and see a finished step.
 #
@@ -18,7 +18,7 @@
 #   - A station on a shared wire (`WirePort`) stands in the `Timetable` at its next tick with work.
 #     It is entered when its port wakes it, after its own tick for `due_us`, and by `_enter_due`
 #     for what changed between steps (an input set, an object written). It stands at one tick;
-#     entries for later ones are passed over.
+#     entries for later ones are ignored.
 #   - All other stations are asked in each step (`_looked_at`), as serial lines say `due_us` alone.
 #   - Wires are asked when something ends next (`Wires`). An idle wire is not asked: it calls
 #     `on_traffic` when something may end earlier than it said.
@@ -28,9 +28,9 @@
 # Several wires run by themselves up to the next tick at which anybody who hears of them could
 # act; only hosts that wait, or observers of two wires, need them in the order of time.
 #
-# A drive may work its next ticks out in one go while nobody looks (`Horizon`). `_foresee` says
-# until when: not with watchers or couplings, and not beyond the next action. `passed_us` tells how
-# far time has come when somebody asks the drive all the same.
+# A drive may compute its next ticks in one go while it is not observed (`Horizon`). `_foresee` says
+# until when: not with watchers or couplings, and not beyond the next action. `passed_us` has the
+# present time, in case the drive is read all the same.
 #
 # With the kernel (`kernel.py`), a rig whose stations are all on one bus, in virtual time, without
 # bridges, couplings and hosts, is run in C from tick to tick: `run` is the loop of
@@ -60,47 +60,47 @@ from tickrig.emulators.rig.port import Host, OutsideBridge, Wire
 from tickrig.emulators.rig.station import Station, Timetable, is_wire_port, next_tick_us
 from tickrig.wire.instant import NEVER
 
-# What joins devices beside their wires.
+# Connections of devices besides their wires.
 
 
 class Coupling(Protocol):
     """A body on the wheels of several drives, a belt between two shafts.
 
-    It acts after all devices of a step have computed: it looks at their outputs
-    and may set their inputs, which count in their next tick. So the order in which
-    devices are listed cannot matter to it either.
+    It acts after all devices of a step have computed: it reads their outputs and may set their
+    inputs, which take effect in their next tick. So it does not depend on the order of the devices
+    either.
     """
 
     @property
     def tick_us(self) -> int:
-        """It acts at multiples of this."""
+        """Its period; it acts at multiples of it."""
         ...
 
     @property
     def due_us(self) -> int:
-        """When it would change something even if no device has work; see `Device.due_us`."""
+        """When it acts even if no device has work; see `Device.due_us`."""
         ...
 
     def act(self, now_us: int, /) -> None:
-        """Look at outputs, set inputs."""
+        """Read outputs, set inputs."""
 
 
-# The wires of a rig: only those are asked that have something on them.
+# The wires of a rig: only those with traffic are asked.
 
 _NOBODY: Final[tuple[Host, ...]] = ()
 
 
 class Wires(Part):
-    """Wires that are moved on together, each by itself for as long as nobody can notice.
+    """Wires that are advanced together, each separately as long as this has no visible effect.
 
-    What ends on one wire may let a station send on another, but not before its next tick.
-    Up to there each wire goes on alone; in the order of time, frame by frame, where hosts
-    wait or several wires have observers.
+    A transmission that ends on one wire may let a station send on another, but not before its next
+    tick. Until then each wire is advanced alone; in order of time, frame by frame, if hosts wait or
+    several wires have observers.
 
-    A wire without anything on it is left behind: `advance` brings it along.
+    A wire without traffic stays behind until `advance`.
 
     Args:
-        periods: the control periods, in us, on whose multiples ticks fall.
+        periods: the control periods in us; ticks are at their multiples.
     """
 
     def __init__(self, periods: Iterable[int]) -> None:
@@ -108,17 +108,17 @@ class Wires(Part):
         self._busy: tuple[int, ...] = ()  # places of those that may have something on them
 
     def __bool__(self) -> bool:
-        """Return whether there is any."""
+        """Return whether there is any wire."""
         return bool(self._wires)
 
     def join(self, wire: Wire) -> None:
-        """Take a wire along; one that is there already is no second one."""
+        """Add a wire; does nothing if it was added before."""
         if wire not in self._wires:
             self._wires.append(wire)
             self._hear_of(len(self._wires) - 1, wire)
 
     def hear_again(self) -> None:
-        """Hear of new traffic, after all this was copied."""
+        """Subscribe to new traffic after a copy."""
         for place, wire in enumerate(self._wires):
             self._hear_of(place, wire)
 
@@ -127,7 +127,7 @@ class Wires(Part):
         self._begin(place)
 
     def _begin(self, place: int) -> None:
-        """Ask a wire from now on: something is on it."""
+        """Ask a wire from now on, because it has traffic."""
         if place not in self._busy:
             self._busy = tuple(sorted((*self._busy, place)))
 
@@ -138,35 +138,35 @@ class Wires(Part):
 
     @property
     def due_us(self) -> int:
-        """When something ends on one of them, `NEVER` if nothing is on its way."""
+        """When the next transmission ends on one of them, `NEVER` if there is none."""
         return min(self._dues())[0] if self._busy else NEVER
 
     def _dues(self) -> list[tuple[int, int]]:
-        """Return when something ends next on those that have something on them, and where."""
+        """Return the end of the next transmission, and its wire."""
         dues = [(self._wires[place].due_us, place) for place in self._busy]
         if any(due_us == NEVER for due_us, _ in dues):
             self._busy = tuple(place for due_us, place in dues if due_us < NEVER)
         return dues
 
     def advance(self, now_us: int) -> None:
-        """Bring all wires to a time."""
+        """Advance all wires to a time."""
         for wire in self._wires:
             wire.advance(now_us)
 
     def advance_busy(self, now_us: int) -> None:
-        """Bring those to a time that have something on them."""
+        """Advance the wires with traffic to a time."""
         for place in self._busy:
             self._wires[place].advance(now_us)
 
     def advance_until_received(self, until_us: int, hosts: tuple[Host, ...] = _NOBODY) -> bool:
-        """Let things end up to a time, but not beyond a tick for which a station was woken.
+        """Advance to a time, but not beyond a tick for which a station was woken.
 
         Args:
             until_us: the time.
-            hosts: who stops it, too, when something has arrived there.
+            hosts: hosts that also stop it when traffic has arrived.
 
         Returns:
-            False if nothing is left that ends by then, and nobody was woken.
+            False if nothing else ends by then, and no station was woken.
         """
         if not self._busy:
             return False
@@ -176,7 +176,7 @@ class Wires(Part):
         first_us = min(dues)[0]
         if first_us > until_us:
             return False
-        for tick_us in self._periods:  # nobody who hears of it has a tick before
+        for tick_us in self._periods:  # no receiver has a tick before
             until_us = min(until_us, -(-first_us // tick_us) * tick_us)
         if hosts or sum(bool(self._wires[place].observers) for _, place in dues) > 1:
             self._advance_in_order(dues, until_us, hosts)
@@ -189,7 +189,7 @@ class Wires(Part):
     def _advance_in_order(
         self, heap: list[tuple[int, int]], until_us: int, hosts: tuple[Host, ...]
     ) -> None:
-        """Let what ends first end first, on whichever wire; stop when a host has something."""
+        """Advance all wires in order of time; stop when a host has received traffic."""
         heap.append((NEVER, len(self._wires)))
         heapify(heap)
         while heap[0][0] <= until_us:
@@ -204,10 +204,10 @@ class Wires(Part):
 
 
 _LATE_US: Final = 1_000
-"""A step that begins later than this counts as late."""
+"""A step that starts later than this counts as late."""
 
 LATE_KEPT: Final = 1_000
-"""So many of the latest late steps are known by their times."""
+"""Number of late steps whose times are kept."""
 
 
 T = TypeVar("T")
@@ -217,39 +217,37 @@ U = TypeVar("U")
 class Rig(Copyable):
     """Stations that share a clock.
 
-    A step has two phases, as registers on one clock line have: first every
-    port is polled and every device computes, then everything is sent. So the
-    order in which stations are listed cannot change what they do.
+    A step has two phases, like registers on one clock line: first every port is polled and every
+    device computes, then everything is sent. So the order of the stations has no effect.
 
-    In virtual time the rig jumps over ticks at which no device is due and
-    nothing arrives; `dense=True` visits them all, which must make no
-    difference. In real time it wakes at every tick and runs those with work.
-    Stations on a shared wire stand in a timetable and cost nothing until they
-    have work; the others are looked at in every step.
+    In virtual time the rig jumps over ticks at which no device is due and nothing arrives;
+    `dense=True` visits them all, with the same result. In real time it wakes at every tick and runs
+    those with work. Stations on a shared wire stand in a timetable and cost nothing until they have
+    work; the others are checked in every step.
 
-    What the event_queue holds is done by whoever makes time pass, in whatever way:
-    after all that happens before its time, and before the tick of its time.
+    Actions of the event_queue run whenever the time is advanced: after all events before their
+    time, and before the tick of their time.
 
     A rig can be copied while it runs, with its devices, wires and faults: `fork`.
 
     Args:
         stations: the devices, each on its port.
-        bridges: joints with the outside world (real time).
-        couplings: what joins the devices beside their wires, in the order in which they act.
-        clock: a `VirtualClock` unless given.
+        bridges: connections with the outside world (real time).
+        couplings: connections of the devices besides their wires, in the order in which they act.
+        clock: by default a `VirtualClock`.
         dense: run every tick of every device.
-        event_queue: what is to be done between ticks; a new one unless given.
+        event_queue: actions between ticks; by default a new queue.
 
     Attributes:
-        event_queue: what is to be done between ticks.
+        event_queue: actions between ticks.
         stations: the devices, each on its port.
-        acting_us: the time for which an action of the event_queue is being done, else None.
-        in_step: whether a step is being done: what is called back then cannot wait.
+        acting_us: the time of the running action of the event_queue, else None.
+        in_step: whether a step is running; callbacks in it cannot wait.
         now_us: time since the start of the rig.
-        worst_late_us: by how much the worst step was late.
-        late_ticks: how many steps began more than `_LATE_US` late.
-        hosts: ends at which something that arrives is a step by itself; a watcher takes it.
-        watchers: called with the time after each step, in the order of entering.
+        worst_late_us: largest delay of a step.
+        late_ticks: number of steps that started more than `_LATE_US` late.
+        hosts: ends where each arrival is a separate step; a watcher handles it.
+        watchers: called with the time after each step, in the order of registration.
     """
 
     def __init__(
@@ -283,7 +281,7 @@ class Rig(Copyable):
         self._look_for_bus()
 
     def _look_for_bus(self) -> None:
-        """Let the kernel run the rig if all stations are on one bus, in virtual time."""
+        """Run the rig in the kernel if all stations are on one bus, in virtual time."""
         others = self._bridges or self._couplings or self._looked_at
         virtual = self._jumps and type(self._clock) is VirtualClock
         bus = self._wires.only_bus if kernel and virtual and not others else None
@@ -303,13 +301,13 @@ class Rig(Copyable):
         return True
 
     def __getstate__(self) -> object:
-        """Return the state that a twin begins with: it has no hosts, and runs in virtual time."""
+        """Return the initial state of a twin: it has no hosts, and runs in virtual time."""
         begun = {"_bridges": (), "_short": (), "_clock": VirtualClock(), "_jumps": not self._dense}
         now = {"_in_real_time": False, "acting_us": None, "in_step": False}
         return state_of(self, {**begun, **now})
 
     def __setstate__(self, state: object) -> None:
-        """Go on as the rig that was copied; its ports know no devices yet."""
+        """Restore the state of the copied rig; its ports have no devices yet."""
         restore(self, state)
         self._wires.hear_again()
         for station in self.stations:
@@ -329,22 +327,22 @@ class Rig(Copyable):
     def fork(self, *parts: Any) -> tuple[Any, ...]: ...
 
     def fork(self, *parts: Any) -> Any:
-        """Return a twin of the rig: a copy that goes on from here, independent of this one.
+        """Return a twin of the rig: an independent copy that continues from here.
 
-        Fed the same, it does the same to the byte. It has the devices, wires, faults, couplings
-        and events of this one, runs in virtual time, and knows nobody outside: no bridge,
-        recorder or observer.
+        With the same input it behaves the same to the byte. It has the devices, wires, faults,
+        couplings and events of this one, runs in virtual time, and has no connection to the
+        outside: no bridge, recorder or observer.
 
         Args:
-            parts: what belongs to the rig and is wanted of the twin too, such as the host's
-                end of a line.
+            parts: objects of the rig that are also needed of the twin, such as the host's end of a
+                line.
 
         Returns:
             The twin; with `parts` a tuple of the twin and of its parts.
 
         Raises:
-            TypeError: something in it cannot be copied, such as a port that is a pty; the
-                text says what and why.
+            TypeError: an object in it cannot be copied, such as a pty port; the message names it
+                and the reason.
 
         >>> from tickrig.device.rrc.machine import Rrc
         >>> from tickrig.emulators.serial.serial_line import SerialLine
@@ -358,16 +356,16 @@ class Rig(Copyable):
         return twin((self, *parts)) if parts else twin(self)
 
     def snapshot(self, *parts: object) -> MachineSnapshot:
-        """Return what puts the rig back to what it is now, as often as wanted.
+        """Return a snapshot that restores the present state of the rig any number of times.
 
-        It is the same rig afterwards, so who has an end of its wires keeps it; it costs a
+        It restores the same rig, so references to ends of its wires stay valid; it costs a
         twentieth of a `fork`.
 
         Args:
-            parts: what is to be put back with it, such as a host.
+            parts: objects to restore with it, such as a host.
 
         Raises:
-            TypeError: something in it cannot be put back, such as a port that is a pty.
+            TypeError: an object in it cannot be restored, such as a pty port.
 
         >>> from tickrig.device.rrc.machine import Rrc
         >>> from tickrig.emulators.serial.serial_line import SerialLine
@@ -384,7 +382,7 @@ class Rig(Copyable):
         return MachineSnapshot(self, *parts)
 
     def move_on(self, wire: Wire) -> None:
-        """Let a wire go on with the rig; one with stations does so anyway.
+        """Advance a wire with the rig; wires with stations are already included.
 
         Args:
             wire: the wire.
@@ -394,29 +392,29 @@ class Rig(Copyable):
 
     @property
     def next_us(self) -> int:
-        """When there is something to do next: an action, a tick with work, an end on a wire.
+        """The time of the next event: an action, a tick with work, the end of a transmission.
 
-        In real time nobody outside sees what ends between two ticks: it waits for the tick.
+        In real time a transmission that ends between two ticks becomes visible at the tick.
         """
         self._enter_due()
         planned_us = self._planned_us
         return planned_us if self._in_real_time else min(planned_us, self._wires.due_us)
 
     def step(self) -> None:
-        """Go to the next time with something to do, and do it; nothing if that never comes."""
+        """Advance to the next event and run it; do nothing if there is none."""
         self._foresee(0)
         if (next_us := self.next_us) != NEVER:
             self._happen(next_us)
             self._wires.advance(self.now_us)
 
     def run_to(self, t_us: int, host: Host | None = None, unseen_us: int = 0) -> None:
-        """Step through all that happens up to and at a time, or until something is at a host.
+        """Run all events up to and at a time, or until traffic has arrived at a host.
 
         Args:
             t_us: the time, since the start of the rig.
-            host: where to look for something, if given.
-            unseen_us: how long after that time it is likely that nobody looks at a device or
-                sets an input between ticks; it may happen, and costs more then.
+            host: the host to watch, if given.
+            unseen_us: how long after that time devices are probably not read and inputs not set
+                between ticks; doing so is allowed, but slower.
         """
         if host is None and self._short:
             self._until_us = t_us + unseen_us
@@ -436,22 +434,22 @@ class Rig(Copyable):
                 return
 
     def run_for(self, duration_us: int) -> None:
-        """Step through a time.
+        """Run for a duration.
 
         Args:
-            duration_us: how long it is.
+            duration_us: the duration.
         """
         self.run_to(self.now_us + duration_us)
 
     def run_until(self, done: Callable[[], bool], timeout_us: int) -> bool:
-        """Step until something is so.
+        """Run until a condition is true.
 
         Args:
-            done: returns whether it is; it only looks.
-            timeout_us: for how long at most.
+            done: returns the condition, without side effects.
+            timeout_us: largest duration.
 
         Returns:
-            False if the time passed first.
+            False after the time-out.
         """
         deadline_us = self.now_us + timeout_us
         self._enter_due()
@@ -467,12 +465,12 @@ class Rig(Copyable):
         return True
 
     def _foresee(self, until_us: int) -> None:
-        """Tell the devices until when nobody looks at them, if nobody comes by `until_us`."""
+        """Set the time until which devices are not read, unless something happens by `until_us`."""
         self._until_us, seen = until_us, self.watchers or self._couplings
         self._horizon.until_us = 0 if seen else min(until_us, self.event_queue.due_us - 1)
 
     def _enter_due(self) -> None:
-        """Enter what has come due between steps: inputs set, a dictionary written."""
+        """Enter stations that became due between steps: inputs set, a dictionary written."""
         if kernel and enter_stations(self._timetable, self._woken):
             return
         for station in self._woken:
@@ -481,7 +479,7 @@ class Rig(Copyable):
 
     @property
     def _planned_us(self) -> int:
-        """The next action, or the next tick that is known to have work."""
+        """The time of the next action, or of the next known tick with work."""
         now_us, next_us = self.now_us, min(self._timetable.first_us, self.event_queue.due_us)
         for bridge in self._bridges:
             next_us = min(next_us, bridge.due_us)
@@ -497,7 +495,7 @@ class Rig(Copyable):
         return max(now_us, next_us)
 
     def _go_on(self, until_us: int, host: Host | None) -> int:
-        """Let frames end up to the next tick with work, or one at a host; return its time."""
+        """Advance the wires to the next tick with work or arrival at a host; return the time."""
         hosts = (*self.hosts,) if host is None else (*self.hosts, host)
         while True:
             next_us = self._planned_us
@@ -507,7 +505,7 @@ class Rig(Copyable):
                 return next_us
 
     def _happen(self, next_us: int) -> None:
-        """Do what is due next: all actions of that time, or else its tick."""
+        """Run the next events: all actions of that time, else its tick."""
         outer, self.in_step = self.in_step, True
         try:
             if self.event_queue.due_us <= next_us:
@@ -518,7 +516,7 @@ class Rig(Copyable):
             self.in_step = outer
 
     def _act(self, now_us: int) -> None:
-        """Do what is due at `now_us`, before the tick of that time."""
+        """Run the actions due at `now_us`, before the tick of that time."""
         self._pass_to(max(self.now_us, now_us - 1))
         self.acting_us = now_us
         try:
@@ -530,7 +528,7 @@ class Rig(Copyable):
         self._foresee(self._until_us)
 
     def _pass_to(self, t_us: int) -> None:
-        """Let time pass in which no tick has work."""
+        """Advance through a time without ticks with work."""
         self._wires.advance(t_us)
         self._idle_to(t_us)
 
@@ -563,7 +561,7 @@ class Rig(Copyable):
             watch(now_us)
 
     def late_since(self, t_us: int) -> int:
-        """Return by how much the worst step was late from a time on, of those beyond `_LATE_US`.
+        """Return the largest delay of a step since a time, counting those beyond `_LATE_US`.
 
         Args:
             t_us: the time; if more than `LATE_KEPT` steps were late since then, all count.
@@ -579,7 +577,7 @@ class Rig(Copyable):
             self._late.append((self.now_us, late_us))
 
     def _tick(self, now_us: int) -> None:
-        """Let all devices with work compute, then send."""
+        """Run all devices with work: compute, then send."""
         sent = []
         for station in self._looked_at:
             if now_us % station.tick_us:
@@ -593,7 +591,7 @@ class Rig(Copyable):
             port.send(now_us, traffic)
 
     def _tick_woken(self, now_us: int) -> None:
-        """Let those compute and send that stand in the timetable."""
+        """Run the stations due in the timetable: compute and send."""
         timetable = self._timetable
         woken, enter = timetable.take(now_us), timetable.enter
         timetable.open_us = now_us + 1
@@ -606,7 +604,7 @@ class Rig(Copyable):
                 enter(station, due_us)
 
     def _couple(self, now_us: int) -> None:
-        """Let couplings act, and devices whose inputs they set have work."""
+        """Run the couplings, and enter devices whose inputs they set."""
         acting = [coupling for coupling in self._couplings if now_us % coupling.tick_us == 0]
         for coupling in acting:
             coupling.act(now_us)

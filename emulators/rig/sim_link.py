@@ -1,4 +1,4 @@
-"""What is beside a rig and makes its virtual time pass: a byte link, a clock."""
+"""A byte link and a clock that advance the virtual time of a rig."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from tickrig.wire.instant import NEVER
 
 
 class SimLink:
-    """A `Link[bytes]` that makes virtual time pass while its caller waits.
+    """A `Link[bytes]` that advances the virtual time while its caller waits.
 
     Args:
-        rig: the rig that is stepped meanwhile.
+        rig: the rig to advance.
         end: the host's end of a serial line of that rig.
     """
 
@@ -26,7 +26,7 @@ class SimLink:
         return self._rig.now_us
 
     def send(self, traffic: bytes, /) -> None:
-        """Queue bytes on the line; where its buffer is full, time passes until they fit.
+        """Queue bytes on the line; if its buffer is full, advance the time until they fit.
 
         Args:
             traffic: the bytes.
@@ -43,13 +43,13 @@ class SimLink:
                 self._rig.run_for(1_000)
 
     def receive(self, timeout_us: int, /) -> bytes:
-        """Step the rig until bytes have arrived.
+        """Advance the rig until bytes have arrived.
 
         Args:
-            timeout_us: for how long at most; 0 only looks.
+            timeout_us: longest wait; 0 only polls.
 
         Returns:
-            The bytes, none if none came in time.
+            The bytes, empty after the time-out.
 
         Raises:
             LinkClosed: the link was closed.
@@ -63,7 +63,7 @@ class SimLink:
         return data
 
     def close(self) -> None:
-        """Close the link; the rig stays as it is."""
+        """Close the link; the rig is unchanged."""
         self._closed = True
 
     def _check_open(self) -> None:
@@ -72,20 +72,20 @@ class SimLink:
 
 
 class RigClock:
-    """A clock whose time passes as its rig is stepped.
+    """A clock whose time advances with its rig.
 
     With it a system of RT components (`host.rtc.real_time`) and the emulated
     devices behind its proxies run in virtual time together.
 
     Args:
-        rig: stepped while somebody waits.
+        rig: advanced while the caller waits.
     """
 
     def __init__(self, rig: Rig) -> None:
         self._rig, self._start_us = rig, rig.now_us
 
     def wait_until(self, t_us: int, /) -> int:
-        """Step the rig until it is `t_us`; return by how much it was late."""
+        """Advance the rig to `t_us`; return the delay."""
         late_us = self._rig.now_us - self._start_us - t_us
         if late_us < 0:
             self._rig.run_for(-late_us)

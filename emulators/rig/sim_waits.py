@@ -1,4 +1,4 @@
-"""What a library waits on, replaced by what makes virtual time pass."""
+"""Replacements for the waits of libraries, which advance the virtual time."""
 
 from __future__ import annotations
 
@@ -18,34 +18,35 @@ EPOCH_S: Final = 946_684_800
 """The clock of hosts at the start of a rig: 2000-01-01."""
 
 LOOK_US: Final = 100
-"""What a look at the clock costs: a loop that does nothing else then ends some day."""
+"""Time added by each read of the clock, so that a loop that only reads it ends."""
 
 MOST_LOOKS: Final = 10_000
-"""Looks that a host takes at one instant before it is told that it will wait for ever."""
+"""Largest number of polls at one instant; then the host gets an error, because it would wait
+endlessly."""
 
 T = TypeVar("T")
 
 
 class OneThread(Copyable):
-    """The thread in which hosts make virtual time pass: two would race, and no run be like another.
+    """The thread in which hosts advance the virtual time: two threads would make runs differ.
 
-    It is the one that makes this; a twin's is the one in which it is made.
+    It is the thread that makes this object; for a twin, the thread that makes the twin.
     """
 
     def __init__(self) -> None:
         self._thread, self._refusal = get_ident(), ""
 
     def __setstate__(self, state: object) -> None:
-        """Go on in the thread in which it is copied."""
+        """Continue in the thread in which it is copied."""
         restore(self, state)
         self._thread = get_ident()
 
     def refusal(self, name: str, instead: str) -> str:
-        """Return why nothing can be done here, now and ever after a second thread has tried; or "".
+        """Return why use is impossible, permanently after a second thread has tried it; else "".
 
         Args:
-            name: what is used: a port, a bus.
-            instead: what a host does that has one.
+            name: the used object: a port, a bus.
+            instead: alternative for hosts with a second thread.
         """
         if get_ident() != self._thread and not self._refusal:
             self._refusal = (
@@ -57,17 +58,17 @@ class OneThread(Copyable):
 
 
 class Looks(Copyable):
-    """Looks that found nothing at one instant: they make no time pass, so a loop of them hangs."""
+    """Counter of polls without result at one instant: they take no time, so a loop hangs."""
 
     def __init__(self) -> None:
         self._count, self._at_us = 0, NEVER
 
     def refusal(self, now_us: int, instead: str) -> str:
-        """Count a look; return why the host would wait for ever, or "".
+        """Count a poll; return why the host would wait endlessly, or "".
 
         Args:
-            now_us: when it is.
-            instead: what makes time pass.
+            now_us: present time.
+            instead: calls that advance the time.
         """
         if self._at_us != now_us:
             self._count, self._at_us = 0, now_us
@@ -81,7 +82,7 @@ class Looks(Copyable):
 
 
 class Passing(Protocol):
-    """Something whose time can be made to pass."""
+    """An object whose time can be advanced."""
 
     @property
     def time_s(self) -> float:
@@ -89,53 +90,53 @@ class Passing(Protocol):
         ...
 
     def wait(self, done: Callable[[], bool], timeout_s: float | None) -> bool:
-        """Let time pass until `done()`; False if the timeout was first."""
+        """Advance the time until `done()`; return False after the timeout."""
         ...
 
 
 class SimQueue(Generic[T]):
-    """A `queue.Queue` as one thread needs it: waiting lets time pass."""
+    """A `queue.Queue` for one thread: waiting advances the time."""
 
     def __init__(self, passing: Passing) -> None:
         self._passing = passing
         self._items: deque[T] = deque()
 
     def put(self, item: T) -> None:
-        """Put something at the end."""
+        """Append an item."""
         self._items.append(item)
 
     def get(self, block: bool = True, timeout: float | None = None) -> T:
-        """Take the first; raises queue.Empty if there is none in time."""
+        """Return the first item; raise queue.Empty after the timeout."""
         self._passing.wait(lambda: bool(self._items), timeout if block else 0)
         if not self._items:
             raise queue.Empty
         return self._items.popleft()
 
     def empty(self) -> bool:
-        """Say whether there is nothing in it."""
+        """Return whether it is empty."""
         return not self._items
 
 
 class SimCondition:
-    """A `threading.Condition` as one thread needs it: waiting lets time pass."""
+    """A `threading.Condition` for one thread: waiting advances the time."""
 
     def __init__(self, passing: Passing) -> None:
         self._passing, self._notified = passing, 0
 
     def __enter__(self) -> bool:
-        """Nothing to lock."""
+        """Do nothing; one thread needs no lock."""
         return True
 
     def __exit__(self, *exception: object) -> None:
-        """Nothing to unlock."""
+        """Do nothing; one thread needs no lock."""
 
     def wait(self, timeout: float | None = None) -> bool:
-        """Wait for the next notification; False if the timeout was first."""
+        """Wait for the next notification; return False after the timeout."""
         before = self._notified
         return self._passing.wait(lambda: self._notified != before, timeout)
 
     def notify_all(self) -> None:
-        """Let those who wait go on."""
+        """Wake the waiting callers."""
         self._notified += 1
 
 
@@ -155,14 +156,14 @@ class SimTime:
         return round(self.time() * 1e6) * 1_000
 
     def monotonic(self) -> float:
-        """Return a time in seconds of which only differences mean anything."""
+        """Return a time in seconds for computing differences."""
         return self.time()
 
     perf_counter = monotonic
     monotonic_ns = perf_counter_ns = time_ns
 
     def sleep(self, seconds: float) -> None:
-        """Let time pass."""
+        """Advance the time."""
         self._passing.wait(lambda: False, seconds)
 
 

@@ -17,22 +17,22 @@ from tickrig.wire.uart import UartSetting
 
 
 class WirePort(Protocol[W]):
-    """A `Port` that says when traffic has arrived, so that nobody need look.
+    """A `Port` that reports arrived traffic, so that it need not be polled.
 
-    It is not derived from it: a compiled base has more names than what is looked for.
+    It is not derived from `Port`, because a compiled base has additional names.
     """
 
     @property
     def wire(self) -> Wire:
-        """The wire it is an end of."""
+        """The wire of the port."""
         ...
 
     def attach(self, device: Device[W], wake: Callable[[int], None], /) -> None:
-        """Serve a device: call `wake` with the time when traffic has arrived for it."""
+        """Attach a device: call `wake` with the time when traffic has arrived for it."""
 
 
 def is_wire_port(port: object) -> TypeGuard[WirePort[Any]]:
-    """Say whether a port has the members of `WirePort`, by `__getattr__` too."""
+    """Return whether a port has the members of `WirePort`, by `__getattr__` too."""
     return hasattr(port, "wire") and hasattr(port, "attach")
 
 
@@ -40,7 +40,7 @@ class Station(StationFields, Generic[W]):
     """A device on a port.
 
     Attributes:
-        at_us: the tick for which it stands in the timetable of its rig.
+        at_us: its tick in the timetable of its rig.
     """
 
     __slots__ = ()
@@ -53,7 +53,7 @@ class Station(StationFields, Generic[W]):
         self._timetable: Timetable | None = None
 
     def stand_in(self, timetable: Timetable | None) -> None:
-        """Enter itself in a timetable when traffic arrives; without one it is looked at anyway."""
+        """Enter the station in a timetable on arrivals; without a timetable it is polled."""
         self._timetable = timetable
         if is_wire_port(self.port):
             self.port.attach(self.device, self._wake)
@@ -82,11 +82,11 @@ class _UartPort(Copyable, Generic[W]):
         return self._port.due_us  # type: ignore[no-any-return] # a Port
 
     def poll(self, now_us: int, /) -> W:
-        """Take what has arrived."""
+        """Return the arrived traffic."""
         return self._port.poll(now_us)  # type: ignore[no-any-return] # a Port
 
     def send(self, now_us: int, traffic: W, /) -> None:
-        """Send the traffic of a tick, and use the setting that the tick has left behind it."""
+        """Send the traffic of a tick, then apply the setting after the tick."""
         self._port.send(now_us, traffic)
         self._follow(now_us)
 
@@ -105,14 +105,13 @@ def next_tick_us(now_us: int, due_us: int, tick_us: int) -> int:
     return -(-due_us // tick_us) * tick_us
 
 
-# Which stations of a rig have work at which tick.
+# Timetable of ticks with work.
 
 
 class Timetable(TimetableFields):
     """Ticks with work, soonest first, each with its stations.
 
-    A station stands at one tick, `station.at_us`. Where it stood before it was
-    entered for an earlier tick it is simply passed over.
+    A station has one tick, `station.at_us`. Its older entries at later ticks are ignored.
 
     Attributes:
         first_us: the soonest tick with work, `NEVER` if there is none.
@@ -128,7 +127,7 @@ class Timetable(TimetableFields):
 
     @in_kernel
     def enter(self, station: Station[Any], at_us: int) -> None:
-        """Let a station have work at the first tick from `at_us` on, unless it has some before."""
+        """Enter a station for the first tick from `at_us` on, unless it has an earlier one."""
         if at_us >= station.at_us:
             return
         tick_us = station.tick_us
@@ -146,7 +145,7 @@ class Timetable(TimetableFields):
 
     @in_kernel
     def take(self, now_us: int) -> list[Station[Any]]:
-        """Take the stations that have work by `now_us`."""
+        """Return the stations that have work by `now_us`."""
         if self.first_us > now_us:
             return []
         taken = []
@@ -160,7 +159,7 @@ class Timetable(TimetableFields):
         return taken
 
     def _pass_over(self) -> None:
-        """Drop ticks whose stations all have gone elsewhere."""
+        """Drop ticks without valid entries."""
         while self._ticks:
             at_us = self._ticks[0]
             if any(station.at_us == at_us for station in self._stations[at_us]):

@@ -1,4 +1,4 @@
-"""The RRC as a device type: `rrc-emu`, and the configuration that its traces carry."""
+"""The RRC as a device type: `rrc-emu`, and its configuration in traces."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _EVENTS: Final = (b"EV:", b"ER:")
 
 
 def _config_to_trace(config: RrcConfig) -> Config:
-    """Return all settings, also those left alone: defaults may change one day."""
+    """Return all settings, including unchanged ones, because defaults may change."""
     return {**asdict(config), "power_on_fail_target": config.power_on_fail_target.value}
 
 

@@ -1,4 +1,4 @@
-"""What can be set of an RRC."""
+"""Options of an RRC."""
 
 from __future__ import annotations
 
@@ -25,6 +25,6 @@ FIELDS: Final = (
         high=100_000,
         default=1_200,
         unit="WH",
-        help="What the battery of the vehicle holds.",
+        help="Capacity of the vehicle's battery.",
     ),
 )

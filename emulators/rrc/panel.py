@@ -24,7 +24,7 @@ from tickrig.host.rrc import gauges
 from tickrig.host.tui import FramedApp, KeyFooter
 
 _SendRequests = Callable[[Sequence[Object]], Awaitable[list[Object]]]
-"""Makes requests of an emulator, those of the control socket, and brings the answers."""
+"""Sends requests of the control socket to an emulator, and returns the answers."""
 
 REFRESH_S: Final = 0.1
 _STEP_PCT: Final = 10
@@ -44,20 +44,20 @@ q       end the emulator"""
 
 _LEAST: Final = (60, 15)
 _ROOMY: Final = (80, 24)
-"""Columns and lines: with fewer than the first there is no panel, with the second all of it."""
+"""Columns and lines: minimum for the panel, and size for all of it."""
 
 
 class RrcPanel(FramedApp):
     """Stick, buttons, faults and lamps of an RRC and its VR2.
 
-    A terminal tells no key-up: arrows move the stick and leave it there, a
-    button key is a pulse of 100 ms, and capitals hold the speed buttons.
+    A terminal reports no key release: arrows move the stick and leave it there, a button key is a
+    pulse of 100 ms, and capitals hold the speed buttons.
 
     Below 80 x 24 it draws no square for the stick and no frames; 60 x 15 is the least.
 
     Args:
         send: sends requests to the emulator, and returns its answers.
-        ready: called when the screen stands, to start the emulator.
+        ready: called when the screen is ready, to start the emulator.
     """
 
     ENABLE_COMMAND_PALETTE = False
@@ -106,16 +106,16 @@ class RrcPanel(FramedApp):
 
     @property
     def view(self) -> PanelView:
-        """What is shown."""
+        """The displayed view."""
         return self._observer.view
 
     @property
     def helps(self) -> bool:
-        """Whether help is on the screen; Textual's own has no room beside the panel."""
+        """Whether help is on the screen; Textual's own help does not fit beside the panel."""
         return bool(self.screen_stack and self.screen.has_class("-helps"))
 
     def action_show_help_panel(self) -> None:
-        """Show what the keys do."""
+        """Show the help for the keys."""
         self.screen.add_class("-helps")
         self.refresh_bindings()
 
@@ -125,12 +125,12 @@ class RrcPanel(FramedApp):
         self.refresh_bindings()
 
     def on_ready(self) -> None:
-        """Begin to look at the emulator."""
+        """Start to poll the emulator."""
         self._when_ready()
         self.set_interval(REFRESH_S, self.look)
 
     async def look(self) -> None:
-        """Fetch what there is to see, and show it."""
+        """Fetch the present state, and show it."""
         answers = await self._request(
             _request("get"), _request("status"), _request("lines", since=self._observer.seen)
         )
@@ -147,7 +147,7 @@ class RrcPanel(FramedApp):
         await self._do(_request("set", name="stick", value=stick))
 
     async def action_centre(self) -> None:
-        """Let the stick go."""
+        """Release the stick."""
         await self._do(_request("set", name="stick", value=[0, 0]))
 
     async def action_press(self, name: str) -> None:
@@ -155,11 +155,11 @@ class RrcPanel(FramedApp):
         await self._do(_request("press", name=name))
 
     async def action_hold(self, name: str) -> None:
-        """Hold a button, or let it go."""
+        """Hold or release a button."""
         await self._do(_request("set", name=name, value=1 - self.view.number(name)))
 
     async def action_fault(self, name: str) -> None:
-        """Let a fault come, or go."""
+        """Start or clear a fault."""
         if name in self.view.faults:
             await self._do(_request("clear", name=name))
         else:
@@ -208,11 +208,11 @@ def _request(do: str, **fields: object) -> Object:
 # Run an emulator in a thread of its own, and the operator panel in this one.
 
 _SWITCH_S: Final = 0.000_2
-"""How long the screen may keep the rig from running, a tick being 10 ms."""
+"""How long the screen may block the rig; a tick is 10 ms."""
 
 
 def run_panel(emulator: Emulator) -> None:
-    """Show the panel until it is left or the emulator is stopped."""
+    """Show the panel until it is closed or the emulator is stopped."""
     inbox = RequestInbox(EmulatorControl(emulator))
 
     def run() -> None:
@@ -243,7 +243,7 @@ def run_panel(emulator: Emulator) -> None:
 
 @contextmanager
 def _ending(emulator: Emulator, inbox: RequestInbox) -> Iterator[None]:
-    """Let the emulator end, and nobody wait for it, however this ends."""
+    """Stop the emulator, and release all waiting requests, on any exit."""
     try:
         yield
     finally:

@@ -1,4 +1,4 @@
-"""What the operator panel shows, as text: no terminal, no time."""
+"""Text of the operator panel, without terminal and clock."""
 
 from __future__ import annotations
 
@@ -43,17 +43,17 @@ _LINE_STYLES: Final = {"EV": "bold cyan", "ER": "bold red"}
 
 _KEPT_LINES: Final = 60
 _REPORT_US: Final = 100_000
-"""So long the latest SA line stands; one comes each 10 ms while the status is on."""
+"""How long the latest SA line is shown; one arrives each 10 ms while the status is on."""
 
 
 @dataclass(frozen=True, slots=True)
 class PanelView:
-    """What is known of the emulator at one time.
+    """The state of the emulator at one time.
 
     Attributes:
         values: inputs and outputs by name.
-        status: how the run is going.
-        lines: the latest lines on the wire but SA, as `(time, mark, text)`.
+        status: status of the run.
+        lines: the latest lines on the wire except SA, as `(time, mark, text)`.
         report: the latest SA line.
     """
 
@@ -63,13 +63,13 @@ class PanelView:
     report: str = ""
 
     def number(self, name: str) -> int:
-        """Return a value that is a number, 0 if it is not known yet."""
+        """Return a numeric value, 0 if it is not known yet."""
         value = self.values.get(name, 0)
         return value if isinstance(value, int) else 0
 
     @property
     def decoded(self) -> StatusA | None:
-        """What the SA line says; None if there is none."""
+        """The latest SA line; None if there is none."""
         try:
             reply = parse_reply(self.report.encode())
         except WireError:
@@ -78,7 +78,7 @@ class PanelView:
 
     @property
     def faults(self) -> tuple[str, ...]:
-        """Names of the faults that are present."""
+        """Names of the active faults."""
         return tuple(str(self.status.get("faults", "")).split())
 
 
@@ -97,11 +97,11 @@ class _WireRow(NamedTuple):
 
 
 class Observer:
-    """Makes a `PanelView` of what an emulator answers to `get`, `status` and `lines`.
+    """Makes a `PanelView` from the answers to `get`, `status` and `lines`.
 
     Attributes:
-        view: what is known now.
-        seen: number of the latest line on the wire; ask for those after it.
+        view: the present view.
+        seen: number of the latest line on the wire; request those after it.
     """
 
     def __init__(self) -> None:
@@ -109,7 +109,7 @@ class Observer:
         self._report = _WireRow(0, -_REPORT_US, "", "")  # the latest SA
 
     def take(self, values: Object, status: Object, lines: Object) -> None:
-        """Take three answers in, asked for at the same time."""
+        """Add three answers from the same time."""
         fresh = [line for line in _lines(lines) if line.number > self.seen]
         self.seen = fresh[-1].number if fresh else self.seen
         now, present = _values(status), _values(values["values"])
@@ -125,7 +125,7 @@ class Observer:
         )
 
     def _reports(self, status: _Values, values: _Values) -> bool:
-        """Whether SA lines come: VR2 runs, and the latest one is fresh."""
+        """Whether SA lines arrive: VR2 runs, and the latest one is recent."""
         fresh = self._report.at_us + _REPORT_US > int(status["now_us"])
         return fresh and bool(values["vr2_power"])
 
@@ -154,7 +154,7 @@ _STICK_HINTS: Final = {
 
 
 def stick_hint(view: PanelView) -> str:
-    """Say whether the stick drives, and what it waits for if it does not; at most 21 columns."""
+    """Return whether the stick drives, or what it waits for; at most 21 columns."""
     state = str(view.values.get("state", ""))
     if state == "Standby" and view.number("stick_drives"):
         return "drives"
@@ -171,7 +171,7 @@ def lamps(view: PanelView) -> list[Text]:
 
 
 def load(view: PanelView) -> Text:
-    """Show how busy the RRC is, and how much of its time is left."""
+    """Show the load of the RRC, and its time left."""
     margin_pct = view.number("margin_pct")
     style = FAULT if margin_pct < 0 else ON if margin_pct < 100 - SAFE_PCT else ""
     return Text(f"{view.number('load_pct')} %, margin {margin_pct} %", style=style)
@@ -184,7 +184,7 @@ def state_of(view: PanelView) -> Text:
 
 
 def outputs_pane(view: PanelView) -> Text:
-    """Show what the RRC does."""
+    """Show the work of the RRC."""
     rows = [
         Text.assemble("state  ", state_of(view)),
         Text.assemble("drive  v ", bar(view.number("out_v_pct"))),
@@ -201,13 +201,13 @@ def outputs_pane(view: PanelView) -> Text:
 
 
 def controls_pane(view: PanelView) -> Text:
-    """Show which buttons are pressed and which faults are present."""
+    """Show the pressed buttons and the active faults."""
     rows = [Text(" ").join(faults(view, 22)[at : at + 2]) for at in range(0, len(FAULT_KEYS), 2)]
     return Text("\n").join([buttons(view), *rows])
 
 
 def buttons(view: PanelView) -> Text:
-    """Show which buttons are pressed."""
+    """Show the pressed buttons."""
     return Text(" ").join(
         Text(f" {label} ", style="bold black on yellow" if view.number(name) else "reverse dim")
         for label, name in _BUTTONS.items()
@@ -215,7 +215,7 @@ def buttons(view: PanelView) -> Text:
 
 
 def faults(view: PanelView, width: int) -> list[Text]:
-    """Show each fault and its key, in so many columns."""
+    """Show each fault and its key, in a number of columns."""
     return [
         Text.assemble(
             (shown := f"{key} {name}", FAULT if name in view.faults else ""),
@@ -226,7 +226,7 @@ def faults(view: PanelView, width: int) -> list[Text]:
 
 
 def report_line(view: PanelView) -> Text:
-    """Show what the latest SA line says, with its raw text."""
+    """Show the values of the latest SA line, and its raw text."""
     if (sa := view.decoded) is None:
         return Text(view.report)
     return Text(
@@ -247,7 +247,7 @@ def wire_pane(view: PanelView, height: int) -> Text:
 
 
 def status_line(view: PanelView) -> Text:
-    """Show how the run is going."""
+    """Show the status of the run."""
     status, now_us = view.status, view.status.get("now_us", 0)
     text = Text(f" {status.get('link', '')}   {int(now_us) / 1e6:.1f} s")
     late, lost = int(status.get("late_steps", 0)), int(status.get("lost_bytes", 0))

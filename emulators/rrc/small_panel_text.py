@@ -1,4 +1,4 @@
-"""The operator panel where there is little room: 60 columns, 15 lines."""
+"""The operator panel for small terminals: 60 columns, 15 lines."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from tickrig.host.rrc.gauges import DIM, bar, scale, signed
 
 
 def outputs_pane(view: PanelView) -> Text:
-    """Show what the RRC does, and the stick beside what becomes of it."""
+    """Show the work of the RRC, and stick and output side by side."""
     rows = [
         Text(" ").join([panel_text.state_of(view), *panel_text.lamps(view)]),
         Text.assemble(
@@ -37,14 +37,14 @@ def outputs_pane(view: PanelView) -> Text:
 
 
 def controls_pane(view: PanelView) -> Text:
-    """Show which buttons are pressed and which faults are present."""
+    """Show the pressed buttons and the active faults."""
     shown = panel_text.faults(view, 0)
     rows = [Text("  ").join(shown[at : at + 3]) for at in range(0, len(shown), 3)]
     return Text("\n").join([panel_text.buttons(view), *rows])
 
 
 def report_line(view: PanelView) -> Text:
-    """Show what the latest SA line says; the counters are those of speed up, down and alarm."""
+    """Show the latest SA line; the counters are those of speed up, down and alarm."""
     if (sa := view.decoded) is None:
         return Text(view.report)
     return Text(
@@ -56,6 +56,6 @@ def report_line(view: PanelView) -> Text:
 
 
 def too_small(size: tuple[int, int], least: tuple[int, int]) -> Text:
-    """Say that the terminal is too small, in columns and lines."""
+    """Report that the terminal is too small, in columns and lines."""
     have, need = (f"{columns} x {lines}" for columns, lines in (size, least))
     return Text(f"terminal too small: {have}, at least {need}")

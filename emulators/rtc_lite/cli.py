@@ -15,15 +15,12 @@ from tickrig.emulators.rtc_lite.fields import FIELDS
 def main() -> None:
     """Emulate a PIC with an RTC-Lite component, on a pseudo-terminal.
 
-    It runs in real time until Ctrl-C. A scenario alone runs in virtual time:
-    as fast as it goes, with the same transcript each time, exit status 1 if
-    something expected did not come. Together with --link, --serve or
-    --control it is played in real time.
+    The emulator runs in real time until Ctrl-C. A scenario alone runs in virtual time: as fast as
+    possible, with the same transcript each time, and with exit status 1 if an expectation was
+    missed. Together with --link, --serve or --control it is played in real time.
 
-    \b
-    Faults: power_cut the supply, slow_answer; on the line noise=0.01 bytes of
-    chance, flip=0.001 bits turned over, ping=0.5 every second PING unanswered,
-    radio=0.05 a lossy radio link.
+    \b Faults: power_cut the supply, slow_answer; on the line noise=0.01 random bytes, flip=0.001
+    inverted bits, ping=0.5 every second PING unanswered, radio=0.05 a lossy radio link.
 
     \b
     rtc-lite-emu --link /tmp/lite-a --node lite-a

@@ -1,4 +1,4 @@
-"""The RTC-Lite node as a device type: `rtc-lite-emu`, and the configuration of its traces."""
+"""The RTC-Lite node as a device type: `rtc-lite-emu`, and its configuration in traces."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ _ROUTINE: Final = tuple(
         LiteCommand.DATA,
     )
 )
-"""What -v leaves out: the traffic of each period."""
+"""Periodic traffic, which -v omits."""
 
 
 def _config_to_trace(node: str, config: LiteConfig) -> Config:
-    """Return all settings, also those left alone: defaults may change one day."""
+    """Return all settings, including unchanged ones, because defaults may change."""
     return {
         "node": node,
         "framing": config.framing.value,
@@ -80,10 +80,10 @@ COMPONENTS: Final[Mapping[str, type[LiteComponent]]] = MappingProxyType(
 
 
 def _find_component(spec: str) -> type[LiteComponent]:
-    """Return the component that a name or `FILE.py:Class` stands for.
+    """Return the component of a name or `FILE.py:Class`.
 
     Raises:
-        ValueError: there is none, its file cannot be run, or no PIC has room for it.
+        ValueError: unknown name, its file cannot be run, or it does not fit into a PIC.
     """
     if spec in COMPONENTS:
         return COMPONENTS[spec]

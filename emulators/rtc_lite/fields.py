@@ -1,4 +1,4 @@
-"""What can be set of an RTC-Lite node."""
+"""Options of an RTC-Lite node."""
 
 from __future__ import annotations
 
@@ -42,6 +42,6 @@ FIELDS: Final = (
         name="checksum",
         choices=tuple(checksum.value for checksum in Checksum),
         default=Checksum.SUM8.value,
-        help="How frames are summed up.  [sum8]",
+        help="Checksum of frames. [sum8]",
     ),
 )

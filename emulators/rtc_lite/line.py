@@ -1,4 +1,4 @@
-"""What is on the line of an RTC-Lite node: the verbs of its scenarios, and the line's faults."""
+"""The line of an RTC-Lite node: verbs of its scenarios, and faults of the line."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from tickrig.wire.rtc_lite.messages import LitePortData
 from tickrig.wire.rtc_lite.rtno import RtnoPacketDecoder
 from tickrig.wire.rtc_lite.values import LitePortType
 
-# Cut what passes on the line into frames, as the log, transcripts and `expect` show them.
+# Split the traffic into frames, as shown in the log, transcripts and `expect`.
 #
 # A frame is shown without header and checksum, as `CX`, `CX@I` or
 # `QV\x03\x04out*\x00\x00\x00`; a packet of RTno as `X`, `XI`.
@@ -41,11 +41,11 @@ _SHOWN: Final = {
     LiteLinkFault.UNKNOWN: b"(unknown frame)",
     LiteLinkFault.TIMEOUT: b"(broken off)",
 }
-"""What is shown of bytes that are no frame."""
+"""Text for bytes that are not a frame."""
 
 
 def frame_splitter(config: LiteConfig) -> Callable[[Mark], Splitter]:
-    """Return what makes the splitter of each direction."""
+    """Return the factory of the splitters of each direction."""
 
     def make(mark: Mark) -> Splitter:
         if config.framing is Framing.RTNO:
@@ -75,7 +75,7 @@ class _PacketSplitter:
 
 
 def _split(receiver: LiteReceiver, at_us: int, data: bytes) -> list[bytes]:
-    """Listen as a node listens, with the same time-outs."""
+    """Split as a node does, with the same time-outs."""
     out = [_SHOWN[LiteLinkFault.TIMEOUT]] if receiver.drop_broken_off(at_us) else []
     for at in range(0, len(data), BUFFER_BYTES):
         receiver.push(at_us, data[at : at + BUFFER_BYTES])
@@ -88,14 +88,14 @@ _NAMES: Final = {command.value: command.name for command in LiteCommand}
 
 
 class MonitoredLink:
-    """A `Link[bytes]` that tells each frame that passes through another one.
+    """A `Link[bytes]` that reports each frame on another link.
 
     Args:
         link: the other one.
-        show: called with a line of text, as `> AE  EXECUTE`.
+        show: called with a line of text, such as `> AE EXECUTE`.
 
     Attributes:
-        shown: whether frames are told just now.
+        shown: whether frames are reported now.
     """
 
     def __init__(self, link: Link[bytes], show: Callable[[str], None]) -> None:
@@ -105,22 +105,22 @@ class MonitoredLink:
 
     @property
     def now_us(self) -> int:
-        """Time on the link below."""
+        """Time on the other link."""
         return self._link.now_us
 
     def send(self, traffic: bytes, /) -> None:
-        """Send, and tell."""
+        """Send and report."""
         self._report(Mark.TO_DEVICE, traffic)
         self._link.send(traffic)
 
     def receive(self, timeout_us: int, /) -> bytes:
-        """Receive, and tell."""
+        """Receive and report."""
         data = self._link.receive(timeout_us)
         self._report(Mark.FROM_DEVICE, data)
         return data
 
     def close(self) -> None:
-        """Close the link below."""
+        """Close the other link."""
         self._link.close()
 
     def _report(self, mark: Mark, data: bytes) -> None:
@@ -130,7 +130,7 @@ class MonitoredLink:
 
 
 def verbs(component: LiteComponent, config: LiteConfig) -> Mapping[str, Sender]:
-    """Return the verbs that send."""
+    """Return the sending verbs."""
     lite = config.framing is Framing.LITE
 
     def send(rest: str) -> Send:
@@ -153,14 +153,14 @@ def verbs(component: LiteComponent, config: LiteConfig) -> Mapping[str, Sender]:
 
 
 def _packed(body: bytes, config: LiteConfig) -> Send:
-    """Put a frame, or a packet of RTno, around a command and its data."""
+    """Make a frame, or a packet of RTno, from a command and its data."""
     if config.framing is Framing.LITE:
         return Send(HEADER + body + bytes([config.checksum.of(body)]), body)
     return Send(rtno.pack(body[:1], body[1:]), body)
 
 
 def _value(port_type: LitePortType[Any], words: list[str]) -> bytes:
-    """Write the value that a person typed: a word, or one for each element."""
+    """Write a typed value: a word, or one for each element."""
     if port_type.code in "cC":
         return port_type.encode(" ".join(words))
     values = tuple(parse_setting(word) for word in words)
@@ -185,7 +185,7 @@ class _Noise(ByteFault):
 
 
 class _LostPing:
-    """It counts; there is no chance in it. A node sends an answer whole, in one tick."""
+    """A fault without random numbers: it counts. A node sends an answer in one tick."""
 
     def __init__(self, trigger: FaultTrigger, arguments: FaultArguments) -> None:
         self._every, self._seen, self._tally = round(1 / arguments.rate), 0, trigger.tally
@@ -201,14 +201,14 @@ class _LostPing:
 
 @dataclass(frozen=True, slots=True)
 class RadioSettings:
-    """What a radio link between host and node is like.
+    """Parameters of a radio link between host and node.
 
     Attributes:
         latency_us: the shortest time that a packet takes.
-        jitter_us: up to so much longer it takes, by chance; packets keep their order.
-        gap_us: silence after which a radio sends what it has taken in, as one packet.
+        jitter_us: random additional time; packets keep their order.
+        gap_us: silence after which a radio sends the collected bytes as one packet.
         up_us: mean time from one dropout to the next, 0 for no dropouts.
-        dropout_us: mean time of a dropout; both times vary by half by chance.
+        dropout_us: mean time of a dropout; both times vary randomly by half.
     """
 
     latency_us: int = 15_000
@@ -219,14 +219,14 @@ class RadioSettings:
 
 
 class _Dropouts:
-    """When both directions hear nothing."""
+    """Dropouts, common to both directions."""
 
     def __init__(self, chance: Chance, settings: RadioSettings) -> None:
         self._chance, self._settings = chance, settings
         self._down, self._until_us = True, 0
 
     def down(self, now_us: int) -> bool:
-        """Return whether there is a dropout; times do not go back."""
+        """Return whether there is a dropout; times must not decrease."""
         while self._settings.up_us and now_us >= self._until_us:
             self._down = not self._down
             mean_us = self._settings.dropout_us if self._down else self._settings.up_us
@@ -235,7 +235,7 @@ class _Dropouts:
 
 
 class Radio(HoldingFault[bytes]):
-    """One direction of a radio link: packets are late, lost by chance, or fall into a dropout."""
+    """One direction of a radio link: packets are late, lost at random, or lost in a dropout."""
 
     def __init__(
         self, settings: RadioSettings, trigger: FaultTrigger, arguments: FaultArguments
@@ -247,17 +247,17 @@ class Radio(HoldingFault[bytes]):
 
     @property
     def due_us(self) -> int:
-        """When a packet leaves or arrives."""
+        """When a packet is sent or arrives."""
         leaves_us = self._taken_us + self._settings.gap_us if self._taken else NEVER
         return min(leaves_us, self._flying[0][0] if self._flying else NEVER)
 
     def pair(self, other: HoldingFault[bytes]) -> None:
-        """Let both directions have the same dropouts."""
+        """Share the dropouts with the other direction."""
         assert isinstance(other, Radio)
         other._dropouts = self._dropouts
 
     def __call__(self, now_us: int, data: bytes, /) -> bytes:
-        """Take bytes in."""
+        """Accept bytes."""
         self._leave(now_us)
         self._taken += data
         self._taken_us = now_us
@@ -272,7 +272,7 @@ class Radio(HoldingFault[bytes]):
         return arrived or None
 
     def _leave(self, now_us: int) -> None:
-        """Send what was taken in before the last gap."""
+        """Send the bytes collected before the last gap."""
         leaves_us = self._taken_us + self._settings.gap_us
         if not self._taken or now_us < leaves_us:
             return
@@ -293,7 +293,7 @@ def radio(settings: RadioSettings) -> FaultType[bytes]:
 
 LINE_FAULTS: Final[Mapping[str, FaultType[bytes]]] = {
     **BYTE_FAULTS,
-    "noise": FaultType("a byte of chance comes before each byte at this rate", _Noise),
+    "noise": FaultType("a random byte precedes each byte at this rate", _Noise),
     "ping": FaultType("every n-th answer to a PING is lost, at a rate of 1/n", _LostPing),
     "radio": radio(RadioSettings()),
 }

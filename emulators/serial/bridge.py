@@ -12,21 +12,21 @@ from tickrig.host.text.trace import Mark
 from tickrig.wire.instant import NEVER
 from tickrig.wire.uart import UartSetting
 
-# What the hosts of a line have set their port to, where the device has something else.
+# Port settings of hosts that differ from those of the device.
 
 _LOOK_US: Final = 500_000
 
 
 class HostSetting:
-    """Tells, once each, the settings in which a device would not understand its host.
+    """Reports, once each, host settings with which the device does not understand the host.
 
     Args:
-        read: returns the present setting, as `9600 8N1`.
+        read: returns the present setting, such as `9600 8N1`.
         wanted: the device's; empty if any host is understood.
-        notify: called with a setting that is not the device's.
+        notify: called with a different setting.
 
     Attributes:
-        differing: the present setting, if it is not the device's.
+        differing: the present setting, if it differs from the device's.
     """
 
     def __init__(self, read: Callable[[], str], wanted: str, notify: Callable[[str], None]) -> None:
@@ -36,7 +36,7 @@ class HostSetting:
         self.differing = ""
 
     def want(self, wanted: str) -> None:
-        """Judge hosts by another setting: the device has changed its own.
+        """Compare with another setting after the device has changed its own.
 
         Args:
             wanted: the device's; empty if any host is understood.
@@ -46,11 +46,11 @@ class HostSetting:
             self._notified.clear()
 
     def look(self, now_us: int, *, at_once: bool = False) -> None:
-        """Look whether it differs: twice a second, or at once.
+        """Check whether it differs: twice a second, or at once.
 
         Args:
-            now_us: the present.
-            at_once: whether the host did something.
+            now_us: the present time.
+            at_once: whether the host has acted.
         """
         if now_us < self._next_us and not at_once:
             return
@@ -63,19 +63,18 @@ class HostSetting:
 
 
 class Bridge:
-    """The far end of a line, handed to the outside: a pty, a socket, a real port.
+    """A bridge between the far end of a line and the outside: a pty, a socket, a real port.
 
-    The line keeps its baud rate: what the outside writes at once arrives at the
-    device byte by byte, and what does not fit into the line's buffer stays in
-    the outside's until it does.
+    The line keeps its baud rate: data written at once from outside arrive at the device byte by
+    byte, and data that do not fit into the line's buffer stay in the outside's buffer until they
+    do.
 
     Args:
         end: the host's end of the line.
-        outside: where the host is.
-        attend: called with the time instead of a poll, as long as the line has no room for
-            what was taken before.
-        changed: called with the setting of the device, at first and when it has changed;
-            None if hosts of any setting understand it.
+        outside: the host's port.
+        attend: called with the time instead of a poll, while the line has no room for earlier data.
+        changed: called with the setting of the device, at first and when it has changed; None if
+            hosts of any setting understand it.
     """
 
     def __init__(
@@ -93,15 +92,14 @@ class Bridge:
 
     @property
     def due_us(self) -> int:
-        """When the bytes now on the line will all have arrived at this end."""
+        """When all bytes now on the line will have arrived at this end."""
         return self._end.idle_us
 
     def take_in(self, now_us: int) -> None:
-        """Put what the outside wrote since the last look on the line.
+        """Send the data written outside since the last poll on the line.
 
-        It may have been written at any time since then, so it is taken as
-        written right after that look: a host is not charged a tick for being
-        polled.
+        They may have been written at any time since then, so they count as written right after that
+        poll: polling costs a host no tick.
         """
         if self._pending:
             self._attend(now_us)
@@ -116,7 +114,7 @@ class Bridge:
         self._looked_us = now_us
 
     def give_out(self, now_us: int) -> None:
-        """Hand what has arrived by now to the outside."""
+        """Deliver the data that have arrived by now to the outside."""
         uart = self._end.uart
         if uart.setting != self._setting and uart.since_us <= now_us:
             if before := self._end.poll(uart.since_us):
@@ -128,10 +126,10 @@ class Bridge:
 
 
 class HostEnd:
-    """A `ByteEnd` that tells what passes it.
+    """A `ByteEnd` that reports its traffic.
 
     Args:
-        end: the end behind it.
+        end: the other end.
         hear: called with the time, the direction and the bytes.
     """
 
@@ -139,7 +137,7 @@ class HostEnd:
         self._end, self._hear = end, hear
 
     def __reduce__(self) -> tuple[Callable[[ByteEnd], ByteEnd], tuple[ByteEnd]]:
-        """Copy the end alone: nobody listens to a twin."""
+        """Copy only the end: a twin has no listeners."""
         return itself, (self._end,)
 
     @property
@@ -149,16 +147,16 @@ class HostEnd:
 
     @property
     def idle_us(self) -> int:
-        """When the last byte that is on its way here will have arrived."""
+        """When the last byte in transit to this end will have arrived."""
         return self._end.idle_us
 
     @property
     def coming(self) -> bytes:
-        """What is on its way here and was not taken, as far as it is known to arrive."""
+        """The bytes in transit to this end that are known to arrive."""
         return self._end.coming
 
     def arrival_us(self, count: int) -> int:
-        """Return when so many bytes will have arrived, or when to look again; `NEVER` for none."""
+        """Return when `count` bytes will have arrived, or when to check again; `NEVER` for none."""
         return self._end.arrival_us(count)
 
     @property
@@ -171,16 +169,16 @@ class HostEnd:
         self._end.use_uart(now_us, setting)
 
     def withdraw(self, now_us: int) -> list[tuple[int, int]]:
-        """Take bytes of the host that have not arrived off the line: start in ps, value."""
+        """Remove the host's bytes that have not arrived; return start in ps and value."""
         return self._end.withdraw(now_us)
 
     @property
     def lost(self) -> int:
-        """Bytes that found a buffer full."""
+        """Number of bytes lost because of a full buffer."""
         return self._end.lost
 
     def room(self, now_us: int) -> int:
-        """Return how many bytes `send` takes at `now_us` without loss."""
+        """Return how many bytes `send` accepts at `now_us` without loss."""
         return self._end.room(now_us)
 
     @property
@@ -193,11 +191,11 @@ class HostEnd:
         return self._end.unsent(now_us)
 
     def drop_unsent(self, now_us: int) -> None:
-        """Forget the bytes of the host of which no bit is on the line yet."""
+        """Discard the bytes of the host of which no bit is on the line yet."""
         self._end.drop_unsent(now_us)
 
     def poll(self, now_us: int, /) -> bytes:
-        """Take what the device sent."""
+        """Return the data of the device."""
         if data := self._end.poll(now_us):
             self._hear(now_us, Mark.FROM_DEVICE, data)
         return data
@@ -209,9 +207,9 @@ class HostEnd:
 
 
 class Tap(Copyable, Generic[W]):
-    """A port with listeners: what is polled is on its way to the device, what is sent from it.
+    """A port with listeners: polled data go to the device, sent data come from it.
 
-    It may be the device's end of a wire, or the port where the host is. Nobody listens to a twin.
+    It may be the device's end of a wire, or the port of the host. A twin has no listeners.
 
     Args:
         port: the port.
@@ -224,28 +222,28 @@ class Tap(Copyable, Generic[W]):
 
     @property
     def due_us(self) -> int:
-        """When the next traffic reaches the port behind."""
+        """When the next traffic arrives at the port."""
         return self._port.due_us
 
     def poll(self, now_us: int, /) -> W:
-        """Take what the host sent."""
+        """Return the traffic of the host."""
         if traffic := self._port.poll(now_us):
             self._hear(now_us, Mark.TO_DEVICE, traffic)
         return traffic
 
     def send(self, now_us: int, traffic: W, /) -> None:
-        """Hand on what the device sent."""
+        """Forward the traffic of the device."""
         if traffic:
             self._hear(now_us, Mark.FROM_DEVICE, traffic)
         self._port.send(now_us, traffic)
 
     @property
     def sent_us(self) -> int:
-        """When the line will have sent what was sent last; `NEVER` if it has, or nobody knows."""
+        """When the line will have sent the latest data; `NEVER` if it has, or if unknown."""
         return getattr(self._port, "sent_us", NEVER)
 
     def use_uart(self, now_us: int, setting: UartSetting) -> None:
-        """Change the setting of the device at the end behind."""
+        """Change the setting of the device at the other end."""
         self._port.use_uart(now_us, setting)  # type: ignore[attr-defined] # of a ByteEnd
 
     @property

@@ -1,4 +1,4 @@
-"""Faults of a serial line: what happens to the bytes of a device and of its host on their way."""
+"""Faults of a serial line: effects on the bytes of a device and of its host."""
 
 # Theory of operation
 # ===================
@@ -44,7 +44,7 @@ _LINES: Final = re.compile(rb"[^\n]*\n|[^\n]+")
 
 
 def _units(by: str, data: bytes) -> list[bytes]:
-    r"""Cut bytes into what a fault acts on.
+    r"""Split bytes into the units that a fault acts on.
 
     >>> _units("line", b"a\nbc"), _units("byte", b"ab"), _units("frame", b"a\nbc")
     ([b'a\n', b'bc'], [b'a', b'b'], [b'a\nbc'])
@@ -56,10 +56,10 @@ def _units(by: str, data: bytes) -> list[bytes]:
 
 @dataclass(slots=True)
 class ByteFault:
-    """A fault that hits bits, bytes, lines or frames by chance.
+    """A fault that hits bits, bytes, lines or frames at random.
 
     Attributes:
-        trigger: decides which ones.
+        trigger: decides which ones it hits.
         arguments: of the fault.
     """
 
@@ -100,7 +100,7 @@ class _Framing(ByteFault):
     def __call__(self, now_us: int, data: bytes) -> bytes:
         received = bytearray(data)
         for at in self.trigger.hits(len(data)):
-            # One bit less on the line: the stop bit is taken for the highest data bit.
+            # One bit less on the line: the stop bit is read as the highest data bit.
             received[at] = received[at] >> 1 | 0x80
         return bytes(received)
 
@@ -114,7 +114,7 @@ class _Parity(ByteFault):
 
 
 class _UnitFault(ByteFault):
-    """A fault that makes something else of each byte, line or frame that it hits."""
+    """A fault that changes each byte, line or frame that it hits."""
 
     def __call__(self, now_us: int, data: bytes) -> bytes:
         units = _units(self.arguments["by"], data)
@@ -124,7 +124,7 @@ class _UnitFault(ByteFault):
         return self._spoil(unit) if self.trigger.hit() else unit
 
     def _spoil(self, unit: bytes) -> bytes:
-        """Return what arrives in its place."""
+        """Return the bytes that arrive in its place."""
         raise NotImplementedError
 
 
@@ -175,7 +175,7 @@ class _Repeat(_UnitFault):
 
 
 class _Late(ByteFault, HoldingFault[bytes]):
-    """A fault that lets bytes go later, in their order."""
+    """A fault that delays bytes, in their order."""
 
     is_late = True
 
@@ -187,14 +187,14 @@ class _Late(ByteFault, HoldingFault[bytes]):
 
     @property
     def due_us(self) -> int:
-        """When the next bytes go."""
+        """When the next bytes are sent."""
         if not self._queue:
             return NEVER
         at_us, pause_us, _ = self._queue[0]
         return max(at_us, self._free_us + pause_us) if pause_us else at_us
 
     def __call__(self, now_us: int, data: bytes, /) -> bytes:
-        """Take bytes in; return those that go at once."""
+        """Accept bytes; return those that pass at once."""
         for unit in _units(self.arguments["by"], data):
             if self.trigger.hit():
                 self._queue.extend(self._delayed(now_us, unit))
@@ -203,7 +203,7 @@ class _Late(ByteFault, HoldingFault[bytes]):
         return self.release(now_us) or b""
 
     def release(self, now_us: int) -> bytes | None:
-        """Return what goes now."""
+        """Return the bytes to send now."""
         out = b""
         while self.due_us <= now_us:
             out += self._queue.popleft()[2]
@@ -211,12 +211,12 @@ class _Late(ByteFault, HoldingFault[bytes]):
         return out or None
 
     def sent(self, until_us: int) -> None:
-        """Count pauses from when the line has sent what went last."""
+        """Start pauses when the line has sent the latest bytes."""
         self._free_us = max(self._free_us, until_us)
 
     @abstractmethod
     def _delayed(self, now_us: int, unit: bytes) -> list[tuple[int, int, bytes]]:
-        """Return when the parts of it go."""
+        """Return the times of its parts."""
 
 
 class _Delay(_Late):
@@ -257,7 +257,7 @@ def _time(name: str, text: str, default: str) -> FaultArgument:
 
 
 def _read_keep(word: str) -> tuple[int, bool]:
-    """Read how much is left: a number, and whether it is a share in per cent.
+    """Read how much remains: a number, and whether it is a percentage.
 
     >>> _read_keep("half"), _read_keep("3"), _read_keep("90%")
     ((50, True), (3, False), (90, True))
@@ -279,7 +279,7 @@ _PIECES: Final = FaultArgument("pieces", "how many", "2", "pieces", 2, 4_096)
 _FRAME: Final = _by("frame")
 
 BYTE_FAULTS: Final[Mapping[str, FaultType[bytes]]] = {
-    "flip": FaultType("each bit is turned over at this rate", _Flip),
+    "flip": FaultType("each bit is inverted at this rate", _Flip),
     "drop": FaultType("each byte is lost at this rate", _Drop),
     "dup": FaultType("each byte arrives twice at this rate", _Dup),
     "cut": FaultType("nothing passes", _Cut, rated=False),
@@ -289,7 +289,7 @@ BYTE_FAULTS: Final[Mapping[str, FaultType[bytes]]] = {
         arguments=(_time("time", "how late", "100ms"), _FRAME, WAY),
     ),
     "jitter": FaultType(
-        "an answer comes late by a time of chance",
+        "an answer comes late by a random time",
         _Jitter,
         arguments=(_time("time", "how late at most", "20ms"), _FRAME, WAY),
     ),
@@ -302,12 +302,12 @@ BYTE_FAULTS: Final[Mapping[str, FaultType[bytes]]] = {
         "two neighbours arrive in the wrong order", _Swap, arguments=(_by("byte"), WAY)
     ),
     "garbage": FaultType(
-        "bytes of chance come before an answer, or behind it",
+        "random bytes come before an answer, or after it",
         _Garbage,
         arguments=(_BYTES, _place("before", "behind"), _FRAME, WAY),
     ),
     "repeat": FaultType(
-        "the answer before comes again: before this one, or instead of it",
+        "the previous answer comes again: before this one, or instead of it",
         _Repeat,
         arguments=(_place("before", "instead"), _FRAME, WAY),
     ),

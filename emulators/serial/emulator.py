@@ -1,4 +1,4 @@
-"""One emulated device on a serial line, with all that can be done to it while it runs."""
+"""One emulated device on a serial line, with its operator."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from tickrig.wire.uart import UartSetting
 
 
 class LineOutside(Port[bytes], Protocol):
-    """Where the host is: a pty, a network port, or several of these."""
+    """The port of the host: a pty, a network port, or several of these."""
 
     @property
     def lost(self) -> int:
@@ -34,26 +34,26 @@ class LineOutside(Port[bytes], Protocol):
 
     @property
     def host_setting(self) -> str:
-        """What the host has set it to, if that is not what the device has."""
+        """The setting of the host, if it differs from the device's."""
         ...
 
     def attend(self, now_us: int, /) -> None:
-        """Let hosts come and go, but take nothing: the line has no room."""
+        """Let hosts come and go without reading from them, while the line has no room."""
 
     def device_uses(self, setting: UartSetting, /) -> None:
-        """Take note of the setting that the device has now."""
+        """Note the present setting of the device."""
 
 
 @dataclass(frozen=True, slots=True)
 class LineSettings:
-    """What the serial line of a kind of device is like.
+    """Parameters of the serial line of a device type.
 
     Attributes:
         baud: bit rate in bit/s.
         faults: the wire faults that can be armed.
-        splitter: makes what cuts one direction for the log, into lines unless given.
-        wire: makes the line of a baud rate.
-        uart: whether the device has a UART; one behind USB understands a host of any setting.
+        splitter: makes the splitter of one direction for the log; by default into lines.
+        wire: makes the line for a baud rate.
+        uart: whether the device has a UART; a device behind USB understands a host of any setting.
     """
 
     baud: int = 115_200
@@ -67,18 +67,18 @@ class Emulator(RunningEmulator):
     """A device, its line, its operator, and a rig that runs them.
 
     Args:
-        name: what the device is called.
+        name: name of the device.
         device: the device.
-        outside: where the host is; without it the host is the caller (`send`, `log`).
-        clock: a `VirtualClock` unless given.
-        seed: seed of the wire faults' chance.
-        trace: where to record the run.
-        link: path under which the host finds it, for people.
-        line: what the line is like.
+        outside: the port of the host; without it the host is the caller (`send`, `log`).
+        clock: by default a `VirtualClock`.
+        seed: seed of random wire faults.
+        trace: the recording.
+        link: path for the host, as text.
+        line: parameters of the line.
 
     Attributes:
         line: the line itself.
-        host_end: the caller's end of it, for a `SimLink` too; what passes here is logged.
+        host_end: the caller's end of it, also for a `SimLink`; its traffic is logged.
     """
 
     def __init__(  # noqa: PLR0913 - options, by keyword
@@ -122,17 +122,17 @@ class Emulator(RunningEmulator):
             self.host_end.poll(now_us)
 
     def send(self, now_us: int, data: bytes) -> None:
-        """Put bytes on the line, as the host would."""
+        """Send bytes on the line as the host."""
         self.host_end.send(now_us, data)
 
     @property
     def lost(self) -> dict[str, int]:
-        """Bytes that found a buffer full, on the line or outside."""
+        """Number of bytes lost because of a full buffer, on the line or outside."""
         outside = self._outside.lost if self._outside else 0
         return {"lost_bytes": self.line.a.lost + self.line.b.lost + outside}
 
     def status(self) -> dict[str, str | int]:
-        """Return how the run is going, and what the host has set its port to."""
+        """Return the status of the run, and the port setting of the host."""
         return {
             **super().status(),
             "host_setting": self._outside.host_setting if self._outside else "",
@@ -143,10 +143,10 @@ class Emulator(RunningEmulator):
 
 
 class SerialHub(NonCopyable):
-    """Ports on one line: each hears all that the device sends, and each may send.
+    """Ports on one line: each receives everything that the device sends, and each may send.
 
-    What several hosts send at the same time arrives mixed, in pieces of a port's poll; none of
-    them hears the others.
+    Data of several hosts at the same time arrive mixed, in pieces of one poll; hosts do not receive
+    each other's data.
 
     Args:
         ports: the ports, a pty and network ports.
@@ -159,7 +159,7 @@ class SerialHub(NonCopyable):
 
     @property
     def due_us(self) -> int:
-        """Unknown to anybody but the hosts."""
+        """`NEVER`: only the hosts know when data arrive."""
         return NEVER
 
     @property
@@ -169,20 +169,20 @@ class SerialHub(NonCopyable):
 
     @property
     def host_setting(self) -> str:
-        """What hosts have set that is not the device's, as `9600 8N1`."""
+        """Settings of hosts that differ from the device's, such as `9600 8N1`."""
         return ", ".join(port.host_setting for port in self._ports if port.host_setting)
 
     def poll(self, now_us: int, /) -> bytes:
-        """Take what the hosts sent."""
+        """Return the data of the hosts."""
         return b"".join([port.poll(now_us) for port in self._ports])
 
     def attend(self, now_us: int, /) -> None:
-        """Let hosts come and go, and give them what is kept for them."""
+        """Let hosts come and go, and send them buffered data."""
         for port in self._ports:
             port.attend(now_us)
 
     def device_uses(self, setting: UartSetting, /) -> None:
-        """Tell every port the setting that the device has now."""
+        """Report the present setting of the device to every port."""
         for port in self._ports:
             port.device_uses(setting)
 

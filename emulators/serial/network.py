@@ -34,7 +34,7 @@ from tickrig.wire.uart import Parity, UartSetting, sample
 #
 # The second host. Whether the first is still there is known only behind all that it sent,
 # because the end of a connection comes after its data. So the second is accepted and
-# listened to (one of RFC 2217 gives up if nobody negotiates with it), and a little of what
+# listened to (one of RFC 2217 gives up without negotiation), and a little of what
 # it sends is held. Then `_let_in` decides, in a later tick if need be: the first has ended
 # or is stuck, and the second gets the line, what was held first; or nothing of the first
 # was waiting at the latest look, so that it is at work, and the second is refused.
@@ -51,10 +51,10 @@ from tickrig.wire.uart import Parity, UartSetting, sample
 # (`_may_read`). The buffers of the kernel are small for the same reason: what is in them is
 # beyond the time of the rig.
 #
-# The settings of RFC 2217 are answered and remembered. The rate of the line is that of the
-# device, which may change it (`device_uses`). What a host of another setting reads and what
-# the device reads of it is sampled, as at a real port, each piece of a tick by itself; people
-# are told (`HostSetting`).
+# The settings of RFC 2217 are answered and remembered. The rate of the line is that of the device,
+# which may change it (`device_uses`). What a host of another setting reads and what the device
+# reads of it is sampled, as at a real port, each piece of a tick by itself; the user is warned
+# (`HostSetting`).
 
 _SCHEMES: Final = ("rfc2217", "socket")
 _LOOPBACK: Final = "127.0.0.1"
@@ -62,10 +62,10 @@ _LOOPBACK: Final = "127.0.0.1"
 
 @dataclass(frozen=True, slots=True)
 class ServeUrl:
-    """An address to listen at, and what is spoken there.
+    """An address to listen at, and its protocol.
 
     Attributes:
-        scheme: `rfc2217`, or `socket` for the bytes of the line and nothing else.
+        scheme: `rfc2217`, or `socket` for the plain bytes of the line.
         host: name or address of this machine, an IPv6 address without brackets.
         port: TCP port; 0 lets the system pick one.
     """
@@ -81,13 +81,13 @@ class ServeUrl:
 
 
 def parse_serve_url(text: str) -> ServeUrl:
-    """Read where a line is to be served.
+    """Read the address at which to serve a line.
 
     Args:
         text: `SCHEME://[HOST:]PORT`; without a host only this machine can connect.
 
     Raises:
-        ValueError: it is none; the text says what came and what is allowed.
+        ValueError: invalid URL; the message has the URL and the allowed form.
 
     >>> str(parse_serve_url("rfc2217://7000")), str(parse_serve_url("socket://[::1]:0"))
     ('rfc2217://127.0.0.1:7000', 'socket://[::1]:0')
@@ -108,21 +108,21 @@ def parse_serve_url(text: str) -> ServeUrl:
     return ServeUrl(scheme, bare or _LOOPBACK, number)
 
 
-# A host that was told to leave.
+# A host that was refused.
 
 LEAVING_US: Final = 1_000_000
 _DISCARDED_BYTES: Final = 65_536
 
 
 class DismissedHost:
-    """A host that is told why it cannot stay, and has a second to read it.
+    """A refused host, which has a second to read the reason.
 
-    A connection that is closed while its host still sends is reset, and some systems then drop
-    what the host had not read yet. So what comes is read, and dropped.
+    A connection that is closed while its host still sends is reset, and some systems then drop data
+    that the host had not read yet. So received data are read and dropped.
 
     Args:
         connection: to the host.
-        now_us: the time.
+        now_us: the present time.
         reason: a line of text.
     """
 
@@ -136,7 +136,7 @@ class DismissedHost:
             connection.shutdown(socket.SHUT_WR)
 
     def is_gone(self, now_us: int) -> bool:
-        """Hang up if the host has, or if its time is over; return whether it is gone."""
+        """Close the connection if the host has, or after its time; return whether it is closed."""
         try:
             gone = not self._connection.recv(_DISCARDED_BYTES)
         except BlockingIOError:
@@ -149,26 +149,26 @@ class DismissedHost:
         return False
 
     def close(self) -> None:
-        """Hang up."""
+        """Close the connection."""
         self._connection.close()
 
 
-# A host on a TCP connection that carries the bytes of the line and nothing else.
+# A host on a TCP connection with the plain bytes of the line.
 
 READ_BYTES: Final = 1_024
 _SEND_BUFFER_BYTES: Final = 16_384
-"""Of the kernel: what is in it comes late to a host that did not read."""
+"""Size of the kernel's buffer: data in it reach a slow host late."""
 
 LAST_WORDS_US: Final = 1_000_000
 STUCK_US: Final = 30_000_000
 
 
 class HostConnection:
-    """A host on a plain connection; nothing here ever waits for it.
+    """A host on a plain connection; nothing here blocks.
 
-    What it does not read is kept up to `buffer_bytes`; after that whole sends are dropped
-    and counted, as on a pty. A host that sends no more, but may still read, as `nc` at the
-    end of its input, is given what comes within a second.
+    Unread data are kept up to `buffer_bytes`; then whole sends are dropped and counted, as on a
+    pty. A host that has stopped sending but may still read, such as `nc` at the end of its input,
+    gets the data of one more second.
 
     Args:
         connection: to the host.
@@ -176,9 +176,9 @@ class HostConnection:
 
     Attributes:
         connection: to the host.
-        over: the host has gone, or was hung up on.
-        mistake: why it has to be left, if it sent what cannot be understood.
-        is_idle: nothing of it was waiting at the latest look.
+        over: the connection is closed.
+        mistake: reason to drop the host, if it sent invalid data.
+        is_idle: no data of it were waiting at the latest poll.
         lost: bytes dropped because it did not read.
     """
 
@@ -194,16 +194,16 @@ class HostConnection:
 
     @property
     def setting(self) -> UartSetting | None:
-        """What it has set the port to; None where it cannot."""
+        """The port setting of the host; None if it cannot set one."""
         return None
 
     def has_ended(self, now_us: int) -> bool:
-        """Whether another host may have the line: this one sends no more, or is stuck."""
+        """Whether another host may get the line: this one has stopped sending, or is stuck."""
         stuck = self._stuck_us is not None and now_us - self._stuck_us >= STUCK_US
         return self.over or stuck or self._last_words_us is not None
 
     def poll(self, now_us: int) -> bytes:
-        """Take some of what it sent; what was held comes first."""
+        """Return part of its data; held data come first."""
         if not self._held:
             return self._look(now_us)
         data, self._held, self.is_idle = self._held, b"", False
@@ -212,13 +212,13 @@ class HostConnection:
         return data
 
     def hold(self, now_us: int) -> None:
-        """Negotiate while another host has the line, and keep some of what it sends."""
+        """Negotiate while another host has the line, and hold part of its data."""
         if len(self._held) < READ_BYTES and not self.has_ended(now_us):
             self._held += self._look(now_us)
         self.over |= self.has_ended(now_us) and not self._held  # it has not waited
 
     def send(self, now_us: int, traffic: bytes) -> None:
-        """Send as much as fits, and keep the rest for later."""
+        """Send as much as fits, and buffer the rest."""
         if len(self._unsent) + len(traffic) > self._buffer_bytes:
             self.lost += len(traffic)
         else:
@@ -226,7 +226,7 @@ class HostConnection:
         self.flush(now_us)
 
     def flush(self, now_us: int) -> None:
-        """Send of what is kept as much as fits."""
+        """Send as much of the buffered data as fits."""
         sent = 0
         try:
             if self._unsent and not self.over:
@@ -242,25 +242,25 @@ class HostConnection:
             self._stuck_us = now_us
 
     def close(self) -> None:
-        """Hang up."""
+        """Close the connection."""
         self.over = True
         self.connection.close()
 
     @property
     def _may_read(self) -> bool:
-        """Whether there is room for what reading may bring forth."""
+        """Whether there is room for the answers that reading may cause."""
         return True
 
     def _take_in(self, data: bytes) -> bytes:
-        """Return what of it is for the device."""
+        """Return the part for the device."""
         return data
 
     def _give_out(self, traffic: bytes) -> bytes:
-        """Return how it is sent to the host."""
+        """Return the bytes encoded for the host."""
         return traffic
 
     def _look(self, now_us: int) -> bytes:
-        """Take some of what comes."""
+        """Read part of the received data."""
         self.flush(now_us)
         self.is_idle = True
         if self._last_words_us is not None:
@@ -309,7 +309,7 @@ _VALUE_BYTES: Final = {
     ),
     rfc2217.SET_BAUDRATE: 4,
 }
-"""How long the value of a command is at least."""
+"""Minimum length of the value of a command."""
 
 _KNOWN_VALUES: Final[Mapping[bytes, Mapping[int, object]]] = {
     rfc2217.SET_PARITY: rfc2217.RFC2217_REVERSE_PARITY_MAP,
@@ -325,21 +325,21 @@ class _QuietAdapter(SerialBase):
     cts = dsr = ri = cd = False
 
     def reset_input_buffer(self) -> None:
-        """Do nothing: what the device sent is on its way to the host, who drops it there."""
+        """Do nothing: data of the device are in transit to the host, which drops them."""
 
     def reset_output_buffer(self) -> None:
-        """Do nothing: what came before is on the line."""
+        """Do nothing: earlier data are already on the line."""
 
 
 class _SafePortManager(PortManager):
-    """pyserial's, made whole: it answers what RFC 2217 has answered, and survives any value."""
+    """pyserial's manager, completed: it gives all answers of RFC 2217 and accepts any value."""
 
     def _telnet_process_subnegotiation(self, suboption: bytes) -> None:
         option, command, value = suboption[:1], suboption[1:2], suboption[2:]
         if option != COM_PORT_OPTION or len(value) < _VALUE_BYTES.get(command, 0):
             return
         if command in _KNOWN_VALUES and value[0] not in _KNOWN_VALUES[command]:
-            suboption = option + command + b"\0"  # it is told what is set
+            suboption = option + command + b"\0"  # it gets the settings
         # IAC SB 2C 00 IAC SE asks for the signature; 64h is the answer's command (RFC 2217:
         # server + 100).
         if command == b"\0":
@@ -352,7 +352,7 @@ class _SafePortManager(PortManager):
                 self.rfc2217_send_subnegotiation(rfc2217.RFC2217_ANSWER_MAP[command], value[:1])
 
     def _control_state(self, request: int) -> int:
-        """Return what is answered to SET-CONTROL where pyserial has no answer, else 0."""
+        """Return the answer to SET-CONTROL if pyserial has none, else 0."""
         port = self.serial
         # SET-CONTROL: 4, 7, 10 ask for break, DTR, RTS; the next number says on, the one
         # after it off.
@@ -367,14 +367,14 @@ class _SafePortManager(PortManager):
 class Rfc2217Connection(HostConnection):
     """A host that may set the port, as on a serial server; pyserial's `rfc2217://` is one.
 
-    What it sets is answered and remembered; the device has its own setting. Its DTR, RTS and break
-    reach nobody; CTS, DSR, CD and RI are off. One whose telnet cannot be understood is left. Not
-    emulated: FLOWCONTROL-SUSPEND, and purging what is on the line already.
+    Its settings are answered and stored; the device has its own setting. Its DTR, RTS and break
+    have no effect; CTS, DSR, CD and RI are off. A host with invalid telnet data is dropped. Not
+    emulated: FLOWCONTROL-SUSPEND, and purging data that are already on the line.
 
     Args:
         connection: to the host.
         buffer_bytes: bytes kept for a host that does not read.
-        setting: what the port is set to until the host sets it.
+        setting: the port setting until the host changes it.
     """
 
     def __init__(self, connection: socket.socket, buffer_bytes: int, setting: UartSetting) -> None:
@@ -390,7 +390,7 @@ class Rfc2217Connection(HostConnection):
 
     @property
     def setting(self) -> UartSetting | None:
-        """What it has set the port to."""
+        """The port setting of the host."""
         port = self._adapter
         parity = cast(Parity, port.parity)  # pyserial has checked it
         return UartSetting(max(1, port.baudrate), port.bytesize, parity, port.stopbits)
@@ -420,18 +420,19 @@ class Rfc2217Connection(HostConnection):
 # The host's end of a serial line, served over TCP.
 
 _RECEIVE_BUFFER_BYTES: Final = 4_096
-"""Of the kernel: a host that writes faster than the line is held up soon, as at a real port."""
+"""Size of the kernel's buffer: a host that writes faster than the line soon blocks, as at a real
+port."""
 
 _MAX_BAUD: Final = 4_000_000
-"""Above it no adapter goes: the device is on USB, and its host may set what it likes."""
+"""Highest rate of adapters: above it the device is on USB, and its host may use any setting."""
 
 MAX_DISMISSED: Final = 8
 
 QUIET_US: Final = 10_000_000
-"""After a warning there is none for so long."""
+"""Shortest time between two warnings."""
 
 _OPEN_TO_OTHERS: Final = (
-    "Whoever reaches port %s of %s can drive this device: there is no password."
+    "Anyone who reaches port %s of %s can drive this device: there is no password."
     " Leave out the host to serve this machine alone."
 )
 
@@ -439,27 +440,26 @@ _log = logging.getLogger(__name__)
 
 
 class NetworkPort(NonCopyable):
-    """A `Port[bytes]` that a host reaches over TCP; hosts may come and go, one at a time.
+    """A `Port[bytes]` for hosts over TCP; hosts may come and go, one at a time.
 
-    A second host is told so in a line of text and is left, unless the present one sends no
-    more, or has not read for 30 s. Whether it does is known only behind all that it sent: until
-    that is on the line one more host is listened to, and a little of what it sends is kept.
-    While there is no host, what the device sends is gone, as
-    on a line without one. Nothing here ever waits, and what is kept for a host is bounded. There
-    is no password: a port that other machines can reach is warned of.
+    A second host is refused with a line of text, unless the present one has stopped sending, or has
+    not read for 30 s. This is known only after all its data: until they are on the line, one more
+    host is accepted, and a little of its data is held. Without a host, data of the device are lost,
+    as on an open line. Nothing here blocks, and buffers are bounded. There is no password: a port
+    that other machines can reach causes a warning.
 
     Args:
-        url: where to listen.
+        url: address to listen at.
         buffer_bytes: bytes kept for a host that does not read.
 
     Attributes:
-        url: where hosts of this machine connect, as pyserial opens it, with its port.
+        url: URL for hosts on this machine, for pyserial, with its port.
         address: the address that it listens at.
         port: its TCP port.
-        spoken: whether a host ever sent something.
+        spoken: whether a host ever sent data.
 
     Raises:
-        OSError: the port is taken, or the host is no address of this machine; the URL is its
+        OSError: the port is in use, or the host is not an address of this machine; the URL is its
             `filename`.
     """
 
@@ -482,7 +482,7 @@ class NetworkPort(NonCopyable):
 
     @property
     def due_us(self) -> int:
-        """Unknown to anybody but the host."""
+        """`NEVER`: only the host knows when data arrive."""
         return NEVER
 
     @property
@@ -492,22 +492,22 @@ class NetworkPort(NonCopyable):
 
     @property
     def host_setting(self) -> str:
-        """What the host has set it to, as `9600 8N1`; empty if that is the device's, or unknown."""
+        """The setting of the host, such as `9600 8N1`; empty if unknown or that of the device."""
         return self._setting.differing if self._setting else ""
 
     def watch_setting(self, baud: int, notify: Callable[[str], None]) -> None:
-        """Set it as the device is, and tell when a host sets it otherwise; see `HostSetting`.
+        """Set the port like the device, and report hosts that change it; see `HostSetting`.
 
         Args:
-            baud: the device's rate in bit/s, with 8N1; above 4 Mbit/s it is not watched.
-            notify: called with a setting as `9600 8N1` that is not the device's.
+            baud: the device's rate in bit/s, with 8N1; above 4 Mbit/s it is not checked.
+            notify: called with a different setting, such as `9600 8N1`.
         """
         self._uart = UartSetting(baud)
         if baud <= _MAX_BAUD:
             self._setting = HostSetting(self._shown_setting, str(self._uart), notify)
 
     def device_uses(self, setting: UartSetting) -> None:
-        """Let a host of another setting read what its UART would sample, and the device likewise.
+        """Let a host with another setting read what its UART would sample, and the device likewise.
 
         Args:
             setting: the device's; above 4 Mbit/s a host of any setting is understood.
@@ -517,7 +517,7 @@ class NetworkPort(NonCopyable):
             self._setting.want(str(setting))
 
     def poll(self, now_us: int, /) -> bytes:
-        """Take some of what the host sent; let hosts come and go."""
+        """Return part of the host's data; let hosts come and go."""
         data = self._host.poll(now_us) if self._host else b""
         self.spoken |= bool(data)
         if (setting := self._differing) is not None:
@@ -532,9 +532,9 @@ class NetworkPort(NonCopyable):
         return data
 
     def attend(self, now_us: int, /) -> None:
-        """Let hosts come and go, and give them what is kept for them, but take nothing.
+        """Let hosts come and go, and send them buffered data, without reading.
 
-        It is called between polls as long as the line has no room for what was taken before.
+        It is called between polls while the line has no room for earlier data.
         """
         if self._host is not None:
             self._host.flush(now_us)
@@ -544,14 +544,14 @@ class NetworkPort(NonCopyable):
             self._setting.look(now_us)
 
     def send(self, now_us: int, traffic: bytes, /) -> None:
-        """Send to the host, if there is one, as much as fits; keep the rest for later."""
+        """Send to the host, if there is one, as much as fits; buffer the rest."""
         if self._host is not None:
             if (setting := self._differing) is not None:
                 traffic = _sampled(traffic, self._uart, setting)
             self._host.send(now_us, traffic)
 
     def close(self) -> None:
-        """Hang up, and listen no more."""
+        """Close the connections and the listening socket."""
         self._hang_up()
         for host in self._dismissed:
             host.close()
@@ -570,9 +570,9 @@ class NetworkPort(NonCopyable):
         return None if setting == self._uart else setting
 
     def _attend_next(self, now_us: int) -> None:
-        """Accept the next host, and listen to it until the line is its own."""
+        """Accept the next host, and let it negotiate until it gets the line."""
         if self._next is None:
-            with suppress(OSError):  # nobody, or gone again, or no descriptor is left
+            with suppress(OSError):  # no host, closed again, or no descriptor left
                 connection, address = self._listener.accept()
                 self._next = self._connected(connection), "{}:{}".format(*address[:2])
             return
@@ -587,7 +587,7 @@ class NetworkPort(NonCopyable):
         self._next = None
 
     def _let_in(self, now_us: int) -> None:
-        """Give the line to the next host, or refuse it, as soon as it is known which."""
+        """Give the line to the next host, or refuse it, as soon as this is decided."""
         if self._next is None:
             return
         host, peer = self._next
@@ -607,14 +607,14 @@ class NetworkPort(NonCopyable):
         return Rfc2217Connection(connection, self._buffer_bytes, self._uart)
 
     def _refuse(self, connection: socket.socket, peer: str, now_us: int) -> None:
-        """Send a second host away."""
+        """Refuse a second host."""
         reason = f"{self.url} has a host already: {self._peer}"
         self._warn(now_us, f"{reason}; {peer} was refused")
         self._dismiss(connection, now_us, reason)
 
     def _leave(self, host: HostConnection, peer: str, now_us: int) -> None:
-        """Send a host away that cannot be understood."""
-        self._warn(now_us, f"{self.url}: host {peer} was left: {host.mistake}")
+        """Drop a host that sends invalid data."""
+        self._warn(now_us, f"{self.url}: host {peer} was dropped: {host.mistake}")
         self._dismiss(host.connection, now_us, host.mistake)
 
     def _dismiss(self, connection: socket.socket, now_us: int, reason: str) -> None:
@@ -632,7 +632,7 @@ class NetworkPort(NonCopyable):
         self._host = None
 
     def _warn(self, now_us: int, text: str) -> None:
-        """Tell people, but not all that a host does over and over."""
+        """Warn, but not of each repetition."""
         if now_us >= self._quiet_until_us:
             self._quiet_until_us = now_us + QUIET_US
             _log.warning("%s", text)
@@ -648,7 +648,7 @@ def _listen(url: ServeUrl) -> socket.socket:
         family, kind, protocol, address = _resolve(url)
         listener = socket.socket(family, kind, protocol)
         try:
-            if os.name == "posix":  # else somebody could take the same port
+            if os.name == "posix":  # else another program could take the same port
                 listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             with suppress(OSError):
                 listener.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BUFFER_BYTES)
@@ -664,7 +664,7 @@ def _listen(url: ServeUrl) -> socket.socket:
 
 
 def _resolve(url: ServeUrl) -> tuple[int, int, int, Any]:
-    """Return family, kind, protocol and address of where to listen."""
+    """Return family, kind, protocol and address for listening."""
     try:
         found = socket.getaddrinfo(url.host, url.port, type=socket.SOCK_STREAM)
     except ValueError as error:  # what IDNA cannot take, as a..b

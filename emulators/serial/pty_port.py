@@ -1,4 +1,4 @@
-"""The master side of a pseudo-terminal, under a name that stays."""
+"""The master side of a pseudo-terminal, under a fixed name."""
 
 from __future__ import annotations
 
@@ -19,23 +19,23 @@ from tickrig.emulators.serial.bridge import HostSetting
 from tickrig.wire.instant import NEVER
 from tickrig.wire.uart import UartSetting
 
-# The name under which a pseudo-terminal is found, and who gave it.
+# The name of a pseudo-terminal, and its owner.
 
 
 class _PtyLink:
-    """A symbolic link to a terminal that tells whether its emulator lives.
+    """A symbolic link to a terminal, with a note that shows whether its emulator runs.
 
-    Beside `NAME` lies `.NAME.emulator`, locked for as long as the link is in use: it names the
-    process and the terminal. So a link that a killed emulator left over is known for one even
-    when its terminal belongs to somebody else by now.
+    Beside `NAME` is the file `.NAME.emulator`, locked while the link is in use: it names the
+    process and the terminal. So the link of a killed emulator is recognised even if its terminal
+    now belongs to another program.
 
     Args:
-        path: where the link is to be.
+        path: path of the link.
         target: the terminal.
 
     Raises:
-        FileExistsError: a running emulator has this link, or it is none of an emulator's.
-        OSError: no link can be made there.
+        FileExistsError: a running emulator uses this link, or it does not belong to an emulator.
+        OSError: the link cannot be made.
     """
 
     def __init__(self, path: Path, target: str) -> None:
@@ -50,20 +50,20 @@ class _PtyLink:
             raise OSError(error.errno, error.strerror, str(path)) from None
 
     def close(self) -> None:
-        """Remove the link, if it is still this one, and the note."""
+        """Remove the link, if it is still ours, and the note."""
         if _target(self._path) == self._target:
             self._path.unlink()
         self._drop_note()
 
     def _take_note(self) -> int:
-        """Open and lock the note; whoever has it has the link."""
+        """Open and lock the note; its owner owns the link."""
         while True:
             lock = os.open(self._note, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
             try:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                # Between `open` and `flock` the owner may have removed the note and another
-                # have made a new one: then this lock is of a file that nobody finds any
-                # more. Try again.
+                # Between `open` and `flock` the owner may have removed the note and another have
+                # made a new one: then this lock is of a file that is no longer reachable. Try
+                # again.
                 if os.path.samestat(os.fstat(lock), self._note.stat()):
                     return lock
             except BlockingIOError:
@@ -76,7 +76,7 @@ class _PtyLink:
             os.close(lock)
 
     def _make(self) -> None:
-        """Make the link, and note whose it is."""
+        """Make the link, and note its owner."""
         try:
             if self._is_left_over():
                 self._path.unlink()
@@ -90,7 +90,7 @@ class _PtyLink:
             raise
 
     def _is_left_over(self) -> bool:
-        """Whether the link names no terminal, ours, or that of an emulator which has ended."""
+        """Whether the link names no terminal, ours, or that of an ended emulator."""
         target = _target(self._path)
         noted = os.read(self._lock, 4_096).decode("ascii", "replace").split()
         return target is not None and (
@@ -134,14 +134,14 @@ _IN_CLOSE: Final = 0x08 | 0x10
 
 
 class _PtyVisits(NonCopyable):
-    """Wakes the emulator when a host opens or closes the terminal, or sends something.
+    """Wakes the emulator when a host opens or closes the terminal, or sends data.
 
     Args:
         master: the emulator's side.
         path: the host's side.
 
     Attributes:
-        wakes: the descriptor to wait on. Without inotify, which Linux alone has, it is `master`.
+        wakes: the descriptor to wait on. Without inotify, which only Linux has, it is `master`.
     """
 
     why_not_copied = "it is a pty of this machine"
@@ -161,14 +161,14 @@ class _PtyVisits(NonCopyable):
             self._epoll = epoll
 
     def any(self) -> bool:
-        """Return whether a host came or left since the last call."""
+        """Return whether a host opened or closed it since the last call."""
         try:
             return self._inotify >= 0 and bool(os.read(self._inotify, _READ_BYTES))
         except BlockingIOError:
             return False
 
     def close(self) -> None:
-        """Watch no more."""
+        """Stop watching."""
         if self._inotify >= 0:
             self._epoll.close()
             os.close(self._inotify)
@@ -178,35 +178,34 @@ class _PtyVisits(NonCopyable):
 class PtyPort(NonCopyable):
     """A `Port[bytes]` whose other side any serial program can open.
 
-    The emulator keeps the other side open too, so hosts may come and go. What
-    nobody reads is kept up to `buffer_bytes` here and some 4 KiB in the kernel;
-    after that whole sends are dropped and counted.
+    The emulator keeps the other side open too, so hosts may come and go. Unread data are kept, up
+    to `buffer_bytes` here and some 4 KiB in the kernel; then whole sends are dropped and counted.
 
-    A second host that opens the terminal is not refused: the kernel does not tell this side who
-    has it open, and TIOCEXCL would keep out the first host as well, and not one of root. What the
-    device sends then goes to whichever of them reads first. Hosts that lock it, as
-    pyserial's `exclusive=True` does, refuse each other.
+    A second host that opens the terminal is not refused: the kernel does not show this side who has
+    it open, and TIOCEXCL would exclude the first host as well, but not one of root. Data of the
+    device then go to the host that reads first. Hosts that lock it, as with pyserial's
+    `exclusive=True`, exclude each other.
 
     Args:
-        link: path of a symbolic link to the terminal, see `_PtyLink`; none if not given.
-            One that is left over from a killed emulator is replaced.
+        link: path of a symbolic link to the terminal, see `_PtyLink`; None for no link. The link of
+            a killed emulator is replaced.
         buffer_bytes: bytes kept for a host that does not read.
 
     Attributes:
-        path: the terminal, as `/dev/pts/7`.
-        lost: bytes dropped because nobody read.
-        spoken: whether a host ever sent something.
+        path: the terminal, such as `/dev/pts/7`.
+        lost: bytes dropped because no host read them.
+        spoken: whether a host ever sent data.
 
     Raises:
-        FileExistsError: `link` exists, and no emulator left it over.
-        OSError: no pseudo-terminal is to be had, or no link can be made there.
+        FileExistsError: `link` exists and does not belong to an ended emulator.
+        OSError: there is no free pseudo-terminal, or the link cannot be made.
     """
 
     why_not_copied = "it is a pty of this machine"
 
     def __init__(self, link: Path | None = None, buffer_bytes: int = 4_096) -> None:
-        # The slave stays open here: on Linux reading the master fails with EIO while nobody
-        # has it open.
+        # The slave stays open here: on Linux reading the master fails with EIO while no process has
+        # it open.
         self._master, self._slave = os.openpty()
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
@@ -224,25 +223,26 @@ class PtyPort(NonCopyable):
                 raise
 
     def fileno(self) -> int:
-        """Return the descriptor to wait on for what the host does."""
+        """Return the descriptor to wait on for actions of the host."""
         return self._visits.wakes
 
     @property
     def due_us(self) -> int:
-        """Unknown to anybody but the host."""
+        """`NEVER`: only the host knows when data arrive."""
         return NEVER
 
     @property
     def host_setting(self) -> str:
-        """What the host has set it to, as `9600 8N1`; empty if that is the device's, or unknown."""
+        """The setting of the host, such as `9600 8N1`; empty if unknown or that of the device."""
         return self._setting.differing if self._setting else ""
 
     def watch_setting(self, baud: int, notify: Callable[[str], None]) -> None:
-        """Set it as the device is, and tell when a host sets it otherwise; see `HostSetting`.
+        """Set the port like the device, and report hosts that change it; see `HostSetting`.
 
         Args:
-            baud: the device's rate in bit/s, with 8N1; one without a name is not watched.
-            notify: called with a setting as `9600 8N1` that is not the device's.
+            baud: the device's rate in bit/s, with 8N1; a rate without a termios name is not
+                checked.
+            notify: called with a different setting, such as `9600 8N1`.
         """
         codes = [code for code, rate in _BAUDS.items() if rate == baud]
         if not codes:
@@ -253,7 +253,7 @@ class PtyPort(NonCopyable):
         self._setting = HostSetting(lambda: _setting_of(slave), _setting_of(slave), notify)
 
     def device_uses(self, setting: UartSetting) -> None:
-        """Judge hosts by the setting that the device has now; a pty passes all bytes unchanged.
+        """Compare hosts with the present setting of the device; a pty passes all bytes unchanged.
 
         Args:
             setting: the device's; a pty shows 8 data bits, and even parity as none.
@@ -265,7 +265,7 @@ class PtyPort(NonCopyable):
             self._setting.want(shown if named else "")
 
     def poll(self, now_us: int, /) -> bytes:
-        """Read without waiting."""
+        """Read without blocking."""
         self.attend(now_us)
         try:
             data = os.read(self._master, _READ_BYTES)
@@ -276,12 +276,12 @@ class PtyPort(NonCopyable):
         return data
 
     def attend(self, now_us: int, /) -> None:
-        """Look at what the host has set, and give it what is kept for it."""
+        """Check the setting of the host, and send it buffered data."""
         self._look(now_us, at_once=self._visits.any())
         self._flush()
 
     def send(self, now_us: int, traffic: bytes, /) -> None:
-        """Write as much as fits; keep the rest for later."""
+        """Write as much as fits; buffer the rest."""
         # A whole send or nothing: half a line would reach the host as another line.
         if len(self._unsent) + len(traffic) > self._buffer_bytes:
             self.lost += len(traffic)
@@ -290,7 +290,7 @@ class PtyPort(NonCopyable):
         self._flush()
 
     def close(self) -> None:
-        """Give the pseudo-terminal back and remove the link."""
+        """Close the pseudo-terminal and remove the link."""
         if self._link is not None:
             self._link.close()
         self._link = self._setting = None
@@ -301,7 +301,7 @@ class PtyPort(NonCopyable):
         self._master = self._slave = -1
 
     def _look(self, now_us: int, *, at_once: bool) -> None:
-        """Look at what the host has set, and let the next one set it again.
+        """Check the setting of the host, and allow the next host to set it again.
 
         A pseudo-terminal drops even parity and 7 bits. glibc reports EINVAL if nothing is left of
         what a host asked for, so the second host of such a setting fails. Hosts set CLOCAL, which

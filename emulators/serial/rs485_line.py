@@ -1,4 +1,4 @@
-"""A pair of wires that all stations share: half duplex, as RS485 with two wires is."""
+"""A pair of wires shared by all stations: half duplex, as RS485 with two wires."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ class _Burst:
     """Bytes that one end sends back to back.
 
     Attributes:
-        sender: who sends it.
-        start_us: when it begins.
-        end_us: when it ends.
+        sender: the sender.
+        start_us: its start.
+        end_us: its end.
         data: as it arrives.
     """
 
@@ -31,22 +31,21 @@ class _Burst:
 class Rs485Line(Copyable):
     """Several ends on one pair of wires.
 
-    A byte is heard by all other ends when its stop bit has passed. Where two speak at
-    once, the wires carry neither: every byte that overlaps one of another end arrives as
-    the bits that both have set, and is counted. What an end sends while it is still
-    sending waits its turn.
+    All other ends receive a byte when its stop bit has passed. If two ends send at once, both are
+    garbled: every byte that overlaps one of another end arrives as the bits that both have set, and
+    is counted. Data that an end sends while it is still sending are queued.
 
     Not emulated: the turn-round of the transceivers, a change of the bit rate, framing and parity
-    errors, echo of one's own bytes unless asked for.
+    errors, echo of own bytes unless requested.
 
     Args:
         baud: bit rate in bit/s.
         frame_bits: bits of a byte on the line, 10 for 8N1.
-        buffer_bytes: size of each receiver's buffer, and of what a sender may queue.
-        ends: how many stations there are.
-        echo: each end hears its own bytes too.
-        bursts: a receiver takes what was sent back to back when it has ended, as one does
-            that waits for an idle line; else it takes each byte.
+        buffer_bytes: size of each receiver's buffer and sender's queue.
+        ends: number of stations.
+        echo: whether each end also receives its own bytes.
+        bursts: whether a receiver gets bytes sent back to back together at their end, as one that
+            waits for an idle line; else it gets each byte.
 
     Attributes:
         ends: the stations' ends.
@@ -91,12 +90,12 @@ class Rs485Line(Copyable):
         return self.ends[1]
 
     def put(self, sender: Rs485End, now_us: int, start_us: int, data: bytes) -> int:
-        """Put bytes on the wires back to back; an end does so.
+        """Send bytes on the wires back to back; called by an end.
 
         Args:
             sender: the end.
-            now_us: the present.
-            start_us: when the first begins.
+            now_us: the present time.
+            start_us: start of the first byte.
             data: the bytes.
 
         Returns:
@@ -108,7 +107,7 @@ class Rs485Line(Copyable):
         burst = _Burst(sender, start_us, end_us, bytearray(data))
         self._air = [other for other in self._air if other.end_us > now_us]
         for other in self._air:
-            # Each pair of senders is looked at once, when the later of the two begins.
+            # Each pair of senders is checked once, when the later of the two starts.
             if other.sender is not sender:
                 self._collide(burst, other)
         self._air.append(burst)
@@ -118,14 +117,14 @@ class Rs485Line(Copyable):
         return end_us
 
     def cut(self, sender: Rs485End, now_us: int) -> int:
-        """Take the bytes off the wires of which no bit is there yet.
+        """Remove the bytes of which no bit is on the wires yet.
 
         Args:
-            sender: the end that was to send them.
-            now_us: the present.
+            sender: their sender.
+            now_us: the present time.
 
         Returns:
-            When the byte that is on its way has passed, in us.
+            When the byte in transit has passed, in us.
         """
         end_us = now_us
         for burst in self._air:
@@ -140,10 +139,10 @@ class Rs485Line(Copyable):
         return end_us
 
     def after(self, count: int) -> int:
-        """Compute how long bytes take on the wires.
+        """Compute the duration of bytes on the wires.
 
         Args:
-            count: how many.
+            count: number of bytes.
 
         Returns:
             The time in us, rounded up.
@@ -151,14 +150,14 @@ class Rs485Line(Copyable):
         return -(-count * self._byte_cost // self._baud)
 
     def passed(self, burst: _Burst, now_us: int) -> int:
-        """Compute how many bytes of a burst a receiver can take.
+        """Compute how many bytes of a burst a receiver can get.
 
         Args:
             burst: bytes sent back to back.
-            now_us: the present.
+            now_us: the present time.
 
         Returns:
-            Their number, those that it took already among them.
+            Their number, including those already taken.
         """
         if now_us >= burst.end_us:
             return len(burst.data)
@@ -167,11 +166,11 @@ class Rs485Line(Copyable):
         return max(0, now_us - burst.start_us) * self._baud // self._byte_cost
 
     def arrival_us(self, burst: _Burst, taken: int) -> int:
-        """Compute when a receiver can take more of a burst.
+        """Compute when a receiver can get more of a burst.
 
         Args:
             burst: bytes sent back to back.
-            taken: how many of them it took.
+            taken: number of bytes taken.
 
         Returns:
             The time in us.
@@ -182,7 +181,7 @@ class Rs485Line(Copyable):
         """Compute how many bytes are still to be sent.
 
         Args:
-            duration_us: how long their sender is busy with them.
+            duration_us: how long their sender is busy.
 
         Returns:
             Their number, rounded up.
@@ -209,7 +208,7 @@ class Rs485End:
     """One station's end of an `Rs485Line`; a `Port[bytes]`.
 
     Attributes:
-        lost: bytes that found this end's buffer full, or came in more than it could queue.
+        lost: bytes lost because the buffer or the queue of this end was full.
     """
 
     __slots__ = ("_buffer_bytes", "_busy_us", "_inbox", "_line", "_taken", "lost")
@@ -222,27 +221,27 @@ class Rs485End:
 
     @property
     def due_us(self) -> int:
-        """When there will be something to take."""
+        """When the next bytes will be available."""
         if not self._inbox:
             return NEVER
         return min(map(self._line.arrival_us, self._inbox, self._taken))
 
     @property
     def idle_us(self) -> int:
-        """When the last byte that is on its way here will have arrived."""
+        """When the last byte in transit to this end will have arrived."""
         return max((burst.end_us for burst in self._inbox), default=NEVER)
 
     @property
     def coming(self) -> bytes:
-        """Nothing: what is on its way can still be garbled."""
+        """Always empty: bytes in transit can still be garbled."""
         return b""
 
     def arrival_us(self, count: int) -> int:
-        """Return when to look again, `NEVER` if nothing is on its way."""
+        """Return when to check again, `NEVER` if nothing is in transit."""
         return self.due_us
 
     def room(self, now_us: int) -> int:
-        """Return how many bytes `send` takes at `now_us` without loss."""
+        """Return how many bytes `send` accepts at `now_us` without loss."""
         return max(0, self._buffer_bytes - self.unsent(now_us))
 
     @property
@@ -255,7 +254,7 @@ class Rs485End:
         return self._line.unsent(self._busy_us - now_us)
 
     def drop_unsent(self, now_us: int) -> None:
-        """Forget the bytes sent from here of which no bit is on the line yet."""
+        """Discard the bytes sent from here of which no bit is on the line yet."""
         self._busy_us = self._line.cut(self, now_us)
 
     @property
@@ -264,7 +263,7 @@ class Rs485End:
         return self._line.uart
 
     def use_uart(self, now_us: int, setting: UartSetting) -> None:
-        """Raise ValueError if it is not that of the line: no device changes it."""
+        """Raise ValueError if it differs from that of the line: devices cannot change it."""
         if setting != self._line.uart.setting:
             has = self._line.uart.setting
             raise ValueError(f"a device changes its setting to {setting}: RS-485 keeps {has}")
@@ -274,7 +273,7 @@ class Rs485End:
         return []
 
     def poll(self, now_us: int, /) -> bytes:
-        """Take the bytes that have arrived by `now_us`."""
+        """Return the bytes that have arrived by `now_us`."""
         if not self._inbox:
             return b""
         out = self._take(now_us) if len(self._inbox) == 1 else self._merge(now_us)
@@ -282,7 +281,7 @@ class Rs485End:
         return out[: self._buffer_bytes]
 
     def send(self, now_us: int, traffic: bytes, /) -> None:
-        """Queue bytes behind those that this end is still sending."""
+        """Queue bytes after those that this end is still sending."""
         if not traffic:
             return
         accepted = traffic[: self.room(now_us)]
@@ -291,12 +290,12 @@ class Rs485End:
             self._busy_us = self._line.put(self, now_us, max(now_us, self._busy_us), accepted)
 
     def hear(self, burst: _Burst) -> None:
-        """Have a burst on its way here."""
+        """Add a burst in transit to this end."""
         self._inbox.append(burst)
         self._taken.append(0)
 
     def _take(self, now_us: int) -> bytes:
-        """Take what has passed of the only burst."""
+        """Return the part of the only burst that has passed."""
         burst, taken = self._inbox[0], self._taken[0]
         passed = self._line.passed(burst, now_us)
         if passed == len(burst.data):
@@ -307,7 +306,7 @@ class Rs485End:
         return bytes(burst.data[taken:passed])
 
     def _merge(self, now_us: int) -> bytes:
-        """Take what has passed of several bursts, in the order in which the bytes ended."""
+        """Return the parts of several bursts that have passed, in the order of their ends."""
         ended: list[tuple[int, int]] = []
         after, left = self._line.after, list[tuple[_Burst, int]]()
         for burst, taken in zip(self._inbox, self._taken, strict=True):

@@ -15,11 +15,10 @@ from tickrig.wire.uart import PS_PER_US, UartSetting
 # Theory of operation
 # ===================
 #
-# A line is two directions, and a direction is a queue of bursts: bytes that leave back to
-# back from `start_us` on. A byte has no event of its own. Everything is worked out from the
-# burst when somebody asks: byte n has arrived at start + n * frame_bits / baud, rounded up
-# to a whole microsecond. So a megabyte costs as much as a byte, and looking does not change
-# anything.
+# A line is two directions, and a direction is a queue of bursts: bytes that leave back to back from
+# `start_us` on. A byte has no event of its own. Everything is computed from the burst on request:
+# byte n has arrived at start + n * frame_bits / baud, rounded up to a whole microsecond. So a
+# megabyte costs as much as a byte, and looking does not change anything.
 #
 # Rules:
 #
@@ -47,10 +46,10 @@ from tickrig.wire.uart import PS_PER_US, UartSetting
 class SerialLine(Copyable):
     """Two ends joined by two independent directions.
 
-    A byte is delivered when its stop bit has passed. What is sent while the
-    line is busy waits its turn; what finds a buffer full is lost and counted.
-    A device may change the setting (`LineEnd.use_uart`). What a host of another setting reads
-    is worked out at its end (`SerialSide`, `Bridge`). Not emulated: modem control lines.
+    A byte is delivered when its stop bit has passed. Data sent while the line is busy are queued;
+    data for which a buffer has no room are lost and counted. A device may change the setting
+    (`LineEnd.use_uart`). Characters for a host with another setting are computed at its end
+    (`SerialSide`, `Bridge`). Not emulated: modem control lines.
 
     Args:
         baud: bit rate in bit/s.
@@ -91,10 +90,10 @@ class LineEnd(Part):
         self._in, self._out, self.uart = incoming, outgoing, uart
 
     def use_uart(self, now_us: int, setting: UartSetting) -> None:
-        """Change the setting of the device at this end, behind the last stop bit it has sent.
+        """Change the setting of the device at this end, after the last stop bit it has sent.
 
         Args:
-            now_us: the present.
+            now_us: the present time.
             setting: the new setting.
         """
         uart = self.uart
@@ -109,10 +108,10 @@ class LineEnd(Part):
             listener(since_us, setting)
 
     def withdraw(self, now_us: int) -> list[tuple[int, int]]:
-        """Take the bytes sent from here that have not arrived off the line.
+        """Remove the bytes sent from here that have not arrived.
 
         Args:
-            now_us: the present.
+            now_us: the present time.
 
         Returns:
             For each byte the start of its start bit in ps, and its value.
@@ -126,25 +125,25 @@ class LineEnd(Part):
 
     @property
     def idle_us(self) -> int:
-        """When the last byte that is on its way here will have arrived."""
+        """When the last byte in transit to this end will have arrived."""
         return self._in.last_us
 
     @property
     def coming(self) -> bytes:
-        """What is on its way here and was not taken."""
+        """The bytes in transit to this end."""
         return self._in.coming
 
     def arrival_us(self, count: int) -> int:
-        """Return when so many bytes will have arrived, the last if fewer are on their way."""
+        """Return when `count` bytes will have arrived, or all bytes if fewer are in transit."""
         return self._in.arrival_us(count)
 
     @property
     def lost(self) -> int:
-        """Bytes from the other end that found a buffer full."""
+        """Number of bytes from the other end lost because of a full buffer."""
         return self._in.lost
 
     def room(self, now_us: int) -> int:
-        """Return how many bytes `send` takes at `now_us` without loss."""
+        """Return how many bytes `send` accepts at `now_us` without loss."""
         return self._out.room(now_us)
 
     @property
@@ -157,15 +156,15 @@ class LineEnd(Part):
         return self._out.unsent(now_us)
 
     def drop_unsent(self, now_us: int) -> None:
-        """Forget the bytes sent from here of which no bit is on the line yet."""
+        """Discard the bytes sent from here of which no bit is on the line yet."""
         self._out.drop_unsent(now_us)
 
     def poll(self, now_us: int, /) -> bytes:
-        """Take the bytes that have arrived by `now_us`."""
+        """Return the bytes that have arrived by `now_us`."""
         return self._in.take(now_us)
 
     def send(self, now_us: int, traffic: bytes, /) -> None:
-        """Queue bytes behind those that are still being sent."""
+        """Queue bytes after those that are still being sent."""
         if traffic:
             self._out.put(now_us, traffic)
 
@@ -197,11 +196,11 @@ class _Burst(Part):
         return min(len(self.data), passed_us * self.timing.baud // self.timing.byte_cost)
 
     def arrival_us(self, count: int) -> int:
-        """Return when so many bytes have arrived, rounded up."""
+        """Return when a number of bytes has arrived, rounded up."""
         return self.start_us - (-count * self.timing.byte_cost // self.timing.baud)
 
     def forget_taken(self) -> None:
-        """Drop what was taken of a burst that goes on for long, without moving a time."""
+        """Drop the taken part of a long burst without changing any time."""
         count = self.taken - self.taken % self.timing.whole_bytes
         self.data, self.taken = self.data[count:], self.taken - count
         self.start_us += count * self.timing.byte_cost // self.timing.baud
@@ -224,7 +223,7 @@ class _Direction(Part):
         self.lost = 0
 
     def change(self, from_us: int, timing: _Timing) -> None:
-        """Send with another timing what begins at `from_us` or later."""
+        """Use another timing for data that start at `from_us` or later."""
         if from_us > self._from_us:
             self._timing = self._next
         self._next, self._from_us = timing, from_us
@@ -276,7 +275,7 @@ class _Direction(Part):
         return self.last_us
 
     def room(self, now_us: int) -> int:
-        """Return what the sender's buffer takes; the receiver's may overflow later."""
+        """Return the data that fit into the sender's buffer; the receiver's may overflow later."""
         free = self._buffer_bytes - self.unsent(now_us)
         # A receiver that takes nothing would let bursts pile up: both buffers together are
         # the most.
@@ -319,7 +318,7 @@ class _Direction(Part):
         burst.data = burst.data[:count]
 
     def _tidy(self) -> None:
-        """Forget bursts of which nothing is left to be taken."""
+        """Discard bursts that have been taken completely."""
         self._bursts = deque(each for each in self._bursts if each.taken < len(each.data))
         self._note_due()
 

@@ -129,7 +129,7 @@ class _InputReader:
         self._waits = (0, tick_us // 2, tick_us, tick_us, 2 * tick_us, 5 * tick_us, 20_000, 100_000)
 
     def acts(self, data: bytes) -> Iterator[FuzzAct]:
-        """Give the acts; what is left over at the end means nothing."""
+        """Yield the acts; what is left over at the end means nothing."""
         rest = iter(data)
         try:
             for _ in range(_MOST_ACTS):

@@ -1,1 +1,1 @@
-"""OpenRTM on T-Kernel: its node, the ucode reader, the resolution service, the demonstration."""
+"""OpenRTM on T-Kernel: node, ucode reader, resolution service and demonstration."""

@@ -1,4 +1,4 @@
-"""The board of a node: its supply, its boot, and the system that runs on it while it is up."""
+"""The board of a node: its supply, its boot, and the system that runs on it."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from tickrig.wire.instant import NEVER
 
 INPUTS: Final = (
     InputSignal("reset", "the reset button", SignalType.BUTTON),
-    InputSignal("power_cut", "the supply is off, and everything is forgotten", SignalType.FAULT),
+    InputSignal("power_cut", "the supply is off, and everything is lost", SignalType.FAULT),
 )
 
 _OUTPUTS: Final = (
     OutputSignal("state", "0 without supply, 1 while it boots, 2 while it runs"),
-    OutputSignal("boots", "how often it was up"),
+    OutputSignal("boots", "number of boots"),
     OutputSignal("components", "components on it"),
-    *(OutputSignal(f"refused_{what}", f"{what} that are beyond its limits") for what in REFUSED),
+    *(OutputSignal(f"refused_{what}", f"{what} beyond its limits") for what in REFUSED),
 )
 
 
@@ -33,31 +33,31 @@ class _BoardState(IntEnum):
 
 
 class _SolderedLines(Protocol):
-    """What is soldered to a board and is let go without a word when its supply goes."""
+    """Hardware on a board that is disconnected without notice when the supply fails."""
 
     def cut(self) -> None:
-        """Close all that was opened since the latest time."""
+        """Close everything opened since the last call."""
 
 
 _StartSystem = Callable[[NodeManager, ExitStack], None]
-"""Makes the system of a board that has booted; what it enters is left when the supply goes."""
+"""Makes the system of a booted board; its contexts are exited when the supply fails."""
 
 
 class Board:
     """A board that boots, runs its system, and loses it with its supply; an item of a `Schedule`.
 
-    A power cut is no shutdown: no component is deactivated, no device told, and all caches are
-    gone. A new boot makes everything anew. The reset button does the same.
+    A power cut is not a shutdown: no component is deactivated, no device is notified, and all
+    caches are lost. A new boot makes everything new. The reset button has the same effect.
 
     Args:
         limits: of the node.
         start: makes its system.
-        lines: are cut with the supply.
+        lines: cut with the supply.
 
     Attributes:
-        inputs: what is done to it.
+        inputs: its inputs.
         manager: its system while it runs, else None.
-        boots: how often it was up.
+        boots: number of boots.
     """
 
     def __init__(self, limits: NodeLimits, start: _StartSystem, lines: _SolderedLines) -> None:
@@ -70,23 +70,23 @@ class Board:
 
     @property
     def tick_us(self) -> int:
-        """How finely it keeps time."""
+        """Resolution of its time."""
         return self.limits.tick_us
 
     @property
     def due_us(self) -> int:
-        """When it has something to do."""
+        """The time of its next event."""
         if self._changed:
             return 0
         return self._up_us if self.manager is None else self.manager.due_us
 
     @property
     def outputs(self) -> Mapping[str, OutputSignal]:
-        """What `read` knows."""
+        """The outputs that `read` accepts."""
         return {output.name: output for output in _OUTPUTS}
 
     def read(self, name: str, /) -> int:
-        """Look at an output; KeyError if there is none of that name."""
+        """Return the present value of an output; KeyError if it is unknown."""
         manager = self.manager
         if name.startswith("refused_"):
             what = name.removeprefix("refused_")
@@ -95,7 +95,7 @@ class Board:
         return {"state": self._state, "boots": self.boots, "components": components}[name]
 
     def tick(self, now_us: int, /) -> None:
-        """Go on: lose or get the supply, boot, run what is due."""
+        """Advance: lose or get the supply, boot, run due events."""
         if self._changed:
             self._inputs_changed(now_us)
         if self._state is _BoardState.BOOTING and now_us >= self._up_us:
@@ -104,7 +104,7 @@ class Board:
             self.manager.tick(now_us)
 
     def close(self) -> None:
-        """End in order: each component is deactivated."""
+        """Shut down: deactivate each component."""
         for component in self.manager.components if self.manager else ():
             for context in tuple(component.contexts):
                 context.close()
@@ -130,7 +130,7 @@ class Board:
         self.boots += 1
 
     def _lose(self) -> None:
-        """Be without supply: nothing of the system is left."""
+        """Switch the supply off: the system is lost."""
         for what in REFUSED:
             self._refused[what] += self.manager.refused[what] if self.manager else 0
         self._state, self.manager, self._up_us = _BoardState.OFF, None, NEVER

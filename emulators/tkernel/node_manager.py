@@ -1,4 +1,4 @@
-"""The manager of a node on T-Kernel: what is beyond its limits is refused, and told."""
+"""The manager of a node on T-Kernel, which refuses and reports requests beyond its limits."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from tickrig.host.rtc.ucode.ucode_settlement import UcodeSettlement
 from tickrig.host.text.log import log_of
 from tickrig.wire.rtc_types.cdr import encode
 
-# What a node on T-Kernel cannot do, in numbers. The report gives none; these are choices.
+# Limits of a node on T-Kernel. The report has no numbers; these are choices.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,13 +30,13 @@ class NodeLimits:
     """The limits of a node.
 
     Attributes:
-        connectors: how many its ports may have together, 1..1000.
-        message_octets: of a value as CDR, 16..1048576.
+        connectors: largest number for all ports together, 1..1000.
+        message_octets: largest size of a value as CDR, 16..1048576.
         tick_us: of its cyclic handlers; periods are multiples of it, 1000..1000000.
-        boot_us: from power-up until it answers, 0..600000000.
+        boot_us: time from power-up until it answers, 0..600000000.
 
     Raises:
-        ValueError: a limit that cannot be.
+        ValueError: a limit out of range.
     """
 
     connectors: int = 8
@@ -45,7 +45,7 @@ class NodeLimits:
     boot_us: int = 3_000_000
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be."""
+        """Raise ValueError if a value is out of range."""
         ranges = {
             "connectors": (1, 1_000),
             "message_octets": (16, 1 << 20),
@@ -79,7 +79,7 @@ HOST: Final = "tkernel"
 """Its naming context."""
 
 _RATE_HZ: Final = 100.0
-"""Of components for which nobody names one: the shortest period."""
+"""Default period of components: the shortest one."""
 
 _INTERFACE: Final = "dataport.interface_type"
 _CORBA_CDR: Final = "corba_cdr"
@@ -95,10 +95,10 @@ _LOG: Final = log_of(__name__)
 class NodeManager(Manager):
     """Runs RT components within the limits of a small board (NEDO report 3.4.43.3 (4)).
 
-    Interfaces are those of OpenRTM 1.0: data passes as CDR, never as it is (`direct`), and
-    connectors have no properties that came later. Requests are served one after the other, as
-    RtORB does: those of peers in the manager's thread, values of peers under one lock. What is
-    refused is counted, and logged in a line, the first of each reason and port.
+    Interfaces are those of OpenRTM 1.0: data are always passed as CDR, never directly (`direct`),
+    and connectors do not have later properties. Requests are served one after the other, as in
+    RtORB: those of peers in the manager's thread, values of peers under one lock. Refusals are
+    counted, and the first one of each reason and port is logged.
 
     Not limited: memory, processor time, threads, and the connectors of observers such as
     `tickrig rtc print`, which are on no board.
@@ -108,7 +108,7 @@ class NodeManager(Manager):
 
     Attributes:
         limits: as above.
-        refused: how often what was refused, by `REFUSED`.
+        refused: number of refusals, by `REFUSED`.
     """
 
     def __init__(self, limits: NodeLimits | None = None) -> None:
@@ -124,17 +124,17 @@ class NodeManager(Manager):
         rate_hz: float = _RATE_HZ,
         context: ExecutionContext | None = None,
     ) -> RtComponent:
-        """Create a component, at 100 Hz if nobody says otherwise; see `Manager.create`."""
+        """Create a component, by default at 100 Hz; see `Manager.create`."""
         return super().create(type_name, instance_name, rate_hz, context)
 
     def add(
         self, component: R, rate_hz: float = _RATE_HZ, context: ExecutionContext | None = None
     ) -> R:
-        """Add a component, and keep it within the limits; see `Manager.add`.
+        """Add a component within the limits; see `Manager.add`.
 
         Raises:
-            RtcRefused: its period is no multiple of the node's tick, and what `Manager.add`
-                refuses.
+            RtcRefused: its period is not a multiple of the node's tick, or `Manager.add` refuses
+                it.
         """
         name = component.instance_name
         wanted = ExecutionContext(rate_hz) if context is None else context
@@ -156,12 +156,12 @@ class NodeManager(Manager):
         name: str = "",
         connector_id: str = "",
     ) -> ConnectorProfile:
-        """Join two ports, by CDR if nobody says otherwise; see `Manager.connect`."""
+        """Connect two ports, by default with CDR; see `Manager.connect`."""
         stated = {_INTERFACE: _CORBA_CDR, **(properties or {})}
         return super().connect(first, second, stated, name=name, connector_id=connector_id)
 
     def admit(self, connector: ConnectorBase, /) -> None:
-        """Raise RtcRefused unless its ports may have one more connector, this one."""
+        """Raise RtcRefused unless its ports may have this additional connector."""
         if len(connector.ports) == 2 and not connector.joins_components:
             return  # an observer's
         way, properties = " to ".join(connector.profile.ports), connector.profile.properties
@@ -196,7 +196,7 @@ class NodeManager(Manager):
             self._refuse("interfaces", way, why, ReturnCode.UNSUPPORTED)
 
     def _connectors(self) -> set[ConnectorBase]:
-        """Return all but those of observers."""
+        """Return all connectors except those of observers."""
         return {
             connector
             for component in self.components
@@ -206,7 +206,7 @@ class NodeManager(Manager):
         }
 
     def _refused_period(self, name: str, period_us: int) -> str:
-        """Return why a period cannot be, empty if it can."""
+        """Return the reason to refuse a period, empty if it is allowed."""
         tick_us = self.limits.tick_us
         if not period_us % tick_us:
             return ""
@@ -243,12 +243,12 @@ class _Closable(Protocol):
 
 
 class BoardLines:
-    """What the components of a board open; it can be cut.
+    """The lines and sources that components of a board open; they can be cut.
 
     Args:
         open_urg: opens the line of a range finder.
         open_reader: opens the line of a ucode reader.
-        open_source: makes what asks the resolution service.
+        open_source: makes the client of the resolution service.
     """
 
     def __init__(
@@ -268,12 +268,12 @@ class BoardLines:
         return link
 
     def open_source(self, name: str, hosts: tuple[str, ...]) -> Source:
-        """Make what asks the resolution service."""
+        """Make the client of the resolution service."""
         self._opened.append(source := self._open_source(name, hosts))
         return source
 
     def cut(self) -> None:
-        """Close all that was opened, without a word to any device."""
+        """Close everything without notice to any device."""
         for opened in self._opened:
             opened.close()
         self._opened.clear()
@@ -289,13 +289,13 @@ def add_range_finder(manager: NodeManager, lines: BoardLines, device: str) -> No
 def add_position_detection(
     manager: NodeManager, lines: BoardLines, device: str, service: str = ""
 ) -> None:
-    """Add, join and activate reader, settlement and interpretation.
+    """Add, connect and activate reader, settlement and interpretation.
 
     Args:
         manager: of the node.
-        lines: open what they need.
+        lines: open their lines.
         device: line of the reader.
-        service: address of the resolution service; that of the component if left out.
+        service: address of the resolution service; by default that of the component.
     """
     reader = manager.add(InfraredRaysReader(READER, lines.open_reader))
     reader.configuration.set("DeviceFileName", device)

@@ -1,4 +1,4 @@
-"""What is done to a thing that has inputs and outputs and no wire."""
+"""Operation of an object with inputs and outputs but without a wire."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from tickrig.emulators.rig.event_queue import EventQueue
 
 
 class Operated:
-    """A thing without a wire, and what is done to it, now or at a later time.
+    """An object without a wire, and actions on it, now or later.
 
     `EmulatorControl` answers requests about it.
 
     Args:
-        name: of the thing.
+        name: of the object.
         thing: has inputs and outputs.
-        stop: called when somebody asks for the end.
-        status: gives more for the request `status`.
+        stop: called on the request to end.
+        status: returns more data for the request `status`.
 
     Attributes:
-        operator: does what is asked for.
-        now_us: the present, as `tick` was told.
+        operator: executes the actions.
+        now_us: the present time, from `tick`.
     """
 
     def __init__(
@@ -38,29 +38,29 @@ class Operated:
 
     @property
     def due_us(self) -> int:
-        """When something is to be done next; `NEVER` if nothing is."""
+        """The time of the next action; `NEVER` if there is none."""
         return self._events.due_us
 
     @property
     def effective_us(self) -> int:
-        """When what is done now takes effect."""
+        """The time at which an action takes effect."""
         return self.now_us
 
     def tick(self, now_us: int, /) -> None:
-        """Do what is due."""
+        """Run due actions."""
         self.now_us = now_us
         self._events.run(now_us)
 
     def plan(self, faults: Iterable[FaultSpec]) -> None:
-        """Let faults come at their times.
+        """Schedule faults.
 
         Raises:
-            ValueError: one cannot be.
+            ValueError: an invalid fault.
         """
         for spec in faults:
             self.operator.fault(self.now_us, spec)
 
     def status(self) -> Mapping[str, object]:
-        """Return how it is going."""
+        """Return its status."""
         faults = list(self.operator.active_faults)
         return {"now_us": self.now_us, "faults": faults, **self._more()}

@@ -1,4 +1,4 @@
-"""A resolution service: what it answers, and what goes wrong with it."""
+"""A resolution service: its answers and its faults."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from tickrig.emulators.tkernel.ucode_table import UcodeTable
 from tickrig.host.rtc.ucode.cache import Fetched, SourceStatus
 
 _INPUTS: Final = (
-    InputSignal("unreachable", "nobody can connect to it", SignalType.FAULT),
+    InputSignal("unreachable", "no client can connect to it", SignalType.FAULT),
     InputSignal("slow", "each answer comes delay_ms later", SignalType.FAULT),
-    InputSignal("unknown_ucode", "it knows no ucode and no contents any more", SignalType.FAULT),
-    InputSignal("broken", "its answers are no addresses and no contents", SignalType.FAULT),
+    InputSignal("unknown_ucode", "it no longer knows any ucode or contents", SignalType.FAULT),
+    InputSignal("broken", "its answers are not addresses or contents", SignalType.FAULT),
     InputSignal("delay_ms", "how much later, while slow", high=60_000, unit="ms", initial=3_000),
 )
 
 _OUTPUTS: Final = (
     OutputSignal("requests", "requests that arrived"),
-    OutputSignal("found", "of these, answered with what was asked for"),
-    OutputSignal("unknown", "of these, for what it does not know"),
+    OutputSignal("found", "of these, answered"),
+    OutputSignal("unknown", "of these, for unknown addresses"),
 )
 
 
@@ -32,7 +32,7 @@ class Response:
     Attributes:
         status: its code.
         text: its body.
-        delay_us: how much later than usual it comes.
+        delay_us: additional delay.
     """
 
     status: int
@@ -44,7 +44,7 @@ class ResolutionService:
     """Answers `/ucodes/UCODE` with an address, `/contents/NAME` with JSON; it does no I/O.
 
     Args:
-        table: what it knows.
+        table: ucodes and contents.
         base: its own address, such as `http://127.0.0.1:8640`.
 
     Attributes:
@@ -61,16 +61,16 @@ class ResolutionService:
 
     @property
     def outputs(self) -> Mapping[str, OutputSignal]:
-        """What `read` knows."""
+        """The outputs that `read` accepts."""
         return {output.name: output for output in _OUTPUTS}
 
     @property
     def reachable(self) -> bool:
-        """Whether anybody can connect."""
+        """Whether clients can connect."""
         return not self.inputs["unreachable"]
 
     def read(self, name: str, /) -> int:
-        """Look at an output; KeyError if there is none of that name."""
+        """Return the present value of an output; KeyError if it is unknown."""
         return self._counts[name]
 
     def respond(self, path: str) -> Response:
@@ -94,22 +94,22 @@ class ResolutionService:
                 return None
 
 
-# A resolution service in virtual time: answers come later by a latency, never by the clock.
+# A resolution service in virtual time: answers come after a latency.
 
 _LATENCY_US: Final = 4_000
-"""Of an answer on the way there and back; a choice."""
+"""Round-trip time of an answer; a choice."""
 
 _TIMEOUT_US: Final = 1_000_000
-"""As long as `HttpSource` waits."""
+"""The time-out of `HttpSource`."""
 
 
 class SimSource:
-    """A `Source` at a service in the same process.
+    """A `Source` for a service in the same process.
 
-    As HTTP does it asks one thing after the other; who cannot connect knows at once.
+    As with HTTP, requests are sent one after the other; a failed connection is reported at once.
 
     Args:
-        service: answers.
+        service: the service.
     """
 
     def __init__(self, service: ResolutionService) -> None:
@@ -117,24 +117,24 @@ class SimSource:
         self._due: list[tuple[int, Fetched]] = []
 
     def request(self, address: str, now_us: int) -> None:
-        """Ask for what is under an address."""
+        """Request the content of an address."""
         self._free_us = max(self._free_us, now_us)
         at_us, fetched = self._fetch(address)
         self._free_us += at_us
         self._due.append((self._free_us, fetched))
 
     def take(self, now_us: int) -> tuple[Fetched, ...]:
-        """Take the requests that have ended."""
+        """Return the finished requests."""
         ended = tuple(fetched for at_us, fetched in self._due if at_us <= now_us)
         self._due = self._due[len(ended) :]
         return ended
 
     def close(self) -> None:
-        """End."""
+        """Stop."""
         self._due.clear()
 
     def _fetch(self, address: str) -> tuple[int, Fetched]:
-        """Return how long it takes, and what comes."""
+        """Return the duration and the answer."""
         service = self._service
         if not service.reachable or not address.startswith(f"{service.base}/"):
             why = f"{address}: connection refused"
@@ -148,5 +148,5 @@ class SimSource:
 
 
 def opener(service: ResolutionService) -> Callable[[str, tuple[str, ...]], SimSource]:
-    """Return what opens sources at a service."""
+    """Return a function that opens sources for a service."""
     return lambda name, hosts: SimSource(service)

@@ -1,4 +1,4 @@
-"""The table of a resolution service: ucodes, their addresses, what is there."""
+"""The table of a resolution service: ucodes, their addresses, and contents."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ EXAMPLE: Final = Path(__file__).with_name("example.toml").read_text("utf-8")
 
 @dataclass(frozen=True, slots=True)
 class UcodeTable:
-    """What a service knows.
+    """Ucodes and contents of a service.
 
     Attributes:
-        ucodes: what each stands for: a name of `contents`, or an address.
+        ucodes: target of each: a name of `contents`, or an address.
         contents: JSON texts by name.
     """
 
@@ -47,7 +47,7 @@ def parse_table(text: str) -> UcodeTable:
     """Read a table.
 
     Raises:
-        ValueError: it is none; the text is one line.
+        ValueError: invalid table; the message is one line.
 
     >>> sorted(parse_table(EXAMPLE).contents)
     ['door', 'lift']
@@ -65,7 +65,7 @@ def parse_table(text: str) -> UcodeTable:
 def _taken(
     section: Section | None, take: Callable[[str, object], str]
 ) -> Iterator[tuple[str, str]]:
-    """Yield the keys of a section with what is taken of their values; a wrong one is noted."""
+    """Yield the keys of a section with their values; report invalid ones."""
     if section is None:
         return
     for key, value in section.values.items():

@@ -1,4 +1,4 @@
-"""The URG as a device type: `urg-emu`, and the configuration that its traces carry."""
+"""The URG as a device type: `urg-emu`, and its configuration in traces."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from tickrig.emulators.urg.fields import FIELDS, USB_BAUD
 from tickrig.host.text.trace import Config, Mark
 
 _USUAL_BAUD: Final = 115_200
-"""What a host sets, which means nothing on USB."""
+"""Line setting of a host, without meaning on USB."""
 
 _BUFFER_BYTES: Final = 16_384
-"""Room for several whole scans at once."""
+"""Buffer size: room for several whole scans."""
 
 _OLD_SCIP: Final = "2.0"
-"""The protocol at the start of traces that name none."""
+"""The protocol at the start of traces without one."""
 
 
 def _config_to_trace(parameters: UrgParameters, world: World) -> Config:
@@ -76,7 +76,7 @@ def _rs232_baud(baud: int) -> int | None:
 
 
 def _parse_wall(text: str) -> Wall:
-    """Read `X1,Y1,X2,Y2`; ValueError if it is no wall.
+    """Read `X1,Y1,X2,Y2`; ValueError if it is not a wall.
 
     >>> _parse_wall("1,-1,1,1")
     Wall(x1_m=1.0, y1_m=-1.0, x2_m=1.0, y2_m=1.0)
@@ -85,12 +85,12 @@ def _parse_wall(text: str) -> Wall:
 
 
 def _parse_post(text: str) -> Post:
-    """Read `X,Y,RADIUS`; ValueError if it is no post."""
+    """Read `X,Y,RADIUS`; ValueError if it is not a post."""
     return Post(*_parse_numbers(text, 3, "a post is X,Y,RADIUS in m"))
 
 
 def _parse_numbers(text: str, count: int, form: str) -> tuple[float, ...]:
-    """Read numbers between commas; ValueError with the form if they are not so many."""
+    """Read comma-separated numbers; ValueError with the form if the number of values is wrong."""
     try:
         numbers = tuple(float(word) for word in text.split(","))
     except ValueError:

@@ -1,4 +1,4 @@
-"""What can be set of a range finder."""
+"""Options of a range finder."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Final
 from tickrig.emulators.fields import DeviceField
 
 USB_BAUD: Final = 12_000_000
-"""As fast as USB at full speed."""
+"""Bit rate of USB at full speed."""
 
 FIELDS: Final = (
     DeviceField(name="serial", unit="TEXT", default="H0614967", help="Serial number.  [H0614967]"),

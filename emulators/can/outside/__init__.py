@@ -1,1 +1,1 @@
-"""Doors between the emulated bus and others: python-can, the canopen library, real buses."""
+"""Connections of the emulated bus to python-can, the canopen library and real buses."""

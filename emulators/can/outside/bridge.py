@@ -11,19 +11,19 @@ from tickrig.wire.can import Frames
 from tickrig.wire.instant import NEVER
 
 _HANDOVER_US: Final = 1_000
-"""What has arrived is handed out at least this often."""
+"""Longest period between two deliveries of received frames."""
 
 
 class CanBridge:
-    """One end of an emulated bus, handed to the outside: one bus of python-can.
+    """A bridge between one end of an emulated bus and a bus of python-can.
 
-    The nodes of the rig hear each other on their own wire, and the outside
-    hears each of their frames once. Frames from outside are put on the wire as
-    one more node would send them, so they take their time there as well.
+    The nodes of the rig communicate on their own wire, and the outside receives each of their
+    frames once. Frames from outside are sent on the wire like those of one more node, so they take
+    the same time there.
 
     Args:
-        end: an end of the wire that no station has.
-        outside: the outside.
+        end: an end of the wire without a station.
+        outside: the port outside.
     """
 
     def __init__(self, end: CanEnd, outside: Port[Frames]) -> None:
@@ -32,40 +32,40 @@ class CanBridge:
 
     @property
     def due_us(self) -> int:
-        """When frames are to be handed out."""
+        """The time of the next delivery."""
         due_us = self._end.due_us
         return due_us if due_us == NEVER else -(-due_us // _HANDOVER_US) * _HANDOVER_US
 
     def take_in(self, now_us: int, /) -> None:
-        """Put what the outside sent since the last look on the wire.
+        """Send the frames from outside since the last poll on the wire.
 
-        It may have been sent at any time since then, so it is taken as sent
-        right after that look: a host is not charged a tick for being polled.
+        They may have been sent at any time since then, so they count as sent right after that poll:
+        polling costs a host no tick.
         """
         if frames := self._outside.poll(now_us):
             self._end.send(self._looked_us, frames)
         self._looked_us = now_us
 
     def give_out(self, now_us: int, /) -> None:
-        """Hand what has arrived by now to the outside."""
+        """Deliver the frames that have arrived by now to the outside."""
         if frames := self._end.poll(now_us):
             self._outside.send(now_us, frames)
 
 
 class CountingPort(Port[Frames], Protocol):
-    """A bus outside that counts what it could not take."""
+    """A bus outside that counts the frames it could not accept."""
 
     @property
     def lost(self) -> int:
-        """How many frames."""
+        """Number of frames."""
         ...
 
 
 class PortBefore:
-    """A port that passes all on to and from the port behind it.
+    """A port that forwards all traffic to and from another port.
 
     Args:
-        port: the port behind it.
+        port: the other port.
     """
 
     def __init__(self, port: CountingPort) -> None:
@@ -73,7 +73,7 @@ class PortBefore:
 
     @property
     def lost(self) -> int:
-        """Frames dropped because the adapter took none."""
+        """Frames dropped because the adapter did not accept them."""
         return self._port.lost
 
     @property
@@ -91,10 +91,10 @@ class PortBefore:
 
 
 class WithoutEcho(PortBefore):
-    """A port on the udp_multicast bus of python-can, which hears its own frames.
+    """A port on the udp_multicast bus of python-can, which receives its own frames.
 
     Args:
-        port: the port behind it.
+        port: the port on the bus.
     """
 
     def __init__(self, port: CountingPort) -> None:
@@ -107,6 +107,6 @@ class WithoutEcho(PortBefore):
         return tuple(frame for frame in super().poll(now_us) if not self._echo.take(frame))
 
     def send(self, now_us: int, traffic: Frames, /) -> None:
-        """Send, and await the echo."""
+        """Send, and note the expected echo."""
         self._echo.sent(now_us, traffic)
         super().send(now_us, traffic)

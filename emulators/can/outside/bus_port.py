@@ -1,4 +1,4 @@
-"""Any bus of python-can as a port of a rig in real time."""
+"""A bus of python-can as a port of a rig in real time."""
 
 from __future__ import annotations
 
@@ -18,27 +18,27 @@ from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.instant import NEVER
 
 FRAMES_A_POLL: Final = 1_024
-"""So that a bus that never falls silent cannot stop the clock."""
+"""Largest number of frames read at once, so that a busy bus cannot stop the clock."""
 
 _logger = log_of(__name__)
 
 
 class CanBusPort(NonCopyable):
-    """A `Port[Frames]` on a real or virtual bus; it never waits.
+    """A `Port[Frames]` on a real or virtual bus; it never blocks.
 
-    What the adapter does not take at once is kept up to `queue_frames`, and
-    sent in order; after that frames are dropped and counted.
+    Frames that the adapter does not accept at once are queued, up to `queue_frames`, and sent in
+    order; further frames are dropped and counted.
 
     Args:
-        bus: an open bus. Nobody else may read from it.
-        name: what people call it.
-        queue_frames: frames kept for an adapter that takes none.
-        gone: makes what is raised of a text when the bus cannot be read any more.
+        bus: an open bus, without other readers.
+        name: its name for messages.
+        queue_frames: size of the queue.
+        gone: makes the exception from a text when the bus can no longer be read.
 
     Attributes:
-        lost: frames dropped because the adapter took none.
-        errors: error frames that came in.
-        reads: reads the bus, and counts what its driver could not read.
+        lost: frames dropped because the adapter did not accept them.
+        errors: number of received error frames.
+        reads: reads the bus, and counts the frames that its driver could not read.
     """
 
     why_not_copied = "it is a bus of this machine"
@@ -58,19 +58,19 @@ class CanBusPort(NonCopyable):
 
     @property
     def failed(self) -> str:
-        """Why the adapter last took or gave nothing, empty while all is well."""
+        """Reason why the adapter last failed to send or read, empty if there was no error."""
         return self.reads.last or self._failed
 
     @property
     def due_us(self) -> int:
-        """Unknown to anybody but the bus."""
+        """`NEVER`: only the bus knows when traffic arrives."""
         return NEVER
 
     def poll(self, now_us: int, /) -> Frames:
-        """Read without waiting.
+        """Read without blocking.
 
         Raises:
-            LinkClosed: 100 reads in a row have failed for 1 s.
+            LinkClosed: 100 reads in a row failed over 1 s.
         """
         self._flush()
         frames = []
@@ -86,7 +86,7 @@ class CanBusPort(NonCopyable):
         return tuple(frames)
 
     def send(self, now_us: int, traffic: Frames, /) -> None:
-        """Send as much as the adapter takes; keep the rest for later."""
+        """Send as much as the adapter accepts; queue the rest."""
         room = self._queue_frames - len(self._unsent)
         self.lost += max(0, len(traffic) - room)
         self._unsent += traffic[:room]
@@ -118,6 +118,6 @@ def port_on(
     name: str = "CAN bus",
     gone: Callable[[str], Exception] = LinkClosed,
 ) -> CountingPort:
-    """Return the port on an open bus, without the echo that some interfaces give."""
+    """Return the port on an open bus, without the echo of some interfaces."""
     port = CanBusPort(bus, name, gone=gone)
     return WithoutEcho(port) if interface in ECHOING else port

@@ -13,7 +13,7 @@ from tickrig.wire.can import CanFrame, ErrorFrame, Frames
 from tickrig.wire.instant import NEVER
 
 _CHUNK_US: Final = 1_000_000
-"""How far the rig runs at once where there is no timeout."""
+"""How far the rig runs at once without a timeout."""
 
 
 _INSTEAD: Final = (
@@ -25,11 +25,11 @@ _LOOKING: Final = "give recv or receive a timeout, or sleep, with the fixture be
 
 
 class Repeat:
-    """Frames that are sent in turn, one each period, as a driver's periodic task does.
+    """Frames that are sent in turn, one per period, like the periodic task of a driver.
 
     Attributes:
-        frames: what is sent, from the next time on.
-        due_us: when the next one is sent, `NEVER` once it was stopped.
+        frames: the frames, effective from the next time on.
+        due_us: when the next one is sent, `NEVER` after `stop`.
     """
 
     def __init__(self, frames: Frames, period_us: int, due_us: int) -> None:
@@ -37,11 +37,11 @@ class Repeat:
         self._period_us, self._sent = period_us, 0
 
     def stop(self) -> None:
-        """Send no more."""
+        """Stop sending."""
         self.due_us = NEVER
 
     def take(self) -> Frames:
-        """Take the frame that is due."""
+        """Return the frame that is due."""
         frame = self.frames[self._sent % len(self.frames)]
         self._sent += 1
         self.due_us += self._period_us
@@ -49,13 +49,13 @@ class Repeat:
 
 
 class CanHost:
-    """A `StampedLink` into a rig: waiting makes virtual time pass.
+    """A `StampedLink` into a rig: waiting advances the virtual time.
 
     Args:
-        rig: the rig that is stepped meanwhile.
-        end: an end of one of its buses that no station has.
-        thread: in which it is used; that which makes it.
-        hears_own: it receives what it has sent itself, too, when that has been on the bus.
+        rig: the rig to advance.
+        end: an end of one of its buses without a station.
+        thread: the thread that uses it; by default the one that makes it.
+        hears_own: whether it also receives its own frames, after they have been on the bus.
     """
 
     def __init__(
@@ -81,7 +81,7 @@ class CanHost:
         self._put(self.now_us, traffic)
 
     def is_own(self, at_us: int) -> bool:
-        """Whether the frame that ended at a time was sent here; it is asked once for each."""
+        """Return whether the frame that ended at a time was sent here; called once for each."""
         own = at_us in self._own
         self._own.discard(at_us)
         return own
@@ -89,7 +89,7 @@ class CanHost:
     def repeat(self, frames: Frames, period_us: int) -> Repeat:
         """Send a frame now and one in each period, in turn, until it is stopped.
 
-        Whoever makes the rig's time pass lets them be sent.
+        They are sent while any code advances the rig's time.
         """
         if period_us < 1 or not frames:
             raise ValueError(f"{len(frames)} frames each {period_us} us; at least 1 frame and 1 us")
@@ -102,22 +102,22 @@ class CanHost:
         return repeat
 
     def receive(self, timeout_us: int, /) -> Frames:
-        """Let time pass until a frame has arrived; return all that are there then."""
+        """Wait until a frame has arrived; return all received frames."""
         return tuple(frame for _, frame in self.receive_stamped(timeout_us)[1])
 
     def receive_stamped(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
-        """Let time pass until a frame has arrived; return the time, and all that are there."""
+        """Wait until a frame has arrived; return the time and all received frames."""
         first = self.take(timeout_us)
         received = () if first is None else (first, *self._inbox)
         self._inbox.clear()
         return self.now_us, received
 
     def take(self, timeout_us: int | None) -> tuple[int, CanFrame] | None:
-        """Let time pass until a frame has arrived; return it with its time, None if none came.
+        """Wait until a frame has arrived; return it with its time, None after the timeout.
 
         Raises:
             LinkClosed: the link was closed.
-            LinkError: a second thread uses it, or a loop that only looks would never end.
+            LinkError: a second thread uses it, or a polling loop would never end.
             LinkTimeout: there is no timeout, and nothing will ever happen.
         """
         self._check_usable()
@@ -133,7 +133,7 @@ class CanHost:
         return inbox.popleft()
 
     def close(self) -> None:
-        """Close the link; the rig stays as it is."""
+        """Close the link; the rig is unchanged."""
         self._closed = True
         if self._repeats:
             self._rig.watchers.remove(self._send_due)
@@ -143,7 +143,7 @@ class CanHost:
             self._hears_own = False
 
     def _put(self, now_us: int, traffic: Frames) -> None:
-        """Queue frames, and note those that fit if they are to be received."""
+        """Queue frames, and note the accepted ones if they are to be received."""
         lost = self._end.lost
         self._end.send(now_us, traffic)
         if self._hears_own:
@@ -160,14 +160,14 @@ class CanHost:
             self._end.receive(at_us, frame, (frame,))
 
     def _look(self, timeout_us: int | None) -> None:
-        """Count a look that found nothing; a wait that is over was none."""
+        """Count a poll without result; a wait that has timed out does not count."""
         if timeout_us is None or timeout_us > 0:
             return
         if refusal := self._looks.refusal(self.now_us, _LOOKING):
             raise LinkError(refusal)
 
     def _step(self, deadline_us: int) -> None:
-        """Let the rig run until a frame has come."""
+        """Run the rig until a frame has arrived."""
         if deadline_us == NEVER:
             if self._rig.next_us == NEVER:
                 raise LinkTimeout("nothing will ever happen on this bus, and no timeout was given")
@@ -175,7 +175,7 @@ class CanHost:
         self._rig.run_to(deadline_us, self._end)
 
     def _wake(self) -> None:
-        """Let the rig stop when the next frame is to be repeated."""
+        """Stop the rig when the next periodic frame is due."""
         self._repeats = [repeat for repeat in self._repeats if repeat.due_us < NEVER]
         if self._repeats:
             due_us = min(repeat.due_us for repeat in self._repeats)
@@ -184,7 +184,7 @@ class CanHost:
             self._rig.watchers.remove(self._send_due)
 
     def _send_due(self, now_us: int) -> None:
-        """Send what is due; called after each step of the rig."""
+        """Send due frames; called after each step of the rig."""
         due = [repeat for repeat in self._repeats if repeat.due_us <= now_us]
         for repeat in due:
             self._put(now_us, repeat.take())

@@ -1,4 +1,4 @@
-"""The python-can interface `tickrig`: rigs in virtual time under the names of channels."""
+"""The python-can interface `tickrig`: rigs in virtual time by channel name."""
 
 from __future__ import annotations
 
@@ -22,12 +22,11 @@ from tickrig.wire.errors import FieldError
 
 
 class _CanChannels:
-    """The buses that can be opened by name at present.
+    """The buses that can presently be opened by name.
 
-    python-can opens a bus by two strings, so the names have to be kept where
-    the whole process finds them: in `CHANNELS`, the one place of this package
-    with state of its own. What is there was put there by `offer`, for the time
-    of a `with` block, and nothing is ever made up or left behind.
+    python-can opens a bus by two strings, so the names must be global to the process: in
+    `CHANNELS`, the only global state of this package. `offer` adds an entry for the duration of a
+    `with` block, and nothing is left behind.
 
     >>> with CHANNELS.offer("robot", Rig(), CanWire()):
     ...     CHANNELS.names
@@ -41,15 +40,15 @@ class _CanChannels:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The names that are offered."""
+        """The offered names."""
         return tuple(self._channels)
 
     @contextmanager
     def offer(self, name: str, rig: Rig, wire: CanWire) -> Iterator[None]:
-        """Let a bus of a rig be opened under a name.
+        """Allow a bus of a rig to be opened under a name.
 
         Raises:
-            ValueError: the name is offered already.
+            ValueError: the name is already offered.
         """
         if name in self._channels:
             raise ValueError(f"channel {name!r} is offered already")
@@ -64,7 +63,7 @@ class _CanChannels:
 
         Args:
             name: of the bus.
-            hears_own: the host receives what it sends, too.
+            hears_own: whether the host also receives its own frames.
 
         Raises:
             KeyError: no bus is offered under this name.
@@ -80,22 +79,21 @@ CHANNELS: Final = _CanChannels()
 class TickrigBus(can.BusABC):
     """A host on a rig: `can.Bus(interface="tickrig", channel="name")`.
 
-    `recv` makes virtual time pass, exactly its timeout if nothing comes; `send`
-    takes none. Timestamps are the rig's time in seconds. Periodic messages are
-    sent while time passes. One thread uses it, that which opened the rig: a
-    `can.Notifier` would make time pass on its own and is refused, so hosts that
-    need one take `SimNetwork`, poll, or run in real time.
+    `recv` advances the virtual time, by exactly its timeout if nothing arrives; `send` takes no
+    time. Timestamps are the rig's time in seconds. Periodic messages are sent while time passes.
+    Only the thread that opened the rig may use it: a `can.Notifier` would advance the time itself
+    and is refused, so hosts that need one use `SimNetwork`, poll, or run in real time.
 
     Args:
         channel: a name that `CHANNELS` offers.
         can_filters: as for any bus.
-        receive_own_messages: messages that it sends are received too when they have been on the
+        receive_own_messages: whether it also receives its own messages after they have been on the
             bus, with `is_rx` False.
         listen_only: must be False.
-        options: what else other interfaces take (bitrate, ...) is ignored.
+        options: options of other interfaces (bitrate, ...) are ignored.
 
     Raises:
-        can.CanInitializationError: no rig has this name, or it is to listen only.
+        can.CanInitializationError: no rig has this name, or `listen_only` is set.
     """
 
     def __init__(
@@ -122,7 +120,7 @@ class TickrigBus(can.BusABC):
         return self._host.now_us
 
     def recv(self, timeout: float | None = None) -> can.Message | None:
-        """Let time pass until a message has come, None after `timeout` seconds."""
+        """Wait until a message has arrived; return None after `timeout` seconds."""
         deadline_us = None if timeout is None else self.now_us + round(timeout * 1e6)
         while True:
             left_us = None if deadline_us is None else deadline_us - self.now_us
@@ -145,7 +143,7 @@ class TickrigBus(can.BusABC):
             raise can.CanOperationError(str(error)) from error
 
     def shutdown(self) -> None:
-        """Leave the bus; the rig stays as it is."""
+        """Leave the bus; the rig is unchanged."""
         super().shutdown()
         self._host.close()
 
@@ -164,7 +162,7 @@ class TickrigBus(can.BusABC):
 
 
 class _Periodic(ModifiableCyclicTaskABC):
-    """Messages that are sent in turn, one each period of the rig's time."""
+    """Messages that are sent in turn, one per period of the rig's time."""
 
     def __init__(
         self, host: CanHost, messages: Sequence[can.Message] | can.Message, period_s: float
@@ -173,7 +171,7 @@ class _Periodic(ModifiableCyclicTaskABC):
         self._repeat = host.repeat(self._frames(), round(period_s * 1e6))
 
     def stop(self) -> None:
-        """Send no more."""
+        """Stop sending."""
         self._repeat.stop()
 
     def modify_data(self, messages: Sequence[can.Message] | can.Message) -> None:
@@ -186,7 +184,7 @@ class _Periodic(ModifiableCyclicTaskABC):
 
 
 def _frame_of(message: can.Message) -> CanFrame:
-    """Return a frame; CanOperationError if it cannot be on the bus."""
+    """Return a frame; CanOperationError if it is not a valid frame for the bus."""
     frame = to_frame(message)
     if frame is None:
         raise can.CanOperationError("error frames and CAN FD are not emulated")

@@ -27,19 +27,19 @@ from tickrig.wire.can import STANDARD_MAX, CanFrame
 # class, and everything else in the process, stay as they are.
 
 _Names = Mapping[str, object]
-"""Global names of a module, and what they shall mean."""
+"""Global names of a module, and their replacements."""
 
 
 def retime(target: object, names: _Names, library: str) -> None:
-    """Let an object's methods see other global names.
+    """Replace global names in the methods of an object.
 
-    Methods of classes outside the library stay as they are: a subclass that
-    reads the clock itself reads the real one.
+    Methods of classes outside the library are unchanged: a subclass that reads the clock itself
+    reads the real one.
 
     Args:
         target: the object; its class must not have slots.
-        names: what the names shall mean.
-        library: name of the package whose classes are meant.
+        names: replacements of the names.
+        library: name of the package whose classes are changed.
     """
     cls = type(target)
     if (other := retimed(cls, names, library)) is not cls:
@@ -47,7 +47,7 @@ def retime(target: object, names: _Names, library: str) -> None:
 
 
 def retimed(cls: type, names: _Names, library: str) -> type:
-    """Return a subclass whose methods see other global names; the class itself if none does."""
+    """Return a subclass with replaced global names; the class itself if no method uses them."""
     members = {
         name: copied
         for name, (owner, member) in _members(cls).items()
@@ -58,7 +58,7 @@ def retimed(cls: type, names: _Names, library: str) -> type:
 
 
 def _members(cls: type) -> dict[str, tuple[type, object]]:
-    """Return what each name means in a class, and which base it comes from."""
+    """Return the value of each name in a class, and the base that defines it."""
     found: dict[str, tuple[type, object]] = {}
     for base in cls.__mro__:
         for name, member in vars(base).items():
@@ -101,22 +101,20 @@ _Data = bytes | bytearray | Iterable[int] | None
 
 
 class SimNetwork(canopen.Network):
-    """A `canopen.Network` on a rig: whatever waits makes virtual time pass.
+    """A `canopen.Network` on a rig: every wait advances the virtual time.
 
-    Nodes, SDO clients, PDOs, NMT, EMCY, LSS and p402 are the library's own
-    code, run on the rig's clock: time-outs last exactly as long as they say,
-    and a run is the same each time. Where an object of the library comes to
-    this network its conditions and queues are exchanged, and its methods see
-    the rig's `time`; nothing outside of it is touched. A callback is called
-    while time passes, whoever makes it pass. Not changed: classes of yours that
-    call the real `time`; let time pass by `run_for` or `sleep` instead.
+    Nodes, SDO clients, PDOs, NMT, EMCY, LSS and p402 are the library's own code, run on the rig's
+    clock: time-outs are exact, and every run is the same. When an object of the library is added to
+    this network, its conditions and queues are replaced, and its methods use the rig's `time`;
+    nothing else is changed. Callbacks run while any code advances the time. Your own classes that
+    call the real `time` are not changed; use `run_for` or `sleep` instead.
 
     Args:
         rig: the rig.
-        end: an end of its bus that no station has.
+        end: an end of its bus without a station.
 
     Attributes:
-        host: the host's link, for frames by hand.
+        host: the host's link, for single frames.
         clock: the library's `time` on this network.
     """
 
@@ -139,11 +137,11 @@ class SimNetwork(canopen.Network):
         return EPOCH_S + self.host.now_us / 1e6
 
     def connect(self, *args: object, **kwargs: object) -> SimNetwork:
-        """Return itself: it is connected from the start."""
+        """Return the network itself, which is connected from the start."""
         return self
 
     def disconnect(self) -> None:
-        """Close the link; the rig stays as it is."""
+        """Close the link; the rig is unchanged."""
         super().disconnect()
         if self._hear in self._rig.watchers:
             self._rig.watchers.remove(self._hear)
@@ -151,11 +149,11 @@ class SimNetwork(canopen.Network):
         self.host.close()
 
     def run_for(self, duration_us: int) -> None:
-        """Let time pass, and deliver what comes meanwhile."""
+        """Advance the time, and deliver the frames that arrive."""
         self._wait_until(lambda: False, self.host.now_us + duration_us)
 
     def wait(self, done: Callable[[], bool], timeout_s: float | None) -> bool:
-        """Let time pass until `done()`; False if the timeout was first."""
+        """Advance the time until `done()`; return False after the timeout."""
         timeout_us = None if timeout_s is None else round(timeout_s * 1e6)
         return self._wait_until(done, None if timeout_us is None else self.host.now_us + timeout_us)
 
@@ -173,7 +171,7 @@ class SimNetwork(canopen.Network):
         return True
 
     def _hear(self, now_us: int) -> None:
-        """Deliver what has come while somebody else made time pass."""
+        """Deliver the frames that arrived while other code advanced the time."""
         if not self._waits:
             while (taken := self.host.take(0)) is not None:
                 self._deliver(*taken)
@@ -195,7 +193,7 @@ class SimNetwork(canopen.Network):
         return SimPeriodic(self.host.repeat((frame,), round(period * 1e6)))
 
     def subscribe(self, can_id: int, callback: _Callback) -> None:
-        """Listen to a CAN-ID, and put the listener on the rig's clock."""
+        """Subscribe to a CAN-ID, and put the callback on the rig's clock."""
         self._adopt(getattr(callback, "__self__", None))
         super().subscribe(can_id, callback)
 
@@ -208,7 +206,7 @@ class SimNetwork(canopen.Network):
                 self._adopt(pdo)
 
     def _adopt(self, target: object) -> None:
-        """Exchange what an object of the library waits on, once."""
+        """Replace the conditions and queues of a library object, once."""
         bases = {base.__module__.partition(".")[0] for base in type(target).__mro__}
         if _LIBRARY not in bases or id(target) in self._adopted:
             return
@@ -228,7 +226,7 @@ class SimPeriodic(canopen.network.PeriodicMessageTask):
         self._repeat = repeat
 
     def stop(self) -> None:
-        """Send it no more."""
+        """Stop sending it."""
         self._repeat.stop()
 
     def update(self, data: _Data) -> None:

@@ -1,4 +1,4 @@
-"""The slaves of a bus.yml: each made of its EDS, as the master of that file will expect it."""
+"""The slaves of a bus.yml: made of their EDS files as the master of the file expects them."""
 
 from __future__ import annotations
 
@@ -24,17 +24,18 @@ from tickrig.host.canopen.data_sheet.rule import RuleFinding
 from tickrig.host.text.document import FileMistake, FilePlace
 from tickrig.wire.canopen.eds.eds_file import EdsError
 
-# What each node of a bus.yml is made of: its EDS, what its master expects, and a joint.
+# Parts of each node of a bus.yml: its EDS, the settings of its master, and a joint.
 
 _TRAVEL_M: Final = 0.01
-"""What a turn of the shaft moves a carriage of which nobody says it."""
+"""Default travel of a carriage per turn of the shaft."""
 _BEYOND_RAD: Final = 0.01
 _BEYOND_M: Final = 0.001
-"""How far beyond the limits of a URDF its switches are: at its limit a joint presses none."""
+"""Distance of the switches beyond the limits of a URDF, so that a joint at its limit presses
+none."""
 _SECOND_AXIS: Final = 0x800
-"""How far the objects of a further axis are from those of the first one (CiA 402-1)."""
+"""Offset of the objects of each further axis (CiA 402-1)."""
 _SAME_UNITS: Final = 0.001
-"""How far the units of an EDS may be off what ROS believes, as a part of them."""
+"""Relative tolerance between the units of an EDS and those of ROS."""
 _IDENTITY: Final = 0x1018
 _SOFTWARE: Final = (0x1F56, 1)
 
@@ -47,8 +48,8 @@ class BusNode:
         name: of its section.
         node_id: 1..127.
         line: of its section.
-        description: what it is made of, with its inputs at the start.
-        about: what moves, for people; empty where nothing does.
+        description: its description, with its initial inputs.
+        about: what it moves, for people; empty if nothing.
     """
 
     name: str
@@ -63,14 +64,14 @@ class _NodeMaker:
 
     Args:
         bus: the file.
-        robot: its joints, None if nobody says more of them.
+        robot: its joints, None if there is no description of them.
         cache: of EDS files.
-        mistakes: takes what is wrong.
-        profile: of `choices.PROFILES`, for nodes that name none.
+        mistakes: collects errors.
+        profile: of `choices.PROFILES`, for nodes without one.
 
     Attributes:
-        remarks: what is odd.
-        added: which objects the EDS of a node lacks: these are added.
+        remarks: warnings.
+        added: objects added to nodes whose EDS lacks them.
     """
 
     def __init__(
@@ -89,7 +90,7 @@ class _NodeMaker:
         self._robot = (Path(robot.name),) if robot else ()
 
     def nodes(self) -> Iterator[BusNode]:
-        """Give all slaves of which something can be made."""
+        """Yield all valid slaves."""
         for slave in self._bus.slaves.values():
             keys = node_keys.read_keys(
                 (slave.extra, self._bus.options.extra), slave.name, self._mistakes
@@ -105,7 +106,7 @@ class _NodeMaker:
             )
 
     def _joints_of(self, robot: Urdf) -> Iterator[tuple[str, UrdfJoint]]:
-        """Give the joints of the robot by the name of their node."""
+        """Yield the joints of the robot by the name of their node."""
         by_id = {slave.node_id: name for name, slave in self._bus.slaves.items()}
         for joint in robot.joints:
             name = joint.device_name or by_id.get(joint.node_id or 0, "")
@@ -142,7 +143,7 @@ class _NodeMaker:
         return BusNode(slave.name, slave.node_id, slave.place.line, description, about)
 
     def _identified(self, slave: BusSlave, dictionary: Dictionary) -> Dictionary:
-        """Return the dictionary with the identity that the file says; 0 says nothing."""
+        """Return the dictionary with the identity of the file; 0 leaves a value unchanged."""
         identity = slave.identity
         wanted = {
             (_IDENTITY, 1): identity.vendor_id,
@@ -156,7 +157,7 @@ class _NodeMaker:
         )
 
     def _check_axes(self, slave: BusSlave, dictionary: Dictionary) -> None:
-        """Note a drive of several axes: the profile has one. Of others that nobody uses, tell."""
+        """Report a drive of several axes, because the profile has one; warn of unused ones."""
         second = indices.CONTROLWORD + _SECOND_AXIS
         if slave.num_channels > 1:
             text = "a drive of several axes (CiA 402-1) is not emulated"
@@ -167,7 +168,7 @@ class _NodeMaker:
             self.remarks.append(FileMistake(slave.place, text))
 
     def _check_units(self, slave: BusSlave, dictionary: Dictionary) -> None:
-        """Tell of speeds that the driver believes in other units; an EDS may have its own."""
+        """Warn of speeds in other units than the driver expects; an EDS may have its own."""
         own = (indices.SI_UNIT_VELOCITY, indices.VELOCITY_DIMENSION, indices.FEED_CONSTANT)
         if any(index in dictionary.objects for index in own):
             return
@@ -180,14 +181,14 @@ class _NodeMaker:
                 self.remarks.append(FileMistake(slave.place, text))
 
     def _check_no_joint(self, slave: BusSlave, keys: node_keys.NodeKeys) -> None:
-        """Note keys of a motor in a node that has none."""
+        """Report keys of a motor in a node without a motor."""
         for name in (*node_keys.JOINT_KEYS, "modes"):
             if name in slave.extra:
                 text = f"{slave.name}.tickrig.{name}: it is no CiA 402 drive, and has no motor"
                 self._mistakes.append(FileMistake(keys.places[name], text))
 
     def _joint(self, slave: BusSlave, keys: node_keys.NodeKeys) -> joint_drive.JointDrive:
-        """Return what moves a node: what its keys say, else the robot, else the driver's scale."""
+        """Return the motion of a node: from its keys, else the robot, else the driver's scale."""
         scale = slave.channels[0].scale_pos_to_dev if slave.channels else joint_drive.UNITS
         found: dict[str, Any] = {"units": abs(scale) or joint_drive.UNITS}
         if robot := self._joints.get(slave.name):
@@ -216,7 +217,7 @@ class _NodeMaker:
         dictionary: Dictionary,
         joint: joint_drive.JointDrive,
     ) -> Dictionary:
-        """Return the objects of a drive, and remark those that its EDS has not."""
+        """Return the objects of a drive, and warn of those missing in its EDS."""
         listed = joint_drive.modes_listed(dictionary)
         modes = keys.modes or listed | self._asked_for(slave, listed)
         wanted = modes if keys.modes else modes - listed
@@ -234,7 +235,7 @@ class _NodeMaker:
         dictionary: Dictionary,
         joint: joint_drive.JointDrive,
     ) -> Dictionary:
-        """Return the objects of a drive with the units of its keys; those of others are told."""
+        """Return the objects of a drive with the units of its keys; warn of different units."""
         written = {
             (each.index, each.sub_index): each.data
             for each in slave.writes
@@ -259,7 +260,7 @@ class _NodeMaker:
         return result
 
     def _asked_for(self, slave: BusSlave, listed: frozenset[int]) -> frozenset[int]:
-        """Return the modes that the file writes to 6060h and the EDS does not list."""
+        """Return the modes that the file writes to 6060h and that the EDS does not list."""
         found = set()
         for write in slave.writes:
             if write.index != indices.MODES_OF_OPERATION:
@@ -279,7 +280,7 @@ class _NodeMaker:
     def _check_start(
         self, slave: BusSlave, keys: node_keys.NodeKeys, description: eds.DeviceDescription
     ) -> None:
-        """Note inputs at the start that there are not, or that do not take their value."""
+        """Report initial inputs that do not exist or do not accept their value."""
         if not keys.start:
             return
         made = make_slave(
@@ -300,7 +301,7 @@ class BusNodes:
 
     Attributes:
         nodes: in the order of the file.
-        remarks: what is odd, a line each.
+        remarks: warnings, one line each.
     """
 
     nodes: tuple[BusNode, ...]
@@ -313,17 +314,17 @@ def read_bus(
     cache: eds.EdsCache | None = None,
     profile: str = AUTO,
 ) -> BusNodes:
-    """Read a bus.yml, the files that it names, and make its slaves once.
+    """Read a bus.yml and the files it names, and make its slaves once.
 
     Args:
         path: the bus.yml.
-        urdf: the robot with the joints; that of `options: tickrig:` unless given.
-        cache: of EDS files; it keeps the slaves, too.
-        profile: of `choices.PROFILES`, for nodes that name none.
+        urdf: the robot with the joints; by default that of `options: tickrig:`.
+        cache: of EDS files and slaves.
+        profile: of `choices.PROFILES`, for nodes without one.
 
     Raises:
         OSError: the bus.yml or the URDF cannot be read.
-        BusMistakesError: all that is wrong.
+        BusMistakesError: all errors.
     """
     cache = cache or eds.EdsCache()
     versions, found = cache.others.get((path, urdf, profile), ({}, None))
@@ -338,10 +339,10 @@ def read_bus(
 
 
 def check_nodes(bus: BusFile) -> tuple[RuleFinding, ...]:
-    """Return what is wrong or odd beside the findings of the file: in `tickrig:`, the robot, ...
+    """Return errors and warnings besides those of the file: in `tickrig:`, the robot, ...
 
     Args:
-        bus: the file; one without slaves has nothing to be made.
+        bus: the file; without slaves there is nothing to check.
     """
     if not bus.slaves:
         return ()
@@ -363,7 +364,7 @@ def _is_same(file: Path, version: eds.Version) -> bool:
 
 
 class _Made(NamedTuple):
-    """What became of a file: its slaves, what is wrong, what is odd, what is added."""
+    """The result of reading a file: slaves, errors, warnings, added objects."""
 
     nodes: tuple[BusNode, ...]
     mistakes: list[FileMistake]
@@ -402,7 +403,7 @@ def _said(one: Any) -> str:
 
 
 def _robot(bus: BusFile, urdf: Path | None) -> Urdf | None:
-    """Return the robot that is named, None if none is."""
+    """Return the named robot, None without one."""
     if urdf is not None:
         return read_urdf(urdf)
     item = bus.options.extra.get(node_keys.URDF)

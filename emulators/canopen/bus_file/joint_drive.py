@@ -32,15 +32,15 @@ from tickrig.wire.canopen.eds.object_table import EntryDescription
 
 _MOTOR: Final = "epos-wheel"
 UNITS: Final = 1_000.0
-"""Position units in a radian or a metre: what ros2_canopen believes unless a bus.yml says more."""
+"""Position units per radian or metre: the default of ros2_canopen."""
 _SPARE_SPEED: Final = 1.5
-"""How much faster than a joint shall be its motor turns without load, where it can be chosen."""
+"""Ratio of the no-load speed of a chosen motor to the speed of its joint."""
 _LOW_SUPPLY: Final = 0.4
 _HIGH_SUPPLY: Final = 1.5
 _NEARLY: Final = 0.99
-"""How much of the motor's speed a limit may leave, to be told."""
+"""Share of the motor's speed below which a limit is reported."""
 _FINEST: Final = 100_000
-"""Largest denominator of the factor group that a drive begins with."""
+"""Largest denominator of the initial factor group of a drive."""
 
 _Defaults = Mapping[tuple[int, int], int]
 """Values by (index, sub-index)."""
@@ -48,22 +48,22 @@ _Defaults = Mapping[tuple[int, int], int]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointDrive:
-    """What moves a joint; None where nothing is said.
+    """The drive of a joint; None for values that are not given.
 
     Attributes:
         motor: name of `servo.presets.PRESETS`.
-        gear_ratio: turns of the motor in a turn of the shaft.
-        gear_efficiency: part of the power of an external torque that gets through.
+        gear_ratio: turns of the motor per turn of the shaft.
+        gear_efficiency: share of the power of an external torque that it transmits.
         friction_nm: dry friction at the shaft.
-        inertia_kg_m2: what always hangs on the shaft; the loops are tuned to it.
+        inertia_kg_m2: permanent inertia on the shaft; the loops are tuned to it.
         supply_v: supply of the power stage.
-        encoder_counts: quadrature counts in a turn of the motor.
-        max_torque: that the shaft gives for a second, in Nm; in N where it moves a carriage.
-        max_velocity: of the shaft, in rad/s; in m/s where it moves a carriage.
-        lower, upper: where the shaft presses the limit switches, in rad; in m as above.
-        home: between which angles it presses the home switch, in rad; in m as above.
-        travel_m: what a turn of the shaft moves a carriage; None where the joint turns.
-        units: position units in a radian, or in a metre.
+        encoder_counts: quadrature counts per turn of the motor.
+        max_torque: of the shaft for one second, in Nm; in N for a carriage.
+        max_velocity: of the shaft, in rad/s; in m/s for a carriage. lower, upper: positions of the
+            limit switches, in rad; in m as above.
+        home: range in which the home switch is pressed, in rad; in m as above.
+        travel_m: travel of a carriage per turn of the shaft; None if the joint turns.
+        units: position units per radian or metre.
     """
 
     motor: str = _MOTOR
@@ -83,12 +83,12 @@ class JointDrive:
 
     @property
     def per_turn(self) -> float:
-        """What a turn of the shaft is, in rad or m."""
+        """A turn of the shaft in rad or m."""
         return 2 * pi if self.travel_m is None else self.travel_m
 
     @property
     def servo(self) -> ServoParameters:
-        """Motor, power stage and gear: the preset, as large and as fast as the joint needs."""
+        """Motor, power stage and gear: the preset, scaled to the torque and speed of the joint."""
         servo = self._with_supply(PRESETS[self.motor])
         turn = self.per_turn / (2 * pi)
         ratio = self.gear_ratio
@@ -105,7 +105,7 @@ class JointDrive:
 
     @property
     def start(self) -> dict[str, float]:
-        """The physical inputs of the drive that are not as usual."""
+        """The physical inputs of the drive with other than the usual values."""
         degrees = 360 / self.per_turn
         found = {"supply_v": self.servo.stage.supply_v}
         if self.lower is not None:
@@ -120,11 +120,11 @@ class JointDrive:
 
     @property
     def unit(self) -> str:
-        """What positions are told in."""
+        """The unit of positions."""
         return "rad" if self.travel_m is None else "m"
 
     def about(self, dictionary: Dictionary) -> str:
-        """Return what it is with these objects, for people."""
+        """Return a description of it with these objects, for people."""
         servo, unit = self.servo, self.unit
         turn = self.per_turn / (2 * pi)
         torque = peak_torque_nm(servo) * servo.gear.efficiency / turn
@@ -137,13 +137,13 @@ class JointDrive:
         return ", ".join([*words, f"{self.units_of(dictionary):.6g} units a {unit}"])
 
     def units_of(self, dictionary: Dictionary) -> float:
-        """Return the position units in a radian, or in a metre, that some objects make."""
+        """Return the position units per radian or metre of these objects."""
         per_position = self._settings(dictionary).units.per_position
         return self._counts_per_unit / abs(per_position)
 
     @property
     def _counts_per_unit(self) -> float:
-        """Counts of the encoder in a radian, or in a metre."""
+        """Counts of the encoder per radian or metre."""
         servo = self.servo
         return servo.encoders.counts_per_turn * servo.gear.ratio / self.per_turn
 
@@ -152,7 +152,7 @@ class JointDrive:
         return read_settings(parameters, self.servo.encoders.counts_per_turn)
 
     def defaults(self) -> _Defaults:
-        """Return what counts for objects of the drive to which its EDS gives no value."""
+        """Return the defaults of objects that have no value in the EDS."""
         servo = self.servo
         speed = free_speed_rad_s(servo) / (2 * pi) * self.per_turn * self.units
         gear = Fraction(servo.gear.ratio).limit_denominator(_FINEST)
@@ -183,7 +183,7 @@ class JointDrive:
         }
 
     def application(self) -> ServiceMaker:
-        """Return what makes the drive, for `make_slave`."""
+        """Return the factory of the drive, for `make_slave`."""
         supply_mv = self.servo.stage.supply_v * 1_000
         bounds = Bounds(supply_mv=(round(supply_mv * _LOW_SUPPLY), round(supply_mv * _HIGH_SUPPLY)))
         return partial(_make_drive, self.servo, self.defaults(), bounds)
@@ -197,7 +197,7 @@ class JointDrive:
         )
 
     def _with_load(self, servo: ServoParameters) -> ServoParameters:
-        """Return the servo with what is said of it outright."""
+        """Return the servo with the given parameters."""
         gear, counts = servo.gear, self.encoder_counts
         if self.friction_nm is not None:
             gear = replace(gear, coulomb_nm=self.friction_nm)
@@ -216,7 +216,7 @@ def _make_drive(
 
 
 def _ratio_for(servo: ServoParameters, speed_rad_s: float) -> float:
-    """Return the gear ratio with which a motor is as fast as a joint needs it."""
+    """Return the gear ratio with which a motor reaches the speed of a joint."""
     return free_speed_rad_s(servo) * servo.gear.ratio / (_SPARE_SPEED * speed_rad_s)
 
 
@@ -236,7 +236,7 @@ NAMES: Final = {
     9: "csv",
     10: "cst",
 }
-"""Modes of operation as CiA 402 abbreviates them, by the number in 6060h."""
+"""Abbreviations of the modes of operation (CiA 402), by the number in 6060h."""
 
 NUMBERS: Final = {name: number for number, name in NAMES.items()}
 
@@ -248,7 +248,7 @@ _ALWAYS: Final = (
 )
 _FACTORS: Final = (indices.ENCODER_RESOLUTION, indices.GEAR_RATIO, indices.FEED_CONSTANT)
 UNITS_OF_POSITION: Final = (*_FACTORS, indices.SI_UNIT_POSITION)
-"""Objects that make the position units."""
+"""Objects that define the position units."""
 _MODES: Final = indices.SUPPORTED_MODES
 _TORQUE: Final = (indices.TARGET_TORQUE, indices.TORQUE_ACTUAL)
 _NEEDED: Final = {
@@ -280,11 +280,11 @@ _NEVER_ZERO: Final = frozenset(
         *(indices.MAX_DECELERATION, indices.POSITIVE_TORQUE_LIMIT, indices.NEGATIVE_TORQUE_LIMIT),
     }
 )
-"""Objects in which 0 lets nothing move: a file that has it there leaves the value open."""
+"""Objects for which 0 means no motion: a 0 in a file counts as not given."""
 
 
 def modes_listed(dictionary: Dictionary) -> frozenset[int]:
-    """Return the modes that 6502h of a dictionary lists; all that there are if it lists none."""
+    """Return the modes that 6502h of a dictionary lists; all modes if it lists none."""
     entry = dictionary.find(indices.SUPPORTED_MODES)
     listed = entry.number if entry else 0
     known = (number for number in MODES if number > 0)
@@ -294,13 +294,13 @@ def modes_listed(dictionary: Dictionary) -> frozenset[int]:
 def complete(
     dictionary: Dictionary, modes: Collection[int], added: Collection[int], defaults: _Defaults
 ) -> Dictionary:
-    """Return the dictionary of a drive: objects without a value have one, and some are added.
+    """Return the dictionary of a drive, with missing values filled in and missing objects added.
 
     Args:
         dictionary: of its EDS.
-        modes: the modes of operation that it shall have.
+        modes: its modes of operation.
         added: objects that its EDS lacks.
-        defaults: values for objects of the profile to which the EDS gives none.
+        defaults: values for objects of the profile without a value in the EDS.
     """
     given, own = dictionary.description, epos.dictionary().description
     entries = [
@@ -314,7 +314,7 @@ def complete(
 
 
 def with_values(dictionary: Dictionary, values: Mapping[tuple[int, int], Value]) -> Dictionary:
-    """Return a dictionary with other power-on values, or their bytes, of entries that it has."""
+    """Return a dictionary with other power-on values (or their bytes) of existing entries."""
     rows: dict[int, EntryDescription] = {}
     for at, value in values.items():
         entry = dictionary.find(*at)
@@ -330,7 +330,7 @@ def with_values(dictionary: Dictionary, values: Mapping[tuple[int, int], Value])
 
 
 def with_factors(dictionary: Dictionary, defaults: _Defaults) -> Dictionary:
-    """Return a dictionary whose position units are those of some defaults, not of its EDS."""
+    """Return a dictionary whose position units come from defaults, not from its EDS."""
     values = {at: value for at, value in defaults.items() if at[0] in _FACTORS}
     found = {
         at: fitting(entry.description, value)
@@ -341,7 +341,7 @@ def with_factors(dictionary: Dictionary, defaults: _Defaults) -> Dictionary:
 
 
 def missing(dictionary: Dictionary, modes: Iterable[int]) -> list[int]:
-    """Return the objects that some modes need and a dictionary has not, sorted."""
+    """Return the objects that some modes need and a dictionary lacks, sorted."""
     wanted = {*_ALWAYS, *(index for mode in modes for index in _NEEDED[mode])}
     return sorted(index for index in wanted if index not in dictionary.objects)
 
@@ -353,9 +353,9 @@ def _of(own: DictionaryDescription, wanted: Collection[int]) -> Iterator[EntryDe
 def _with_default(
     entry: EntryDescription, defaults: _Defaults, *, anew: bool = False
 ) -> EntryDescription:
-    """Return an entry with the default of a drive, if it has none of its own; see `_NEVER_ZERO`.
+    """Return an entry with the default of a drive if it has no value; see `_NEVER_ZERO`.
 
-    It is cut to the type and the limits that the EDS gives the object.
+    It is limited to the type and the limits of the object in the EDS.
     """
     value = defaults.get((entry.index, entry.sub))
     open_zero = entry.index in _NEVER_ZERO and not any(entry.default)
@@ -366,7 +366,7 @@ def _with_default(
 
 
 def _listing(entry: EntryDescription, modes: Collection[int]) -> EntryDescription:
-    """Return 6502h with the modes, beside what else its bits say."""
+    """Return 6502h with the bits of the modes, and its other bits unchanged."""
     known = sum(1 << number - 1 for number in NAMES)
     more = int.from_bytes(entry.default, "little") & ~known
     listed = entry.with_default(more | sum(1 << number - 1 for number in modes))

@@ -20,14 +20,14 @@ from tickrig.host.text.names import near
 from tickrig.host.text.section import Field, flag, number, one_of, shown, whole
 from tickrig.host.text.values import Setting
 
-# What is wrong with a bus.yml and the files that it goes with, a line each.
+# Errors in a bus.yml and its files, one line each.
 
 
 class BusMistakesError(ValueError):
-    """Files of which no slaves can be made.
+    """Files from which no slaves can be made.
 
     Attributes:
-        mistakes: all that is wrong, by file and line.
+        mistakes: all errors, by file and line.
     """
 
     def __init__(self, mistakes: Iterable[FileMistake]) -> None:
@@ -37,22 +37,22 @@ class BusMistakesError(ValueError):
 
 _ALL: Final = "all"
 URDF: Final = "urdf"
-"""A key of `options`: the robot that has the joints."""
+"""A key of `options`: the robot with the joints."""
 
 _MOST: Final = 1e6
 
 
 @dataclass(frozen=True, slots=True)
 class NodeKeys:
-    """What `tickrig:` says of a node.
+    """The settings of a node under `tickrig:`.
 
     Attributes:
         joint: of `JointDrive`, by name.
-        modes: numbers of its modes of operation; None for those that its files ask for.
+        modes: numbers of its modes of operation; None for those in its files.
         profile: of `choices.PROFILES`, None for `auto`.
-        configured: it begins with what its master would write to it.
-        start: inputs at the start, by name.
-        places: where each key and each input stands.
+        configured: whether it starts with the values that its master writes to it.
+        start: initial inputs, by name.
+        places: position of each key and each input.
     """
 
     joint: Mapping[str, Any] = field(default_factory=dict)
@@ -164,7 +164,7 @@ JOINT_KEYS: Final[Mapping[str, Field]] = {
         "`scale_pos_to_dev`, or 1000",
     ),
 }
-"""What makes a `JointDrive`."""
+"""Keys of a `JointDrive`."""
 
 KEYS: Final[Mapping[str, Field]] = {
     **JOINT_KEYS,
@@ -194,25 +194,25 @@ KEYS: Final[Mapping[str, Field]] = {
         "as usual",
     ),
 }
-"""All of a node."""
+"""All keys of a node."""
 
 _ARGUMENTS: Final = {
     "effort": "max_torque",
     "velocity": "max_velocity",
     "home_switch": "home",
 }
-"""Keys whose argument of `JointDrive` is called otherwise."""
+"""Keys with another name as argument of `JointDrive`."""
 
 
 def read_keys(
     layers: tuple[Mapping[str, Item], ...], where: str, mistakes: list[FileMistake]
 ) -> NodeKeys:
-    """Read the mappings `tickrig:` that hold for a node; the first that has a key counts.
+    """Read the mappings `tickrig:` of a node; of several with a key the first is used.
 
     Args:
         layers: that of the node, then those of all nodes.
         where: name of the node, for mistakes.
-        mistakes: takes what is wrong.
+        mistakes: collects errors.
     """
     found: dict[str, Any] = {}
     places: dict[str, FilePlace] = {}

@@ -1,6 +1,6 @@
 """The joints of a URDF that `<ros2_control>` puts on a CANopen bus: limits and reduction.
 
-Nothing but elements and attributes is read: a document type, and so entities, are refused.
+Only elements and attributes are read: a document type, and so entities, are refused.
 
 >>> robot = '''<robot name="arm">
 ... <joint name="elbow" type="revolute"><limit lower="-1" upper="1" velocity="2"/></joint>
@@ -31,7 +31,7 @@ _MOST_BYTES: Final = 32_000_000
 _XACRO_TAGS: Final = ("macro", "include", "property", "arg")
 _XACRO: Final = "xacro a.urdf.xacro > a.urdf expands it"
 LEAST, MOST = 1e-9, 1e9
-"""Of a limit or a reduction, in rad, m, Nm, N and their rates; no joint is anywhere near."""
+"""Bounds of limits and reductions, in rad, m, Nm, N and their rates; far from any real joint."""
 
 _NODE_ID: Final = re.compile("[0-9]{1,9}")
 _LIMITS: Final = ("lower", "upper", "velocity", "effort")
@@ -46,15 +46,16 @@ class UrdfJoint:
 
     Attributes:
         name: of the joint.
-        place: where `<ros2_control>` has it.
-        device_name: of the node in bus.yml, empty if none is said.
-        node_id: of the node, None if none is said.
+        place: place of it in `<ros2_control>`.
+        device_name: of the node in bus.yml, empty if missing.
+        node_id: of the node, None if missing.
         kind: `revolute`, `continuous` or `prismatic`.
-        lower: in rad, or m; None where it does not end.
+        lower: in rad, or m; None if unlimited.
         upper: the same.
-        velocity: largest one in rad/s, or m/s; None where none is said.
-        effort: largest one in Nm, or N; None where none is said.
-        reduction: turns, or rad per m, of the actuator for one of the joint; None if none is said.
+        velocity: largest one in rad/s, or m/s; None if missing.
+        effort: largest one in Nm, or N; None if missing.
+        reduction: turns, or rad per m, of the actuator per turn, or m, of the joint; None if
+            missing.
     """
 
     name: str
@@ -71,7 +72,7 @@ class UrdfJoint:
 
 @dataclass(frozen=True, slots=True)
 class Urdf:
-    """What a file says.
+    """The content of a file.
 
     Attributes:
         name: of the file.
@@ -87,7 +88,7 @@ def read_urdf(path: Path) -> Urdf:
 
     Raises:
         OSError: it cannot be read.
-        BusMistakesError: all that is wrong with it.
+        BusMistakesError: all errors in it.
     """
     with path.open("rb") as file:
         return parse_urdf(file.read(_MOST_BYTES + 1), str(path))
@@ -107,7 +108,7 @@ def parse_urdf(data: bytes, name: str) -> Urdf:
 
 
 def _named(element: Element, *names: str) -> Iterator[Element]:
-    """Give the children of these names."""
+    """Return the children with these names."""
     return (child for child in element.children if child.name in names)
 
 
@@ -117,14 +118,14 @@ def _name(element: Element) -> str:
 
 
 class _Reader:
-    """Reads the joints of one robot."""
+    """Reader of the joints of one robot."""
 
     def __init__(self, name: str) -> None:
         self._name = name
         self._mistakes: list[FileMistake] = []
 
     def read(self, robot: Element) -> Urdf:
-        """Read all joints; BusMistakesError with all that is wrong."""
+        """Read all joints; BusMistakesError with all errors."""
         if robot.name != "robot":
             self._wrong(robot, f"<{robot.name}> is no <robot>")
         for each in itertools.islice(_named(robot, *_XACRO_TAGS), 1):
@@ -155,7 +156,7 @@ class _Reader:
             return None
         kind = shape.attributes.get("type", "")
         if kind not in _MOVES:
-            text = f"joint {_name(element)!r}: type {kind!r} is none of {', '.join(_MOVES)}"
+            text = f"joint {_name(element)!r}: type {kind!r} is not one of {', '.join(_MOVES)}"
             self._wrong(shape, text)
         return UrdfJoint(
             name=_name(element),
@@ -168,7 +169,7 @@ class _Reader:
         )
 
     def _limits(self, shape: Element, kind: str) -> dict[str, float]:
-        """Return what `<limit>` says; an empty range, and 0 of the others, stand for none."""
+        """Return the values of `<limit>`; an empty range, and 0 for the others, mean no limit."""
         found: dict[str, float] = {}
         for limit in _named(shape, "limit"):
             for key in _LIMITS:
@@ -191,7 +192,7 @@ class _Reader:
         return found
 
     def _reductions(self, robot: Element) -> Iterator[tuple[str, float]]:
-        """Give the reduction of each joint with a transmission, of the robot or of its control."""
+        """Yield the reduction of each joint with a transmission, of the robot or of its control."""
         for owner in (robot, *_named(robot, "ros2_control")):
             for transmission in _named(owner, "transmission"):
                 parts = (transmission, *_named(transmission, "joint", "actuator"))
@@ -230,5 +231,5 @@ class _Reader:
 
 
 def _hint(text: str) -> str:
-    """Say that a value of xacro has to be expanded."""
+    """Return a hint that xacro values must be expanded."""
     return f": {_XACRO}" if "$" in text else ""

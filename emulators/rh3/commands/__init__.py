@@ -1,1 +1,1 @@
-"""The command `rh3`, and what its verbs share."""
+"""The command `rh3` and its verbs."""

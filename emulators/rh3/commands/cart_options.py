@@ -1,4 +1,4 @@
-"""What the verbs of `rh3` share: a cart as the options say, and how a run of it ends."""
+"""Common parts of the verbs of `rh3`: options of a cart, and the end of a run."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _SCANNER: Final = "LRFCapture_URG0"
 
 
 class RunStopped(Exception):  # noqa: N818 - no error
-    """Somebody ended the run."""
+    """The user ended the run."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,13 +47,13 @@ class MotionOptions:
         set_id: configuration set.
         device: a serial port, None for an emulated base in virtual time.
         baud: its bit rate.
-        any_device: whether to drive it without asking who it is.
-        pace: how many times as fast as the machine's virtual time passes, None as it goes.
+        any_device: whether to drive it without checking what it is.
+        pace: ratio of virtual time to real time, None for as fast as possible.
         conf: Odometry.conf.
         show_map: draw the track while it runs.
-        base: what the emulated base is like.
+        base: parameters of the emulated base.
         plot: file for a picture.
-        clock: what the cart waits by, in real time and with a pace.
+        clock: the clock for waiting, in real time and with a pace.
         room_m: width and depth of a room around the origin; with one, an emulated base carries a
             range finder.
     """
@@ -100,7 +100,7 @@ class MotionOptions:
 
 
 def _add_scanner(loop: ClosedLoop, eye: MountedUrg) -> None:
-    """Have the scans of a range finder written to a port."""
+    """Write the scans of a range finder to a port."""
     scanner = LrfCaptureUrg(_SCANNER, lambda name: SimLink(loop.rig, eye.line.b))
     loop.manager.add(scanner, RATE_HZ)
     loop.manager.activate(_SCANNER)
@@ -110,9 +110,9 @@ class _SerialBaseConnection:
     """A `BaseConnection` in real time, over a serial port: a base, or `rh3-emu`.
 
     Args:
-        url: what DeviceFileName is set to; a path or a pyserial URL.
+        url: value of DeviceFileName; a path or a pyserial URL.
         baud: bit rate in bit/s.
-        clock: what it waits by.
+        clock: the clock for waiting.
 
     Attributes:
         chain: its components.
@@ -131,17 +131,17 @@ class _SerialBaseConnection:
 
     @property
     def pose(self) -> Pose:
-        """Where odometry takes it to be: nobody else knows."""
+        """Pose by odometry, because the true pose is unknown."""
         return self.chain.odometry.pose
 
     def run_to(self, t_us: int) -> None:
-        """Wait until it is so late, and run what is due meanwhile."""
+        """Wait until a time, and run everything due before it."""
         while self.now_us < t_us:
             self._runner.step()
 
 
 class RunWatcher:
-    """Draws samples if they are to be drawn, and raises `RunStopped` when a signal has come."""
+    """Draws samples if requested, and raises `RunStopped` after a signal."""
 
     def __init__(self, options: MotionOptions, points: Sequence[Pose]) -> None:
         self._ended = self._asking = False
@@ -150,14 +150,14 @@ class RunWatcher:
         self._map = LiveMap(TrackMap(points, width), drawn) if options.show_map else None
 
     def end(self) -> None:
-        """Let the next sample be the last; a question is left at once."""
+        """Stop at the next sample, or at once during a question."""
         self._ended = True
         if self._asking:
             raise KeyboardInterrupt
 
     @contextmanager
     def asking(self) -> Iterator[None]:
-        """Ask somebody something: no samples come; `RunStopped` if that was the answer."""
+        """Ask the user a question; raise `RunStopped` if the user ends the run."""
         self._asking = True
         try:
             yield
@@ -169,7 +169,7 @@ class RunWatcher:
             raise RunStopped
 
     def watch(self, sample: TrackSample) -> None:
-        """Take a sample."""
+        """Handle a sample."""
         if self._map is not None:
             self._map.watch(sample)
         if self._ended:

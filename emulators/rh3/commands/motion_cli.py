@@ -1,4 +1,4 @@
-"""The command `rh3`: let a cart of Reference Hardware 3 drive."""
+"""The command `rh3`: drive a cart of Reference Hardware 3."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ _SHARED: Final[Decorator] = add_options(
         show_default=True,
         help="Configuration set: the specification's, or the more precise one.",
     ),
-    click.option("--device", metavar="URL", help="Serial port of a base; else one is emulated."),
+    click.option("--device", metavar="URL", help="Serial port of a base; default: emulate one."),
     click.option(
         "--any-device",
         is_flag=True,
-        help="Drive what --device names without asking whether it is an RH3 base.",
+        help="Drive the device without checking that it is an RH3 base.",
     ),
     click.option(
         "--baud",
@@ -51,7 +51,7 @@ _SHARED: Final[Decorator] = add_options(
         "--pace",
         type=NumberRange(0.01, 1_000),
         metavar="X",
-        help="Speed of virtual time, 1 is real time; else as fast as it goes.",
+        help="Speed of virtual time, 1 is real time; without it as fast as possible.",
     ),
     click.option("--odometry-conf", "conf", type=PATH, help="File with conf.default.NAME: VALUE."),
     click.option("--map/--no-map", "show_map", default=None, help="Draw the track as it grows."),
@@ -68,7 +68,7 @@ _PLOT: Final[Decorator] = click.option(
 @click.group(cls=LazyGroup, commands={})
 @version_option()
 def main() -> None:
-    """Let a cart of Reference Hardware 3 drive: six components over a base.
+    """Drive a cart of Reference Hardware 3: six components over a base.
 
     The base is emulated, in virtual time; with --device it is real hardware or
     rh3-emu, in real time. Ctrl-C stops it.
@@ -116,16 +116,16 @@ def along_path(file: Path, **options: Any) -> None:
 
 
 @main.command()
-@click.option("--runs", type=click.IntRange(1, 100), help="Each way.  [1, 5 where chance is]")
+@click.option("--runs", type=click.IntRange(1, 100), help="Squares each way. [1, 5 with noise]")
 @click.option("--side", type=NumberRange(0.2, 100), metavar="M", help="Of the squares.  [4]")
 @click.option("--save", type=PATH, help="Write the corrected Odometry.conf here.")
 @_SHARED
 @works_in(f"{_WORK}:go_round")
 def square(runs: int | None, side: float | None, save: Path | None, **options: Any) -> None:
-    """Drive squares both ways (UMBmark), and calibrate the odometry by them.
+    """Drive squares in both directions (UMBmark), and calibrate the odometry by them.
 
-    After each square the true place of the cart is measured: of an emulated base
-    it is known, with --device it is asked for.
+    After each square the true position of the cart is measured: it is known for an emulated base;
+    with --device you enter it.
 
     \b
     rh3 square --tread-m 0.459 --save Odometry.conf
@@ -152,10 +152,10 @@ def square(runs: int | None, side: float | None, save: Path | None, **options: A
 @_SHARED
 @works_in(f"{_WORK}:serve")
 def serve(**options: Any) -> None:
-    """Run the six components in real time until Ctrl-C, for you and others to work with.
+    """Run the six components in real time until Ctrl-C, for you and other programs.
 
-    PositionInput takes what you type: goal X Y DEG, path FILE, path X Y, X Y DEG, path alone
-    for a square of 1 m, end. Metres and degrees; FILE has radians.
+    PositionInput reads the commands that you type: goal X Y DEG, path FILE, path X Y, X Y DEG, path
+    alone for a square of 1 m, end. Metres and degrees; FILE has radians.
 
     \b
     printf 'goal 1 0 90\\npath 0 0, 1 1\\n' | rh3 serve

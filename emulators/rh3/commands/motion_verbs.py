@@ -1,4 +1,4 @@
-"""What `rh3` does: runs of the options of its command line."""
+"""Verbs of `rh3`: runs with the options of its command line."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-# Topics of ROS 2 for a cart, where no table names others.
+# Default ROS 2 topics of a cart.
 
 _TOPICS: Final = Path(__file__).with_name("topics.toml").read_text("utf-8")
 
 _SCAN: Final = Path(__file__).with_name("scan_topic.toml").read_text("utf-8")
-"""With a range finder."""
+"""Topics with a range finder."""
 
 
 # A run as a picture: path, cross-track error and velocities; needs the extra `plot`.
@@ -85,14 +85,14 @@ def _beside_mm(line: Pose | None, pose: Pose) -> float:
 
 
 class SquarePlan(NamedTuple):
-    """How many squares each way, and how large."""
+    """Number of squares in each direction, and their size."""
 
     runs: int
     side_m: float
 
     @property
     def corners(self) -> list[Pose]:
-        """All corners of both ways."""
+        """All corners of both directions."""
         there, back = (square(clockwise=way, side_m=self.side_m) for way in (True, False))
         return [*there, *back]
 
@@ -102,7 +102,7 @@ class _Squares:
 
     Args:
         options: the options.
-        size: how many, and how large.
+        size: number and size of the squares.
         watcher: receives each sample.
 
     Attributes:
@@ -114,7 +114,7 @@ class _Squares:
         self.latest: BaseConnection | None = None
 
     def run(self, wheels: Wheels | None = None) -> Umbmark:
-        """Drive squares; with other radii and axle if they are given."""
+        """Drive squares, with other radii and axle if given."""
         try:
             return run_umbmark(
                 lambda number: self._begin(wheels),
@@ -152,7 +152,7 @@ class _Squares:
 
 
 def run_squares(options: MotionOptions, size: SquarePlan, save: Path | None) -> None:
-    """Drive squares, calibrate, drive them again, and print how both went."""
+    """Drive squares, calibrate, drive them again, and print both results."""
     with watched(options, size.corners) as watcher:
         squares = _Squares(options, size, watcher)
         try:
@@ -206,7 +206,7 @@ def go_along(file: Path, **options: Any) -> None:
 
 
 def go_round(runs: int | None, side: float | None, save: Path | None, **options: Any) -> None:
-    """Drive squares both ways, `runs` times or as often as is of use."""
+    """Drive squares in both directions, `runs` times or a suitable number."""
     checked = _checked(options)
     by_chance = checked.device is not None or checked.base.noise
     run_squares(checked, SquarePlan(runs or (5 if by_chance else 1), side or SIDE_M), save)

@@ -1,4 +1,4 @@
-"""A cart in real time, for others to work with: `rh3 serve`."""
+"""A cart in real time for other programs: `rh3 serve`."""
 
 from __future__ import annotations
 
@@ -31,15 +31,15 @@ from tickrig.host.rtc.system.call_queue import CallQueue
 from tickrig.host.rtc.system.schedule import LATE_US
 
 _NOT_HERE: Final = ("create", "delete", "save")
-"""Requests of a system that a cart refuses: it has its six components."""
+"""System requests that a cart refuses, because its six components are fixed."""
 
 
 class CartClock(ServingClock):
-    """The machine's clock, which serves while it waits and notes what is late.
+    """Real-time clock that serves requests while it waits, and counts late ticks.
 
     Attributes:
-        late_ticks: how many waits began more than `LATE_US` late.
-        worst_late_us: by how much the worst of them was late.
+        late_ticks: number of waits that started more than `LATE_US` late.
+        worst_late_us: largest delay of them.
     """
 
     late_ticks = 0
@@ -54,11 +54,11 @@ class CartClock(ServingClock):
 
 
 class ServedCart:
-    """Moves a cart on until somebody stops it; others are served while it waits.
+    """Advances a cart until it is stopped, and serves requests while it waits.
 
     Args:
         connection: the cart, with its components.
-        clock: what the cart waits by.
+        clock: the clock for waiting.
 
     Attributes:
         running: False once `stop` was called.
@@ -73,23 +73,23 @@ class ServedCart:
 
     @property
     def late_ticks(self) -> int:
-        """How many periods began late."""
+        """Number of late periods."""
         return self._clock.late_ticks
 
     @property
     def worst_late_us(self) -> int:
-        """By how much the worst of them was late."""
+        """Largest delay of a period."""
         return self._clock.worst_late_us
 
     def attach(self, calls: CallQueue) -> None:
-        """Make the calls of other threads while it waits."""
+        """Run the calls of other threads while it waits."""
         if self.server is not None:
             self.server.attach(calls, calls.make)
         else:
             self._clock.serve = calls.serve
 
     def run(self) -> None:
-        """Run until somebody calls `stop`."""
+        """Run until `stop` is called."""
         while self.running:
             self._connection.run_to(self._connection.now_us + PERIOD_US)
             for listener in tuple(self.after_tick):
@@ -104,8 +104,8 @@ class CartControl(SystemControl):
     """Answers requests about a cart: those of a system, and the commands of PositionInput.
 
     Args:
-        connection: the cart; it must not be moved on meanwhile.
-        cart: what moves it on.
+        connection: the cart; it must not be advanced at the same time.
+        cart: advances it.
     """
 
     def __init__(self, connection: BaseConnection, cart: ServedCart) -> None:
@@ -163,10 +163,10 @@ def serve_cart(options: MotionOptions, engines: EngineOptions, control: Path | N
     Lines typed on standard input are commands of PositionInput. When standard input ends and
     no other program can reach the cart, the run ends after the last command.
 
-    Where velocities come from a topic, it obeys these while no command of PositionInput runs.
+    If velocities come from a topic, the cart follows them while no command of PositionInput runs.
 
     Raises:
-        Refused: there is no cart, or an engine or control socket cannot be.
+        Refused: there is no cart, or an engine or control socket cannot be opened.
     """
     clock = CartClock()
     connection = replace(options, clock=clock).begin()
@@ -197,7 +197,7 @@ def serve_cart(options: MotionOptions, engines: EngineOptions, control: Path | N
 
 
 def _open_console(cart: ServedCart, chain: MotionChain, *, reachable: bool) -> None:
-    """Read standard input after each period; stop the cart when no command can come."""
+    """Read standard input after each period; stop the cart when no more commands can arrive."""
     console = Console(chain.manager, click.echo, say)
     try:
         descriptor = sys.stdin.fileno()
@@ -214,7 +214,7 @@ def _open_console(cart: ServedCart, chain: MotionChain, *, reachable: bool) -> N
 
 
 def _share_the_helm(cart: ServedCart, chain: MotionChain) -> None:
-    """Where velocities come from a peer, let PathFollower drive only while a command runs."""
+    """If velocities come from a peer, let PathFollower drive only while a command runs."""
     follower, base = chain.path_follower.velocity, chain.ref_hard.velocity
     if all(connector.joins_components for connector in base.connectors):
         return

@@ -1,1 +1,1 @@
-"""Hosts with pyserial on a line in virtual time; the handler package of `tickrig://`."""
+"""pyserial hosts on a line in virtual time; the handler package of `tickrig://`."""

@@ -1,4 +1,4 @@
-"""What pyserial opens for `tickrig://NAME`: it finds the module by this name."""
+"""The pyserial handler of `tickrig://NAME`, which pyserial finds by this module name."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from tickrig.emulators.serial.outside.sim_serial import SimSerial
 class Serial(SimSerial):
     """The port of a URL, made by `serial.serial_for_url`.
 
-    Its name is looked up when it is opened. As of any port of pyserial, the settings that are not
-    given are 9600 8N1, whatever the device has. `?mismatch=errors` or `?mismatch=refuse` says
-    what a setting is that differs; without it whoever offers the name has said.
+    Its name is looked up when it is opened. As with any pyserial port, the default setting is 9600
+    8N1, whatever the device uses. `?mismatch=errors` or `?mismatch=refuse` selects the effect of a
+    different setting; without it the code that offers the name has chosen.
 
     Args:
         port: the URL, opened at once; None to open it later.
-        options: as `serial.Serial` takes them.
+        options: those of `serial.Serial`.
     """
 
     def __init__(self, port: str | None = None, *args: Any, **options: Any) -> None:

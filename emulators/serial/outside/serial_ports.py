@@ -18,17 +18,17 @@ FORM: Final = "tickrig://NAME or tickrig://NAME?mismatch=refuse"
 
 
 def register_handler() -> None:
-    """Let `serial.serial_for_url` know `tickrig://`; once is enough, more does nothing."""
+    """Register `tickrig://` with `serial.serial_for_url`; further calls have no effect."""
     if HANDLERS not in serial.protocol_handler_packages:
         serial.protocol_handler_packages.append(HANDLERS)
 
 
 class _SerialPorts:
-    """The lines that can be opened by name at present.
+    """The lines that can presently be opened by name.
 
-    pyserial opens a port by a string, so the names have to be kept where the whole process finds
-    them: in `SERIAL_PORTS`, the one place of this package with state of its own. What is there
-    was put there by `offer`, for the time of a `with` block.
+    pyserial opens a port by a string, so the names must be global to the process: in
+    `SERIAL_PORTS`, the only global state of this package. `offer` adds an entry for the duration of
+    a `with` block.
     """
 
     def __init__(self) -> None:
@@ -36,22 +36,22 @@ class _SerialPorts:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The names that are offered."""
+        """The offered names."""
         return tuple(self._sides)
 
     @contextmanager
     def offer(self, name: str, side: SerialSide) -> Iterator[SerialSide]:
-        """Let a line be opened as `tickrig://NAME`, for the time of a `with` block.
+        """Allow a line to be opened as `tickrig://NAME`, for the duration of a `with` block.
 
         Args:
-            name: as in a URL: without `?`, `#` and spaces; pyserial leaves its case alone.
+            name: as in a URL: without `?`, `#` and spaces; pyserial keeps its case.
             side: the host's side of the line.
 
         Yields:
             The host's side.
 
         Raises:
-            ValueError: the name is offered already, or no URL has such a name.
+            ValueError: the name is already offered, or not valid in a URL.
         """
         if not name or set(name) & set("?# \t\r\n"):
             raise ValueError(f"{name!r} cannot be in a URL: no spaces, no ? and no #")
@@ -65,13 +65,13 @@ class _SerialPorts:
             del self._sides[name]
 
     def find(self, url: str) -> tuple[SerialSide, Mismatch | None]:
-        """Return the host's side of a line, and what the URL says of a setting that differs.
+        """Return the host's side of a line, and the `mismatch` of the URL.
 
         Args:
             url: such as `tickrig://rrc?mismatch=refuse`.
 
         Raises:
-            SerialException: it is not such a URL, or no rig offers the name.
+            SerialException: invalid URL, or no rig offers the name.
         """
         name, mismatch = _parse_url(url)
         if name not in self._sides:
@@ -81,13 +81,13 @@ class _SerialPorts:
 
 
 def _parse_url(url: str) -> tuple[str, Mismatch | None]:
-    """Return the name in a URL, and what it says of a setting that differs.
+    """Return the name in a URL, and its `mismatch`.
 
     Args:
         url: such as `tickrig://rrc?mismatch=refuse`.
 
     Raises:
-        SerialException: it is not such a URL.
+        SerialException: invalid URL.
 
     >>> _parse_url("tickrig://rrc"), _parse_url("tickrig://rrc?mismatch=refuse")
     (('rrc', None), ('rrc', 'refuse'))

@@ -1,4 +1,4 @@
-"""The host's side of a serial line on a rig: where a port can be opened."""
+"""The host's side of a serial line on a rig, on which a port can be opened."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def _ignore(now_us: int) -> None:
 
 @dataclass(slots=True)
 class UartErrors:
-    """How many characters were wrong, each counted once, as Linux does (`TIOCGICOUNT`).
+    """Counters of characters with errors, each counted once, as in Linux (`TIOCGICOUNT`).
 
     Attributes:
         framing: the line was 0 where a stop bit should have been.
@@ -43,10 +43,10 @@ class UartErrors:
     breaks: int = 0
 
     def count(self, character: Character) -> None:
-        """Count a character if it is wrong.
+        """Count a character if it has an error.
 
         Args:
-            character: as it was received.
+            character: as received.
         """
         if character.line_break:
             self.breaks += 1
@@ -60,11 +60,11 @@ class UartErrors:
 
 
 class ModemLines(Copyable):
-    """DTR and RTS of a host, and what it reads of CTS, DSR, RI and CD.
+    """Modem lines of a host: DTR and RTS, which it sets, and CTS, DSR, RI and CD, which it reads.
 
-    No device here has such lines: its host reads what a USB adapter reads whose pins are open
-    (the inputs of FT232R, CP2102 and CH340 are pulled up, which is off). Whoever has a device
-    with such lines sets what the host is to read.
+    No device here has such lines: its host reads the same as from a USB adapter with open pins (the
+    inputs of FT232R, CP2102 and CH340 are pulled up, which is off). If your device has such lines,
+    set the values for the host.
 
     Attributes:
         dtr: Data Terminal Ready, set by the host; off while its port is closed.
@@ -72,7 +72,7 @@ class ModemLines(Copyable):
         dsr: Data Set Ready, read by the host.
         ri: Ring Indicator, read by the host.
         cd: Carrier Detect, read by the host.
-        cts_changed: called when `cts` was set: bytes may wait for it.
+        cts_changed: called when `cts` has been set, because bytes may wait for it.
     """
 
     def __init__(self) -> None:
@@ -92,15 +92,15 @@ class ModemLines(Copyable):
             self.cts_changed()
 
 
-# The receiver of a host, and what it makes of a device of another setting.
+# The receiver of a host, also for a device with another setting.
 
 
 class HostReceiver(Copyable):
-    """Takes bytes of a device from a line, as a UART of the host's setting samples them.
+    """Receives bytes of a device from a line, sampled by a UART with the host's setting.
 
-    Of another setting than the device's, a character is there when the device's byte has passed
-    in which it ends. A character with an error is a byte like any other and is counted: so Linux
-    delivers it to pyserial, and Windows.
+    With another setting than the device's, a character is available when the device's byte in which
+    it ends has passed. A character with an error is delivered like any other and counted, as Linux
+    and Windows do for pyserial.
 
     Args:
         end: the host's end of the line.
@@ -108,7 +108,7 @@ class HostReceiver(Copyable):
         garbled: called with the time when bytes of another setting are sampled.
 
     Attributes:
-        errors: how many characters were wrong.
+        errors: counters of characters with errors.
     """
 
     def __init__(
@@ -121,11 +121,11 @@ class HostReceiver(Copyable):
         self._received: deque[Character] = deque()
 
     def follow(self, device: UartSetting, now_us: int) -> None:
-        """Let the device send with another setting from now on; the host's stays as it is.
+        """Let the device send with another setting from now on; the host's is unchanged.
 
         Args:
             device: the new setting.
-            now_us: the present.
+            now_us: the present time.
         """
         if self._uart is None:
             now_ps = now_us * PS_PER_US
@@ -136,11 +136,11 @@ class HostReceiver(Copyable):
         self._device = device
 
     def use(self, setting: UartSetting, now_us: int) -> None:
-        """Receive at a setting from now on; a character that is half received is lost.
+        """Receive at a setting from now on; a partly received character is lost.
 
         Args:
             setting: the host's.
-            now_us: the present; all that had come has been taken.
+            now_us: the present time; all earlier characters have been read.
         """
         same, self._setting = setting == self._device, setting
         self._uart = None if same else UartReceiver(setting, now_us * PS_PER_US)
@@ -148,7 +148,7 @@ class HostReceiver(Copyable):
 
     @property
     def due_us(self) -> int:
-        """When there will be something to take, or to look at."""
+        """When there will be a character, or something to check."""
         due_us = self._end.due_us
         if self._uart is None:
             return due_us
@@ -160,22 +160,22 @@ class HostReceiver(Copyable):
 
     @property
     def coming(self) -> bytes:
-        """What is on its way and was not taken, as far as it is known to arrive."""
+        """The bytes in transit that are known to arrive."""
         return self._end.coming if self._uart is None else b""
 
     def arrival_us(self, count: int) -> int:
-        """Return when so many characters will be there, or when to look again.
+        """Return when `count` characters will be available, or when to check again.
 
         Args:
-            count: how many, at least 1.
+            count: number of characters, at least 1.
         """
         return self._end.arrival_us(count) if self._uart is None else self.due_us
 
     def poll(self, now_us: int) -> bytes:
-        """Take the characters that have been received.
+        """Return the received characters.
 
         Args:
-            now_us: the present.
+            now_us: the present time.
         """
         if self._uart is None:
             return self._end.poll(now_us)
@@ -193,7 +193,7 @@ class HostReceiver(Copyable):
             if self._setting != self._device:
                 self._garbled(at_us)
             self._listen(uart, at_us * PS_PER_US, self._end.poll(at_us))
-        if at_us == NEVER:  # else a byte is on its way that has begun before now
+        if at_us == NEVER:  # else a byte is in transit that started before now
             self._received += uart.push(1, now_us * PS_PER_US)
 
     def _listen(self, uart: UartReceiver, end_ps: int, data: bytes) -> None:
@@ -209,19 +209,19 @@ class HostReceiver(Copyable):
         self._sent_ps = start_ps
 
 
-# The transmitter of a host, and what a device of another setting makes of it.
+# The transmitter of a host, also for a device with another setting.
 
 _HELD_BYTES: Final = 4_096
-"""So many bytes wait for CTS."""
+"""Largest number of bytes that wait for CTS."""
 
 
 class HostTransmitter(Copyable):
     """Sends bytes of a host to a device, which samples them at its own setting.
 
-    Bytes of the device's setting go on the line as they are. All else, a break too, is sampled:
-    the device receives each character when its own stop bit should have passed, with the value
-    that was sampled, wrong or not, as most UARTs deliver it; a break is a byte of 0. Errors are
-    counted, and the device does not see them.
+    Bytes with the device's setting are sent unchanged. All others, and breaks, are sampled: the
+    device receives each character at the expected end of its stop bit, with the sampled value,
+    wrong or not, as most UARTs deliver it; a break is a byte of 0. Errors are counted, but not
+    reported to the device.
 
     Args:
         event_queue: of the rig: characters arrive between its ticks.
@@ -232,10 +232,10 @@ class HostTransmitter(Copyable):
 
     Attributes:
         setting: the host's, for what is sent from now on.
-        waits_for_cts: whether nothing is sent while CTS is off.
-        suspended: whether nothing is sent until the host resumes its output.
-        held: what waits for either.
-        errors: how many characters the device received with an error.
+        waits_for_cts: whether sending waits while CTS is off.
+        suspended: whether sending waits until the host resumes its output.
+        held: the bytes that wait for either.
+        errors: number of characters that the device received with an error.
     """
 
     def __init__(
@@ -253,12 +253,12 @@ class HostTransmitter(Copyable):
         self.held = bytearray()
         self._break_us = NEVER  # since when there is a break
         self._waiting: deque[tuple[int, int, UartSetting]] = deque()  # characters, by their start
-        self._begun_ps = self._free_ps = 0  # when the last that has begun ends; when all have
+        self._begun_ps = self._free_ps = 0  # end of the last one started; end of all
         self._uart = UartReceiver(device)
         self._received: deque[Character] = deque()
 
     def room(self, now_us: int) -> int:
-        """Return how many bytes `send` takes at `now_us` without loss."""
+        """Return how many bytes `send` accepts at `now_us` without loss."""
         if self._holds:
             return _HELD_BYTES - len(self.held)
         return max(0, self._end.room(now_us) - len(self._waiting))
@@ -277,21 +277,21 @@ class HostTransmitter(Copyable):
         return self._end.unsent(now_us) + len(self._waiting) + begun + len(self.held)
 
     def drop_unsent(self, now_us: int) -> None:
-        """Forget the bytes of which no bit is on the line yet."""
+        """Discard the bytes of which no bit is on the line yet."""
         self._end.drop_unsent(now_us)
         self._waiting.clear()
         self.held.clear()
         self._free_ps = self._begun_ps
 
     def send(self, now_us: int, data: bytes) -> int:
-        """Send bytes behind those that are being sent.
+        """Send bytes after those that are being sent.
 
         Args:
-            now_us: the present.
+            now_us: the present time.
             data: the bytes.
 
         Returns:
-            How many there was room for.
+            The number of accepted bytes.
         """
         data = data[: self.room(now_us)]
         if self._holds:
@@ -305,11 +305,11 @@ class HostTransmitter(Copyable):
     def follow(self, device: UartSetting, now_us: int) -> None:
         """Let the device receive with another setting from now on.
 
-        The device loses the character that it has half received. What is on its way is sampled.
+        The device loses a partly received character. Bytes in transit are sampled.
 
         Args:
             device: the new setting.
-            now_us: the present.
+            now_us: the present time.
         """
         self._advance(now_us)
         sent = [(start_ps, value, self.setting) for start_ps, value in self._end.withdraw(now_us)]
@@ -322,10 +322,10 @@ class HostTransmitter(Copyable):
         self._advance(now_us)
 
     def release(self, now_us: int) -> None:
-        """Send what was held, unless the output is suspended or still waits for CTS.
+        """Send the held bytes, unless the output is suspended or still waits for CTS.
 
         Args:
-            now_us: the present.
+            now_us: the present time.
         """
         if self.held and not self._stopped:
             held = bytes(self.held)
@@ -353,10 +353,10 @@ class HostTransmitter(Copyable):
         self._advance(now_us)
 
     def set_break(self, now_us: int, *, on: bool) -> None:
-        """Let the line be 0, or be free again.
+        """Start or end a break, with the line at 0.
 
         Args:
-            now_us: the present.
+            now_us: the present time.
             on: whether there is a break.
         """
         self._advance(now_us)
@@ -365,12 +365,12 @@ class HostTransmitter(Copyable):
 
     @property
     def _understood(self) -> bool:
-        """Whether bytes can go on the line as they are."""
+        """Whether bytes can be sent unchanged."""
         sampling = self._waiting or self._received or self._uart.due_ps < NEVER
         return self.setting == self._device and self._break_us == NEVER and not sampling
 
     def _advance(self, now_us: int) -> None:
-        """Sample the line up to now, and let the device have what it has received."""
+        """Sample the line up to now, and deliver the received characters to the device."""
         now_ps = now_us * PS_PER_US
         while self._waiting and self._waiting[0][0] <= now_ps:
             self._begin(*self._waiting.popleft())
@@ -380,7 +380,7 @@ class HostTransmitter(Copyable):
         self._come_back(now_us)
 
     def _begin(self, start_ps: int, value: int, setting: UartSetting) -> None:
-        """Put a character on the line; in a break nobody hears it."""
+        """Put a character on the line; in a break it is lost."""
         free = self._break_us == NEVER
         self._listen(free, start_ps)
         for level, until_ps in setting.levels(value, start_ps):
@@ -391,13 +391,13 @@ class HostTransmitter(Copyable):
         self._received += self._uart.push(int(level), until_ps)
 
     def _deliver(self, character: Character) -> None:
-        """Let a byte arrive at the time at which the device has received it."""
+        """Deliver a byte at the time at which the device has received it."""
         self.errors.count(character)
         start_us = (character.end_ps - self._device.duration_ps()) // PS_PER_US
         self._end.send(max(0, start_us), bytes([character.value]))
 
     def _come_back(self, now_us: int) -> None:
-        """Be called when there is something to do next."""
+        """Schedule the next call."""
         due_us = NEVER
         if self._waiting:
             due_us = -(-self._waiting[0][0] // PS_PER_US)
@@ -412,7 +412,7 @@ class HostTransmitter(Copyable):
             self._event_queue.put(self, due_us, self._advance)
 
 
-# The waits of a host on a rig, and what it is told that would wait for ever.
+# The waits of a host on a rig, and errors for hosts that would wait endlessly.
 
 _LOG = logging.getLogger(__name__)
 
@@ -442,7 +442,7 @@ class HostWaits(Copyable):
         self._looks = Looks()
 
     def check_thread(self, name: str) -> None:
-        """Raise SerialException, now and ever after, if a second thread uses a port.
+        """Raise SerialException, permanently, if a second thread uses a port.
 
         Args:
             name: the port.
@@ -453,7 +453,7 @@ class HostWaits(Copyable):
             raise SerialException(refusal)
 
     def deadline_us(self, timeout_s: float | None) -> int:
-        """Return when a timeout that begins now ends; without one, when `give_up` says so.
+        """Return the end of a timeout that starts now; without one, the time for `give_up`.
 
         Args:
             timeout_s: the timeout in seconds, None if there is none.
@@ -461,19 +461,19 @@ class HostWaits(Copyable):
         return self.rig.now_us + (LONGEST_US if timeout_s is None else round(timeout_s * 1e6))
 
     def give_up(self, timeout_s: float | None) -> None:
-        """Raise SerialException if there was no timeout: the host would wait for ever.
+        """Raise SerialException if there was no timeout, because the host would wait endlessly.
 
         Args:
-            timeout_s: the timeout that is over.
+            timeout_s: the expired timeout.
         """
         if timeout_s is None:
             raise SerialException("nothing came for an hour, and no timeout was given")
 
     def look(self) -> None:
-        """Count a look that found nothing.
+        """Count a poll without result.
 
         Raises:
-            SerialException: there were too many at one instant: the host would wait for ever.
+            SerialException: too many polls at one instant, because the host would wait endlessly.
         """
         if refusal := self._looks.refusal(self.rig.now_us, _LOOKING):
             raise SerialException(refusal)
@@ -481,12 +481,12 @@ class HostWaits(Copyable):
     def wait(
         self, until_us: int, due_us: Callable[[], int], done: Callable[[], bool] = lambda: False
     ) -> None:
-        """Let time pass until something is due.
+        """Advance the time until an event is due.
 
         Args:
-            until_us: until when at most.
-            due_us: returns when it will be, `NEVER` if that is not known.
-            done: returns whether the wait is to end at once.
+            until_us: latest time.
+            due_us: returns the time of the event, `NEVER` if unknown.
+            done: returns whether to end the wait at once.
         """
         rig = self.rig
         at_us = due_us()
@@ -497,27 +497,27 @@ class HostWaits(Copyable):
 
 
 Mismatch = Literal["errors", "refuse"]
-"""What a host has of a setting that is not the device's: errors, as on a line, or an exception."""
+"""Effect of a host setting that differs from the device's: line errors, or an exception."""
 
 
 class SerialSide(Copyable):
     """The host's side of a serial line: the adapter that a program opens as a port.
 
-    The thread that makes it is the one in which its hosts run: no other can make time pass.
+    Its hosts must run in the thread that makes it: no other thread can advance the time.
 
     Args:
-        rig: the rig that is stepped while a host waits.
+        rig: the rig that advances while a host waits.
         end: the host's end of the line, such as `line.b` or `emulator.host_end`.
-        device: the device's setting, 115200 8N1 unless given; None if it has no UART, as behind
-            USB, and understands a host of any setting.
-        mismatch: `"errors"` if a host of another setting sends and receives what UARTs make of
-            it; `"refuse"` if that raises at once.
+        device: the device's setting, by default 115200 8N1; None if it has no UART, as behind USB,
+            and understands a host of any setting.
+        mismatch: `"errors"` if a host with another setting sends and receives wrong characters, as
+            with real UARTs; `"refuse"` to raise at once.
 
     Attributes:
         setting: the host's.
-        modem_lines: DTR and RTS of the host, and what it reads of the others.
-        receiver: what the host receives; its `errors` are those that the host's UART sees.
-        transmitter: what the host sends; its `errors` are those that the device's UART sees.
+        modem_lines: modem lines of the host.
+        receiver: the receiver of the host; its `errors` are those of the host's UART.
+        transmitter: the transmitter of the host; its `errors` are those of the device's UART.
         waits: the waits of the host.
         in_use: whether a port is open here.
         listeners: called with the time and a text, when bytes pass between two settings.
@@ -565,7 +565,7 @@ class SerialSide(Copyable):
                 listener(now_us, text)
 
     def _device_changes(self, since_us: int, setting: UartSetting) -> None:
-        """Note that the device changes its setting, now or behind what it still sends."""
+        """Apply a change of the device's setting, now or after the data that it still sends."""
         if self.device is None:
             return
         self._changes.append((since_us, setting))

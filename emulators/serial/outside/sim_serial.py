@@ -1,4 +1,4 @@
-"""A pyserial port on a rig: waiting makes its virtual time pass."""
+"""A pyserial port on a rig: waiting advances the virtual time."""
 
 from __future__ import annotations
 
@@ -40,11 +40,11 @@ _LOG = logging.getLogger(__name__)
 
 
 class SimPort(SerialBase):
-    """A port without its bytes: those are `SimSerial`'s.
+    """Base of `SimSerial` without the transfer of bytes.
 
     Attributes:
         side: the host's side of the line, once it is known.
-        mismatch: what a setting is that is not the device's; None as `side` has it.
+        mismatch: effect of a different setting; None for that of `side`.
     """
 
     side: SerialSide | None = None
@@ -52,7 +52,7 @@ class SimPort(SerialBase):
     is_open = False
 
     def _begin(self, *positional: Any, **options: Any) -> None:
-        """Take settings, as a port that is not open."""
+        """Make a port with settings, not yet open."""
         self._input = bytearray()
         super().__init__(None, *positional, **options)
 
@@ -65,10 +65,10 @@ class SimPort(SerialBase):
         return twin(self, memo)
 
     def open(self) -> None:
-        """Open the port: DTR and RTS go on, and what came before is forgotten.
+        """Open the port: DTR and RTS go on, and earlier input is discarded.
 
         Raises:
-            SerialException: it is open, or another one is at the same line, or its setting is
+            SerialException: it is already open, another port is open on the line, or its setting is
                 refused.
         """
         if self.is_open:
@@ -90,7 +90,7 @@ class SimPort(SerialBase):
         self.reset_input_buffer()
 
     def close(self) -> None:
-        """Close the port; DTR and RTS go off, a break ends, and what was sent still arrives."""
+        """Close the port; DTR and RTS go off, a break ends, and sent data still arrive."""
         if not self.is_open or self.side is None:
             return
         self.is_open = self.side.in_use = False
@@ -101,7 +101,7 @@ class SimPort(SerialBase):
             self.side.transmitter.set_break(self.side.rig.now_us, on=False)
 
     def reset_input_buffer(self) -> None:
-        """Forget what has come and was not read."""
+        """Discard received data that were not read."""
         side = self._side()
         side.receiver.poll(side.rig.now_us)
         self._input.clear()
@@ -114,7 +114,7 @@ class SimPort(SerialBase):
         return self.side
 
     def _reconfigure_port(self) -> None:
-        """Use the settings, which pyserial has put into its properties."""
+        """Apply the settings from pyserial's properties."""
         side = self._side()
         if self.baudrate == 0:
             raise ValueError("Invalid baud rate: 0")
@@ -170,7 +170,7 @@ class SimPort(SerialBase):
         return side.modem_lines
 
     def set_output_flow_control(self, enable: bool = True) -> None:
-        """Suspend or resume the output; what is written meanwhile is held.
+        """Suspend or resume the output; data written while suspended are held.
 
         Args:
             enable: whether to send.
@@ -189,52 +189,52 @@ class SimPort(SerialBase):
         side.transmitter.send(side.rig.now_us, XON if enable else XOFF)
 
     def nonblocking(self) -> None:
-        """Warn and change nothing, as the ports of pyserial do."""
+        """Warn without any effect, as pyserial ports do."""
         warnings.warn("nonblocking() has no effect", DeprecationWarning, stacklevel=2)
 
     def set_low_latency_mode(self, low_latency_settings: bool) -> None:
-        """Change nothing: a byte is there when its stop bit has passed.
+        """Do nothing: a byte is available when its stop bit has passed.
 
         Args:
-            low_latency_settings: as pyserial takes it.
+            low_latency_settings: as in pyserial.
         """
         self._side()
 
     def fileno(self) -> NoReturn:
-        """Refuse: there is nothing that `select` could wait for."""
+        """Raise an exception, because `select` has nothing to wait for."""
         raise io.UnsupportedOperation(f"{self.port}: {NO_ASYNCIO}")
 
 
 _INPUT_BYTES: Final = 4_096
-"""So many bytes wait here for a host that does not read; more wait in the line, then are lost."""
+"""Input buffer for a host that does not read; more bytes wait in the line, then are lost."""
 
 _ROOM_BYTES: Final = 256
-"""For so much room, at most, a write waits at once."""
+"""Largest room in the buffer for which a write waits at once."""
 
 
 class SimSerial(SimPort):
     """A `serial.Serial` whose device is on a rig.
 
-    Calls, settings and exceptions are pyserial's. What waits makes the rig's time pass: `read`
-    until a byte is there, its stop bit too, and exactly its timeout if none comes; `write` until
-    the line's buffer takes all; `flush`, a break and `send_break`. Nothing else does.
+    Calls, settings and exceptions are pyserial's. Calls that wait advance the rig's time: `read`
+    until a byte and its stop bit have arrived, or by exactly its timeout; `write` until the line's
+    buffer has accepted all; `flush`, a break and `send_break`. Other calls take no time.
 
-    Where the systems differ it is as Linux, where pyserial ignores `inter_byte_timeout`. Not
+    If systems differ it behaves as on Linux, where pyserial ignores `inter_byte_timeout`. Not
     emulated: XON and XOFF, DSR and DTR as flow control, RS485 modes (the emulated line turns round
-    by itself); they can be set and change nothing. With `rtscts` nothing is sent before CTS is on;
-    what was sent while it was on goes.
+    automatically); they can be set, without effect. With `rtscts` nothing is sent before CTS is on;
+    data accepted while it was on are still sent.
 
     Args:
         side: the host's side of the line.
-        options: as `serial.Serial` takes them: `timeout`, `baudrate`, ... What is not given of
-            baud rate and frame is the device's.
+        options: those of `serial.Serial`: `timeout`, `baudrate`, ... Baud rate and frame default to
+            the device's.
 
     Attributes:
         side: the same.
-        mismatch: what a setting is that is not the device's; None as `side` has it.
+        mismatch: effect of a different setting; None for that of `side`.
 
     Raises:
-        SerialException: another port is open there, or the setting is refused.
+        SerialException: another port is open on the line, or the setting is refused.
         ValueError: a setting that no UART has.
     """
 
@@ -255,7 +255,7 @@ class SimSerial(SimPort):
         self.open()
 
     def open(self) -> None:
-        """Open the port: the line that it was made with, or that of a `tickrig://` URL.
+        """Open the port: on its own line, or on that of a `tickrig://` URL.
 
         Raises:
             SerialException: no rig offers the name; see `SimPort.open`.
@@ -280,7 +280,7 @@ class SimSerial(SimPort):
 
     @property
     def in_waiting(self) -> int:
-        """Bytes that have come and were not read."""
+        """Number of received bytes that were not read."""
         side = self._side()
         self._receive(side)
         if not self._input:
@@ -288,16 +288,17 @@ class SimSerial(SimPort):
         return len(self._input)
 
     def read(self, size: int = 1) -> bytes:
-        """Read bytes; time passes until they are there, or the timeout is over.
+        """Read bytes; time advances until they have arrived or the timeout has expired.
 
         Args:
-            size: how many at most.
+            size: largest number of bytes.
 
         Returns:
-            As many, or fewer after the timeout or `cancel_read`.
+            That many bytes, or fewer after the timeout or `cancel_read`.
 
         Raises:
-            SerialException: the port is closed; nothing came for an hour, and there is no timeout.
+            SerialException: the port is closed; nothing arrived for an hour, and there is no
+                timeout.
         """
         side = self._side()
         if 0 < size <= len(self._input) and not self._read_cancelled:
@@ -326,10 +327,10 @@ class SimSerial(SimPort):
         return bytes(data)
 
     def readline(self, size: int | None = -1, /) -> bytes:
-        """Read until a line ends; the timeout is that of each byte.
+        """Read until a line ends; the timeout applies to each byte.
 
         Args:
-            size: how many bytes at most; -1 for any number.
+            size: largest number of bytes; -1 for any number.
         """
         if size is not None and size >= 0:
             return super().readline(size)
@@ -346,11 +347,11 @@ class SimSerial(SimPort):
         return super().readline()
 
     def read_until(self, expected: bytes | str = LF, size: int | None = None) -> bytes:
-        """Read until a sequence has come, or the timeout is over.
+        """Read until a sequence has arrived or the timeout has expired.
 
         Args:
-            expected: the sequence; text never comes, as with pyserial.
-            size: how many bytes at most.
+            expected: the sequence; text never matches, as with pyserial.
+            size: largest number of bytes.
         """
         side = self._side()
         until_us, data = side.waits.deadline_us(self.timeout), bytearray()
@@ -370,14 +371,14 @@ class SimSerial(SimPort):
         return bytes(data)
 
     def cancel_read(self) -> None:
-        """Let a `read` return that waits at present, or the next one; any thread may call it."""
+        """Make the waiting or the next `read` return; any thread may call it."""
         self._read_cancelled = self.is_open
 
     def _reading_ended(self) -> bool:
         return self._read_cancelled or not self.is_open
 
     def _gather(self, side: SerialSide, expected: bytes, until_us: int) -> None:
-        """Let all bytes come up to a sequence at once, if they are on their way and in time."""
+        """Receive all bytes up to a sequence at once, if they are in transit and in time."""
         coming = side.receiver.coming
         if count := (self._input + coming).find(expected) + 1:
             count += len(expected) - 1 - len(self._input)
@@ -386,13 +387,13 @@ class SimSerial(SimPort):
                 self._receive(side)
 
     def _receive(self, side: SerialSide) -> None:
-        """Take what has come into the input buffer, unless that is full."""
+        """Move received data to the input buffer, unless it is full."""
         now_us = side.rig.now_us
         if side.receiver.due_us <= now_us and len(self._input) < _INPUT_BYTES:
             self._input += side.receiver.poll(now_us)
 
     def _take(self, size: int) -> bytes:
-        """Take bytes out of the input buffer."""
+        """Remove bytes from the input buffer."""
         taken = bytes(self._input[:size])
         del self._input[:size]
         return taken
@@ -401,23 +402,24 @@ class SimSerial(SimPort):
 
     @property
     def out_waiting(self) -> int:
-        """Bytes that were written and have not left."""
+        """Number of written bytes that have not been sent."""
         side = self._side()
         if waiting := side.transmitter.unsent(side.rig.now_us):
             side.waits.look()
         return waiting
 
     def write(self, data: ReadableBuffer) -> int:
-        """Write bytes; time passes until the buffer of the line has taken them.
+        """Write bytes; time advances until the buffer of the line has accepted them.
 
         Args:
             data: the bytes.
 
         Returns:
-            How many were taken: all, but with a `write_timeout` of 0 or after `cancel_write`.
+            The number of accepted bytes: all, except with a `write_timeout` of 0 or after
+            `cancel_write`.
 
         Raises:
-            SerialTimeoutException: the timeout is over; some may have been taken.
+            SerialTimeoutException: the timeout has expired; some bytes may have been accepted.
             SerialException: the port is closed; there was no room for an hour.
             TypeError: the data is text.
         """
@@ -437,11 +439,11 @@ class SimSerial(SimPort):
         return length - len(left)
 
     def cancel_write(self) -> None:
-        """Let a `write` return that waits at present, or the next; any thread may call it."""
+        """Make the waiting or the next `write` return; any thread may call it."""
         self._write_cancelled = self.is_open
 
     def flush(self) -> None:
-        """Wait until all that was written has left, to its last stop bit."""
+        """Wait until all written bytes have been sent, to the last stop bit."""
         side = self._side()
         until_us = side.waits.deadline_us(None)
         while side.transmitter.unsent(side.rig.now_us):
@@ -450,7 +452,7 @@ class SimSerial(SimPort):
             side.waits.wait(until_us, lambda: side.transmitter.sent_us)
 
     def reset_output_buffer(self) -> None:
-        """Forget what was written and of which no bit has left."""
+        """Discard written bytes of which no bit has been sent."""
         side = self._side()
         side.transmitter.drop_unsent(side.rig.now_us)
 
@@ -468,10 +470,10 @@ class SimSerial(SimPort):
     # Breaks
 
     def send_break(self, duration: float = 0.25) -> None:
-        """Hold the line at 0 for a time, which passes.
+        """Hold the line at 0 for a duration, which advances the time.
 
         Args:
-            duration: how long, in seconds.
+            duration: in seconds.
         """
         side = self._side()
         self.break_condition = True
@@ -479,7 +481,7 @@ class SimSerial(SimPort):
         self.break_condition = False
 
     def _update_break_state(self) -> None:
-        """Hold the line at 0 behind what was written, or let it go."""
+        """Hold the line at 0 after the written bytes, or release it."""
         side, on = self._side(), bool(self.break_condition)
         if on:
             self.flush()

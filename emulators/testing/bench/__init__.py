@@ -1,1 +1,1 @@
-"""A bench: devices on wires, hands at them, and time that passes in one place."""
+"""A bench: devices on wires, their operators, and one common time."""

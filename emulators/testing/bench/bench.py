@@ -1,4 +1,4 @@
-"""The bench: devices, the hands at them, and time that passes in one place."""
+"""The bench: devices, operations on them, and one common time."""
 
 from __future__ import annotations
 
@@ -61,20 +61,20 @@ class Transcript(str):
 # What a test does to one device of a bench, and where its host connects.
 
 Duration = int | str
-"""Microseconds, or a text as `"100ms"`."""
+"""Microseconds, or a text such as `"100ms"`."""
 
 PRESS: Final = "100ms"
 SOON: Final = "100ms"
 
 
 class BenchDevice:
-    """A device of a bench: hands at it, eyes on it, and the doors for its host.
+    """A device of a bench: its inputs, outputs and faults, and the connections for its host.
 
-    Inputs, outputs, buttons and faults have the names that `describe` gives.
+    Inputs, outputs, buttons and faults have the names in `describe`.
 
     Args:
         mode: of the bench.
-        name: of the device; empty for all of them, whose signals are `NAME/signal` then.
+        name: of the device; empty for all of them, with signals named `NAME/signal`.
 
     Attributes:
         name: of the device.
@@ -84,7 +84,7 @@ class BenchDevice:
         self._mode, self.name = mode, name
 
     def describe(self) -> BenchDescription:
-        """Return what there is to set, to read and to break; printed, it is a list for people.
+        """Return all inputs, outputs and faults; printed, it is a readable list.
 
         >>> from tickrig import Bench
         >>> with Bench("rrc") as bench:
@@ -108,12 +108,12 @@ class BenchDevice:
         """Set an input, or all inputs of a group.
 
         Args:
-            name: of the input or group, as `stick`.
-            values: one, or one for each input of the group; a list of them will do.
+            name: of the input or group, such as `stick`.
+            values: one, or one for each input of the group; also as a list.
 
         Raises:
-            ValueError: there is none, or it does not take the values.
-            NotOnThisBench: nobody can do that here.
+            ValueError: unknown input, or values that it does not accept.
+            NotOnThisBench: not possible on this bench.
         """
         each = values[0] if len(values) == 1 and isinstance(values[0], list | tuple) else values
         self._mode.request("set", name=self._full(name), value=list(each))
@@ -122,10 +122,10 @@ class BenchDevice:
         """Return the present value of an input or output.
 
         Args:
-            name: of the input or output, as `state`.
+            name: of the input or output, such as `state`.
 
         Raises:
-            ValueError: there is none.
+            ValueError: unknown name.
         """
         full = self._full(name)
         values = self._mode.request("get", names=[full])["values"]
@@ -134,27 +134,28 @@ class BenchDevice:
         return value
 
     def press(self, name: str, for_: Duration = PRESS) -> None:
-        """Press a button and let it go after a time, whoever makes time pass meanwhile.
+        """Press a button, and release it after a time on the bench.
 
         Args:
             name: of the button.
-            for_: how long it stays pressed, from the tick that sees it.
+            for_: duration, from the tick that sees it.
         """
         self._mode.request("press", name=self._full(name), duration_us=us_of(for_))
 
     def fault(
         self, spec: str, *, when: tasks.Condition | None = None, for_: Duration | None = None
     ) -> None:
-        """Let a fault come: now, at a time, or as soon as something is so.
+        """Start a fault: now, at a time, or when a condition becomes true.
 
         Args:
-            spec: as `cut`, `cut@2s-3s`, `flip=0.001`; a fault of the device or of its wire.
-            when: waits for this, such as `on_line("OK:output", nth=3)`; no time in `spec` then.
-            for_: how long it stays, from the moment at which it begins; for ever unless given.
+            spec: such as `cut`, `cut@2s-3s`, `flip=0.001`; a fault of the device or of its wire.
+            when: condition to wait for, such as `on_line("OK:output", nth=3)`; `spec` then has no
+                time.
+            for_: duration from the start of the fault; by default it stays.
 
         Raises:
-            ValueError: there is no such fault, or it cannot be like this.
-            NotOnThisBench: it cannot be made here.
+            ValueError: unknown fault, or invalid arguments.
+            NotOnThisBench: not possible on this bench.
         """
         wanted = parse_fault_spec(spec, partial(self._mode.check_fault, self.name))
         for_us = None if for_ is None else us_of(for_)
@@ -165,18 +166,18 @@ class BenchDevice:
         self._mode.fault(self.name, wanted, when, for_us)
 
     def clear(self, name: str) -> None:
-        """Let a fault go, and its future too.
+        """Clear a fault, also a scheduled one.
 
         Args:
             name: of the fault.
 
         Raises:
-            ValueError: there is none.
+            ValueError: unknown fault.
         """
         self._mode.clear(self.name, name)
 
     def switch_off(self) -> None:
-        """Take the supply of the device away, of all devices if this is the whole bench.
+        """Switch the supply of the device off, or of all devices of the bench.
 
         Raises:
             NotOnThisBench: it has no switch.
@@ -184,7 +185,7 @@ class BenchDevice:
         self._mode.switch_power(self.name, on=False)
 
     def switch_on(self) -> None:
-        """Give the device its supply again.
+        """Switch the supply on again.
 
         Raises:
             NotOnThisBench: it has no switch.
@@ -192,35 +193,37 @@ class BenchDevice:
         self._mode.switch_power(self.name, on=True)
 
     def perform(self, text: str, do: Callable[[], object]) -> None:
-        """Have something done that is more than one act, such as bringing the device off.
+        """Run an action of several steps, such as switching the device off.
 
         Args:
-            text: what, as `switch VR2 off, unless it is off`; a human is told so.
-            do: does it with an emulator; not called where a human does it.
+            text: description, such as `switch VR2 off, unless it is off`, shown to a human
+                operator.
+            do: does it with an emulator; not called if a human does it.
 
         Raises:
             OperatorRefused: the human did not do it.
-            NotOnThisBench: it cannot be done.
+            NotOnThisBench: not possible on this bench.
         """
         self._mode.perform(self.name, text, do)
 
     def observe(self, text: str, seen: tasks.Condition, within: Duration = SOON) -> bool:
-        """Look whether something is seen at the device: in an emulator, or by who sits there.
+        """Check an observation at the device: in an emulator, or by a human operator.
 
         Args:
-            text: what, as `the motors drive forward at 30 %`; a human is asked whether it is so.
-            seen: says it of an emulator; not asked where a human looks.
-            within: how long it may take, beside the tolerance of the bench.
+            text: description, such as `the motors drive forward at 30 %`; a human answers yes or
+                no.
+            seen: returns the answer for an emulator; not called if a human answers.
+            within: longest wait, besides the tolerance of the bench.
         """
         return self._mode.observe(self.name, text, seen, us_of(within))
 
     def on_line(self, pattern: str, nth: int = 1) -> tasks.LineTrigger:
-        """Return what is true as soon as a line, or a frame in candump's notation, has passed.
+        """Return a condition that is true after a line, or a frame as in candump, has passed.
 
         Args:
-            pattern: the whole line without its end, as `OK:output` or `701#05`; `*` stands for
+            pattern: the whole line without its end, as `OK:output` or `701#05`; `*` matches
                 anything.
-            nth: the how manieth from now on, from 1.
+            nth: number of the occurrence from now on, from 1.
         """
         source = self._mode.wire_of(self.name) if self.name else ""
         trigger = tasks.LineTrigger(pattern, nth, source)
@@ -233,18 +236,18 @@ class BenchDevice:
         return self._mode.doors.link(self._wire())
 
     def serial(self, **options: Any) -> serial.Serial:
-        """Open the serial line as a pyserial object, for types what `serial_for_url` returns.
+        """Open the serial line as a pyserial object, typed as the result of `serial_for_url`.
 
         Args:
-            options: as `serial.Serial` takes them; `timeout` passes in the time of the bench.
+            options: those of `serial.Serial`; `timeout` is in the time of the bench.
         """
         return cast("serial.Serial", self._mode.doors.serial(self._wire(), options))
 
     @property
     def url(self) -> str:
-        """Where a program opens the serial line by itself, as long as the bench is open.
+        """URL at which a program can open the serial line itself, while the bench is open.
 
-        It is what `serial.serial_for_url` takes: `tickrig://rrc`, `/dev/pts/7`, `COM3`.
+        It is a URL for `serial.serial_for_url`: `tickrig://rrc`, `/dev/pts/7`, `COM3`.
         """
         address = self._mode.doors.address(self._wire())
         if not isinstance(address, str):
@@ -253,7 +256,7 @@ class BenchDevice:
 
     @property
     def bus_options(self) -> dict[str, Any]:
-        """With what a program opens the CAN bus by itself: `can.Bus(**bench.bus_options)`."""
+        """Options for a program to open the CAN bus itself: `can.Bus(**bench.bus_options)`."""
         address = self._mode.doors.address(self._wire())
         if isinstance(address, str):
             raise ValueError(f"{self._wire()} is a serial line, which has no bus: see url")
@@ -263,16 +266,16 @@ class BenchDevice:
         """Open the CAN bus as a python-can bus.
 
         Args:
-            options: as `can.Bus` takes them.
+            options: those of `can.Bus`.
         """
         return self._mode.doors.can_bus(self._wire(), options)
 
     def canopen_network(self) -> canopen.Network:
-        """Connect the canopen library to the CAN bus, as a master."""
+        """Connect the canopen library to the CAN bus as a master."""
         return self._mode.doors.canopen_network(self._wire())
 
     def _wire(self) -> str:
-        """Return the wire of this device, or the only one there is."""
+        """Return the wire of this device, or the only wire."""
         if self.name:
             return self._mode.wire_of(self.name)
         if len(self._mode.wires) > 1:
@@ -281,7 +284,7 @@ class BenchDevice:
         return self._mode.wires[0]
 
     def _full(self, name: str) -> str:
-        """Return the full name of a signal; that of a lone device may have the device before it."""
+        """Return the full name of a signal; for a single device the prefix is optional."""
         if len(self._mode.devices) == 1:
             return name.removeprefix(f"{self._mode.devices[0]}/")
         return f"{self.name}/{name}" if self.name else name
@@ -298,21 +301,20 @@ HARDWARE: Final = "hardware"
 class Bench(BenchDevice, Closing):
     """Devices on a bench, for a test: in virtual time, in real time, or real ones.
 
-    Time passes in one place: links, serial objects, buses, networks, `run_for` and `wait_until`
-    all step the same rig, and none steps past a button that is to be let go or a fault that is
-    to come.
+    Links, serial objects, buses, networks, `run_for` and `wait_until` all advance the same rig, and
+    all stop for scheduled releases of buttons and scheduled faults.
 
     Args:
-        device: the only device: itself, or its type by name.
-        seed: of all chance.
-        line: what the serial lines are like, if the type of the device does not say it.
+        device: the only device: an object, or the name of its type.
+        seed: of all random numbers.
+        line: parameters of the serial lines, if not in the type of the device.
         mode: `virtual` time, or `real` time with hosts at ptys and buses.
-        sdo_timeout: silence of an SDO client after which CANopen nodes abort a transfer; 5 s, or
-            what a slave was made with, unless given.
+        sdo_timeout: silence of an SDO client after which CANopen nodes abort a transfer; by default
+            5 s, or the time of the given slave.
         devices: several, by name; CANopen slaves share a bus.
 
     Raises:
-        ValueError: no device, or a name that is no device; an SDO time-out of 0, or without a node.
+        ValueError: no device, or an unknown name; an SDO time-out of 0, or without a node.
 
     >>> from tickrig.device.rrc.machine import Rrc
     >>> with Bench(Rrc(), seed=1) as bench:
@@ -350,16 +352,17 @@ class Bench(BenchDevice, Closing):
         """Return the bench of a rig file.
 
         Args:
-            plan: what the file says.
-            mode: `virtual`; `real`: where its hosts are is in the plan; or `hardware`: where its
-                devices are is in the plan.
-            terminal: where the operator of real devices is; standard input and output unless given.
+            plan: content of the file.
+            mode: `virtual`; `real`, with the ports for hosts in the plan; or `hardware`, with the
+                ports of devices in the plan.
+            terminal: terminal of the operator of real devices; by default standard input and
+                output.
 
         Raises:
             ValueError: a device cannot be made.
-            ValueError: an option, input, fault or mode that there is not.
-            PortGone: a bus cannot be opened, or an emulator that plays a device is not there.
-            OSError: no port is to be had, or no link or socket can be made.
+            ValueError: an unknown option, input, fault or mode.
+            PortGone: a bus cannot be opened, or an emulator in place of a device is missing.
+            OSError: no free port, or a link or socket cannot be made.
         """
         if mode == HARDWARE:
             return cls.of_mode(hardware_mode.HardwareMode(plan, terminal))
@@ -373,7 +376,7 @@ class Bench(BenchDevice, Closing):
         return bench
 
     def __getitem__(self, name: str) -> BenchDevice:
-        """Return a device; KeyError if there is none of this name."""
+        """Return a device; KeyError if the name is unknown."""
         if name not in self._devices:
             raise KeyError(f"no device {name!r}; {near(name, self._devices)}")
         return self._devices[name]
@@ -385,7 +388,7 @@ class Bench(BenchDevice, Closing):
 
     @property
     def tolerance(self) -> Tolerances:
-        """How far times, and what a hand does, may be off on this bench."""
+        """Tolerance of times and manual settings on this bench."""
         return self._mode.tolerance
 
     @property
@@ -399,43 +402,43 @@ class Bench(BenchDevice, Closing):
         return self._mode.now_us
 
     def run_for(self, duration: Duration) -> None:
-        """Let time pass.
+        """Advance the time.
 
         Args:
-            duration: microseconds, or a text as `"100ms"`.
+            duration: microseconds, or a text such as `"100ms"`.
         """
         self._mode.run_for(us_of(duration))
 
     def wait_until(self, done: Callable[[], bool], within: Duration) -> bool:
-        """Let time pass until something is so.
+        """Advance the time until a condition is true.
 
         Args:
-            done: says whether it is; it only looks.
-            within: for how long at most.
+            done: returns the condition, without side effects.
+            within: longest wait.
 
         Returns:
-            False if the time was over first.
+            False after the time-out.
         """
         tasks.check_condition(done)
         return self._mode.wait_until(done, us_of(within))
 
     async def sleep(self, duration: Duration) -> None:
-        """Wait in an async body; other tasks go on meanwhile.
+        """Wait in an async body, while other tasks run.
 
         Args:
-            duration: microseconds, or a text as `"100ms"`.
+            duration: microseconds, or a text such as `"100ms"`.
         """
         await tasks.Wait(_never, self.now_us + us_of(duration))
 
     async def until(self, done: tasks.Condition, within: Duration | None = None) -> bool:
-        """Wait in an async body until something is so.
+        """Wait in an async body until a condition is true.
 
         Args:
-            done: says whether it is, such as `on_line("OK:beep")`; it only looks.
-            within: for how long at most; unless given for ever, in virtual time for a day.
+            done: returns the condition, such as `on_line("OK:beep")`, without side effects.
+            within: longest wait; by default unlimited, in virtual time one day.
 
         Returns:
-            False if the time was over first.
+            False after the time-out.
         """
         return await tasks.Wait(done, NEVER if within is None else self.now_us + us_of(within))
 
@@ -444,26 +447,27 @@ class Bench(BenchDevice, Closing):
 
         Args:
             name: of the input or output.
-            within: for how long at most; unless given for ever, in virtual time for a day.
+            within: longest wait; by default unlimited, in virtual time one day.
 
         Returns:
-            Its value then: the old one if the time was over first.
+            Its new value; the old one after the time-out.
         """
         before = self.get(name)
         await self.until(lambda: self.get(name) != before, within)
         return self.get(name)
 
     def start(self, body: Coroutine[Any, Any, T]) -> tasks.Task[T]:
-        """Let an async body run beside the test from now on, whoever makes time pass.
+        """Start an async body that runs beside the test while time advances.
 
         Args:
-            body: it awaits `sleep`, `until`, `edge` or a task, and makes no time pass itself.
+            body: it awaits `sleep`, `until`, `edge` or a task, and does not advance the time
+                itself.
 
         Returns:
-            The task; `await` it, or ask it for its `result()`.
+            The task; `await` it, or call its `result()`.
 
         Raises:
-            NotOnThisBench: real devices; `run` runs a body alone.
+            NotOnThisBench: real devices; use `run` for a single body.
         """
         try:
             task = self._mode.act(lambda rig: tasks.Task(rig, body))
@@ -474,19 +478,19 @@ class Bench(BenchDevice, Closing):
         return task
 
     def check_tasks(self) -> None:
-        """Raise what a task raised whose result nobody has asked for, of the first of these."""
+        """Raise the exception of the first task whose result was not read."""
         for task in self._tasks:
             task.check()
 
     def run(self, body: Coroutine[Any, Any, T]) -> T:
-        """Run an async body to its end, and return what it returns.
+        """Run an async body to its end, and return its result.
 
         Args:
             body: it awaits `sleep`, `until`, `edge` or tasks that it starts.
 
         Raises:
             TypeError: it awaits something else, such as `asyncio.sleep`.
-            RuntimeError: what it waits for never comes, or not within a day of virtual time.
+            RuntimeError: its condition never becomes true, or not within a day of virtual time.
 
         >>> from tickrig.device.rrc.machine import Rrc
         >>> async def body(bench):
@@ -500,23 +504,23 @@ class Bench(BenchDevice, Closing):
         return tasks.run_body(self._mode, body)
 
     def meanwhile(self, host: Callable[[int], object]) -> None:
-        """Let a host go on while a human takes his time, so that no watchdog bites.
+        """Keep a host running while a human answers, so that watchdogs do not expire.
 
         Args:
-            host: is called again and again with microseconds, as `client.run_for`.
+            host: called repeatedly with microseconds, such as `client.run_for`.
         """
         self._mode.meanwhile(host)
 
     def patched_time(self) -> AbstractContextManager[Any]:
-        """Let hosts live in the time of the bench that call `time.sleep` or `time.monotonic`.
+        """Run hosts that call `time.sleep` or `time.monotonic` in the time of the bench.
 
-        In virtual time, from `with` to its end, `time.sleep`, `monotonic`, `time` and
-        `perf_counter`, `wait` of threading's events and conditions, `get` and `put` of queues
-        make the time of the bench pass, wherever the code of a host has kept them
-        (docs/reference/bench/hosts.md). In real time they do so anyway.
+        In virtual time, within the `with` block, `time.sleep`, `monotonic`, `time` and
+        `perf_counter`, `wait` of threading's events and conditions, and `get` and `put` of queues
+        use the time of the bench, wherever host code has stored them
+        (docs/reference/bench/hosts.md). In real time nothing changes.
 
         Returns:
-            A context manager; it gives the clock, with the functions of `time`.
+            A context manager that returns the clock, with the functions of `time`.
         """
         if isinstance(self._mode, VirtualMode):
             return self._mode.patched_time()
@@ -556,10 +560,10 @@ class Bench(BenchDevice, Closing):
         )
 
     def save_trace(self, path: Path | str) -> None:
-        """Save what all devices received, sent and suffered, for `tickrig replay`.
+        """Save traffic, inputs and faults of all devices, for `tickrig replay`.
 
-        Of real devices it has what passed their ports and what the operator did, for
-        `tickrig compare`.
+        For real devices it has the traffic of their ports and the operator's actions, for `tickrig
+        compare`.
 
         Args:
             path: the file; one that exists is replaced.
@@ -570,7 +574,7 @@ class Bench(BenchDevice, Closing):
         self._mode.save_trace(Path(path))
 
     def fork(self) -> Bench:
-        """Return a twin of the bench that goes on from here by itself, in virtual time.
+        """Return a twin of the bench that continues independently in virtual time.
 
         It has the devices, wires, faults and pending events, but no hosts and no triggers.
 
@@ -580,20 +584,20 @@ class Bench(BenchDevice, Closing):
         return Bench.of_mode(self._mode.fork())
 
     def snapshot(self, *hosts: object) -> MachineSnapshot:
-        """Return what puts the bench back to what it is now, as often as wanted.
+        """Return a snapshot that restores the present state of the bench any number of times.
 
-        It is the same bench afterwards: who has it, or a link of it, keeps it. That costs a small
-        part of a `fork`. A task, a trigger or a host that came since is not there any more.
+        It restores the same bench: references to it and to its links stay valid. It costs a small
+        part of a `fork`. Later tasks, triggers and hosts are removed.
 
         Args:
-            hosts: what is to be put back with it: hosts, and what else a test has.
+            hosts: objects to restore with it: hosts and other objects of a test.
 
         Returns:
-            The snapshot; `restore()` puts it all back.
+            The snapshot; `restore()` restores everything.
 
         Raises:
             NotOnThisBench: not in virtual time.
-            TypeError: something in a host cannot be put back, as a file or a thread.
+            TypeError: an object in a host cannot be restored, such as a file or a thread.
 
         >>> from tickrig.device.rrc.machine import Rrc
         >>> with Bench(Rrc()) as bench:
@@ -612,21 +616,21 @@ class Bench(BenchDevice, Closing):
         return MachineSnapshot(self, *hosts)
 
     def close(self) -> None:
-        """Give everything back."""
+        """Release all resources."""
         self._mode.close()
 
 
 def open_bench(path: Path | str, *, mode: str = VIRTUAL, seed: int | None = None) -> Bench:
-    """Open the bench that a rig file describes.
+    """Open the bench described by a rig file.
 
     Args:
         path: the rig file.
         mode: `virtual`, `real` or `hardware`.
-        seed: of all chance, instead of that of the file.
+        seed: of all random numbers, instead of that in the file.
 
     Raises:
-        OSError: the file cannot be read, or a port cannot be had.
-        RigFileError: all that is wrong with the file.
+        OSError: the file cannot be read, or a port is not available.
+        RigFileError: all errors in the file.
         ValueError: a device cannot be made.
         PortGone: a bus cannot be opened.
     """

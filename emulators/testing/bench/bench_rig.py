@@ -1,4 +1,4 @@
-"""All devices of a bench on one rig, with the hands at them and a journal."""
+"""All devices of a bench on one rig, with their operator and a journal."""
 
 from __future__ import annotations
 
@@ -43,28 +43,28 @@ if TYPE_CHECKING:
     from tickrig.emulators.serial.pty_port import PtyPort
 
 
-# What happened on a bench: lines and frames of all wires, and what was done to the devices.
+# Journal of a bench: lines and frames of all wires, and actions on the devices.
 
 KEPT: Final = 10_000
-"""So many lines are kept; of those before it is known how many there were."""
+"""Number of lines kept; earlier ones are only counted."""
 
 _MAPPINGS_KEPT: Final = 4_000
-"""So many frames that say what PDOs carry are kept beyond that."""
+"""Number of additional frames kept that define the contents of PDOs."""
 
 _SDO_IDS: Final = range(0x581, 0x680)
 _ERROR_CONTROL_IDS: Final = range(0x701, 0x780)
 _PDO_OBJECTS: Final = range(0x1400, 0x1C00)
-"""What PDOs carry is written there, by SDO; a boot-up ends what was written."""
+"""Indices that define the contents of PDOs; a boot-up resets them."""
 
 _ENDS: Final = (b"host", b"device")
 
 
 class Journal(WireLog):
-    """The latest lines and frames of all wires, and what was done, in the order of happening.
+    """The latest lines, frames and actions of all wires, in order of time.
 
-    A line counts as passed when the device takes its end, or sends it. A serial line has what the
-    host sent and hears; what a fault changed of it, as the device takes or sends it, is a line of
-    the mark `~`.
+    A line counts as passed when the device receives its end, or sends it. A serial line shows the
+    data as sent and received by the host; data that a fault has changed are shown as the device
+    receives or sends them, with the mark `~`.
     """
 
     def __init__(self) -> None:
@@ -75,7 +75,7 @@ class Journal(WireLog):
     def of_line(
         self, source: str, splitter: Callable[[Mark], Splitter] | None
     ) -> Callable[[int, Mark, bytes], None]:
-        """Return what takes the bytes of a serial line, cut anywhere."""
+        """Return a function that accepts bytes of a serial line, in any chunks."""
         log = WireLog(0) if splitter is None else WireLog(0, splitter)
         log.listeners.append(lambda line: self.add(line.at_us, line.mark, line.data, source))
         self._logs.append((source, log))
@@ -87,11 +87,11 @@ class Journal(WireLog):
         ends: tuple[bytes, bytes] = _ENDS,
         splitter: Callable[[Mark], Splitter] | None = None,
     ) -> Callable[[int, Mark, bytes | Frames, bytes | Frames], None]:
-        """Return what takes traffic as it was sent, and as it is heard.
+        """Return functions for the traffic as sent and as received.
 
         Args:
             source: the line, or the node.
-            ends: who is at the far end, and who at the near one.
+            ends: marks of the far and the near end.
             splitter: of the line; bytes of one without a delimiter are shown in hex.
         """
         is_binary = isinstance(splitter, FrameFormat) and not splitter.delimiter
@@ -122,7 +122,7 @@ class Journal(WireLog):
         return hear
 
     def of_lost(self, source: str) -> Callable[[int, CanFrame], None]:
-        """Return what takes the frames of a bus that no node takes."""
+        """Return a function for frames of a bus that no node receives."""
 
         def hear(at_us: int, frame: CanFrame) -> None:
             self.add(at_us, Mark.WIRE, f"no node takes {frame}".encode(), source)
@@ -161,7 +161,7 @@ class Journal(WireLog):
         return (*self.since(0), *(replace(line, number=number) for number, line in begun))
 
     def mappings(self) -> tuple[WireLine, ...]:
-        """Return the frames before those that are kept which say what PDOs carry."""
+        """Return earlier frames that define the contents of PDOs."""
         first = self._count - KEPT
         return tuple(line for line in self._mappings if line.number <= first)
 
@@ -171,16 +171,16 @@ def _shown(traffic: bytes | Frames) -> bytes:
 
 
 def _maps(frame: CanFrame) -> bool:
-    """Say whether a frame writes or reads what PDOs carry, or is a boot-up."""
+    """Return whether a frame accesses the definition of PDOs, or is a boot-up."""
     if frame.can_id in _SDO_IDS:
         return int.from_bytes(frame.data[1:3], "little") in _PDO_OBJECTS
     return frame.can_id in _ERROR_CONTROL_IDS and frame.data == b"\0"
 
 
 def text_of(lines: Sequence[WireLine]) -> str:
-    """Write what is kept for people, a line each.
+    """Write the kept lines as text, one line each.
 
-    How many lines came before these, and are kept no more, stands above them.
+    The number of earlier lines, no longer kept, is in the first line.
     """
     written = [line_text(line) for line in lines]
     if missing := missing_of(lines):
@@ -189,25 +189,25 @@ def text_of(lines: Sequence[WireLine]) -> str:
 
 
 def line_text(line: WireLine) -> str:
-    """Write a line for people: time in seconds, which wire or device, direction, text."""
+    """Write a line as text: time in seconds, wire or device, direction, text."""
     return f"{format_time(line.at_us)} {line.source} {line.mark} {escape(line.data)}"
 
 
 def missing_of(lines: Sequence[WireLine]) -> str:
-    """Say how many lines came before these, and are kept no more; empty if none did."""
+    """Return a note with the number of earlier lines, no longer kept; empty without them."""
     before = lines[0].number - 1 if lines else 0
     came = f"{before} {'line' if before == 1 else 'lines'} came before"
     return f"{came}; the last {len(lines)} are kept" if before else ""
 
 
-# Several devices under one roof: their signals, and the faults of their wires.
+# Several devices in one table: their signals, and the faults of their wires.
 
 
 class Assembly(Copyable):
     """The physical side of several devices.
 
-    The signals of one device are called as they are, those of several have the device
-    before them: `left_drive/shaft_load_nm`.
+    Signals of a single device have their plain name, those of several have the device as prefix:
+    `left_drive/shaft_load_nm`.
 
     Args:
         parts: by name, at least one.
@@ -225,7 +225,7 @@ class Assembly(Copyable):
 
     @property
     def outputs(self) -> Mapping[str, OutputSignal]:
-        """What the world sees of all devices."""
+        """Physical outputs of all devices."""
         if self._alone is not None:  # asked in each `get`: a sixth of a run that looks often
             return self.parts[self._alone].outputs
         return {
@@ -243,7 +243,7 @@ class Assembly(Copyable):
         return part.read(rest)
 
     def full_name(self, part: str, name: str) -> str:
-        """Return what a signal of a device is called."""
+        """Return the full name of a signal of a device."""
         return name if self._alone is not None else f"{part}/{name}"
 
     def find(self, name: str) -> tuple[HasSignals | None, str]:
@@ -266,7 +266,7 @@ class _AssemblyInputs(Copyable):
         assembly: the devices.
 
     Attributes:
-        changed: never told: each device has that of its own inputs.
+        changed: not used: each device has that of its own inputs.
     """
 
     def __init__(self, assembly: Assembly) -> None:
@@ -293,12 +293,12 @@ class _AssemblyInputs(Copyable):
         return part.inputs[rest]
 
     def set(self, name: str, value: Setting) -> None:
-        """Set an input; ValueError if there is none, or it does not take the value."""
+        """Set an input; ValueError if it is unknown or does not accept the value."""
         part, rest = self._find(name)
         part.inputs.set(rest, value)
 
     def check(self, name: str, value: Setting) -> Setting:
-        """Return the value that it would be set to, or raise as `set` would."""
+        """Return the value that `set` would store, or raise as `set` would."""
         part, rest = self._find(name)
         return part.inputs.check(rest, value)
 
@@ -311,7 +311,7 @@ class _AssemblyInputs(Copyable):
         )
 
     def find(self, name: str, signal_type: SignalType | None = None) -> InputSignal:
-        """Return the description of an input; ValueError if there is none of this type."""
+        """Return the description of an input; ValueError if there is no input of this type."""
         part, rest = self._assembly.find(name)
         if part is not None:
             return part.inputs.find(rest, signal_type)
@@ -327,7 +327,7 @@ class _AssemblyInputs(Copyable):
 
 
 class _Table(Mapping[str, InputSignal]):
-    """The descriptions, made when they are asked for: nodes have many objects."""
+    """The descriptions, created on request: nodes have many objects."""
 
     def __init__(self, assembly: Assembly) -> None:
         self._assembly = assembly
@@ -352,20 +352,20 @@ class _Table(Mapping[str, InputSignal]):
 
 
 class BenchOperator(Operator):
-    """The hands at several devices."""
+    """The operator of several devices."""
 
     _assembly: Assembly
     _wires: tuple[str, ...]
 
     @classmethod
     def at(cls, assembly: Assembly, queue: EventQueue, faults: AssemblyFaults) -> BenchOperator:
-        """Return the operator of several devices, whose later acts are entered in a queue."""
+        """Return the operator of several devices, with scheduled actions in a queue."""
         hands = cls(assembly.inputs, assembly.tick_us, queue, faults)
         hands._assembly, hands._wires = assembly, faults.wires
         return hands
 
     def full_name_of(self, name: str) -> str:
-        """Return how a fault is called, which need not have its device or wire before it."""
+        """Return the full name of a fault; the prefix of device or wire is optional."""
         owner, _, bare = name.rpartition("/")
         owned = owner in self._assembly.parts or owner in self._wires
         return bare if owned and name not in self.faults and bare in self.faults else name
@@ -376,15 +376,15 @@ class BenchOperator(Operator):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parts:
-    """What a bench is put together of.
+    """The parts of a bench.
 
     Attributes:
         mounts: the devices on their wires.
-        bodies: what drives move, seen as devices `body` too.
-        start: inputs at the start, by device and name.
-        signals: values that change by themselves: `DEVICE/INPUT`, or a name for formulas.
-        stores: files in which nodes keep what they store, to be saved while time passes.
-        seed: of all chance.
+        bodies: bodies moved by drives, also available as devices `body`.
+        start: initial inputs, by device and name.
+        signals: values that change with time: `DEVICE/INPUT`, or a name for formulas.
+        stores: store files of nodes, saved while time passes.
+        seed: of all random numbers.
     """
 
     mounts: Sequence[Mount]
@@ -412,17 +412,17 @@ class Parts:
 
 
 class RigState(Copyable):
-    """What a bench consists of in virtual and in real time, and what its twin has too.
+    """State of a bench in virtual and in real time, copied for its twin.
 
     Args:
-        parts: what it is put together of.
-        bridges: joints with the outside world.
-        clock: a `VirtualClock` unless given.
-        trace: the file in which the run is recorded; without it it is kept in memory, if `keeps`.
-        keeps: whether the run is recorded at all without a file.
+        parts: its parts.
+        bridges: connections with the outside world.
+        clock: by default a `VirtualClock`.
+        trace: the file of the recording; without it the run is recorded in memory, if `keeps`.
+        keeps: whether to record the run without a file.
 
     Raises:
-        ValueError: an input or a signal that cannot be.
+        ValueError: an invalid input or signal.
         OSError: the file cannot be opened.
     """
 
@@ -466,11 +466,11 @@ class RigState(Copyable):
 
     @property
     def chances(self) -> Sequence[FaultyPort[bytes] | CanFaults]:
-        """What has faults by chance, in the order of the wires."""
+        """Objects with random faults, in the order of the wires."""
         return [chance for mount in self.mounts.values() for chance in mount.chances]
 
     def draw_by(self, seed: int) -> None:
-        """Let faults that begin from now on draw by another seed, each wire otherwise."""
+        """Set another seed for faults that start from now on, different for each wire."""
         for number, chance in enumerate(self.chances):
             chance.seed = seed * len(self.chances) + number
 
@@ -479,10 +479,10 @@ class RigState(Copyable):
 
         Args:
             owner: the device that has it, or whose wire has it; a wire; empty for any.
-            fault: as people name it there.
+            fault: its name there.
 
         Raises:
-            ValueError: there is none.
+            ValueError: unknown fault.
         """
         faults, hands = self.faults_of(owner), self.operator
         if fault in faults:
@@ -500,7 +500,7 @@ class RigState(Copyable):
             owner: the device or wire; empty for all.
 
         Returns:
-            Full names, by those that people use there.
+            Full names by their names there.
         """
         everything = self.operator.faults
         if not owner:
@@ -521,23 +521,23 @@ class RigState(Copyable):
 
 
 def _header_of(mounts: Iterable[Mount], seed: int) -> BenchHeader:
-    """Return what a trace says of a bench."""
+    """Return the description of the bench for a trace."""
     entries = {name: entry for mount in mounts for name, entry in mount.entries.items()}
     return BenchHeader(entries, {mount.name: mount.wire_entry for mount in mounts}, seed)
 
 
 @dataclass(frozen=True, slots=True)
 class BenchDescription:
-    """What there is to set, to read and to break at a device, or at all devices of a bench.
+    """Inputs, outputs and faults of a device, or of all devices of a bench.
 
-    Names are as the device, or the bench, takes them.
+    Names are those of the device or the bench.
 
     Attributes:
         name: of the device, or of the bench.
-        inputs: what can be set; buttons and physical faults are among them.
+        inputs: inputs, including buttons and physical faults.
         groups: inputs that are set together.
-        outputs: what can be read, beside the inputs.
-        faults: what can go wrong: physical faults, and those of the wire.
+        outputs: outputs, besides the inputs.
+        faults: physical faults, and those of the wire.
     """
 
     name: str
@@ -548,7 +548,7 @@ class BenchDescription:
 
     @property
     def buttons(self) -> tuple[str, ...]:
-        """What can be pressed."""
+        """Names of the buttons."""
         return tuple(n for n, each in self.inputs.items() if each.type is SignalType.BUTTON)
 
     @property
@@ -598,7 +598,7 @@ class BenchDescription:
         )
 
     def __str__(self) -> str:
-        """Return a list for people, without the objects of CANopen nodes: these are many."""
+        """Return a readable list without the objects of CANopen nodes, which are many."""
         inputs = {
             name: f"{one.type.value} {one.low:g}..{one.high:g} {one.unit}".rstrip()
             for name, one in self.inputs.items()
@@ -622,7 +622,7 @@ class BenchDescription:
 
 _OBJECT: Final = "0x"
 _BUS_AND_NODE: Final = (b"bus", b"node")
-"""The ends of a node's filter, for people."""
+"""Labels of the ends of a node's filter."""
 
 
 class BenchRig(RunningEmulator):
@@ -630,14 +630,14 @@ class BenchRig(RunningEmulator):
 
     Args:
         name: of the bench.
-        state: what it consists of.
-        link: where hosts find it, for people.
+        state: its state.
+        link: address for hosts, as text.
 
     Attributes:
-        state: what it consists of.
-        journal: what happens.
-        orders: faults that were ordered; those of a control socket are not among them.
-        ports: where hosts are in real time, by the name of the line.
+        state: its state.
+        journal: the journal.
+        orders: scheduled faults, except those of a control socket.
+        ports: ports of hosts in real time, by the name of the line.
     """
 
     ports: Mapping[str, Sequence[PtyPort | NetworkPort]]
@@ -664,7 +664,7 @@ class BenchRig(RunningEmulator):
         self.journal.follow(self.rig)
 
     def _note(self, text: str) -> None:
-        """Note what was done; the signals and faults of what is alone have no prefix."""
+        """Record an action; signals and faults of a single device or wire have no prefix."""
         source, slash, what = text.partition("/")
         fault = text.partition("=")[0]
         of_wire = fault in self.wire.fault_types
@@ -678,7 +678,7 @@ class BenchRig(RunningEmulator):
         self.journal.add(self.effective_us, Mark.PHYSICAL, what.encode(), source)
 
     def describe(self, owner: str) -> BenchDescription:
-        """Return what there is at a device, at all of them if it is empty."""
+        """Return inputs, outputs and faults of a device, or of all devices if the name is empty."""
         part: HasSignals = self.device
         if owner:
             part = self.state.assembly.parts[owner]
@@ -696,14 +696,14 @@ class BenchRig(RunningEmulator):
         )
 
     def drop_unheard(self) -> None:
-        """Forget what has come on serial lines and no host has taken."""
+        """Discard received data of serial lines that no host has read."""
         for mount in self.state.mounts.values():
             if isinstance(mount, LineMount):
                 mount.line.b.poll(self.rig.now_us)
 
     @property
     def settling_us(self) -> int:
-        """How long it takes until what hosts have sent is there, and each device had two ticks."""
+        """Time until the data of hosts have arrived and each device has had two ticks."""
         now_us = self.rig.now_us
         lines = [one.line for one in self.state.mounts.values() if isinstance(one, LineMount)]
         sent_us = [line.b.sent_us for line in lines if line.b.sent_us < NEVER]
@@ -711,7 +711,7 @@ class BenchRig(RunningEmulator):
         return max([now_us, *sent_us]) - now_us + 2 * tick_us
 
     def save_trace(self, path: Path) -> None:
-        """Write what was recorded in memory; OSError if it cannot be."""
+        """Write the recording in memory to a file; OSError if that fails."""
         if self.state.recorder is None:
             raise NotOnThisBench("nothing was recorded on this bench")
         self.state.recorder.save(path, self.rig.now_us)
@@ -721,15 +721,15 @@ class BenchRig(RunningEmulator):
         return NEVER
 
     def _listen(self, now_us: int) -> None:
-        """Hosts of a bench look for themselves."""
+        """`NEVER`: hosts of a bench poll themselves."""
 
     def send(self, now_us: int, data: bytes) -> None:
-        """Put bytes on the line of the only serial device, as the host would."""
+        """Send bytes on the line of the only serial device, as the host."""
         lines = [mount for mount in self.state.mounts.values() if isinstance(mount, LineMount)]
         (mount,) = lines
         mount.line.b.send(now_us, data)
 
     @property
     def lost(self) -> dict[str, int]:
-        """What found a buffer full, by wire."""
+        """Data lost because of full buffers, by wire."""
         return {f"lost_{name}": mount.lost for name, mount in self.state.mounts.items()}

@@ -1,11 +1,9 @@
-"""What a bench cannot do, and when it cannot judge.
+"""Errors of a bench: unsupported operations, and tests without a verdict.
 
-BenchError
-NotOnThisBench        this mode cannot do that; the plug-in skips the test
-BenchBlocked          no verdict about the device; the plug-in reports an error
-MachineTooSlow    real time was not kept
-PortGone          a port, a bus or an emulator's socket is there no more
-OperatorRefused   a human at the terminal did not do what was asked
+BenchError NotOnThisBench        this mode cannot do that; the plug-in skips the test BenchBlocked
+no verdict about the device; the plug-in reports an error MachineTooSlow    real time was not kept
+PortGone a port, a bus or an emulator's socket is gone OperatorRefused   a human at the terminal did
+not do what was asked
 """
 
 from __future__ import annotations
@@ -16,20 +14,20 @@ class BenchError(Exception):
 
 
 class NotOnThisBench(BenchError):  # noqa: N818 - no error of the test
-    """What the mode of this bench cannot do; the text says why."""
+    """The mode of this bench does not support this; the message has the reason."""
 
 
 class BenchBlocked(BenchError):  # noqa: N818 - no error of the device
-    """A test that came to no verdict, and not because of the device."""
+    """A test without a verdict, for a reason outside the device."""
 
 
 class MachineTooSlow(BenchBlocked):
-    """Real time was not kept: what the device did late says nothing about it."""
+    """Real time was not kept: delays of the device may come from the machine."""
 
 
 class PortGone(BenchBlocked):
-    """A port, a bus or an emulator's control socket is there no more."""
+    """A port, a bus or an emulator's control socket is gone."""
 
 
 class OperatorRefused(BenchBlocked):
-    """A human at the terminal did not do what was asked."""
+    """A human at the terminal did not execute a request."""

@@ -51,7 +51,7 @@ class LineTrigger:
         self._nth, self._source, self.count = nth, source, 0
 
     def __call__(self) -> bool:
-        """Say whether it has passed so often."""
+        """Return whether it has passed so often."""
         return self.count >= self._nth
 
     def __str__(self) -> str:

@@ -124,7 +124,7 @@ def _line(entry: object) -> bytes:
 
 
 def _entries(data: bytes) -> Iterator[Any]:
-    """Give what whole lines have."""
+    """Yield what whole lines have."""
     for line in data.splitlines(keepends=True):
         check, _, text = line.rstrip(b"\n").partition(b" ")
         if line.endswith(b"\n") and check == b"%08x" % crc32(text):

@@ -27,7 +27,7 @@ def parquet_of(names: Sequence[str], rows: Sequence[Sequence[str | int]]) -> byt
 
 
 def read_parquet(path: Path) -> Iterator[Sequence[str]]:
-    """Give the names of the columns, then each row as texts.
+    """Yield the names of the columns, then each row as texts.
 
     Raises:
         Refusal: it is no Parquet file.

@@ -140,7 +140,7 @@ class CampaignPlan:
         return tuple(text.partition("=")[0].strip() for text in self.order.parameters)
 
     def numbers(self) -> Iterator[int]:
-        """Give the numbers of the runs of this shard, in ascending order.
+        """Yield the numbers of the runs of this shard, in ascending order.
 
         Each shard has runs of each test.
         """

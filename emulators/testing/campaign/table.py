@@ -192,7 +192,7 @@ _LISTED: Final = 200
 
 
 def summary(table: CampaignTable, file: str) -> Iterator[str]:
-    """Give the lines: how many ended how, and of what did not pass why, where, and the commands.
+    """Yield the lines: how many ended how, and of what did not pass why, where, and the commands.
 
     Args:
         table: the runs.

@@ -388,7 +388,7 @@ def _sdo_limits(timeout: str, memory: str) -> SdoLimits:
 
 
 def _specs(given: Mapping[str, Path | str | None], node_id: str | None) -> Iterator[NodeSpec]:
-    """Give the nodes of --eds, --dcf, --model or --rtc."""
+    """Yield the nodes of --eds, --dcf, --model or --rtc."""
     named = {option: device for option, device in given.items() if device}
     if len(named) > 1:
         raise Refused(f"{' and '.join(named)} name the same thing: give one of them")

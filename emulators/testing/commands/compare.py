@@ -111,7 +111,7 @@ def _compare_port(
 
 
 def _has_short_change(records: Iterable[BenchRecord], tick_us: int) -> bool:
-    """Say whether an input was set twice within a tick: only some ticks see what was between."""
+    """Return whether an input was set twice within a tick: only some ticks see what was between."""
     latest: dict[str, int] = {}
     for record in records:
         if record.mark is Mark.PHYSICAL and (change := record.change) is not None:
@@ -174,7 +174,7 @@ def _act(emulator: Emulator, record: BenchRecord, now_us: int) -> None:
 
 
 def cut(split: Splitter, traffic: Iterable[tuple[int, object, int]]) -> Iterator[Said]:
-    """Give the lines of what passed, each with the time and the line of its end."""
+    """Yield the lines of what passed, each with the time and the line of its end."""
     for at_us, data, line in traffic:
         assert isinstance(data, bytes)
         for whole in split(at_us, data):
@@ -277,7 +277,7 @@ class _Bus:
         return self._said
 
     def owns(self, traffic: object) -> bool:
-        """Say whether an emulated node sends such a frame."""
+        """Return whether an emulated node sends such a frame."""
         return isinstance(traffic, CanFrame) and any(x.has(traffic) for x in self._ids.values())
 
     def _act(self, record: BenchRecord, early: bool, now_us: int) -> None:
@@ -450,7 +450,7 @@ def _read_tolerance(options: Mapping[str, Any]) -> Tolerance:
 def _runs(
     file: Path, recording: replay.BenchRecording, tolerance: Tolerance, options: Mapping[str, Any]
 ) -> Iterator[tuple[str, _ComparedRun]]:
-    """Give the two runs of each device, of a recorded bus those of all nodes together."""
+    """Yield the two runs of each device, of a recorded bus those of all nodes together."""
     for name in recording.header.devices:
         if not recording.at_port:
             yield name, _ticked(file, recording, name, options)

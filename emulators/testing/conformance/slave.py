@@ -63,7 +63,7 @@ _MEMBERS: Final = ("tick", "due_us", "tick_us", "reset")
 
 
 def is_slave(node: object) -> TypeGuard[Slave]:
-    """Say whether a node has the members of a `Slave`, by `__getattr__` too."""
+    """Return whether a node has the members of a `Slave`, by `__getattr__` too."""
     return all(hasattr(node, name) for name in _MEMBERS)
 
 
@@ -114,7 +114,7 @@ class CalledSlave:
 
 
 def is_step(node: object) -> bool:
-    """Say whether it is what is called each millisecond, not what makes it."""
+    """Return whether it is what is called each millisecond, not what makes it."""
     return not is_slave(node) and _takes(node, *STEP) and not _takes(node)
 
 
@@ -151,7 +151,7 @@ def _is_plain(frame: object) -> bool:
 
 
 def _takes(call: object, *given: object) -> bool:
-    """Say whether it can be called so; of what C has made nobody knows it."""
+    """Return whether it can be called so; of what C has made nobody knows it."""
     if not callable(call):
         return False
     try:

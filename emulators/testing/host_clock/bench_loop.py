@@ -69,7 +69,7 @@ class _BenchLoop(asyncio.SelectorEventLoop):
         super().close()
 
     def _called(self) -> bool:
-        """Say whether something is to be called at once, by whom that may be."""
+        """Return whether something is to be called at once, by whom that may be."""
         ready: object = vars(self).get("_ready")
         return bool(ready)
 

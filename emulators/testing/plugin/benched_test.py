@@ -235,7 +235,7 @@ def benched(
     safe: SafeState,
     warm_up: WarmUp = None,
 ) -> Iterator[Bench]:
-    """Give a test its bench."""
+    """Yield a test its bench."""
     settings = request.config.stash[SETTINGS]
     if settings.rig_file and (settings.ordered or source is None):
         source = settings.rig_file
@@ -249,7 +249,7 @@ def benched(
 
 @contextmanager
 def clocked(bench: Bench) -> Iterator[Any]:
-    """Give a test the clock of its bench; a refusal that a host has swallowed fails the test."""
+    """Yield a test the clock of its bench; a refusal that a host has swallowed fails the test."""
     try:
         with bench.patched_time() as clock:
             yield clock

@@ -167,7 +167,7 @@ def _run(item: pytest.Item, nextitem: pytest.Item | pytest.Collector | None) -> 
 
 
 def _end(item: pytest.Item, nextitem: pytest.Item | None) -> _Reports:
-    """Give back what a test shared with others, which there are none of."""
+    """Return back what a test shared with others, which there are none of."""
     end = partial(item.session._setupstate.teardown_exact, nextitem)
     call = pytest.CallInfo.from_call(end, when="teardown")
     if call.excinfo is None:

@@ -151,7 +151,7 @@ def _statement(item: pytest.Item, error: pytest.ExceptionInfo[BaseException]) ->
 
 
 def _is_reported(item: pytest.Item) -> bool:
-    """Say whether a report tells of a test: it has a bench, or shows a requirement."""
+    """Return whether a report tells of a test: it has a bench, or shows a requirement."""
     return BENCHED in item.stash or item.get_closest_marker("req") is not None
 
 

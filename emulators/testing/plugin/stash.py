@@ -73,7 +73,7 @@ _ERRORS: Final = "tickrig.emulators.testing.bench.errors"
 
 
 def is_blocked(error: BaseException) -> bool:
-    """Say whether a test came to no verdict about its device."""
+    """Return whether a test came to no verdict about its device."""
     errors = sys.modules.get(_ERRORS)
     return errors is not None and isinstance(error, errors.BenchBlocked)
 

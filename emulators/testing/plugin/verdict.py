@@ -62,7 +62,7 @@ def blocked(
 
 
 def is_mistake(error: BaseException) -> bool:
-    """Say whether a test would have raised this on a fast machine too.
+    """Return whether a test would have raised this on a fast machine too.
 
     A misspelt name is a mistake, and so is all that the bench refuses. A test that takes None
     for a message, as there was none in time, is not: nor what the host raises of its own.

@@ -23,23 +23,23 @@ from tickrig.host.control.clock import ServingClock
 _LOOPBACK: Final = "127.0.0.1"
 _POLL_S: Final = 0.02
 _IDLE_S: Final = 5.0
-"""A client that says nothing for so long is hung up on."""
+"""Silence after which a client is disconnected."""
 
 _LOG: Final = logging.getLogger(__name__)
 
 
 class HttpService:
-    """Serves a service in threads of its own, as long as it is reachable.
+    """Serves a service in its own threads, as long as it is reachable.
 
     Args:
-        service: answers; its `base` becomes the address of this server.
-        port: of loopback; 0 takes a free one.
+        service: the service; its `base` becomes the address of this server.
+        port: on loopback; 0 selects a free one.
 
     Attributes:
-        url: where it is.
+        url: its address.
 
     Raises:
-        OSError: the port is taken.
+        OSError: the port is in use.
     """
 
     def __init__(self, service: ResolutionService, port: int = 0) -> None:
@@ -50,9 +50,9 @@ class HttpService:
         service.base = self.url = f"http://{_LOOPBACK}:{self._port}"
 
     def follow(self) -> None:
-        """Listen, or not, as the fault `unreachable` has it; to be called now and then.
+        """Listen unless the fault `unreachable` is active; call it periodically.
 
-        A port that somebody else took meanwhile is told, and tried again.
+        If another program has taken the port, it is reported and tried again.
         """
         if not self._service.reachable:
             self._hang_up()
@@ -63,7 +63,7 @@ class HttpService:
                 _LOG.warning("port %d cannot be had again: %s", self._port, error)
 
     def close(self) -> None:
-        """End; answers that are late are not given."""
+        """Stop; late answers are not sent."""
         self._closing.set()
         self._hang_up()
 
@@ -90,7 +90,7 @@ class _Server(ThreadingHTTPServer):
     block_on_close = False
 
     def handle_error(self, request: object, client_address: object) -> None:
-        """Say nothing of clients that hang up or talk nonsense."""
+        """Ignore clients that disconnect or send invalid data."""
 
 
 class _Handler(BaseHTTPRequestHandler):
@@ -100,7 +100,7 @@ class _Handler(BaseHTTPRequestHandler):
     timeout = _IDLE_S
 
     def do_GET(self) -> None:
-        """Answer, later if it is slow."""
+        """Answer, with a delay if the fault `slow` is active."""
         with self.lock:
             response = self.service.respond(self.path)
         if self.closing.wait(response.delay_us / 1e6):
@@ -113,18 +113,18 @@ class _Handler(BaseHTTPRequestHandler):
         self.wfile.write(body)
 
     def log_message(self, format: str, *args: object) -> None:  # noqa: A002 - as http.server has it
-        """Log a request where somebody wants to see it."""
+        """Log a request at the level DEBUG."""
         _LOG.debug(format, *args)
 
 
-# Run a resolution service as its command line asks.
+# Run a resolution service for its command line.
 
 _LOOK_US = 20_000
-"""How often it looks at its faults."""
+"""Period at which it checks its faults."""
 
 
 def _read_table(path: Path) -> UcodeTable:
-    """Read the table of a file; Refused if it is none."""
+    """Read the table of a file; Refused if it is invalid."""
     try:
         return parse_table(path.read_text("utf-8"))
     except OSError as error:
@@ -136,10 +136,10 @@ def _read_table(path: Path) -> UcodeTable:
 def run_service(
     table: Path | None, *, port: int, control: Path | None, faults: tuple[str, ...], example: bool
 ) -> None:
-    """Serve until somebody stops it; or print a table to begin with.
+    """Serve until it is stopped; or print an example table.
 
     Raises:
-        Refused: the command line asks for something that cannot be done.
+        Refused: the options cannot be carried out.
     """
     if example:
         click.echo(EXAMPLE, nl=False)

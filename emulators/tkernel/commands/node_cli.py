@@ -14,15 +14,17 @@ from tickrig.host.cli.options import PATH, HarmlessCommand, version_option, work
 @click.argument("system", type=PATH, required=False)
 @click.option("--urg", metavar="URL", help="Line of a range finder: its component runs here.")
 @click.option("--ucode", metavar="URL", help="Line of a ucode reader: three components run here.")
-@click.option("--service", default="", metavar="URL", help="Of ucodes.  [http://127.0.0.1:8640]")
+@click.option(
+    "--service", default="", metavar="URL", help="URL of the ucode service. [http://127.0.0.1:8640]"
+)
 @click.option("--control", type=PATH, help="Control socket of its system, for 'tickrig rtc --at'.")
 @click.option("--board", type=PATH, help="Control socket of the board, for 'tickrig ctl'.")
-@click.option("--connectors", type=int, default=8, help="The most that its ports have.  [8]")
+@click.option("--connectors", type=int, default=8, help="Largest number of connectors. [8]")
 @click.option(
-    "--message-octets", type=int, default=4_096, help="The most of a value as CDR.  [4096]"
+    "--message-octets", type=int, default=4_096, help="Largest size of a value as CDR. [4096]"
 )
 @click.option("--tick", default="10ms", help="Periods are multiples of this.  [10ms]")
-@click.option("--boot", default="3s", help="From power-up until it answers.  [3s]")
+@click.option("--boot", default="3s", help="Time from power-up until it answers. [3s]")
 @click.option(
     "--fault",
     "faults",
@@ -36,10 +38,9 @@ from tickrig.host.cli.options import PATH, HarmlessCommand, version_option, work
 def main(**options: Any) -> None:
     """Emulate a board with OpenRTM on T-Kernel, until Ctrl-C.
 
-    Its RT components are those of Figs. 122 and 123 of the NEDO report, or of
-    a SYSTEM file. It has a small board's limits: what is beyond them is
-    refused, and told. Until it has booted nobody answers; a power cut loses
-    all but the files.
+    Its RT components are those of Figs. 122 and 123 of the NEDO report, or of a SYSTEM file. It has
+    the limits of a small board: requests beyond them are refused with a message. Until it has
+    booted it does not answer; a power cut loses everything except files.
 
     \b
     urg-emu --link /tmp/urg --room 4,3

@@ -1,4 +1,4 @@
-"""Run a node on T-Kernel in real time, as its command line asks."""
+"""Run a node on T-Kernel in real time for its command line."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from tickrig.host.rtc.ucode.infrared_rays_reader import OPEN_SERIAL
 
 _JOIN_ENGINES: Final = "tickrig.host.rtc.engines.engines_joined:engines_joined"
 _NAMES: Final = f"{node_manager.HOST}.host_cxt/%n.rtc"
-"""Where its components stand in a name server."""
+"""Naming context of its components in a name server."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,7 +53,7 @@ class _NodeOptions:
 
 
 def run_node(connectors: int, message_octets: int, tick: str, boot: str, **options: Any) -> None:
-    """Run the node of a command line; Refused if there can be none."""
+    """Run the node of a command line; Refused if its options are invalid."""
     engines = take_engines(options)
     tick_us, boot_us = time_us("--tick", tick), time_us("--boot", boot)
     try:
@@ -66,34 +66,34 @@ def run_node(connectors: int, message_octets: int, tick: str, boot: str, **optio
 
 
 class _Door:
-    """A place where somebody may be served; `serving_control` opens it."""
+    """A server, opened by `serving_control`."""
 
     serve: Callable[[int], None] | None = None
 
     def close(self) -> None:
-        """Serve nobody there any more."""
+        """Close the server."""
         self.serve = None
 
 
 class _Boot:
-    """A boot, as a control socket sees it: who runs the system, and how late it was."""
+    """A boot, as seen by a control socket: the runner of the system, and its delays."""
 
     def __init__(self, runner: RealTime) -> None:
         self._runner, self.after_tick = runner, list[Callable[[int], None]]()
 
     def tick(self, now_us: int) -> None:
-        """Call those who want to know of each tick."""
+        """Callbacks after each tick."""
         for listener in tuple(self.after_tick):
             listener(now_us)
 
     @property
     def late_ticks(self) -> int:
-        """How many ticks began late."""
+        """Number of late ticks."""
         return self._runner.late_ticks
 
     @property
     def worst_late_us(self) -> int:
-        """By how much the worst of them was late."""
+        """Largest delay of a tick."""
         return self._runner.worst_late_us
 
     def stop(self) -> None:
@@ -102,7 +102,7 @@ class _Boot:
 
 
 class _NodeRun:
-    """One run of the command; a board in it may boot many times.
+    """One run of the command; its board may boot many times.
 
     Args:
         options: the command line.
@@ -124,7 +124,7 @@ class _NodeRun:
         schedule.add_item(self._board)
 
     def run(self) -> None:
-        """Run until somebody stops it.
+        """Run until it is stopped.
 
         Raises:
             Refused: the system cannot be on this node, or a socket cannot be made.
@@ -147,7 +147,7 @@ class _NodeRun:
         self._sum_up()
 
     def _start(self, manager: node_manager.NodeManager, stack: ExitStack) -> None:
-        """Make the system of a board that has booted, and open its doors."""
+        """Make the system of a booted board, and open its servers."""
         options = self._options
         for kind in EXAMPLES:
             manager.register(kind)
@@ -165,7 +165,7 @@ class _NodeRun:
         stack.callback(say, "The node is off.")
 
     def _open_doors(self, manager: node_manager.NodeManager, stack: ExitStack) -> None:
-        """Serve the system's control socket and peers, as long as the board is up."""
+        """Serve the system's control socket and peers while the board runs."""
         stack.callback(self._system_door.close)
         attach: Callable[[CallQueue], object] = self._attach_alone
         if path := self._options.control:
@@ -191,7 +191,7 @@ class _NodeRun:
         return lambda calls: server.attach(calls, calls.make)
 
     def _serve(self, wait_us: int) -> None:
-        """Serve whoever comes to a door; the board first, which waits for the next tick."""
+        """Serve requests of all servers; the board first, which waits for the next tick."""
         open_doors = [door.serve for door in (self._system_door, self._operator_door) if door.serve]
         for serve in open_doors[1:]:
             serve(0)

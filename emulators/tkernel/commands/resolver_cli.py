@@ -15,7 +15,7 @@ from tickrig.host.cli.options import PATH, HarmlessCommand, version_option, work
     "--port",
     type=click.IntRange(0, 65_535),
     default=8_640,
-    help="Of loopback; 0 takes a free one.  [8640]",
+    help="Port on loopback; 0 selects a free one. [8640]",
 )
 @click.option("--control", type=PATH, help="Control socket to serve, for 'tickrig ctl'.")
 @click.option(
@@ -25,15 +25,14 @@ from tickrig.host.cli.options import PATH, HarmlessCommand, version_option, work
     metavar="NAME[@FROM[-TO]]",
     help="unreachable, slow, unknown_ucode or broken; may be repeated.",
 )
-@click.option("--example", is_flag=True, help="Print a table to begin with, and end.")
+@click.option("--example", is_flag=True, help="Print an example table, and exit.")
 @version_option()
 @works_in("tickrig.emulators.tkernel.commands.http_service:run_service")
 def main(**options: Any) -> None:
     """Serve a TABLE of ucodes over HTTP on loopback, until Ctrl-C.
 
-    GET /ucodes/UCODE answers with the address of its information, GET
-    /contents/NAME with that information, 404 where there is none. What goes
-    wrong with it has names.
+    GET /ucodes/UCODE answers with the address of its information, GET /contents/NAME with that
+    information, 404 if there is none. Its faults have names.
 
     \b
     ucode-resolver --example > places.toml

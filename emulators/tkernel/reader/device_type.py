@@ -1,4 +1,4 @@
-"""The ucode reader as a device type: `ucode-reader-emu`, and what its traces carry."""
+"""The ucode reader as a device type: `ucode-reader-emu`, and its configuration in traces."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def build_reader(config: Config) -> UcodeReader:
 
 
 def _parse_marker(text: str) -> Marker:
-    """Read `UCODE,X,Y`; ValueError if it is no marker.
+    """Read `UCODE,X,Y`; ValueError if it is not a marker.
 
     >>> _parse_marker("00001c00000000000001000000000001,1,-0.5").y_m
     -0.5

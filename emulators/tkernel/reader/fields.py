@@ -1,4 +1,4 @@
-"""What can be set of a reader of ucodes."""
+"""Options of a reader of ucodes."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ FIELDS: Final = (
         high=99,
         default=3.0,
         unit="M",
-        help="How far it hears a marker.  [3]",
+        help="Range at which it receives a marker. [3]",
     ),
     DeviceField(
         name="cone_deg",
@@ -28,6 +28,6 @@ FIELDS: Final = (
         high=360,
         default=90,
         unit="DEG",
-        help="Whole angle in which it hears, around where it looks.  [90]",
+        help="Full angle of reception around its heading. [90]",
     ),
 )

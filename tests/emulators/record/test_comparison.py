@@ -34,21 +34,21 @@ def differences(old: str, new: str, tolerance: Tolerance = STRICT) -> list[tuple
         ("1 OK:a; 2 OK:b", "1.02 OK:a; 1.98 OK:b", []),
         ("1 OK:a", "1.03 OK:a", [(1.0, "the emulator is 30.0 ms later")]),
         ("1 OK:a; 2 OK:b", "1 OK:a; 1.5 OK:b", [(2.0, "the emulator is 500.0 ms earlier")]),
-        ("1 OK:a; 2 OK:b", "1 OK:a", [(2.0, "the emulator does not say it")]),
-        ("1 OK:a", "1 OK:a; 2 OK:b", [(2.0, "the emulator alone says it")]),
-        ("1 OK:a", "1 OK:b", [(1.0, "the emulator says something else")]),
+        ("1 OK:a; 2 OK:b", "1 OK:a", [(2.0, "the emulator does not send it")]),
+        ("1 OK:a", "1 OK:a; 2 OK:b", [(2.0, "only the emulator sends it")]),
+        ("1 OK:a", "1 OK:b", [(1.0, "the emulator answers differently")]),
         ("1 OK:a; 1.001 OK:b; 1.002 OK:c", "1 OK:a; 1.002 OK:c", [
-            (1.001, "the emulator does not say it"),
+            (1.001, "the emulator does not send it"),
         ]),
         ("1 OK:a; 1.002 OK:c", "1 OK:a; 1.001 OK:b; 1.002 OK:c", [
-            (1.001, "the emulator alone says it"),
+            (1.001, "only the emulator sends it"),
         ]),
         ("1 OK:a; 1.001 OK:b", "1 OK:b; 1.001 OK:a", [
-            (1.0, "the emulator alone says it"), (1.001, "the emulator does not say it"),
+            (1.0, "only the emulator sends it"), (1.001, "the emulator does not send it"),
         ]),
         ("1 OK:a; 1.001 EV:b", "1 EV:b; 1.001 OK:a", []),
         ("1 705#05; 2 705#05; 4 705#05", "1 705#05; 2 705#05; 3 705#05; 4 705#05", [
-            (3.0, "the emulator alone says it"),
+            (3.0, "only the emulator sends it"),
         ]),
         ("1 a", "1 a; 9.999 late", []),
         ("1 a", "0.01 early; 1 a", []),

@@ -1,1 +1,1 @@
-"""Where the devices of a bench are, and how time passes for them."""
+"""Modes of a bench: virtual time, real time, real hardware."""

@@ -1,6 +1,6 @@
-"""The doors of a CAN bus: a bus of python-can with a watch at it, a link, a bridge to it.
+"""Connections to a CAN bus: a monitored python-can bus, a link, a bridge.
 
-It imports python-can, which takes longer than all the rest of a bench: whoever has no bus outside
+It imports python-can, which takes longer than the rest of a bench: a bench without an outside bus
 does not load it.
 """
 
@@ -28,11 +28,11 @@ from tickrig.wire.can import Frames
 
 
 class BusGone(PortGone, can.CanOperationError):
-    """A bus is there no more; for hosts, python-can's own error."""
+    """A bus is gone; for hosts, python-can's own error."""
 
 
 class _Watched(can.BusABC):
-    """What a watched bus does beside what its class does."""
+    """Monitoring added to a bus class."""
 
     _watch: DoorWatch
     _reads: can_link.BusReceiver
@@ -81,8 +81,8 @@ def _open_bus(plan: BusPlan, options: dict[str, Any]) -> can.BusABC:
     """Open a bus.
 
     Args:
-        plan: which.
-        options: more, as `can.Bus` takes them.
+        plan: the bus.
+        options: further options of `can.Bus`.
 
     Raises:
         BusGone: it cannot be opened.
@@ -97,7 +97,7 @@ def _open_bus(plan: BusPlan, options: dict[str, Any]) -> can.BusABC:
 
 
 def open_watched_bus(plan: BusPlan, watch: DoorWatch, options: dict[str, Any]) -> can.BusABC:
-    """Open a bus with a watch at it; see `_open_bus`."""
+    """Open a monitored bus; see `_open_bus`."""
     bus = _open_bus(plan, options)
     kind = type(bus)
     reads = can_link.BusReceiver(
@@ -112,12 +112,12 @@ def open_watched_bus(plan: BusPlan, watch: DoorWatch, options: dict[str, Any]) -
 
 
 def _name_of(plan: BusPlan) -> str:
-    """Return what people call a bus, as `socketcan can0`."""
+    """Return the name of a bus, such as `socketcan can0`."""
     return plan.interface if plan.channel is None else f"{plan.interface} {plan.channel}"
 
 
 def frame_link(plan: BusPlan, watch: DoorWatch) -> StampedLink:
-    """Return a link to a bus; what it sends does not come back.
+    """Return a link to a bus, which does not receive its own frames.
 
     Raises:
         BusGone: it cannot be opened.
@@ -133,7 +133,7 @@ def join_bus(end: CanEnd, plan: BusPlan, stack: ExitStack) -> CanBridge:
     Args:
         end: of the emulated bus.
         plan: the bus of python-can.
-        stack: closes it in the end.
+        stack: closes it at the end.
 
     Raises:
         BusGone: it cannot be opened.

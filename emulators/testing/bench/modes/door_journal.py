@@ -1,4 +1,4 @@
-"""What passes the doors to real devices, and what is done to them, for a journal."""
+"""Traffic of the connections to real devices, and actions on them, for a journal."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ from tickrig.host.text.values import Setting
 from tickrig.host.text.whole_file import write_whole
 from tickrig.wire.can import CanFrame, Frames
 
-# What passed the ports of real devices, and what was done to them, as a trace.
+# Traffic and actions of real devices, as a trace.
 
 
 class PortRecord:
-    """Keeps all of it, for `tickrig compare`; hosts have threads, which take turns.
+    """Keeps traffic and actions, for `tickrig compare`; safe for several host threads.
 
-    In the trace a serial line is called as its first device, a CAN bus by its own name. What was
-    done to nodes is not in it: a bus is compared by its frames.
+    In the trace a serial line has the name of its first device, a CAN bus its own name. Actions on
+    nodes are not in it: a bus is compared by its frames.
 
     Args:
         plan: the rig file.
-        mounts: such wires, which know what they are.
+        mounts: equivalent wires, for their types.
         now_us: the time.
     """
 
@@ -62,15 +62,15 @@ class PortRecord:
         ]
 
     def changed(self, device: str, name: str, value: Setting, after_us: int = 0) -> None:
-        """Keep that an input was set, or will be after a time."""
+        """Record a set input, now or after a time."""
         self._done(device, change_text(name, value), after_us)
 
     def was_reset(self, device: str) -> None:
-        """Keep that a device was switched on."""
+        """Record that a device was switched on."""
         self._done(device, RESET)
 
     def save(self, path: Path) -> None:
-        """Write the trace; OSError if it cannot be."""
+        """Write the trace; OSError if that fails."""
         now_us = self._now_us()
         records = sorted((x for x in self._records if x.at_us <= now_us), key=lambda x: x.at_us)
         end = BenchRecord(now_us, "", Mark.END)
@@ -94,8 +94,8 @@ class DoorJournal(Journal):
 
     Args:
         now_us: the time.
-        after: called when something has been heard.
-        record: gets the same, for a trace.
+        after: called after received traffic.
+        record: gets the same data, for a trace.
     """
 
     def __init__(
@@ -107,11 +107,11 @@ class DoorJournal(Journal):
         self._watches: defaultdict[str, WeakSet[_BusWatch]] = defaultdict(WeakSet)
 
     def watch(self, mount: Mount, pace: HostPace) -> DoorWatch:
-        """Return a watch at a door of a wire.
+        """Return a monitor for a connection of a wire.
 
         Args:
-            mount: such a wire.
-            pace: learns how late the host is.
+            mount: an equivalent wire.
+            pace: records how late the host is.
         """
         if isinstance(mount, LineMount):
             return _Watch(pace, partial(self._hear_bytes, mount.name, self._splitting(mount)))
@@ -120,7 +120,7 @@ class DoorJournal(Journal):
         return watch
 
     def note(self, device: str, text: str, **changes: Setting) -> None:
-        """Note what was done to a device, and what its inputs are now."""
+        """Record an action on a device, and its inputs after it."""
         with self._lock:
             for name, value in changes.items():
                 self.record.changed(device, name, value)
@@ -138,7 +138,7 @@ class DoorJournal(Journal):
         self._after()
 
     def hear_frames(self, wire: str, watch: _BusWatch, mark: Mark, frames: Seen) -> None:
-        """Note frames that passed a door, unless another one of its bus has told of them.
+        """Record frames of a connection, unless another one of the bus has recorded them.
 
         The trace has no error frames.
         """
@@ -154,7 +154,7 @@ class DoorJournal(Journal):
         self._after()
 
     def announce(self, wire: str, watch: _BusWatch, frames: Seen, by: int = 1) -> None:
-        """Let all doors of a bus but one know frames, or forget them again."""
+        """Mark frames as known at all other connections of a bus, or unmark them."""
         with self._lock:
             self._announce(wire, watch, frames, by)
 
@@ -166,20 +166,20 @@ class DoorJournal(Journal):
 
 
 class _Watch:
-    """Lets hosts pass, and hands on what they carry."""
+    """Monitor that forwards the traffic of hosts."""
 
     def __init__(self, pace: HostPace, hear: Callable[[Mark, Any], None]) -> None:
         self.waited, self.passed, self.sending = pace.waited, hear, pace.sending
 
     def used(self) -> None:
-        """Anybody may, at any time."""
+        """Always allow."""
 
 
 class _BusWatch:
-    """A watch at one of several doors of a bus, each of which sees each frame.
+    """Monitor of one of several connections of a bus, each of which sees each frame.
 
     Attributes:
-        known: frames that are in the journal already, and have yet to be seen here.
+        known: frames already in the journal and not yet seen here.
     """
 
     def __init__(self, pace: HostPace, wire: str, journal: DoorJournal) -> None:
@@ -187,14 +187,14 @@ class _BusWatch:
         self.known: Counter[str] = Counter()
 
     def used(self) -> None:
-        """Anybody may, at any time."""
+        """Always allow."""
 
     def passed(self, mark: Mark, frames: Seen) -> None:
         self._journal.hear_frames(self._wire, self, mark, frames)
 
     @contextmanager
     def sending(self, frames: Frames) -> Iterator[None]:
-        """Let the other doors know of frames before they can see them."""
+        """Mark frames at the other connections before they can see them."""
         self._journal.announce(self._wire, self, frames)
         try:
             yield

@@ -1,4 +1,4 @@
-"""A link of a host, or a port of pyserial, with a watch at it."""
+"""Monitored links and pyserial ports of hosts."""
 
 from __future__ import annotations
 
@@ -19,27 +19,27 @@ from tickrig.host.links.serial_link import explain_open_error
 from tickrig.host.text.trace import Mark
 from tickrig.wire.can import CanFrame, ErrorFrame, Frames
 
-# What the doors of a bench tell of the host that goes through them.
+# Reports of the connections of a bench about their hosts.
 
 Seen = tuple[CanFrame | ErrorFrame, ...]
-"""What passes a door of a bus."""
+"""Frames of a bus connection."""
 
 
 class DoorWatch(Protocol):
-    """Who is told what passes a door, and how the host keeps time."""
+    """Monitor of a connection: traffic, and timing of the host."""
 
     def used(self) -> None:
-        """Take note that the host is about to send or to wait; may forbid it by raising."""
+        """Called before the host sends or waits; may forbid it by raising."""
 
     def waited(self, wanted_us: int, took_us: int) -> None:
-        """Take note of a wait in vain: how long it was to take, and how long it took."""
+        """Called after a wait without result: the requested and the actual duration."""
 
     def sending(self, traffic: Any) -> AbstractContextManager[object]:
-        """Return what is entered while bytes or frames are sent, which other doors may see."""
+        """Return a context for sending bytes or frames, which other connections may see."""
         ...
 
     def passed(self, mark: Mark, traffic: Any) -> None:
-        """Take note of bytes or frames."""
+        """Called with bytes or frames."""
 
 
 def _now_us() -> int:
@@ -57,31 +57,31 @@ class HostPace:
         self._now_us, self.late_us = now_us, 0
 
     def waited(self, wanted_us: int, took_us: int) -> None:
-        """Take note of a wait in vain."""
+        """Record a wait without result."""
         self.late_us = max(self.late_us, took_us - wanted_us)
 
     def sending(self, traffic: object) -> AbstractContextManager[object]:
-        """Nothing: it is of no matter here who sees what is sent."""
+        """Return an empty context."""
         return nullcontext()
 
     @contextmanager
     def waiting(self, wanted_us: int) -> Iterator[None]:
-        """Take note of what is waited for inside, which ends by itself in time."""
+        """Check the duration of the wait inside the block."""
         begun_us = self._now_us()
         yield
         self.waited(wanted_us, self._now_us() - begun_us)
 
 
 class LinkGone(PortGone, LinkClosed):
-    """The port of a link is there no more; for hosts, the line is closed."""
+    """The port of a link is gone; for hosts, the line is closed."""
 
 
 class WatchedLink(Generic[W]):
-    """A `Link` that tells what passes, and how long its waits in vain took.
+    """A `Link` that reports its traffic, and the duration of waits without result.
 
     Args:
-        link: the link behind it.
-        watch: is told.
+        link: the other link.
+        watch: the monitor.
     """
 
     def __init__(self, link: Link[W], watch: DoorWatch) -> None:
@@ -89,14 +89,14 @@ class WatchedLink(Generic[W]):
 
     @property
     def now_us(self) -> int:
-        """The clock of the link behind it."""
+        """The clock of the other link."""
         return self._link.now_us
 
     def send(self, traffic: W, /) -> None:
         """Send traffic.
 
         Raises:
-            LinkGone: the port is there no more.
+            LinkGone: the port is gone.
             LinkClosed: the link was closed.
         """
         self._watch.used()
@@ -108,7 +108,7 @@ class WatchedLink(Generic[W]):
         """Return what arrived, or empty traffic after `timeout_us`.
 
         Raises:
-            LinkGone: the port is there no more.
+            LinkGone: the port is gone.
             LinkClosed: the link was closed.
         """
         self._watch.used()
@@ -119,7 +119,7 @@ class WatchedLink(Generic[W]):
         return traffic
 
     def close(self) -> None:
-        """Close the link behind it."""
+        """Close the other link."""
         self._closed = True
         self._link.close()
 
@@ -131,7 +131,7 @@ class WatchedLink(Generic[W]):
 
     @contextmanager
     def _told_if_gone(self) -> Iterator[None]:
-        """Tell a port that is gone from a line that the host has closed."""
+        """Distinguish a lost port from a line that the host has closed."""
         try:
             yield
         except LinkClosed as error:
@@ -141,11 +141,11 @@ class WatchedLink(Generic[W]):
 
 
 class WatchedFrameLink(WatchedLink[Frames]):
-    """A `StampedLink` with a watch at it.
+    """A monitored `StampedLink`.
 
     Args:
-        link: the link behind it.
-        watch: is told.
+        link: the other link.
+        watch: the monitor.
     """
 
     def __init__(self, link: StampedLink, watch: DoorWatch) -> None:
@@ -156,7 +156,7 @@ class WatchedFrameLink(WatchedLink[Frames]):
         """Wait for a first frame; return a time, and all that had arrived by then.
 
         Raises:
-            LinkGone: the bus is there no more.
+            LinkGone: the bus is gone.
             LinkClosed: the link was closed.
         """
         self._watch.used()
@@ -167,20 +167,20 @@ class WatchedFrameLink(WatchedLink[Frames]):
         return now_us, received
 
 
-# A port of pyserial, with a watch at it.
+# A monitored pyserial port.
 
 
 class SerialGone(PortGone, serial.SerialException):
-    """A port is there no more; for hosts, pyserial's own error."""
+    """A port is gone; for hosts, pyserial's own error."""
 
 
 class WatchedPort(serial.SerialBase):
-    """What a watched port does beside what its class does."""
+    """Monitoring added to a port class."""
 
     _watch: DoorWatch
 
     def read(self, size: int = 1) -> bytes:
-        """Read as the port does, and note what came and how late."""
+        """Read like the port, and record data and delay."""
         self._watch.used()
         wanted_s, begun_ns = self.timeout, monotonic_ns()
         try:
@@ -197,7 +197,7 @@ class WatchedPort(serial.SerialBase):
         return data
 
     def write(self, data: Any) -> int | None:
-        """Write as the port does, and note what went out."""
+        """Write like the port, and record the data."""
         self._watch.used()
         try:
             written = super().write(data)
@@ -213,9 +213,9 @@ def open_watched_serial(url: str, watch: DoorWatch, options: dict[str, Any]) -> 
     """Open a port.
 
     Args:
-        url: as `serial.serial_for_url` takes it.
-        watch: is told what passes.
-        options: as `serial.Serial` takes them.
+        url: for `serial.serial_for_url`.
+        watch: monitor of the traffic.
+        options: those of `serial.Serial`.
 
     Raises:
         SerialGone: it cannot be opened.
@@ -237,11 +237,11 @@ def open_watched_serial(url: str, watch: DoorWatch, options: dict[str, Any]) -> 
 # How late a bench was: in real time a device can be judged only by one that keeps up.
 
 _LATE_US: Final = 5_000
-"""Later than this the bench cannot be believed: half a period of the RRC."""
+"""Largest delay for a valid verdict: half a period of the RRC."""
 
 
 def too_slow(**late_us: int) -> str:
-    """Say which parts of a bench were too late to judge a device; empty if none was.
+    """Return which parts of a bench were too late for a verdict; empty if none was.
 
     Args:
         late_us: of each part, in microseconds.
@@ -259,21 +259,21 @@ def too_slow(**late_us: int) -> str:
 
 _TASKS: Final = Path("/proc/self/task")
 _LOOK_US: Final = 10_000
-"""Waits are added up over at least so long; sleepers wait a little each time they wake."""
+"""Shortest time over which waits are added up; sleeping threads wait a little at each wake-up."""
 
 _LONG_US: Final = 20 * _LOOK_US
-"""In a longer time many short waits add up to what a late thread has."""
+"""Longest such time; over a longer one many short waits add up to a large delay."""
 
 
 class CpuWaits:
-    """The longest wait that came on in a short time; none where the system does not count.
+    """The longest wait within a short time; 0 if the system does not count waits.
 
     A thread waits for a processor when it could run and others are served. That is in the
     second number of `schedstat` of each thread (Linux, Documentation/scheduler/sched-stats).
 
     Args:
         tasks: the folder of the threads.
-        spares_looker: the thread that looks is not looked at: it knows how late it is.
+        spares_looker: whether to omit the calling thread, which measures its own delay.
 
     Attributes:
         worst_us: the longest so far, in about `_LOOK_US`.
@@ -285,7 +285,7 @@ class CpuWaits:
         self._seen_us, self._own = -_LOOK_US, ""
 
     def look(self, now_us: int) -> None:
-        """Look at all threads, unless that was a moment ago; what was long ago says nothing."""
+        """Check all threads, unless the last check is recent; old values are discarded."""
         passed_us, before = now_us - self._seen_us, self._waited_ns
         if passed_us < _LOOK_US:
             return

@@ -44,15 +44,15 @@ else:
     bus_doors = LazyModule("tickrig.emulators.testing.bench.modes.bus_doors")
     can_link = LazyModule("tickrig.host.links.can_link")
 
-# The doors that hosts come in by: ports and buses of this machine.
+# The connections for hosts: ports and buses of this machine.
 
 _NOTIFIER_S: Final = 0.1
-"""How often the canopen library looks whether it is to end."""
+"""Period at which the canopen library checks whether to stop."""
 
 
 @dataclass(frozen=True, slots=True)
 class LinePlace:
-    """Where a serial line is.
+    """Address of a serial line.
 
     Attributes:
         url: device path, or URL of pyserial.
@@ -66,12 +66,12 @@ class LinePlace:
 
 
 class Doors:
-    """The `HostDoors` of benches in real time; what a host leaves open is closed with them.
+    """The `HostDoors` of benches in real time; ports left open by hosts are closed with them.
 
     Args:
-        places: where the wires are, by name.
-        watch_of: returns who watches the doors of a wire.
-        begin: lets time begin; called when a door is open.
+        places: addresses of the wires, by name.
+        watch_of: returns the monitor for a wire.
+        begin: starts the time; called when a connection is open.
     """
 
     def __init__(
@@ -131,7 +131,7 @@ class Doors:
         return network
 
     def address(self, wire: str) -> Address:
-        """Return where a program opens a wire by itself."""
+        """Return the address at which a program can open a wire itself."""
         place = self._places[wire]
         self._begin()
         if isinstance(place, LinePlace):
@@ -140,12 +140,12 @@ class Doors:
         return {"interface": place.interface, "channel": place.channel, **rate, **place.options}
 
     def close(self) -> None:
-        """Close what is still open."""
+        """Close everything still open."""
         self._opened.close()
 
     def _place(self, wire: str) -> LinePlace | BusPlan:
         if wire not in self._places:
-            raise NotOnThisBench(f"nobody has said where {wire} is")
+            raise NotOnThisBench(f"no address of {wire} is given")
         return self._places[wire]
 
     def _bus(self, wire: str) -> BusPlan:
@@ -166,29 +166,29 @@ _IN_PROCESS: Final = "virtual"
 """The bus of python-can that has both ends in one process."""
 
 _WITHOUT_PTYS: Final = "socket://0"
-"""Where a line is on a system without ptys, for this machine alone."""
+"""Address of a line on a system without ptys, for this machine only."""
 
 
 class OutsideEnds:
-    """Where hosts find the wires of a bench in real time.
+    """Addresses of the wires of a bench in real time.
 
-    A serial line is at a pty, on a system without ptys at a TCP port, and at what it is served by
-    too. A CAN bus is joined with one of
-    python-can: unless told otherwise one in this process, on a channel of its own.
+    A serial line is at a pty (on a system without ptys at a TCP port) and at the addresses in
+    `serve`. A CAN bus is connected with a python-can bus: by default one in this process, on its
+    own channel.
 
     Args:
         mounts: the wires.
-        plan: where they are to be.
+        plan: their addresses.
 
     Attributes:
         clock: of the rig.
         bridges: between the wires and the outside, for the rig.
-        places: where hosts of this process come in, by the name of the wire.
+        places: addresses for hosts in this process, by the name of the wire.
         ports: of the lines, by the name of the wire.
 
     Raises:
         BusGone: a bus cannot be opened.
-        OSError: no port is to be had, or no link can be made.
+        OSError: no free port, or a link cannot be made.
     """
 
     def __init__(self, mounts: Iterable[Mount], plan: RealPlan | None = None) -> None:
@@ -236,10 +236,10 @@ class OutsideEnds:
         self.places[mount.name] = plan
 
     def close(self) -> None:
-        """Give everything back."""
+        """Release all resources."""
         self._stack.close()
 
 
 def _own_bus(mount: BusMount) -> BusPlan:
-    """Return a bus that nobody else has."""
+    """Return a bus of its own."""
     return BusPlan(interface=_IN_PROCESS, channel=f"{mount.name} {id(mount)}")

@@ -28,18 +28,18 @@ if TYPE_CHECKING:
     pass
 
 
-# Where the wires of real devices are.
+# Addresses of the wires of real devices.
 
 
 def _places_of(
     plan: RigPlan, hardware: HardwarePlan, mounts: Mapping[str, Mount]
 ) -> dict[str, LinePlace | BusPlan]:
-    """Return where the wires are, by name; those that nobody has told are left out.
+    """Return the addresses of the wires, by name; unknown ones are omitted.
 
     Args:
         plan: the rig file.
-        hardware: what it says of real devices.
-        mounts: such wires, which know the rate of their devices.
+        hardware: its section for real devices.
+        mounts: equivalent wires, with the rates of their devices.
     """
     places: dict[str, LinePlace | BusPlan] = dict(hardware.buses)
     for wire, port in hardware.ports.items():
@@ -53,26 +53,26 @@ def _places_of(
 T = TypeVar("T")
 
 _Begin = Callable[[int], None]
-"""Does what has waited, at a time."""
+"""An action that has waited, called with the time."""
 
 _POLL_US: Final = 5_000
-"""How often a condition is asked."""
+"""Period at which conditions are checked."""
 
 
 class HardwareMode(BenchMode):
-    """A `BenchMode` of real devices. What the rig file says of them is not made, but believed.
+    """A `BenchMode` of real devices, which the rig file describes.
 
     A device is at a port or on a bus; its operator is a human at the terminal, or the control
-    socket of an emulator that plays the device. Conditions are asked whenever something passes
-    a door, and while the bench waits.
+    socket of an emulator in place of the device. Conditions are checked on all traffic, and while
+    the bench waits.
 
     Args:
-        plan: what the rig file says, `[hardware]` included.
-        terminal: where the human is.
+        plan: content of the rig file with `[hardware]`.
+        terminal: terminal of the human.
 
     Raises:
-        ValueError: the plan does not say where the devices are, or names one that there is not.
-        PortGone: an emulator is not there.
+        ValueError: the plan has no addresses of the devices, or names an unknown device.
+        PortGone: an emulator is missing.
     """
 
     name = "hardware"
@@ -116,13 +116,13 @@ class HardwareMode(BenchMode):
         return (time.monotonic_ns() - self._begun_ns) // 1_000
 
     def request(self, do: str, **fields: Any) -> Object:
-        """Have the operator do what a control socket would; ValueError if it is refused."""
+        """Execute a request by the operator; ValueError if it is refused."""
         return self._operators.request(do, fields)
 
     def fault(
         self, owner: str, spec: FaultSpec, condition: Condition | None, for_us: int | None
     ) -> None:
-        """Have a fault made, or note that it shall be."""
+        """Start or schedule a fault by the operator."""
         text = "" if condition is None else text_of(condition)
         order = FaultOrder(spec, self.now_us, for_us, text)
         begin = self._operators.fault(owner, order)
@@ -134,33 +134,33 @@ class HardwareMode(BenchMode):
             self._look()
 
     def clear(self, owner: str, fault: str) -> None:
-        """Have a fault mended."""
+        """Clear a fault by the operator."""
         self._operators.clear(owner, fault)
 
     def switch_power(self, owner: str, *, on: bool) -> None:
-        """Have the supply of a device switched, of all if it is empty."""
+        """Switch the supply of a device, or of all if the name is empty."""
         self._operators.switch_power(owner, on=on)
 
     def observe(self, owner: str, text: str, seen: Condition, within_us: int) -> bool:
-        """Ask the human at a device whether something is seen; an emulator is looked at."""
+        """Ask the human at a device for an observation; an emulator is read."""
         answer = self._operators.sees(owner, text)
         return super().observe(owner, text, seen, within_us) if answer is None else answer
 
     def perform(self, owner: str, text: str, do: Callable[[], object]) -> None:
-        """Have something done that is more than one act."""
+        """Run an action of several steps."""
         if not self._operators.have_done(owner, text):
             do()
 
     def meanwhile(self, host: Callable[[int], object]) -> None:
-        """Let a host go on while a human is asked."""
+        """Keep a host running while a human answers."""
         self._terminal.hosts.append(host)
 
     def run_for(self, duration_us: int) -> None:
-        """Let time pass."""
+        """Advance the time."""
         self.wait_until(lambda: False, duration_us)
 
     def wait_until(self, done: Condition, within_us: int) -> bool:
-        """Let time pass until something is so; False if it was not in time."""
+        """Advance the time until a condition is true; return False after the time-out."""
         self._begin()
         until_us = self.now_us + within_us
         while True:
@@ -175,36 +175,36 @@ class HardwareMode(BenchMode):
                 time.sleep(wait_us / 1e6)
 
     def too_slow(self) -> str:
-        """Say why no failure is to be believed; empty if one is, or a human has said no."""
+        """Return why failures are not valid; empty if they are, or if a human has said no."""
         if self._operators.said_no:
             return ""
         host_us = max(self._pace.late_us, self._waits.worst_us)
         return too_slow(host=host_us, emulator=self._operators.late_us)
 
     def act(self, action: Callable[[BenchRig], T]) -> NoReturn:
-        """Refuse: there is no rig."""
+        """Raise NotOnThisBench: there is no rig."""
         raise NotOnThisBench("this works on emulated devices alone: here are real ones")
 
     def save_trace(self, path: Path) -> None:
-        """Write what passed the ports and was done by hand; OSError if it cannot be."""
+        """Write traffic and operator actions; OSError if that fails."""
         self._record.save(path)
 
     def fork(self) -> NoReturn:
-        """Refuse: real devices cannot be copied."""
+        """Raise NotOnThisBench: real devices cannot be copied."""
         raise NotOnThisBench("real devices have no twins")
 
     def close(self) -> None:
-        """Close all ports, and let the operator go."""
+        """Close all ports, and release the operator."""
         self._stack.close()
 
     def _begin(self) -> None:
-        """Give the devices their power, now that somebody hears them."""
+        """Switch the devices on, now that their traffic is received."""
         if not self._begun:
             self._begun = True
             self._operators.begin()
 
     def _look(self) -> None:
-        """Do what has waited for a condition that is true now."""
+        """Run the actions whose condition is now true."""
         self._waits.look(self.now_us)
         if self._looking:
             return
@@ -220,6 +220,6 @@ class HardwareMode(BenchMode):
 
 
 def _without_stores(plan: RigPlan) -> RigPlan:
-    """Return the plan of devices that keep nothing: real ones have their own memory."""
+    """Return the plan without store files: real devices have their own memory."""
     devices = {name: replace(device, store=None) for name, device in plan.devices.items()}
     return replace(plan, devices=devices)

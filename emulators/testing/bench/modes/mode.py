@@ -1,4 +1,4 @@
-"""What virtual time, real time and real hardware have in common for a test."""
+"""Common interface of virtual time, real time and real hardware for a test."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 Address = str | dict[str, Any]
-"""What `serial.serial_for_url` takes of a line, and by keyword `can.Bus` of a bus."""
+"""URL of a line for `serial.serial_for_url`, or options of a bus for `can.Bus`."""
 
 
 class HostDoors(Protocol):
     """Opens the wires of a bench for hosts; each wire by its name.
 
-    A wire of the other kind raises ValueError, one that is nowhere `NotOnThisBench`.
+    A wire of the other kind raises ValueError, one without an address `NotOnThisBench`.
     """
 
     def link(self, wire: str) -> Link[Any]:
@@ -55,26 +55,26 @@ class HostDoors(Protocol):
         ...
 
     def address(self, wire: str) -> Address:
-        """Return where a program opens a wire by itself."""
+        """Return the address at which a program can open a wire itself."""
         ...
 
     def close(self) -> None:
-        """Close what is open, and offer nothing any more."""
+        """Close everything open, and withdraw all names."""
 
 
 class BenchMode(ABC):
-    """Where the devices are, and how time passes.
+    """A mode: place of the devices, and passing of time.
 
-    What a mode cannot do raises `NotOnThisBench`.
+    Unsupported operations raise `NotOnThisBench`.
 
     Args:
-        rig: with the devices, or, of real devices, with such ones: it does not run then.
-        tolerance: what is still right.
+        rig: with the devices; for real devices with equivalent ones, and not running.
+        tolerance: the tolerances.
 
     Attributes:
         name: `virtual`, `real` or `hardware`.
-        tolerance: what is still right.
-        doors: where hosts come in; the first one that does lets time begin.
+        tolerance: the tolerances.
+        doors: connections for hosts; the first one starts the time.
     """
 
     name: ClassVar[str]
@@ -84,7 +84,7 @@ class BenchMode(ABC):
         self._rig, self.tolerance = rig, tolerance
 
     def _query(self, question: Callable[[BenchRig], T]) -> T:
-        """Return what the rig says; nothing is done to it."""
+        """Return a value from the rig without changing it."""
         return question(self._rig)
 
     @property
@@ -108,21 +108,21 @@ class BenchMode(ABC):
 
     @abstractmethod
     def request(self, do: str, **fields: Any) -> Object:
-        """Ask as the control socket is asked; ValueError if it is refused."""
+        """Execute a request of the control socket; ValueError if it is refused."""
 
     @abstractmethod
     def act(self, action: Callable[[BenchRig], T]) -> T:
-        """Do something to the rig between two ticks."""
+        """Run a function on the rig between two ticks."""
 
     @abstractmethod
     def fault(
         self, owner: str, spec: FaultSpec, condition: Condition | None, for_us: int | None
     ) -> None:
-        """Let a fault of a device, a wire or (empty) any come, or note that it shall."""
+        """Start or schedule a fault of a device, a wire or (empty) any of them."""
 
     @property
     def orders(self) -> Sequence[FaultOrder]:
-        """The faults that were ordered, by the rig file too, in this order."""
+        """The scheduled faults, including those of the rig file, in order."""
         return self._rig.orders
 
     def check_fault(self, owner: str, name: str) -> None:
@@ -130,95 +130,95 @@ class BenchMode(ABC):
         self._query(lambda rig: rig.state.full_fault_name(owner, name))
 
     def describe(self, owner: str) -> BenchDescription:
-        """Return what there is at a device, at all of them if it is empty."""
+        """Return inputs, outputs and faults of a device, or of all devices if the name is empty."""
         return self._query(lambda rig: rig.describe(owner))
 
     @abstractmethod
     def clear(self, owner: str, fault: str) -> None:
-        """Let a fault go, and its future too."""
+        """Clear a fault, also a scheduled one."""
 
     @abstractmethod
     def switch_power(self, owner: str, *, on: bool) -> None:
-        """Give or take the supply of a device, of all if it is empty."""
+        """Switch the supply of a device, or of all if the name is empty."""
 
     def hear(self, listener: Callable[[WireLine], None]) -> None:
-        """Tell of each line and frame from now on."""
+        """Call a listener with each line and frame from now on."""
         self._query(lambda rig: rig.journal.listeners.append(listener))
 
     def observe(self, owner: str, text: str, seen: Condition, within_us: int) -> bool:
-        """Say whether something is seen at a device, or by a human who is asked the text."""
+        """Return an observation at a device; a human is asked the text."""
         return self.wait_until(seen, within_us + self.tolerance.time_us)
 
     def perform(self, owner: str, text: str, do: Callable[[], object]) -> None:
-        """Have something done at a device: by the test itself, or by a human who is told."""
+        """Run an action at a device: by the test, or by a human who gets the text."""
         do()
 
     def meanwhile(self, host: Callable[[int], object]) -> None:  # noqa: B027 - nothing to do
-        """Let a host go on, so many microseconds at a time, while a human is asked."""
+        """Keep a host running, in steps of microseconds, while a human answers."""
 
     @abstractmethod
     def run_for(self, duration_us: int) -> None:
-        """Let time pass."""
+        """Advance the time."""
 
     @abstractmethod
     def wait_until(self, done: Callable[[], bool], within_us: int) -> bool:
-        """Let time pass until something is so; False if it was not in time."""
+        """Advance the time until a condition is true; return False after the time-out."""
 
     @abstractmethod
     def save_trace(self, path: Path) -> None:
-        """Write a trace of all that happened; OSError if it cannot be."""
+        """Write a trace of the run; OSError if that fails."""
 
     def journal(self) -> tuple[WireLine, ...]:
-        """Return the latest lines and frames, and what was done."""
+        """Return the latest lines, frames and actions."""
         return self._query(lambda rig: rig.journal.lines())
 
     def mappings(self) -> tuple[WireLine, ...]:
-        """Return the frames before the journal's which say what PDOs carry."""
+        """Return frames before the journal that define the contents of PDOs."""
         return self._query(lambda rig: rig.journal.mappings())
 
     def unfinished(self) -> tuple[WireLine, ...]:
-        """Return what has begun on serial lines and did not end."""
+        """Return incomplete lines of serial lines."""
         return self._query(lambda rig: rig.journal.unfinished())
 
     @abstractmethod
     def too_slow(self) -> str:
-        """Say why no failure is to be believed: real time was not kept; empty if it was."""
+        """Return why failures are not valid, if real time was not kept; else empty."""
 
     @abstractmethod
     def fork(self) -> BenchMode:
-        """Return a twin that goes on by itself from here."""
+        """Return a twin that continues independently."""
 
     @abstractmethod
     def close(self) -> None:
-        """Give everything back."""
+        """Release all resources."""
 
 
-# What benches of emulated devices have in common, in virtual and in real time.
+# Common part of benches of emulated devices, in virtual and in real time.
 
 POWER: Final = {"rrc_power": 1, "power_cut": 0, "power_off": 0}
-"""Inputs that are the supply of a device, each with its value while that is there."""
+"""Inputs for the supply of a device, each with its value while the supply is on."""
 
 
 class EmulatedMode(BenchMode):
-    """The part of a `BenchMode` of emulated devices that does not ask what time it is."""
+    """The part of a `BenchMode` of emulated devices that does not depend on the time."""
 
     @cached_property
     def _control(self) -> EmulatorControl:
-        """What answers requests."""
+        """The object that answers requests."""
         return EmulatorControl(self._rig)
 
     def _query(self, question: Callable[[BenchRig], T]) -> T:
         return self.act(question)
 
     def request(self, do: str, **fields: object) -> Object:
-        """Ask as the control socket is asked; ValueError if it is refused."""
+        """Execute a request of the control socket; ValueError if it is refused."""
         request = {"v": VERSION, "do": do, **fields}
         return _answer_of(self.act(lambda rig: self._control.answer(request)))
 
     def fault(
         self, owner: str, spec: FaultSpec, condition: Condition | None, for_us: int | None
     ) -> None:
-        """Let a fault come, or note that it shall."""
+        """Start or schedule a fault."""
         text = "" if condition is None else text_of(condition)
         self.act(
             lambda rig: _arm(
@@ -234,11 +234,11 @@ class EmulatedMode(BenchMode):
         )
 
     def clear(self, owner: str, fault: str) -> None:
-        """Let a fault go, and its future too."""
+        """Clear a fault, also a scheduled one."""
         self.act(lambda rig: rig.operator.clear(rig.state.full_fault_name(owner, fault)))
 
     def switch_power(self, owner: str, *, on: bool) -> None:
-        """Give or take the supply of a device, of all if it is empty."""
+        """Switch the supply of a device, or of all if the name is empty."""
         for name in [owner] if owner else self.devices:
             inputs = self._rig.state.assembly.parts[name].inputs
             found = next((item for item in POWER if item in inputs.table), None)
@@ -248,7 +248,7 @@ class EmulatedMode(BenchMode):
             self.request("set", name=full, value=POWER[found] if on else 1 - POWER[found])
 
     def save_trace(self, path: Path) -> None:
-        """Write a trace of all that happened; OSError if it cannot be."""
+        """Write a trace of the run; OSError if that fails."""
         self.act(lambda rig: rig.save_trace(path))
 
 
@@ -260,7 +260,7 @@ def _answer_of(answer: Object) -> Object:
 
 
 def _arm(rig: BenchRig, order: FaultOrder, condition: Condition | None) -> None:
-    """Let a fault come, or note that it shall."""
+    """Start or schedule a fault."""
 
     def begin() -> None:
         now_us = rig.effective_us

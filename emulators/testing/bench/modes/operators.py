@@ -1,4 +1,4 @@
-"""Who is at which real device, a human or an emulator, and what is asked of whom."""
+"""Operators of real devices, human or emulator, and their requests."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ from tickrig.wire.instant import NEVER
 # A device that is switched by commands.
 
 _SWITCH_S: Final = 30.0
-"""A command that takes longer is ended."""
+"""Time-out of a command."""
 
 
 class _PowerSwitch:
@@ -53,7 +53,7 @@ class _PowerSwitch:
         self._device, self._plan = device, plan
 
     def switch(self, *, on: bool) -> None:
-        """Give or take the supply.
+        """Switch the supply.
 
         Raises:
             BenchBlocked: the command cannot be run, failed, or did not end.
@@ -80,7 +80,7 @@ class _PowerSwitch:
         return BenchBlocked(f"{self._device} was not switched {state}: {' '.join(command)}: {why}")
 
 
-# Who sits at the terminal is told what to do, and asked what happened.
+# Requests and questions to a human at the terminal.
 
 _TERMINAL: Final = "/dev/tty"
 _POLL_US: Final = 10_000
@@ -88,15 +88,15 @@ _DONE: Final = "then press Enter (n: not done, c: cannot be done)"
 
 
 class Terminal:
-    """Asks at the terminal of this process, whatever its standard input and output are.
+    """Asks at the terminal of this process, even if standard input and output are redirected.
 
-    So tests may run with both caught. Hosts go on meanwhile.
+    So pytest may capture both. Hosts keep running while it waits.
 
     Args:
         path: of the terminal.
 
     Attributes:
-        hosts: are called in turn with microseconds while an answer is awaited.
+        hosts: called in turn with microseconds while it waits for an answer.
     """
 
     def __init__(self, path: str = _TERMINAL) -> None:
@@ -107,7 +107,7 @@ class Terminal:
         """Show a text and return the line that is typed.
 
         Raises:
-            OperatorRefused: nobody is there.
+            OperatorRefused: there is no terminal.
         """
         try:
             with open(self._path, "r+b", buffering=0) as terminal:
@@ -123,14 +123,14 @@ class Terminal:
         return line.decode("utf-8", "replace").strip()
 
     def have_done(self, text: str) -> None:
-        """Ask for something to be done.
+        """Ask for an action.
 
         Args:
-            text: what, as a sentence without its end.
+            text: the action, as a sentence without its end.
 
         Raises:
             OperatorRefused: it was not done.
-            NotOnThisBench: it cannot be done.
+            NotOnThisBench: it is impossible.
         """
         while answer := self.prompt(f"{text}, {_DONE}:").lower():
             if answer == "n":
@@ -139,7 +139,7 @@ class Terminal:
                 raise NotOnThisBench(f"the operator cannot do this: {text}")
 
     def sees(self, question: str) -> bool:
-        """Ask a question that is answered by yes or no."""
+        """Ask a yes/no question."""
         while (answer := self.prompt(f"{question} [y/n]").lower()) not in ("y", "n"):
             continue
         return answer == "y"
@@ -150,19 +150,19 @@ class Terminal:
 
 
 _HOLD_US: Final = 1_000_000
-"""Who holds a button for so long is told how long."""
+"""Shortest press whose duration is shown to the human."""
 
 
 class _HumanOperator:
-    """`DeviceOperator` of a human, who is asked in the words of the device's type.
+    """`DeviceOperator` of a human, with the texts of the device type.
 
-    What was set is remembered: nobody is asked for it again.
+    Set values are stored and not asked for again.
 
     Args:
         device: name of the device.
-        physical: such a device, for its tables; it remembers.
-        terminal: where the human is.
-        power: switches the device; the human does if there is none.
+        physical: an equivalent device, for its tables and set values.
+        terminal: terminal of the human.
+        power: switches the device; None if the human does.
     """
 
     late_us, quick = 0, False
@@ -180,7 +180,7 @@ class _HumanOperator:
         self._record = Operator(physical.inputs, physical.tick_us, EventQueue(), no_faults)
 
     def prepare(self, like: HasSignals) -> None:
-        """Switch it off, if a command can; nobody is asked to bring it anywhere."""
+        """Switch it off, if a command can; the human is not asked."""
         if self._power is not None:
             self._power.switch(on=False)
 
@@ -190,14 +190,14 @@ class _HumanOperator:
             self._power.switch(on=True)
 
     def set(self, name: str, values: tuple[Setting, ...]) -> None:
-        """Have an input set, or all inputs of a group, and held."""
+        """Ask to set and hold an input, or all inputs of a group."""
         pairs = self._record.check_set(name, *values)
         wanted = [self._wish(self._physical.inputs.table[member], value) for member, value in pairs]
         self.have_done(f"{' and '.join(wanted)}, and leave it so")
         self._record.set(name, *values)
 
     def set_all(self, values: Mapping[str, Setting]) -> None:
-        """Have several inputs set, and held, in one go."""
+        """Ask to set and hold several inputs together."""
         table = self._physical.inputs.table
         wanted = [self._wish(table[name], value) for name, value in values.items()]
         self.have_done(f"{' and '.join(wanted)}, and leave it so")
@@ -205,7 +205,7 @@ class _HumanOperator:
             self._record.set(name, value)
 
     def get(self, name: str) -> Setting:
-        """Return what an input was set to, or ask for what is seen of an output."""
+        """Return the set value of an input, or ask for the value of an output."""
         if name in self._physical.inputs.table:
             return self._physical.inputs[name]
         output = self._physical.outputs.get(name)
@@ -222,13 +222,13 @@ class _HumanOperator:
                 return value
 
     def press(self, name: str, duration_us: int) -> None:
-        """Have a button pressed and let go."""
+        """Ask to press and release a button."""
         text = self._physical.inputs.find(name, SignalType.BUTTON).text
         held = f", hold it for {duration_us / 1e6:g} s" if duration_us >= _HOLD_US else ""
         self.have_done(f"press the {text}{held} and let it go")
 
     def fault(self, spec: FaultSpec, now_us: int, for_us: int | None) -> None:
-        """Have a physical fault made; NotOnThisBench for one of the wire, or of a certain time."""
+        """Ask to make a physical fault; NotOnThisBench for a wire fault or a given time."""
         item = self._find_fault(spec.name)
         if (spec.arguments, spec.from_us, spec.to_us, for_us) != ((), 0, NEVER, None):
             raise NotOnThisBench(f"no hand makes {spec.name} at a certain time")
@@ -236,31 +236,31 @@ class _HumanOperator:
         self._record.set(spec.name, 1)
 
     def clear(self, fault: str) -> None:
-        """Have a physical fault mended."""
+        """Ask to clear a physical fault."""
         item = self._find_fault(fault)
         self.have_done(f"mend this fault: {item.text} ({item.name})")
         self._record.set(fault, 0)
 
     def sees(self, text: str) -> bool | None:
-        """Ask whether something is seen."""
+        """Ask for an observation."""
         seen = self._terminal.sees(f"{self._device}: is it so? {text}")
         self.said_no |= not seen
         return seen
 
     def have_done(self, text: str) -> bool:
-        """Have something done, told in words."""
+        """Ask for an action described in words."""
         self._terminal.have_done(f"{self._device}: {text}")
         return True
 
     def switch_power(self, *, on: bool) -> None:
-        """Switch the device, or have it switched."""
+        """Switch the device, or ask to switch it."""
         if self._power is not None:
             self._power.switch(on=on)
         else:
             self.have_done(f"switch it {'on' if on else 'off'}")
 
     def close(self) -> None:
-        """Nothing is held."""
+        """Do nothing: there are no resources."""
 
     def _find_fault(self, name: str) -> InputSignal:
         if name not in self._physical.inputs.table:
@@ -271,7 +271,7 @@ class _HumanOperator:
         return self._physical.inputs.find(name, SignalType.FAULT)
 
     def _wish(self, item: InputSignal, value: Setting) -> str:
-        """Say what an input is to become."""
+        """Return the request for the new value of an input."""
         if item.type is SignalType.FAULT:
             return f"{'make' if value else 'mend'} this fault: {item.text}"
         if item.type is SignalType.BUTTON:
@@ -280,26 +280,26 @@ class _HumanOperator:
         return f"set {item.name} ({item.text}) to {value}{unit}"
 
 
-# An emulator that plays a real device, reached by its control socket for what hands do.
+# An emulator in place of a real device, operated by its control socket.
 
 _NO_ANSWER_US: Final = round(TIMEOUT_S * 1e6)
-"""How late an emulator is that does not answer."""
+"""Delay reported for an emulator that does not answer."""
 
 _OBJECT: Final = "0x"
-"""So objects of a dictionary begin; they are new whenever the power comes."""
+"""Prefix of dictionary objects, which are reset at power-on."""
 
 
 class _EmulatorOperator:
-    """`DeviceOperator` that ask the control socket of an emulator.
+    """`DeviceOperator` that uses the control socket of an emulator.
 
     Args:
         path: of its socket.
-        plan: the device; an emulator of several has it under its name, or its node-ID.
+        plan: the device; an emulator of several devices has it under its name or node-ID.
 
     Raises:
-        PortGone: nobody is there.
-        MachineTooSlow: nobody answers.
-        ValueError: the emulator has several devices, and none of this name.
+        PortGone: there is no emulator.
+        MachineTooSlow: it does not answer.
+        ValueError: the emulator has several devices, but not this one.
     """
 
     said_no, quick = False, True
@@ -322,7 +322,7 @@ class _EmulatorOperator:
 
     @property
     def late_us(self) -> int:
-        """How late its worst step was since this was made; 0 if it is gone."""
+        """Largest delay of a step since the start; 0 if the emulator is gone."""
         try:
             late_us = self._request("status", since=self._begun_us)["late_us"]
         except MachineTooSlow:
@@ -333,9 +333,9 @@ class _EmulatorOperator:
         return late_us
 
     def prepare(self, like: HasSignals) -> None:
-        """Bring it to where a new one begins: nothing is broken, all inputs are as at the start.
+        """Reset it: clear all faults, and set all inputs to their initial values.
 
-        Its power is off then. The world around it stays: where a drive has turned to it is still.
+        Its power is then off. The physical state stays: the position of a drive is unchanged.
         """
         for name in self._wire_faults:
             self._request("clear", name=name)
@@ -351,7 +351,7 @@ class _EmulatorOperator:
         self._off_us = self._now_us
 
     def begin(self) -> None:
-        """Give it its power, when it has seen that it had none."""
+        """Switch it on after it has been without power."""
         if self._power is None:
             return
         while self._now_us < self._off_us + 2 * self._tick_us:
@@ -363,7 +363,7 @@ class _EmulatorOperator:
         self._request("set", name=self._prefix + name, value=list(values))
 
     def set_all(self, values: Mapping[str, Setting]) -> None:
-        """Nothing: `prepare` has done so."""
+        """Do nothing: `prepare` has done so."""
 
     def get(self, name: str) -> Setting:
         """Return the present value of an input or output."""
@@ -374,11 +374,11 @@ class _EmulatorOperator:
         return value
 
     def press(self, name: str, duration_us: int) -> None:
-        """Press a button and let it go."""
+        """Press and release a button."""
         self._request("press", name=self._prefix + name, duration_us=duration_us)
 
     def fault(self, spec: FaultSpec, now_us: int, for_us: int | None) -> None:
-        """Let a fault come, in the time of the emulator."""
+        """Start a fault, in the time of the emulator."""
         text = replace(spec, name=self._fault_name(spec.name)).text
         timed = (spec.from_us, spec.to_us, for_us) != (0, NEVER, None)
         if timed:
@@ -390,25 +390,25 @@ class _EmulatorOperator:
         self._request("fault", spec=text)
 
     def clear(self, fault: str) -> None:
-        """Let a fault go."""
+        """Clear a fault."""
         self._request("clear", name=self._fault_name(fault))
 
     def sees(self, text: str) -> bool | None:
-        """The emulator is to be asked."""
+        """Return None: the emulator answers."""
         return None
 
     def have_done(self, text: str) -> bool:
-        """Nobody understands it."""
+        """Return False: an emulator cannot follow words."""
         return False
 
     def switch_power(self, *, on: bool) -> None:
-        """Give or take the supply."""
+        """Switch the supply."""
         if self._power is None:
             raise NotOnThisBench("this device has no input that is its supply")
         self.set(self._power, (POWER[self._power] if on else 1 - POWER[self._power],))
 
     def close(self) -> None:
-        """Hang up."""
+        """Close the connection."""
         self._client.close()
 
     def _fault_name(self, name: str) -> str:
@@ -425,7 +425,7 @@ class _EmulatorOperator:
 
     @property
     def _power(self) -> str | None:
-        """The input that is its supply, None if there is none."""
+        """The input for its supply, None if there is none."""
         return next((name for name in POWER if self._prefix + name in self._inputs), None)
 
     @property
@@ -454,7 +454,7 @@ def _names_of(found: Object, key: str) -> frozenset[str]:
 
 
 def _prefix_of(plan: DevicePlan, names: frozenset[str], path: Path) -> str:
-    """Return what an emulator writes before the names of a device."""
+    """Return the prefix of an emulator for the names of a device."""
     owners = {name.partition("/")[0] for name in names if "/" in name}
     for name in (plan.name, str(plan.node_id)):
         if name in owners:
@@ -464,17 +464,17 @@ def _prefix_of(plan: DevicePlan, names: frozenset[str], path: Path) -> str:
     return ""
 
 
-# The hands at one real device, and the eyes on it.
+# The operator of one real device.
 
 
 class _DeviceOperator(Protocol):
-    """An operator: a human at the terminal, or an emulator that stands in for one.
+    """An operator: a human at the terminal, or the control socket of an emulator.
 
-    Names are those of the device alone, without the name of the device.
+    Names are those within the device, without its name.
 
     Attributes:
-        said_no: a human saw what should not be; that counts however late the machine was.
-        quick: does something the moment that it is to be done.
+        said_no: a human answered no; that is valid however late the machine was.
+        quick: acts without delay.
     """
 
     said_no: bool
@@ -482,14 +482,14 @@ class _DeviceOperator(Protocol):
 
     @property
     def late_us(self) -> int:
-        """How late the device was, as far as anybody knows."""
+        """Largest known delay of the device."""
         ...
 
     def prepare(self, like: HasSignals) -> None:
-        """Bring the device to where such a one begins, without its power, if that can be done."""
+        """Reset the device and switch its power off, if possible."""
 
     def begin(self) -> None:
-        """Give it its power, if `prepare` took it."""
+        """Switch it on, if `prepare` has switched it off."""
 
     def set(self, name: str, values: tuple[Setting, ...]) -> None:
         """Set an input, or all inputs of a group."""
@@ -502,27 +502,27 @@ class _DeviceOperator(Protocol):
         ...
 
     def press(self, name: str, duration_us: int) -> None:
-        """Press a button and let it go."""
+        """Press and release a button."""
 
     def fault(self, spec: FaultSpec, now_us: int, for_us: int | None) -> None:
-        """Let a fault come; its times are those of the bench, where it is `now_us`."""
+        """Start a fault; its times are those of the bench, whose time is `now_us`."""
 
     def clear(self, fault: str) -> None:
-        """Let a fault go."""
+        """Clear a fault."""
 
     def sees(self, text: str) -> bool | None:
-        """Say whether something is seen; None if the device itself is to be asked."""
+        """Return an observation; None if the device itself answers."""
         ...
 
     def have_done(self, text: str) -> bool:
-        """Have something done, told in words; False if nobody is here who understands them."""
+        """Run an action described in words; return False if the operator cannot."""
         ...
 
     def switch_power(self, *, on: bool) -> None:
-        """Give or take the supply."""
+        """Switch the supply."""
 
     def close(self) -> None:
-        """Go home."""
+        """Release all resources."""
 
 
 class Operators:
@@ -530,13 +530,13 @@ class Operators:
 
     Args:
         plan: the rig file.
-        where: what it says of real devices.
-        like: such devices, for their tables; nothing runs there.
-        terminal: where the human is.
-        journal: gets what is done.
+        where: its section for real devices.
+        like: equivalent devices, for their tables; they do not run.
+        terminal: terminal of the human.
+        journal: records the actions.
 
     Raises:
-        PortGone: an emulator that plays a device is not there.
+        PortGone: an emulator in place of a device is missing.
     """
 
     def __init__(
@@ -562,28 +562,28 @@ class Operators:
             undo.pop_all()
 
     def begin(self) -> None:
-        """Give the devices their power that were brought to where they begin."""
+        """Switch on the devices that have been reset."""
         for device in self._waiting:
             self._operators[device].begin()
         self._waiting.clear()
 
     @property
     def said_no(self) -> bool:
-        """Whether a human saw what should not be."""
+        """Whether a human answered no."""
         return any(operator.said_no for operator in self._operators.values())
 
     @property
     def late_us(self) -> int:
-        """How late the worst of the devices was."""
+        """Largest delay of the devices."""
         return max((operator.late_us for operator in self._operators.values()), default=0)
 
     def close(self) -> None:
-        """Let all go."""
+        """Release all operators."""
         for operator in self._operators.values():
             operator.close()
 
     def request(self, do: str, fields: dict[str, Any]) -> Object:
-        """Have done what a control socket would; ValueError if it is refused."""
+        """Execute a request of a control socket; ValueError if it is refused."""
         match do:
             case "set":
                 self._set(fields["name"], fields["value"])
@@ -614,11 +614,11 @@ class Operators:
         return self._operator_at(device).get(signal)
 
     def fault(self, owner: str, order: FaultOrder) -> Callable[[int], None]:
-        """Return what has a fault made, at a time of the bench.
+        """Return an action that makes a fault at a time of the bench.
 
         Args:
             owner: a device or wire, empty for any.
-            order: the fault, which gets its full name; one that waits is no good a moment later.
+            order: the fault, which gets its full name; one with a condition must act at once.
         """
         name = self._like.state.full_fault_name(owner, order.spec.name)
         spec = order.spec = replace(order.spec, name=name)
@@ -639,7 +639,7 @@ class Operators:
         return begin
 
     def clear(self, owner: str, fault: str) -> None:
-        """Have a fault mended."""
+        """Clear a fault."""
         name = self._like.state.full_fault_name(owner, fault)
         device, bare = self._fault_owner(name)
         self._operator_at(device).clear(bare)
@@ -647,7 +647,7 @@ class Operators:
         self._journal.note(device, f"{bare}=0", **({bare: 0} if is_input else {}))
 
     def switch_power(self, owner: str, *, on: bool) -> None:
-        """Have the supply of a device switched, of all if it is empty."""
+        """Switch the supply of a device, or of all if the name is empty."""
         for device in [owner] if owner else self._plan.devices:
             self._operator_at(device).switch_power(on=on)
             if device in self._waiting:  # the test says itself what it is to have
@@ -666,7 +666,7 @@ class Operators:
         return None
 
     def have_done(self, owner: str, text: str) -> bool:
-        """Tell the human at a device, or the first that there is; False if there is none."""
+        """Show a text to the human at a device, or the first one; return False if there is none."""
         for device in [owner] if owner else self._plan.devices:
             if self._operator_at(device).have_done(text):
                 self._journal.note(device, f"done: {text}")
@@ -674,7 +674,7 @@ class Operators:
         return False
 
     def _start(self, device: str, operator: _DeviceOperator) -> None:
-        """Have the inputs as the rig file has them at the start; nobody's hand plays a signal."""
+        """Set the initial inputs of the rig file; operators cannot play signals."""
         start = self._plan.devices[device].start
         values = {key: each for key, each in start.items() if not isinstance(each, SignalSpec)}
         if values:
@@ -703,7 +703,7 @@ class Operators:
         return device, name.removeprefix(f"{device}/")
 
     def _fault_owner(self, name: str) -> tuple[str, str]:
-        """Return who can make a fault, and its name there."""
+        """Return the operator that can make a fault, and its name there."""
         if name not in self._like.state.faults.fault_types:
             return self._owner(name)
         wire, _, bare = name.rpartition("/")
@@ -715,5 +715,5 @@ class Operators:
 
     def _operator_at(self, device: str) -> _DeviceOperator:
         if device not in self._operators:
-            raise NotOnThisBench(f"nobody here is at {device}")
+            raise NotOnThisBench(f"there is no operator of {device}")
         return self._operators[device]

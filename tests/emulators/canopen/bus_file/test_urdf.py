@@ -77,7 +77,7 @@ def test_joints_that_have_a_device_are_read_with_limits_and_reduction() -> None:
         ("-80", "$(arg r)", "14: shoulder: '$(arg r)' is no number: xacro a.urdf.xacro > a.urdf"),
         (" 3 ", "300", "18: node_id '300' is not 1..127"),
         ('"slide" type', '"slid" type', "19: joint 'slide': the robot has no joint of this name"),
-        ('"prismatic"', '"planar"', "8: joint 'slide': type 'planar' is none of revolute"),
+        ('"prismatic"', '"planar"', "8: joint 'slide': type 'planar' is not one of revolute"),
         ('<link name="base"/>', '<xacro:include filename="a"/>', "3: <xacro:include> is not exp"),
         ("robot", "model", "2: <model> is no <robot>"),
         ("</robot>", "", "is no XML: no element found"),

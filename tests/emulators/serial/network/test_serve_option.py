@@ -93,7 +93,7 @@ def test_a_port_open_to_others_is_warned_of_in_a_line() -> None:
     result = CliRunner().invoke(rrc_emu, words.split(), input="0.02 end\n")
     number = result.stdout.splitlines()[0].rpartition(":")[2]
     assert result.stderr.splitlines()[0] == (
-        f"Whoever reaches port {number} of 0.0.0.0 can drive this device: there is no password."
+        f"Anyone who reaches port {number} of 0.0.0.0 can drive this device: there is no password."
         " Leave out the host to serve this machine alone."
     )
 

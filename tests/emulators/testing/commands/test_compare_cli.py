@@ -150,7 +150,7 @@ def test_one_byte_is_found_with_its_line(tmp_path: Path) -> None:
     trace = (tmp_path / "t").read_text().splitlines()
     number = next(n for n, line in enumerate(trace, 1) if "Version" in line)
     first, recorded, emulated = result.stdout.splitlines()[:3]
-    assert f"({tmp_path}/t:{number}): the emulator says something else" in first
+    assert f"({tmp_path}/t:{number}): the emulator answers differently" in first
     assert recorded.startswith("  recorded < Version 1.1  at 0.0")
     assert emulated.startswith("  emulated < Version 1.0  at 0.0")
     assert "\ndifferent: 1 of " in result.stdout

@@ -214,7 +214,7 @@ def test_a_command_that_fails_says_nothing_of_the_device(bench_of: BenchOf, tmp_
         (lambda bench: bench.get("nothing"), "no input or output 'nothing'; known: "),
         (lambda bench: bench.press("state"), "no button 'state'; known: .*power_button"),
         (lambda bench: bench.fault("smoke"), "no fault 'smoke'; known: .*cut"),
-        (lambda bench: bench.can_bus(), "nobody has said where rrc is"),
+        (lambda bench: bench.can_bus(), "no address of rrc is given"),
     ],
 )
 def test_what_cannot_be_is_told(bench_of: BenchOf, act, text: str) -> None:  # type: ignore[no-untyped-def]
