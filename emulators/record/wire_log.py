@@ -82,11 +82,11 @@ class WireLog:
         logs = self._splitters.values()
         if any(isinstance(each, FrameLog) and each.ends_by_time for each in logs):
             self._wake = partial(rig.event_queue.wake, ("silence", name))
-            rig.watchers.append(self._end_silent)
+            rig.watchers.append(self.end_silent)
 
     def hear(self, at_us: int, mark: Mark, data: bytes) -> None:
         """Add traffic, in chunks of any size."""
-        self._end_silent(at_us)
+        self.end_silent(at_us)
         splitter = self._splitters[mark]
         if isinstance(splitter, FrameLog):
             for line in splitter(at_us, data):
@@ -100,7 +100,7 @@ class WireLog:
             begun = begun[begun.find(line) + len(line) :].lstrip(_LINE_ENDS)
         self._begun[mark] = at_us, begun
 
-    def _end_silent(self, at_us: int) -> None:
+    def end_silent(self, at_us: int) -> None:
         """Add frames that a silence has ended, at the time of their last byte."""
         for mark, splitter in self._splitters.items():
             if isinstance(splitter, FrameLog) and splitter.due_us <= at_us:

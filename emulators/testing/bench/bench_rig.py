@@ -146,6 +146,12 @@ class Journal(WireLog):
         for source, log in self._logs:
             log.follow(rig, source)
 
+    def end_silent(self, at_us: int) -> None:
+        """Take frames that a silence has ended."""
+        super().end_silent(at_us)
+        for _, log in self._logs:
+            log.end_silent(at_us)
+
     def unfinished(self, *, by_gap: bool = False) -> tuple[WireLine, ...]:
         """Return what has begun on serial lines and did not end, by the time of its last byte."""
         found = [

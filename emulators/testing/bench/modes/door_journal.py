@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 from weakref import WeakSet
 
+from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.testing.bench.bench_rig import Journal
 from tickrig.emulators.testing.bench.modes.door_watch import DoorWatch, HostPace, Seen
 from tickrig.emulators.testing.bench.mounts import LineMount, Mount
@@ -125,6 +126,16 @@ class DoorJournal(Journal):
             for name, value in changes.items():
                 self.record.changed(device, name, value)
             self.add(self._now_us(), Mark.PHYSICAL, text.encode(), device)
+
+    def lines(self) -> tuple[WireLine, ...]:
+        """Return what is kept; a silence that is over has ended a frame."""
+        self.look()
+        return super().lines()
+
+    def look(self) -> None:
+        """Take frames that a silence has ended: no rig stops there."""
+        with self._lock:
+            self.end_silent(self._now_us())
 
     def _splitting(self, mount: LineMount) -> Callable[[int, Mark, bytes], None]:
         return self.of_line(mount.name, mount.settings.splitter)

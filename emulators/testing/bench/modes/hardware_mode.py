@@ -88,7 +88,9 @@ class HardwareMode(BenchMode):
         self._looking = self._begun = False
         mounts = like.state.mounts
         self._record = PortRecord(plan, mounts, lambda: self.now_us)
-        journal = like.journal = DoorJournal(lambda: self.now_us, self._look, self._record)
+        self._journal = journal = like.journal = DoorJournal(
+            lambda: self.now_us, self._look, self._record
+        )
         places = _places_of(plan, self._where, mounts)
         self.doors = Doors(
             places, lambda wire: journal.watch(mounts[wire], self._pace), self._begin
@@ -165,6 +167,7 @@ class HardwareMode(BenchMode):
         until_us = self.now_us + within_us
         while True:
             left_us = until_us - self.now_us
+            self._journal.look()
             self._look()
             if done():
                 return True

@@ -12,6 +12,8 @@ from can.interfaces.virtual import VirtualBus
 from tests.emulators.testing.bench.modes.hardware.plans import Answers
 from tickrig import Bench, NotOnThisBench
 from tickrig.emulators.canopen.faults import NODE_FAULTS
+from tickrig.emulators.record.frames import by_gap
+from tickrig.emulators.testing.bench.modes.door_journal import DoorJournal, PortRecord
 from tickrig.emulators.testing.rig_file.plan import (
     BusPlan,
     DeviceKind,
@@ -21,6 +23,7 @@ from tickrig.emulators.testing.rig_file.plan import (
     WirePlan,
     WireType,
 )
+from tickrig.host.text.trace import Mark
 from tickrig.wire.can import CanFrame
 
 BUS = BusPlan(interface="virtual", channel="doors")
@@ -75,6 +78,22 @@ def test_a_physical_fault_of_a_real_node_is_asked_of_a_human() -> None:
     with Bench.of_plan(PLAN, "hardware", human) as bench:
         bench["drive"].fault("power_off")
     assert human.asked[0].startswith("drive: make this fault: its supply is cut (power_off)")
+
+
+def test_at_a_real_port_the_last_frame_ends_by_the_gap() -> None:
+    now_us, heard = [0], list[bytes]()
+    record = PortRecord(PLAN, {}, lambda: now_us[0])
+    journal = DoorJournal(lambda: now_us[0], lambda: None, record)
+    journal.listeners.append(lambda line: heard.append(line.data))
+    hear = journal.of_line("line", by_gap("2ms"))
+    hear(1_000, Mark.FROM_DEVICE, b"\x01\x02")
+    now_us[0] = 2_000
+    assert [line.data for line in journal.lines()] == [b"0102"]
+    assert heard == []  # it may go on
+    now_us[0] = 3_000
+    journal.look()
+    assert heard == [b"0102"]
+    assert [line.data for line in journal.lines()] == [b"0102"]
 
 
 def told(bench: Bench) -> list[str]:
