@@ -33,7 +33,7 @@ from tickrig.host.text.names import near
 from tickrig.host.text.page_text import json_text, one_line
 
 
-class CheckState(StrEnum):
+class _CheckState(StrEnum):
     """What a check found.
 
     Attributes:
@@ -48,7 +48,7 @@ class CheckState(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class CheckRow:
+class _CheckRow:
     """A row of the table.
 
     Attributes:
@@ -60,14 +60,14 @@ class CheckRow:
     """
 
     name: str
-    state: CheckState
+    state: _CheckState
     found: str
     do: str = ""
     needed: bool = False
 
 
-_Rows = Iterator[CheckRow]
-OK, NOTE, MISSING = CheckState
+_Rows = Iterator[_CheckRow]
+_OK, _NOTE, _MISSING = _CheckState
 
 # Python, tickrig and its packages.
 
@@ -83,20 +83,20 @@ def _python() -> _Rows:
     found = f"{platform.python_version()}, {sys.executable}"
     here = sys.version_info[:2]
     if here < _LEAST:
-        yield CheckRow("python", MISSING, found, "install Python 3.11 or newer", needed=True)
+        yield _CheckRow("python", _MISSING, found, "install Python 3.11 or newer", needed=True)
     elif here > _TESTED:
-        yield CheckRow("python", NOTE, found, "tested are 3.11, 3.12 and 3.13", needed=True)
+        yield _CheckRow("python", _NOTE, found, "tested are 3.11, 3.12 and 3.13", needed=True)
     else:
-        yield CheckRow("python", OK, found, needed=True)
+        yield _CheckRow("python", _OK, found, needed=True)
 
 
 def _build() -> _Rows:
     if compiled:
-        yield CheckRow("compiled", OK, f"{__version__}, compiled")
+        yield _CheckRow("compiled", _OK, f"{__version__}, compiled")
     else:
-        yield CheckRow(
+        yield _CheckRow(
             "compiled",
-            NOTE,
+            _NOTE,
             f"{__version__}, not compiled" + ", kernel in C" * kernel,
             "drives run 3 to 5 times as fast compiled: docs/howto/compiled.md",
         )
@@ -108,7 +108,7 @@ def _packages() -> _Rows:
         lines = requires("tickrig") or []
     except PackageNotFoundError:
         do = "pip install tickrig, else nobody knows which packages it needs"
-        yield CheckRow("packages", NOTE, "runs from a folder, not installed", do)
+        yield _CheckRow("packages", _NOTE, "runs from a folder, not installed", do)
         return
     extras: dict[str, list[str]] = {"": []}
     for line in lines:
@@ -126,7 +126,7 @@ def _packages() -> _Rows:
             yield _package_row(extra, wanted)
 
 
-def _package_row(extra: str, wanted: Sequence[str]) -> CheckRow:
+def _package_row(extra: str, wanted: Sequence[str]) -> _CheckRow:
     """Return a row of packages that belong together."""
     name = f"extra {extra}" if extra else "packages"
     command = f"pip install 'tickrig[{extra}]'" if extra else "pip install --upgrade tickrig"
@@ -144,8 +144,8 @@ def _package_row(extra: str, wanted: Sequence[str]) -> CheckRow:
         else:
             found.append(f"{package} {installed}")
     if lacking:
-        return CheckRow(name, MISSING, "; ".join([*lacking, *found]), command, needed=not extra)
-    return CheckRow(name, OK, ", ".join(found), needed=not extra)
+        return _CheckRow(name, _MISSING, "; ".join([*lacking, *found]), command, needed=not extra)
+    return _CheckRow(name, _OK, ", ".join(found), needed=not extra)
 
 
 def _numbers(text: str) -> tuple[int, ...]:
@@ -178,18 +178,18 @@ def _terminals() -> _Rows:
     """Look for pseudo-terminals, where emulators are in real time."""
     if sys.platform == "win32":
         do = "emulators in real time run in WSL or a container: docs/howto/windows.md"
-        yield CheckRow("terminals", NOTE, "Windows has no pseudo-terminals", do)
+        yield _CheckRow("terminals", _NOTE, "Windows has no pseudo-terminals", do)
         return
     try:
         ends = os.openpty()
     except OSError as error:
         do = "mount devpts: emulators in real time are at pseudo-terminals"
-        yield CheckRow("terminals", MISSING, error.strerror or str(error), do, needed=True)
+        yield _CheckRow("terminals", _MISSING, error.strerror or str(error), do, needed=True)
         return
     path = os.ttyname(ends[1])
     for end in ends:
         os.close(end)
-    yield CheckRow("terminals", OK, f"pseudo-terminals, as {path}", needed=True)
+    yield _CheckRow("terminals", _OK, f"pseudo-terminals, as {path}", needed=True)
 
 
 def _group() -> _Rows:
@@ -204,31 +204,33 @@ def _group() -> _Rows:
             continue
         if os.geteuid() == 0 or number in (os.getegid(), *os.getgroups()):
             is_root = "you are root" if os.geteuid() == 0 else "you are in it"
-            yield CheckRow(f"group {name}", OK, is_root)
+            yield _CheckRow(f"group {name}", _OK, is_root)
         else:
             do = f"sudo usermod -aG {name} $USER, then log in again"
-            yield CheckRow(f"group {name}", MISSING, "it may open serial ports; you may not", do)
+            yield _CheckRow(f"group {name}", _MISSING, "it may open serial ports; you may not", do)
         return
-    yield CheckRow("group dialout", NOTE, "there is no such group; look at `ls -l /dev/tty*`")
+    yield _CheckRow("group dialout", _NOTE, "there is no such group; look at `ls -l /dev/tty*`")
 
 
 def _socketcan() -> _Rows:
     if sys.platform != "linux":
-        yield CheckRow("socketcan", MISSING, "it is part of Linux", 'use "udp_multicast", or slcan')
+        yield _CheckRow(
+            "socketcan", _MISSING, "it is part of Linux", 'use "udp_multicast", or slcan'
+        )
         return
     try:
         socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW).close()
     except OSError as error:
-        yield CheckRow("socketcan", MISSING, error.strerror or str(error), _NO_SOCKETCAN)
+        yield _CheckRow("socketcan", _MISSING, error.strerror or str(error), _NO_SOCKETCAN)
         return
     names = [path.name for path in sorted(_NET.glob("*")) if _read(path / "type") == _CAN]
     shown = [f"{name} ({'up' if _is_up(name) else 'down'})" for name in names]
     down = [name for name in names if not _is_up(name)]
     if down:
         do = f"sudo ip link set {down[0]} up type can bitrate 500000 (of a vcan: without type)"
-        yield CheckRow("socketcan", NOTE, ", ".join(shown), do)
+        yield _CheckRow("socketcan", _NOTE, ", ".join(shown), do)
     else:
-        yield CheckRow("socketcan", OK, ", ".join(shown) or "no interface yet")
+        yield _CheckRow("socketcan", _OK, ", ".join(shown) or "no interface yet")
 
 
 def _is_up(name: str) -> bool:
@@ -247,14 +249,14 @@ def _vcan() -> _Rows:
         return
     modules = Path("/lib/modules") / platform.release()
     if Path("/sys/module/vcan").is_dir():
-        yield CheckRow("vcan", OK, "the module is loaded")
+        yield _CheckRow("vcan", _OK, "the module is loaded")
     elif "/vcan.ko" in _read(modules / "modules.builtin"):
-        yield CheckRow("vcan", OK, "built into the kernel")
+        yield _CheckRow("vcan", _OK, "built into the kernel")
     elif "/vcan.ko" in _read(modules / "modules.dep"):
-        yield CheckRow("vcan", NOTE, "the module is there and not loaded", _MODPROBE)
+        yield _CheckRow("vcan", _NOTE, "the module is there and not loaded", _MODPROBE)
     else:
         found = f"no module for {platform.release()}"
-        yield CheckRow("vcan", MISSING, found, _NO_SOCKETCAN)
+        yield _CheckRow("vcan", _MISSING, found, _NO_SOCKETCAN)
 
 
 def _guests() -> _Rows:
@@ -269,12 +271,12 @@ def _guests() -> _Rows:
     ):
         if path is None:
             do = f"only for tools/with-vcan: sudo apt-get install {packages}"
-            yield CheckRow(name, MISSING, "for SocketCAN in a guest", do)
+            yield _CheckRow(name, _MISSING, "for SocketCAN in a guest", do)
         elif name == "qemu" and not os.access("/dev/kvm", os.R_OK | os.W_OK):
             do = "/dev/kvm cannot be opened: a guest is about 20 times slower"
-            yield CheckRow(name, NOTE, path, do)
+            yield _CheckRow(name, _NOTE, path, do)
         else:
-            yield CheckRow(name, OK, path)
+            yield _CheckRow(name, _OK, path)
 
 
 # What is plugged in.
@@ -290,12 +292,12 @@ def _serial_ports() -> _Rows:
         found = f"{port.device} {shown}".rstrip() + about
         if sys.platform != "win32" and not os.access(port.device, os.R_OK | os.W_OK):
             do = "you may not open it: see the row of the group"
-            yield CheckRow("serial port", MISSING, found, do)
+            yield _CheckRow("serial port", _MISSING, found, do)
         else:
-            yield CheckRow("serial port", OK, found)
+            yield _CheckRow("serial port", _OK, found)
     if not ports:
         do = "plug an adapter in; emulators need none"
-        yield CheckRow("serial port", NOTE, "none found", do)
+        yield _CheckRow("serial port", _NOTE, "none found", do)
 
 
 _ADAPTERS: Final = """
@@ -324,15 +326,15 @@ def _can_adapters() -> _Rows:
         )
     except subprocess.TimeoutExpired:
         found = f"the drivers of python-can do not answer within {_ADAPTER_S:g} s"
-        yield CheckRow("can adapter", NOTE, found)
+        yield _CheckRow("can adapter", _NOTE, found)
         return
     last = done.stdout.decode("utf-8", "replace").strip().rpartition("\n")[2]
     adapters = json.loads(last or "[]")
     for interface, channel in adapters:
-        yield CheckRow("can adapter", OK, f"{interface} {channel}")
+        yield _CheckRow("can adapter", _OK, f"{interface} {channel}")
     if not adapters:
         do = "adapters of SocketCAN and slcan are in the rows above; emulators need none"
-        yield CheckRow("can adapter", NOTE, "none found by the drivers of python-can", do)
+        yield _CheckRow("can adapter", _NOTE, "none found by the drivers of python-can", do)
 
 
 # How well this machine keeps time.
@@ -356,13 +358,13 @@ def _jitter() -> _Rows:
     middle, most, worst = late_us[_WAITS // 2], late_us[_WAITS * 99 // 100], late_us[-1]
     found = f"of {_WAITS} wake-ups the median is {middle} us late, 99 % {most} us, worst {worst} us"
     if most <= _GOOD_US:
-        yield CheckRow("real time", OK, found)
+        yield _CheckRow("real time", _OK, found)
     elif most <= _FAIR_US:
         do = "CANopen nodes tick each 1 ms and are late at times; end other programs"
-        yield CheckRow("real time", NOTE, found, do)
+        yield _CheckRow("real time", _NOTE, found, do)
     else:
         do = "test in virtual time here; in real time, end other programs or take another machine"
-        yield CheckRow("real time", NOTE, found, do)
+        yield _CheckRow("real time", _NOTE, found, do)
 
 
 # All of it.
@@ -392,22 +394,22 @@ _PROBES: Final = (
 )
 
 
-def _rows_of(probe: _Probe) -> list[CheckRow]:
+def _rows_of(probe: _Probe) -> list[_CheckRow]:
     """Return what a probe finds; one that takes too long, or fails, has a row that says so."""
-    rows: list[CheckRow] = []
+    rows: list[_CheckRow] = []
 
     def look() -> None:
         try:
             rows.extend(probe.look())
         except Exception as error:  # a probe of foreign drivers may raise anything
             why = f"{type(error).__name__}: {error}"
-            rows.append(CheckRow(probe.name, NOTE, f"the check failed: {why}"))
+            rows.append(_CheckRow(probe.name, _NOTE, f"the check failed: {why}"))
 
     thread = Thread(target=look, daemon=True)
     thread.start()
     thread.join(probe.within_s)
     if thread.is_alive():
-        return [CheckRow(probe.name, NOTE, f"no answer within {probe.within_s:g} s")]
+        return [_CheckRow(probe.name, _NOTE, f"no answer within {probe.within_s:g} s")]
     return rows
 
 
@@ -424,7 +426,7 @@ def run_doctor(*, as_json: bool, needs: Sequence[str]) -> int:
             raise Refused(f"--need: no check {need!r}; {near(need, names)}")
     wanted = {*needs, *(f"extra {need}" for need in needs)}
     rows = [
-        CheckRow(row.name, row.state, row.found, row.do, row.needed or row.name in wanted)
+        _CheckRow(row.name, row.state, row.found, row.do, row.needed or row.name in wanted)
         for row in rows
     ]
     lacking = list(dict.fromkeys(name for name in names if _lacks(rows, name, name in wanted)))
@@ -444,9 +446,9 @@ def run_doctor(*, as_json: bool, needs: Sequence[str]) -> int:
     return bool(lacking)
 
 
-def _lacks(rows: Sequence[CheckRow], name: str, is_wanted: bool) -> bool:
+def _lacks(rows: Sequence[_CheckRow], name: str, is_wanted: bool) -> bool:
     """Say whether a needed check found nothing; of several ports one is enough."""
     states = [row.state for row in rows if row.name == name and row.needed]
     if is_wanted and name in ("serial port", "can adapter"):
-        return OK not in states
-    return bool(states) and all(state is MISSING for state in states)
+        return _OK not in states
+    return bool(states) and all(state is _MISSING for state in states)

@@ -49,7 +49,7 @@ else:  # POSIX
     real_mode = LazyModule("tickrig.emulators.testing.bench.modes.real_mode")
 
 
-class Transcript(str):
+class BenchTranscript(str):
     """What happened on a bench: a text, which Jupyter shows line by line."""
 
     __slots__ = ()
@@ -526,7 +526,7 @@ class Bench(BenchDevice, Closing):
             return self._mode.patched_time()
         return nullcontext(time)
 
-    def transcript(self) -> Transcript:
+    def transcript(self) -> BenchTranscript:
         """Return the latest lines and frames, and what was done: time, where, direction, text.
 
         10,000 are kept; a line above them says how many came before.
@@ -534,7 +534,7 @@ class Bench(BenchDevice, Closing):
         Returns:
             A text; Jupyter shows it line by line.
         """
-        return Transcript(text_of(self._mode.journal()))
+        return BenchTranscript(text_of(self._mode.journal()))
 
     def trace(self) -> BenchRecording:
         """Return what `save_trace` saves, to look at it: `bench.trace().to_pandas()`.

@@ -14,7 +14,8 @@ from click.testing import CliRunner
 
 from tickrig.emulators.commands import doctor
 from tickrig.emulators.commands.cli import main
-from tickrig.emulators.commands.doctor import CheckRow, CheckState
+from tickrig.emulators.commands.doctor import _CheckRow as CheckRow
+from tickrig.emulators.commands.doctor import _CheckState as CheckState
 
 PAGE = Path(__file__).parents[3] / "docs/howto/doctor.md"
 
