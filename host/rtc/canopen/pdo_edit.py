@@ -143,7 +143,7 @@ def switched(pdo: PdoDescription) -> PdoDescription:
 # Scripts.
 
 
-class PdoRefused(SdoFailed):
+class _PdoRefused(SdoFailed):
     """A PDO that a node did not take.
 
     Attributes:
@@ -191,11 +191,11 @@ def _optional(index: int, sub: int, file: definition.DeviceFile) -> Script[int]:
         return 0
 
 
-def rewrite_pdos(before: Pdos, wanted: Pdos, file: definition.DeviceFile) -> Script[None]:
+def _rewrite_pdos(before: Pdos, wanted: Pdos, file: definition.DeviceFile) -> Script[None]:
     """Write PDOs and read them back; if the node refuses one, all have their old values again.
 
     Raises:
-        PdoRefused: the node refused something, does not answer, or keeps other values.
+        _PdoRefused: the node refused something, does not answer, or keeps other values.
     """
     begun = list[int]()
     try:
@@ -213,9 +213,9 @@ def rewrite_pdos(before: Pdos, wanted: Pdos, file: definition.DeviceFile) -> Scr
                 yield from _write(index, wanted[index], before[index])
         except SdoFailed as again:
             text = f"{why}; the old values are written when it boots ({_why(again)})"
-            raise PdoRefused(text, error.index, error.sub, restored=False) from error
+            raise _PdoRefused(text, error.index, error.sub, restored=False) from error
         text = f"{why}; the old values are back"
-        raise PdoRefused(text, error.index, error.sub, restored=True) from error
+        raise _PdoRefused(text, error.index, error.sub, restored=True) from error
 
 
 def _why(error: SdoFailed) -> str:
@@ -303,14 +303,14 @@ class Rewrite:
 
     def failed(self, failure: Failure | str) -> None:
         """Set the node up as it was."""
-        if not isinstance(failure, PdoRefused) or failure.restored:
+        if not isinstance(failure, _PdoRefused) or failure.restored:
             self._node.entry = replace(self._node.entry, pdos=self._pdos)
         self._boot()
 
     def _script(self) -> Script[None]:
         if self._node.nmt_state is NmtState.OPERATIONAL:
             yield from self._node.operations.leave_operational()
-        yield from rewrite_pdos(self._before, self._wanted, self._node.file)
+        yield from _rewrite_pdos(self._before, self._wanted, self._node.file)
 
     def _keep(self, there: Pdos, values: Pdos) -> None:
         """Let each boot of the node write these values in place of others."""

@@ -14,8 +14,8 @@ from textual.containers import Container
 from tickrig.host.cli.messages import Refused
 from tickrig.host.control.requests import Object
 from tickrig.host.rtc.commands.request import request_system
-from tickrig.host.rtc.editor.picture_view import PictureView
 from tickrig.host.rtc.editor.system_link import SystemLink
+from tickrig.host.rtc.editor.system_picture import SystemPicture
 from tickrig.host.rtc.editor.widgets import ChoiceScreen, CursorRow, CursorView, QuestionScreen
 from tickrig.host.rtc.system.dot import boxes_and_edges
 from tickrig.host.rtc.system.system_file import file_format
@@ -33,7 +33,7 @@ _GOOD: Final = "green"
 _MOVES: Final = ("activate", "deactivate", "reset")
 
 
-class Setting(NamedTuple):
+class _Setting(NamedTuple):
     """A row of the details.
 
     Attributes:
@@ -49,7 +49,7 @@ class Setting(NamedTuple):
     peer: str = ""
 
 
-def detail_rows(component: Any, port: str = "") -> list[CursorRow[Setting]]:
+def _detail_rows(component: Any, port: str = "") -> list[CursorRow[_Setting]]:
     """Return what the details show of a component.
 
     Args:
@@ -59,7 +59,7 @@ def detail_rows(component: Any, port: str = "") -> list[CursorRow[Setting]]:
     rows = list(_connector_rows(component, port)) if port else []
     configuration = component["configuration"]
     if not configuration["parameters"]:
-        rows.append(CursorRow("none", plain("no configuration parameters", _DIM), Setting()))
+        rows.append(CursorRow("none", plain("no configuration parameters", _DIM), _Setting()))
     for one in configuration["parameters"]:
         allowed = f"  [{one['constraint']}]" if one["constraint"] else ""
         line: Line = (
@@ -67,35 +67,37 @@ def detail_rows(component: Any, port: str = "") -> list[CursorRow[Setting]]:
             (f"{one['value']} {one['unit']}".rstrip(), "bold"),
             (allowed, _DIM),
         )
-        rows.append(CursorRow(f"holds {one['name']}", line, Setting("", one["name"], one["value"])))
+        rows.append(
+            CursorRow(f"holds {one['name']}", line, _Setting("", one["name"], one["value"]))
+        )
     for set_id, values in configuration["sets"].items() if configuration["parameters"] else ():
         active = set_id == configuration["active"]
         mark = ("  active", _GOOD) if active else ("", "")
         rows.append(
-            CursorRow(f"set {set_id}", (("set ", _DIM), (set_id, "bold"), mark), Setting(set_id))
+            CursorRow(f"set {set_id}", (("set ", _DIM), (set_id, "bold"), mark), _Setting(set_id))
         )
         for name, value in values.items():
             line = (f"  {name} = ", ""), (value, "bold")
-            rows.append(CursorRow(f"set {set_id} {name}", line, Setting(set_id, name, value)))
+            rows.append(CursorRow(f"set {set_id} {name}", line, _Setting(set_id, name, value)))
     return rows
 
 
-def _connector_rows(component: Any, port: str) -> Iterator[CursorRow[Setting]]:
+def _connector_rows(component: Any, port: str) -> Iterator[CursorRow[_Setting]]:
     described = next((one for one in component["ports"] if one["name"] == port), None)
     if described is None:
         return
     data_type = described["data_type"].removeprefix("IDL:").removesuffix(":1.0")
     head = described["kind"], data_type.removeprefix("RTC/")
-    yield CursorRow("port", ((" ".join(head).rstrip(), _DIM),), Setting())
+    yield CursorRow("port", ((" ".join(head).rstrip(), _DIM),), _Setting())
     for interface in described["interfaces"]:
         text = f"{interface['polarity'].lower()} {interface['name']} ({interface['type']})"
-        yield CursorRow(f"interface {interface['name']}", plain(text, _DIM), Setting())
+        yield CursorRow(f"interface {interface['name']}", plain(text, _DIM), _Setting())
     for connector in described["connectors"]:
         peer = next((one for one in connector["ports"] if one != port), port)
         kind = connector["properties"].get("dataport.subscription_type", "")
         lost = "  lost" if connector.get("state") == "lost" else ""
         line: Line = (("with ", _DIM), (peer, _GOOD), (f"  {kind}", _DIM), (lost, _ALARM))
-        yield CursorRow(f"connector {peer}", line, Setting(peer=peer))
+        yield CursorRow(f"connector {peer}", line, _Setting(peer=peer))
 
 
 class SystemScreen(FramedApp):
@@ -112,13 +114,13 @@ class SystemScreen(FramedApp):
         (120, "-wide"),
     ]
     CSS = """
-    PictureView, #details { border: round $secondary; }
-    PictureView:focus, #details:focus { border: round $accent; }
+    SystemPicture, #details { border: round $secondary; }
+    SystemPicture:focus, #details:focus { border: round $accent; }
     #panes { height: 1fr; }
-    PictureView { height: 2fr; }
+    SystemPicture { height: 2fr; }
     #details { height: 1fr; min-height: 5; max-height: 12; }
     .-wide #panes { layout: horizontal; }
-    .-wide PictureView { width: 1fr; height: 100%; }
+    .-wide SystemPicture { width: 1fr; height: 100%; }
     .-wide #details { width: 38; height: 100%; max-height: 100%; }
     #status { height: 1; background: $boost; }
     """
@@ -136,7 +138,7 @@ class SystemScreen(FramedApp):
     def __init__(self, link: SystemLink, name: str) -> None:
         super().__init__()
         self._link, self._socket = link, name
-        self.view, self.details = PictureView(), CursorView[Setting]("details")
+        self.view, self.details = SystemPicture(), CursorView[_Setting]("details")
         self.status = LineView("status")
 
     def compose(self) -> ComposeResult:
@@ -162,7 +164,7 @@ class SystemScreen(FramedApp):
         self.view.offer(*boxes_and_edges(components))
         self._frame()
         component = self._component()
-        self.details.offer([] if component is None else detail_rows(component, self.view.port))
+        self.details.offer([] if component is None else _detail_rows(component, self.view.port))
         active = sum(one["state"] == "ACTIVE" for one in components)
         line: Line = (
             (f" {counted(len(components), 'component')}, {active} active  ", ""),
@@ -188,7 +190,7 @@ class SystemScreen(FramedApp):
         owner = self.view.owner
         return next((one for one in self._link.components if one["name"] == owner), None)
 
-    def on_picture_view_moved(self) -> None:
+    def on_system_picture_moved(self) -> None:
         """Show what belongs to the component under the cursor."""
         self.look()
 
@@ -244,7 +246,7 @@ class SystemScreen(FramedApp):
     def action_edit(self) -> None:
         """Ask for the value of the row under the cursor; of a set, activate it."""
         component, row = self._component(), self.details.row
-        if component is None or row is None or row.item == Setting() or row.item.peer:
+        if component is None or row is None or row.item == _Setting() or row.item.peer:
             self._refuse("go to a parameter or set in the details (Tab)")
             return
         name, (set_id, parameter, value, _) = component["name"], row.item

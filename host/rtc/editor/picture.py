@@ -58,7 +58,7 @@ from rich.cells import cell_len
 from tickrig.host.rtc.system.dot import Box, Edge
 from tickrig.host.text.page_text import in_cells
 
-Line = tuple[tuple[str, str], ...]
+_Line = tuple[tuple[str, str], ...]
 """Pieces of text with a style each, as `LineView` takes them."""
 
 _MOST_BOX: Final = 26
@@ -81,7 +81,7 @@ _DASHED: Final = {"│": "╎", "─": "╌"}
 _ELSEWHERE: Final = "elsewhere"
 
 
-class Place(NamedTuple):
+class _Place(NamedTuple):
     """Where something is in a picture, in lines and cells."""
 
     line: int
@@ -97,8 +97,8 @@ class Picture(NamedTuple):
         places: of boxes by their names, of ports by their full names.
     """
 
-    lines: tuple[Line, ...]
-    places: Mapping[str, Place]
+    lines: tuple[_Line, ...]
+    places: Mapping[str, _Place]
 
     @property
     def width(self) -> int:
@@ -146,7 +146,7 @@ def _fitting(boxes: tuple[Box, ...], wires: tuple[Edge, ...], columns: int) -> _
     return min(tried, key=lambda layout: layout.width)
 
 
-def neighbour(places: Mapping[str, Place], name: str, right: int, down: int) -> str:
+def neighbour(places: Mapping[str, _Place], name: str, right: int, down: int) -> str:
     """Return what is next to a box or port in a direction; itself if there is nothing.
 
     Args:
@@ -157,7 +157,7 @@ def neighbour(places: Mapping[str, Place], name: str, right: int, down: int) -> 
     """
     at = places[name]
 
-    def cost(other: Place) -> int:
+    def cost(other: _Place) -> int:
         lines, cells = other.line - at.line, other.column - at.column
         along, across = (lines * down, abs(cells)) if down else (cells * right, 4 * abs(lines))
         return along + 2 * across if along > 0 else 0
@@ -168,10 +168,10 @@ def neighbour(places: Mapping[str, Place], name: str, right: int, down: int) -> 
     return min(costs, key=lambda one: costs[one], default=name)
 
 
-def shown(name: str, width: int) -> str:
+def _shown(name: str, width: int) -> str:
     r"""Return a name as it is written into so many cells; a cut one ends with `…`.
 
-    >>> shown("ロボット0", 6), shown("a\x1b[1m\u0301b", 20)
+    >>> _shown("ロボット0", 6), _shown("a\x1b[1m\u0301b", 20)
     ('ロボ…', 'a␛[1m�b')
     """
     text = "".join(one if cell_len(one) else "�" for one in in_cells(name))
@@ -402,7 +402,7 @@ class _Layout:
     def _width(self, box: Box) -> int:
         texts = [box.name, f"{box.title} {box.state}".strip(), *(f"{port} " for port in box.ins)]
         texts += [f"{port} " for port in box.outs]
-        inner = max(cell_len(shown(text, self._most)) for text in texts)
+        inner = max(cell_len(_shown(text, self._most)) for text in texts)
         return max(_LEAST_BOX, min(self._most, inner + 4))
 
     def paint(self, lit: Mapping[str, str]) -> Picture:
@@ -414,7 +414,7 @@ class _Layout:
                 style = _LIT
             canvas.wire(self._path(number), style, dashed=wire.dashed)
         connected = {end for wire in self._wires for end in (wire.source, wire.target)}
-        places = dict[str, Place]()
+        places = dict[str, _Place]()
         for box in self._boxes.values():
             self._paint_box(canvas, box, connected, lit, places)
         return Picture(canvas.lines(self.height), places)
@@ -440,7 +440,7 @@ class _Layout:
         box: Box,
         connected: set[str],
         lit: Mapping[str, str],
-        places: dict[str, Place],
+        places: dict[str, _Place],
     ) -> None:
         row, column = self._cells[box.name]
         top, left, width = self._tops[row], self._lefts[column], self._widths[column]
@@ -450,10 +450,10 @@ class _Layout:
         canvas.text(bottom, left, f"└{'─' * (width - 2)}┘", frame)
         for line in range(top + 1, bottom):
             canvas.text(line, left, f"│{' ' * (width - 2)}│", frame)
-        name = shown(box.name, width - 4)
+        name = _shown(box.name, width - 4)
         canvas.text(top, left + 1, f" {name} ", lit.get(box.name, _NAME))
-        places[box.name] = Place(top, left + 2, cell_len(name))
-        state = shown(box.state.capitalize(), width - 4)
+        places[box.name] = _Place(top, left + 2, cell_len(name))
+        state = _shown(box.state.capitalize(), width - 4)
         if state:
             at = right - 2 - cell_len(state)
             canvas.text(bottom, at, " ", frame)
@@ -461,18 +461,18 @@ class _Layout:
             canvas.text(bottom, right - 1, " ", frame)
         room = width - 4 - (cell_len(state) + 1 if state else 0)
         if box.title and room > 2:
-            canvas.text(bottom, left + 1, f" {shown(box.title, room)} ", _DIM)
+            canvas.text(bottom, left + 1, f" {_shown(box.title, room)} ", _DIM)
         ends = dict(self._ends(box))
         for port, is_in in (*((one, True) for one in box.ins), *((one, False) for one in box.outs)):
             full = f"{box.name}.{port}"
-            text, line = shown(port, width - 2), self._line(ends[full])
+            text, line = _shown(port, width - 2), self._line(ends[full])
             size = cell_len(text)
             at = left + 1 if is_in else right - size
             canvas.text(line, at, text, lit.get(full, ""))
             if full in connected:
                 style = _LIT if full in lit else frame
                 canvas.text(line, left if is_in else right, "▶" if is_in else "├", style)
-            places[full] = Place(line, at, size)
+            places[full] = _Place(line, at, size)
 
 
 def _owner(port: str) -> str:
@@ -520,7 +520,7 @@ class _Canvas:
         shown_style = _LIT if _LIT in (before, style) else before
         self._wires[line, cell] = sides | side, shown_style, is_dashed and dashed
 
-    def lines(self, height: int) -> tuple[Line, ...]:
+    def lines(self, height: int) -> tuple[_Line, ...]:
         """Return all lines, without blanks at their ends."""
         by_line = defaultdict[int, dict[int, tuple[str, str]]](dict)
         for (line, cell), (sides, style, dashed) in self._wires.items():
@@ -531,7 +531,7 @@ class _Canvas:
         return tuple(_pieces(by_line[line]) for line in range(height))
 
 
-def _pieces(cells: Mapping[int, tuple[str, str]]) -> Line:
+def _pieces(cells: Mapping[int, tuple[str, str]]) -> _Line:
     """Return the cells of a line, those of one style in one piece."""
     pieces = list[tuple[str, str]]()
     for cell in range(1 + max(cells, default=-1)):

@@ -18,7 +18,7 @@ _PERIOD_S: Final = 0.2
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class _Answer:
     """What came of a request.
 
     Attributes:
@@ -54,7 +54,7 @@ class SystemLink:
         self._socket = socket
         self.components: list[Any] = []
         self.problem = ""
-        self._answers = deque[Answer]()
+        self._answers = deque[_Answer]()
         self._requests: queue.SimpleQueue[_Request | None] = queue.SimpleQueue()
         self._client: ControlClient | None = None
         self._thread = threading.Thread(target=self._run, name="system", daemon=True)
@@ -71,9 +71,9 @@ class SystemLink:
         """
         self._requests.put(_Request(do, fields, then or (lambda answer: "")))
 
-    def take_answers(self) -> list[Answer]:
+    def take_answers(self) -> list[_Answer]:
         """Return what came of requests since the last call."""
-        taken = list[Answer]()
+        taken = list[_Answer]()
         while self._answers:
             taken.append(self._answers.popleft())
         return taken
@@ -112,14 +112,14 @@ class SystemLink:
     def _make(self, request: _Request) -> None:
         answer = self._request(request.do, **request.fields)
         if isinstance(answer, str):
-            self._answers.append(Answer(answer, refused=True))
+            self._answers.append(_Answer(answer, refused=True))
             return
         try:
             text = request.then(answer)
         except (OSError, ValueError) as error:
-            self._answers.append(Answer(str(error), refused=True))
+            self._answers.append(_Answer(str(error), refused=True))
         else:
-            self._answers.append(Answer(text))
+            self._answers.append(_Answer(text))
 
     def _request(self, do: str, **fields: object) -> Object | str:
         """Return the answer, or why there is none."""

@@ -30,7 +30,7 @@ from tickrig.host.rtc.canopen.editor.system_pane import (
 from tickrig.host.rtc.canopen.events import ServerEvent, ServerEventType
 from tickrig.host.rtc.canopen.served_node import NodePhase
 from tickrig.host.rtc.canopen.view import NodeView, PortView, ServerView, SystemView
-from tickrig.host.rtc.editor.picture_view import PictureView
+from tickrig.host.rtc.editor.system_picture import SystemPicture
 from tickrig.host.rtc.editor.widgets import ChoiceScreen, CursorRow, CursorView, QuestionScreen
 from tickrig.host.rtc.states import RtcRefused
 from tickrig.host.tui import FramedApp, KeyFooter, Line, LineView, plain
@@ -130,7 +130,7 @@ class SystemEditor(FramedApp):
         super().__init__()
         self.session, self._bus = session, bus
         self.system, self.objects = SystemPane(), ObjectsPane()
-        self.picture = PictureView()
+        self.picture = SystemPicture()
         self.events, self.status = LineView("events"), LineView("status")
 
     def compose(self) -> ComposeResult:
@@ -199,7 +199,7 @@ class SystemEditor(FramedApp):
         self.picture.offer(*boxes_and_edges(system))
         self.picture.frame("system", self.picture.at)
 
-    def on_picture_view_moved(self) -> None:
+    def on_system_picture_moved(self) -> None:
         """Let the keys be about what is under the cursor of the picture."""
         self.system.go_to(self.picture.at)
         self.look()

@@ -34,7 +34,7 @@ _BIT_RATE: Final = 1_000_000
 
 
 @dataclass(frozen=True, slots=True)
-class PdoPlace:
+class _PdoPlace:
     """A row of the screen.
 
     Attributes:
@@ -46,13 +46,13 @@ class PdoPlace:
     entry: int = -1
 
 
-def pdo_rows(
+def _pdo_rows(
     node_id: int,
     pdos: pdo_edit.Pdos,
     wanted: pdo_edit.Pdos,
     names: Mapping[tuple[int, int], str],
     links: tuple[PdoLink, ...],
-) -> list[CursorRow[PdoPlace]]:
+) -> list[CursorRow[_PdoPlace]]:
     """Return the rows of the PDOs of a node.
 
     Args:
@@ -66,7 +66,7 @@ def pdo_rows(
     for index, there in pdos.items():
         pdo = wanted.get(index, there)
         name = pdo_edit.pdo_name(node_id, index)
-        rows.append(CursorRow(f"{name}", _pdo_line(name, pdo, there, links), PdoPlace(index)))
+        rows.append(CursorRow(f"{name}", _pdo_line(name, pdo, there, links), _PdoPlace(index)))
         for place, (mapped, shift) in enumerate(fields(pdo.mapping)):
             at = mapped.index, mapped.sub
             line: Line = (
@@ -75,7 +75,7 @@ def pdo_rows(
                 (f"  bit {shift:>2}  {mapped.bits:>2} bits  ", _DIM),
                 (names.get(at, "dummy" if mapped.index < 0x20 else "not in the EDS")[:_NAME], ""),
             )
-            rows.append(CursorRow(f"{name} {place}", line, PdoPlace(index, place)))
+            rows.append(CursorRow(f"{name} {place}", line, _PdoPlace(index, place)))
     return rows
 
 
@@ -131,7 +131,7 @@ class PdoScreen(ModalScreen[None]):
     def __init__(self, session: EditorSession, node_id: int) -> None:
         super().__init__()
         self._session, self._node_id = session, node_id
-        self.view = CursorView[PdoPlace]("pdos")
+        self.view = CursorView[_PdoPlace]("pdos")
         self.status = LineView("pdo-status")
         self.pdos: dict[int, PdoDescription] = {}
         self.wanted: dict[int, PdoDescription] = {}
@@ -180,7 +180,7 @@ class PdoScreen(ModalScreen[None]):
         self.view.title = f"{title}: {'lost' if node.late else state}{problem}"
         names = dict.fromkeys(self._file.data_types, "not mappable by its EDS")
         names |= {(one.mapped.index, one.mapped.sub): one.name for one in self._file.mappable}
-        self.view.offer(pdo_rows(self._node_id, self.pdos, self.wanted, names, links))
+        self.view.offer(_pdo_rows(self._node_id, self.pdos, self.wanted, names, links))
         width = max(20, int(self.status.scrollable_content_region.width) - 1)
         ((text, style),) = self._status()
         self.status.show([plain(f" {part}", style) for part in wrap(text.strip(), width)])
@@ -411,7 +411,7 @@ class PdoScreen(ModalScreen[None]):
 
     # How they do it.
 
-    def _at(self) -> PdoPlace | None:
+    def _at(self) -> _PdoPlace | None:
         """Return the row under the cursor, None if nothing can be changed now."""
         if self._is_busy():
             return None
@@ -427,7 +427,7 @@ class PdoScreen(ModalScreen[None]):
             self.look()
         return busy
 
-    def _choose_object(self, at: PdoPlace, place: int, *, insert: bool) -> None:
+    def _choose_object(self, at: _PdoPlace, place: int, *, insert: bool) -> None:
         if self._file is None:
             return
         rows = [

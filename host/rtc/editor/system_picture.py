@@ -15,7 +15,7 @@ from tickrig.host.rtc.system.dot import Box, Edge
 from tickrig.host.tui import LineView
 
 
-class PictureView(LineView):
+class SystemPicture(LineView):
     """Shows components as boxes and connectors as wires.
 
     Attributes:
