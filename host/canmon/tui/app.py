@@ -284,7 +284,7 @@ _CELL: Final = (8, 17)
 _GROUND, _INK = "#121212", "#e0e0e0"
 
 
-def write_png(path: Path, strips: Sequence[Strip]) -> None:
+def _write_png(path: Path, strips: Sequence[Strip]) -> None:
     """Write lines of a screen as PNG, by Pillow and a font of matplotlib.
 
     Raises:
@@ -346,7 +346,7 @@ def _ends(setup: workspace.MonitorSetup) -> set[tuple[str | None, str | None]]:
 
 
 def _read_files(setup: workspace.MonitorSetup) -> EdsFiles:
-    """Read the EDS files; FieldError if one is none."""
+    """Read the EDS files; InputError if one is none."""
     with fields.of_field("eds"):
         objects = {node: read_eds_objects(path, node) for node, path in setup.eds.items()}
     with fields.of_field("eds_dir"):
@@ -363,7 +363,7 @@ def _hand_on(
     changes: dict[str, Any],
     buses: Mapping[str, object],
 ) -> None:
-    """Give settings of a panel to another one, with changes; FieldError if one is wrong."""
+    """Give settings of a panel to another one, with changes; InputError if one is wrong."""
     scratch = workspace.Workspace()
     scratch.put(before.section, before.save())
     settings = scratch.section(before.section) | changes
@@ -372,7 +372,7 @@ def _hand_on(
     try:
         after.load(settings)
     except workspace.SettingError as error:
-        raise fields.FieldError(_FIELDS.get(before.section, "source"), str(error)) from None
+        raise fields.InputError(_FIELDS.get(before.section, "source"), str(error)) from None
 
 
 _PAINT_S: Final = 0.1
@@ -532,15 +532,15 @@ class MonitorApp(FramedApp):
     def action_settings(self) -> None:
         """Show what is set, and apply what is changed."""
         trace, alarms = self._panel(TracePanel), self._panel(AlarmsPanel)
-        now = fields.Settings(
+        now = fields.MonitorSettings(
             self.panel_settings.setup,
             trace.filter_text if trace else "",
             alarms.rules_text if alarms else "",
         )
         self.push_screen(fields.SettingsScreen(now, partial(self._apply, now)))
 
-    def _apply(self, before: fields.Settings, after: fields.Settings) -> None:
-        """Use other settings; FieldError if they cannot be used: then nothing has changed."""
+    def _apply(self, before: fields.MonitorSettings, after: fields.MonitorSettings) -> None:
+        """Use other settings; InputError if they cannot be used: then nothing has changed."""
         changes: dict[str, dict[str, Any]] = {}
         if after.filter != before.filter:
             changes["trace"] = {"filter": after.filter}
@@ -549,13 +549,13 @@ class MonitorApp(FramedApp):
         if after.setup == before.setup:
             self._apply_words(changes, after)
         elif self.recorder.running:
-            raise fields.FieldError("source", "a recording runs: F8 ends it")
+            raise fields.InputError("source", "a recording runs: F8 ends it")
         else:
             work = self._opened(before.setup, after.setup, changes)
             self._moving = True
             self.call_later(self._move, work)
 
-    def _apply_words(self, changes: Mapping[str, object], after: fields.Settings) -> None:
+    def _apply_words(self, changes: Mapping[str, object], after: fields.MonitorSettings) -> None:
         trace, alarms = self._panel(TracePanel), self._panel(AlarmsPanel)
         if alarms and "alarms" in changes:
             with fields.of_field("rules"):
@@ -570,7 +570,7 @@ class MonitorApp(FramedApp):
         after: workspace.MonitorSetup,
         changes: Mapping[str, dict[str, Any]],
     ) -> _Work:
-        """Open other buses or read other files, and end what ran; FieldError if that fails.
+        """Open other buses or read other files, and end what ran; InputError if that fails.
 
         A bus that is in both is closed first, for most adapters are opened once; if it cannot be
         opened as it is wanted, it is opened as it was.
@@ -586,7 +586,7 @@ class MonitorApp(FramedApp):
             work.session.feed([row.record for row in rows])
             return work
         if "-" in after.source:
-            raise fields.FieldError("source", "standard input can be named at the start only")
+            raise fields.InputError("source", "standard input can be named at the start only")
         shares = bool(_ends(before) & _ends(after))
         if shares:
             self._close(old)
@@ -595,10 +595,10 @@ class MonitorApp(FramedApp):
                 session = open_session(after.source, after.options, model)
             try:
                 work = self._made(session, after, changes)
-            except fields.FieldError:
+            except fields.InputError:
                 session.source.close()
                 raise
-        except fields.FieldError:
+        except fields.InputError:
             if shares:
                 self._open_again(old, before)
             raise
@@ -684,7 +684,7 @@ class MonitorApp(FramedApp):
         if path.suffix.lower() == ".png":
             strips = self.screen._compositor.render_strips()  # as export_screenshot does
             try:
-                write_png(path, strips)
+                _write_png(path, strips)
             except ImportError:
                 said = "PNG needs matplotlib: pip install 'tickrig[plot]'; "
                 path = path.with_suffix(".svg")

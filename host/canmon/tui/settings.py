@@ -5,7 +5,7 @@
 >>> parse_settings({**EMPTY, "source": "can0", "bitrate": "fast"})
 Traceback (most recent call last):
     ...
-tickrig.host.canmon.tui.settings.FieldError: 'fast' is not a bit rate like 500000, 500k or 1M
+tickrig.host.canmon.tui.settings.InputError: 'fast' is not a bit rate like 500000, 500k or 1M
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ from tickrig.host.tui import KeyFooter
 # ===================
 #
 # A field is a text, as on the command line; `setting_texts` writes what is used now, and
-# `parse_settings` reads it back. What is wrong belongs to one field: a `FieldError` has its
+# `parse_settings` reads it back. What is wrong belongs to one field: a `InputError` has its
 # name, and the screen shows the reason below it. Reading the text finds most mistakes; the
 # rest, as a bus that cannot be opened, is found when the settings are applied. So the screen
 # hands what it has read to the program (`apply`), stays if that raises, and else leaves.
@@ -70,7 +70,7 @@ EMPTY: Final = dict.fromkeys(_ORDER, "")
 _PATHS: Final = ("source", "eds_dir", "dbc")
 
 
-class FieldError(ValueError):
+class InputError(ValueError):
     """What is wrong with a field.
 
     Attributes:
@@ -83,7 +83,7 @@ class FieldError(ValueError):
 
 
 @dataclass(frozen=True, slots=True)
-class Settings:
+class MonitorSettings:
     """What the screen sets.
 
     Attributes:
@@ -102,20 +102,20 @@ def of_field(name: str) -> Iterator[None]:
     """Let what goes wrong in the block be told of a field."""
     try:
         yield
-    except FieldError:
+    except InputError:
         raise
     except (Refused, SourceFailed) as error:
         reason = error.message
         for option in ("--eds ", "--eds-dir ", "--dbc ", "-i "):
             reason = reason.removeprefix(option)
-        raise FieldError(name, reason) from None
+        raise InputError(name, reason) from None
     except OSError as error:
-        raise FieldError(name, f"{error.filename}: {error.strerror}") from None
+        raise InputError(name, f"{error.filename}: {error.strerror}") from None
     except ValueError as error:
-        raise FieldError(name, str(error)) from None
+        raise InputError(name, str(error)) from None
 
 
-def setting_texts(settings: Settings) -> dict[str, str]:
+def setting_texts(settings: MonitorSettings) -> dict[str, str]:
     """Return the text of each field."""
     setup, options = settings.setup, settings.setup.options
     eds = [f"{node}={path}" for node, path in sorted(setup.eds.items())]
@@ -134,7 +134,7 @@ def setting_texts(settings: Settings) -> dict[str, str]:
     }
 
 
-def parse_settings(texts: Mapping[str, str], before: MonitorSetup | None = None) -> Settings:
+def parse_settings(texts: Mapping[str, str], before: MonitorSetup | None = None) -> MonitorSettings:
     """Read the fields.
 
     Args:
@@ -142,7 +142,7 @@ def parse_settings(texts: Mapping[str, str], before: MonitorSetup | None = None)
         before: what is used now; options that have no field stay.
 
     Raises:
-        FieldError: one is wrong.
+        InputError: one is wrong.
     """
     words = {name: _words(name, texts[name]) for name in (*_PATHS, "bus_kwargs")}
     with of_field("source"):
@@ -180,7 +180,7 @@ def parse_settings(texts: Mapping[str, str], before: MonitorSetup | None = None)
         dbc=tuple(map(Path, words["dbc"])),
         eds_dir=folders,
     )
-    return Settings(setup, texts["filter"], texts["rules"])
+    return MonitorSettings(setup, texts["filter"], texts["rules"])
 
 
 def _words(name: str, text: str) -> tuple[str, ...]:
@@ -208,7 +208,7 @@ class SettingsScreen(ModalScreen[None]):
 
     Args:
         settings: as they are.
-        apply: takes those that were written; FieldError if they cannot be used.
+        apply: takes those that were written; InputError if they cannot be used.
     """
 
     HELP = """
@@ -238,7 +238,7 @@ the name that is proposed.
         Binding("tab", "app.focus_next", "next field", key_display="Tab"),
     ]
 
-    def __init__(self, settings: Settings, apply: Callable[[Settings], Any]) -> None:
+    def __init__(self, settings: MonitorSettings, apply: Callable[[MonitorSettings], Any]) -> None:
         super().__init__(id="settings")
         self._settings, self._apply = settings, apply
         self._texts = setting_texts(settings)
@@ -286,7 +286,7 @@ the name that is proposed.
             one.display = False
         try:
             self._apply(parse_settings(self._read(), self._settings.setup))
-        except FieldError as error:
+        except InputError as error:
             self._show(error)
             return
         self.dismiss()
@@ -303,7 +303,7 @@ the name that is proposed.
             texts[name] = field.text if isinstance(field, TextArea) else field.value.strip()
         return texts
 
-    def _show(self, error: FieldError) -> None:
+    def _show(self, error: InputError) -> None:
         wrong = self.query_one(f"#wrong-{error.field}", Static)
         wrong.update(str(error))
         wrong.display = True

@@ -69,7 +69,7 @@ def node_identity(values: Sequence[int | None]) -> EdsIdentity | None:
     return None if vendor is None or product is None else EdsIdentity(vendor, product, revision)
 
 
-class EdsChoice(NamedTuple):
+class _EdsChoice(NamedTuple):
     """The file for a node.
 
     Attributes:
@@ -119,7 +119,7 @@ class EdsFolder:
         self.folders = tuple(folders)
         self._candidates: list[_Candidate] | None = None
 
-    def choose(self, node: int, wanted: EdsIdentity) -> EdsChoice | None:
+    def choose(self, node: int, wanted: EdsIdentity) -> _EdsChoice | None:
         """Return the file for a node; None if none fits."""
         if self._candidates is None:
             self._candidates = list(self._read())
@@ -137,7 +137,7 @@ class EdsFolder:
         if others:
             names = ", ".join(str(one.path) for one in others)
             text += f"; also fits: {names}; preferred: {_reason(best, others[0], wanted, node)}"
-        return EdsChoice(best.path, one_line(text))
+        return _EdsChoice(best.path, one_line(text))
 
     def __str__(self) -> str:
         return ", ".join(map(str, self.folders))

@@ -272,7 +272,7 @@ class _NodeTask(Task):
         """Ask all node-IDs of a bus for their device type, and who answers for its identity."""
         self.channel, self._due_us = channel, now_us
         self._answered_ids.clear()
-        self._asks = deque(_upload(node, *DEVICE_TYPE) for node in NODE_IDS)
+        self._asks = deque(_upload(node, *DEVICE_TYPE) for node in _NODE_IDS)
 
     def command(self, channel: str, node: int, command: NmtCommand) -> None:
         """Command a node on a bus, or all nodes there by 0."""
@@ -317,7 +317,7 @@ def _answers(record: Record, node: int) -> bool:
     )
 
 
-NODE_IDS: Final = range(1, 128)
+_NODE_IDS: Final = range(1, 128)
 _IDENTITY: Final = tuple((0x1018, sub) for sub in (1, 2, 3))
 _ASK_US: Final = 10_000
 """Between two requests: 5 % of a bus of 125 kbit/s, and time for an answer."""

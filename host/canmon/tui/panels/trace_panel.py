@@ -161,7 +161,7 @@ _CHANNEL_MAX: Final = 12
 _BOOKMARK: Final = "black on yellow"
 _BOOKMARKS: Final = 1_000
 """As many are kept in a workspace."""
-SILENT: Final = (
+_SILENT: Final = (
     "no frame comes: bit rate, cable, termination, power? F2 changes the settings.",
     "To ask all node-IDs: A, then f in the tab nodes; or in another terminal",
 )
@@ -247,7 +247,7 @@ class TracePanel(Panel):
         self._lines = [self._marked_line(row, number) for number, row in enumerate(rows, begin)]
         if not self._total and self.session.silent:
             command = self.session.scan_command
-            self._lines = [*map(plain, SILENT), plain(f"    {command}", "bold")]
+            self._lines = [*map(plain, _SILENT), plain(f"    {command}", "bold")]
             self._total = len(self._lines)
 
     def _marked_line(self, row: TraceRow, number: int) -> Line:

@@ -16,7 +16,7 @@ from tickrig.host.canmon.tui.panels.alarms_panel import AlarmsPanel
 from tickrig.host.canmon.tui.panels.panel import TABS, Panel
 from tickrig.host.canmon.tui.panels.trace_panel import TracePanel
 from tickrig.host.canmon.tui.session import Session
-from tickrig.host.canmon.tui.settings import EMPTY, FieldError, parse_settings, setting_texts
+from tickrig.host.canmon.tui.settings import EMPTY, InputError, parse_settings, setting_texts
 from tickrig.host.canmon.workspace import MonitorSetup, PanelSettings, Workspace
 from tickrig.host.cli.can_options import BusOptions
 
@@ -375,7 +375,7 @@ def test_what_is_written_is_read_back() -> None:
     }
     settings = parse_settings(texts)
     assert setting_texts(settings) == texts
-    with pytest.raises(FieldError, match="nothing to listen to"):
+    with pytest.raises(InputError, match="nothing to listen to"):
         parse_settings(EMPTY)
 
 

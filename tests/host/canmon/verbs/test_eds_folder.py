@@ -219,3 +219,27 @@ def test_send_asks_the_node_who_it_is(folder: Path, wire: Wire) -> None:
         result = canmon("send", wire.word, *words)
     assert result.exit_code == 2
     assert "node 5 does not tell vendor and product (1018h); give --eds 5=FILE" in result.stderr
+
+
+def test_a_name_that_commands_a_terminal_is_inert(folder: Path, log: str) -> None:
+    (folder / "drive.eds").rename(folder / "a\x1b[31m\nb.eds")
+    said = canmon("dump", log, "--eds-dir", str(folder), "-F", "tpdo1").stderr
+    assert "\x1b" not in said
+    assert "a\N{SYMBOL FOR ESCAPE}[31m\N{SYMBOL FOR LINE FEED}b.eds (vendor" in said.splitlines()[0]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "[DeviceInfo]\n",
+        "[DeviceInfo]\nVendorNumber=x\nProductNumber=\n",
+        "[DeviceInfo]\nVendorNumber=99999999999999\n",
+        "[1018sub1]\nDefaultValue=$NODEID\n",
+        "[DeviceInfo\n[[[[",
+    ],
+)
+def test_a_file_that_does_not_say_whom_it_is_for_fits_nobody(folder: Path, text: str) -> None:
+    (folder / "odd.eds").write_text(text)
+    assert choice(folder).startswith("drive.eds (")
+    assert "odd.eds" not in choice(folder)
