@@ -539,6 +539,10 @@ class MonitorApp(FramedApp):
         )
         self.push_screen(fields.SettingsScreen(now, partial(self._apply, now)))
 
+    def _say_applied(self) -> None:
+        path = self.panel_settings.workspace.path
+        self.notify("settings are applied" + ("; w keeps them in a file" if path is None else ""))
+
     def _apply(self, before: fields.MonitorSettings, after: fields.MonitorSettings) -> None:
         """Use other settings; InputError if they cannot be used: then nothing has changed."""
         changes: dict[str, dict[str, Any]] = {}
@@ -548,6 +552,7 @@ class MonitorApp(FramedApp):
             changes["alarms"] = {"rules": load_toml(after.rules)}
         if after.setup == before.setup:
             self._apply_words(changes, after)
+            self._say_applied()
         elif self.recorder.running:
             raise fields.InputError("source", "a recording runs: F8 ends it")
         else:
@@ -655,6 +660,7 @@ class MonitorApp(FramedApp):
         if started:
             self.session.start()
         self.save()
+        self._say_applied()
         self.refresh_view()
 
     def _panel(self, kind: type[_P]) -> _P | None:

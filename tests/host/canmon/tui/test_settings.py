@@ -206,7 +206,8 @@ def test_a_folder_of_eds_files_is_used_and_the_choice_is_said(wire: Wire) -> Non
             hear(form.monitor.session, wire, asked, answered)
         form.monitor.refresh_view()
         await form.pilot.pause()
-        (said,) = [note.message for note in form.monitor._notifications]
+        applied, said = [note.message for note in form.monitor._notifications]
+        assert applied == "settings are applied; w keeps them in a file"
         assert said.startswith(f"node 5: EDS {EPOS} (vendor 00000000h, product 00006210h)")
         hear(form.monitor.session, wire, NAMED_PDO)
         assert form.monitor.session.model.trace.tail(1)[0].decoded.kind == "tpdo1"  # type: ignore[union-attr]
