@@ -50,6 +50,9 @@ _RESEND_US: Final = 100_000
 _SILENT_US: Final = 300_000
 """Status lines come each 10 ms; after so long without one, the RRC does not answer."""
 
+_ASK_US: Final = 1_000_000
+"""VR2 that is off sends no status lines; after so long without one, the RRC is asked."""
+
 _TAKEN_US: Final = 200_000
 """After so long a status line shows what was commanded."""
 
@@ -172,6 +175,7 @@ class Chair(Closing):
         self._sent: tuple[int, int] | None = None  # what the host drives, None if it does not
         self._changed_us = self._resend_us = 0
         self._status_since_us: int | None = None
+        self._asked_us = self.client.now_us
         try:
             self._meet(opening)
             self._found_stable = self.client.stable
@@ -302,8 +306,9 @@ class Chair(Closing):
 
         Raises:
             ChairStopped: VR2 was stopped, or does something else than it was told.
-            LinkTimeout: status lines do not come any more.
+            LinkTimeout: status lines do not come any more, or the RRC does not answer.
         """
+        self.ask_if_silent()
         events = []
         for arrival in self.client.events(0):  # those behind one that raises stay untaken
             events.append(arrival)
@@ -324,6 +329,25 @@ class Chair(Closing):
                 said = "commanded {} {}, the RRC drives {} {}: VR2 switched off"
                 raise ChairStopped(said.format(*self._sent, *out_pct))
         return events
+
+    def ask_if_silent(self) -> None:
+        """Ask the RRC for its name if no status line has come for a second: VR2 may be off.
+
+        Raises:
+            LinkTimeout: it does not answer.
+        """
+        latest, now_us = self.latest_status, self.client.now_us
+        heard_us = 0 if latest is None else latest.at_us
+        if now_us - max(heard_us, self._asked_us) < _ASK_US:
+            return
+        for tries_left in reversed(range(_MEET_TRIES)):
+            try:
+                self.client.device()
+                break
+            except LinkTimeout as error:
+                if not tries_left:
+                    raise LinkTimeout("no answer: is the RRC still there?") from error
+        self._asked_us = self.client.now_us
 
     def stay_silent(self, kind: RrcEvent, most_us: int) -> int | None:
         """Send nothing until an event comes, as a program that hangs; then begin to talk again.

@@ -358,6 +358,7 @@ def watch(*, for_us: int | None, every: bool, as_json: bool) -> None:
         before: StatusA | None = None
         while not ended.number and client.now_us < end_us:
             client.run_for(STEP_US)
+            chair.ask_if_silent()
             lines: list[tuple[int, dict[str, object]]] = [
                 (each.at_us, {"event": each.value.name}) for each in client.events(0)
             ]

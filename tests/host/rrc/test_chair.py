@@ -73,6 +73,21 @@ def test_an_rrc_that_always_answers_late_is_not_taken_for_another_device() -> No
         Chair(LateLink(range(1, 99)), Guard())
 
 
+def listen(bench: Bench, duration_us: int) -> None:
+    for _ in range(duration_us // 20_000):
+        bench.chair.client.run_for(20_000)
+        assert bench.chair.watch() == []
+
+
+def test_an_rrc_that_is_gone_while_vr2_is_off_is_noticed_within_two_seconds() -> None:
+    bench = Bench(on=False)
+    bench.chair.status()
+    listen(bench, 4_000_000)  # VR2 off is no failure
+    bench.rrc.inputs.set("rrc_power", 0)
+    with pytest.raises(LinkTimeout, match="is the RRC still there"):
+        listen(bench, 2_000_000)
+
+
 def test_without_a_guard_nothing_is_set() -> None:
     bench = Bench(Guard(0, stable=False))
     assert set(bench.link.lines) == {b"\ndevice", b"device"}

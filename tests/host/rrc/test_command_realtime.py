@@ -195,6 +195,16 @@ def test_watch_prints_what_comes(bench: Bench) -> None:
     assert status_of(child) == 130
 
 
+def test_watch_ends_where_the_rrc_is_gone(bench: Bench) -> None:
+    live, port = bench
+    child = spawned(port, "watch")
+    child.expect_exact("stick_v_pct 0")
+    live.set("rrc_power", 0)
+    child.expect_exact(f"Error: {port.path}: no answer: is the RRC still there?")
+    child.expect(pexpect.EOF)
+    assert status_of(child) == 3
+
+
 def test_a_chair_that_is_switched_off_ends_the_drive(bench: Bench) -> None:
     live, port = bench
     child = spawned(port, "drive", "30", "0", "--no-dead-man", "--for", "60s")
