@@ -439,9 +439,11 @@ class RtcLiteProxy(RtComponent):
         return _code_of(self._channel.request(command, data))
 
     def _optional(self, command: LiteCommand) -> ReturnCode:
-        """Ask for a callback that a device may leave out."""
-        code = self._command(command)
-        return _OK if code is ReturnCode.UNSUPPORTED else code
+        """Ask for a callback that a device may leave out; that is no trouble."""
+        if (code := self._command(command)) is not ReturnCode.UNSUPPORTED:
+            return code
+        self._channel.trouble = ""
+        return _OK
 
     def _known_state(self) -> LiteState | None:
         """Return the state of the device; ask for it if nobody knows."""

@@ -7,10 +7,12 @@ from tests.host.rtc.lite.test_experiments import recorder_bench
 from tests.host.rtc.lite.test_timer import active
 from tests.host.spy_link import SpyLink
 from tickrig.device.rtc_lite.component import LiteEcho
+from tickrig.device.rtc_lite.server import LiteConfig
 from tickrig.emulators.rig.rig import Rig
 from tickrig.host.links.link import Link
 from tickrig.host.rtc.lite import ProxySettings
 from tickrig.host.rtc.lite.events import ProxyEvent, ProxyEventType
+from tickrig.wire.rtc_lite.frame import Framing
 
 
 def only_event(bench: Bench) -> ProxyEvent:
@@ -48,6 +50,16 @@ def test_a_lost_device_is_told_with_the_request_that_it_left_out() -> None:
 def test_a_device_that_is_lost_while_it_is_inactive_is_told_with_its_pings() -> None:
     bench = Bench(LiteEcho)
     bench.attach(0, "Echo")
+    bench.nodes[0].inputs.set("power_cut", 1)
+    bench.run_for(15 * PERIOD_US)
+    assert bench.events[0].reason == "none of 4 PINGs was answered"
+
+
+def test_a_callback_that_a_board_leaves_out_is_no_reason() -> None:
+    bench = Bench(LiteEcho, config=LiteConfig(Framing.RTNO))
+    bench.attach(0, "Board", ProxySettings(framing=Framing.RTNO))
+    bench.context.start()
+    bench.run_for(PERIOD_US)
     bench.nodes[0].inputs.set("power_cut", 1)
     bench.run_for(15 * PERIOD_US)
     assert bench.events[0].reason == "none of 4 PINGs was answered"
