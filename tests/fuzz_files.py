@@ -28,6 +28,7 @@ KINDS: Final = {
     "bus": "tests.host.canopen.bus_file.mutations",
     "check": "tests.host.canmon.model.check.mutations",
     "conform": "tests.host.canopen.conform.fuzzing",
+    "diagnosis": "tests.host.canmon.model.check.log_mutations",
     "eds": "tests.host.canopen.data_sheet.mutations",
     "logs": "tests.host.canmon.model.logs.mutations",
     "net": "tests.host.canmon.net.net_mutations",

@@ -168,7 +168,8 @@ def _alike(one: float, other: float, usual: int) -> bool:
 
 
 def _is_steady(middle: int, spread: int) -> bool:
-    return spread <= max(_STEADY * middle, min(_FLOOR_US, middle / 3))
+    limit = max(_STEADY * middle, min(_FLOOR_US, middle / 3))
+    return middle >= _SHORTEST_US and spread <= limit
 
 
 def _levels(windows: Sequence[tuple[int, int]], gaps: int, usual: int) -> list[Level]:

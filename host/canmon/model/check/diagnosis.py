@@ -281,6 +281,7 @@ class _BusJudge:
         self.judged = {"no-error-frames", "time-back"}
         self.unjudged: dict[str, str] = {}
         self._hits: list[Hit] = []
+        self._cuts: list[node_events.Cut] = []
         self._rows = bus.rows_by_ident()
         self._backward = bus.backward()
         self._times, self._set_back = steady_times(bus, self._backward)
@@ -379,10 +380,13 @@ class _BusJudge:
             begin_us = first_us + (step + 1) * _LOAD_STEP_US - _LOAD_US
             if total > most and begin_us >= over_us:
                 over_us = begin_us + _LOAD_US
-                begin, end = (bisect_left(self._times, at) for at in (begin_us, over_us))
+                begin, end = (
+                    min(bisect_left(self._times, at), len(self._bus) - 1)
+                    for at in (begin_us, over_us)
+                )
                 percent = total * 100_000_000 / (self._bit_rate * _LOAD_US)
                 text = f"load {percent:.1f} % in {_LOAD_US // 1_000} ms, at most {MOST_LOAD:g} %"
-                self._hit("max-load", None, f"{text} is right", [begin, end - 1])
+                self._hit("max-load", None, f"{text} is right", [begin, max(begin, end - 1)])
 
     def _bits_by_step(self, first_us: int) -> dict[int, int]:
         """Return the bits of classic frames in each step of time."""
@@ -484,17 +488,14 @@ class _BusJudge:
                     self._heartbeats(node, one)
             elif ident in node_events.PDO_IDS:
                 self._rhythm("pdo", ident, rows)
-        for at, idents in sorted(self._silent.items()):
-            row = bisect_left(self._times, at)
-            gap = self._times[row + 1] - at if row + 1 < len(self._times) else 0
-            row = bisect_right(self._times, at) - 1
-            gap = self._times[row + 1] - at
+        for row, idents in sorted(self._silent.items()):
+            gap_us = self._times[row + 1] - self._times[row]
             names = counted(len(idents), "CAN-ID")
-            text = f"no frame for {ms_text(gap)} ms, where {names} should come"
+            text = f"no frame for {ms_text(gap_us)} ms, where {names} should come"
             self._hit("silence", None, text, [row, row + 1])
 
-    def _silences(self) -> list[tuple[int, int]]:
-        """Return the times in which no frame at all came, where they are long."""
+    def _silences(self) -> list[tuple[int, int, int]]:
+        """Return the times in which no frame at all came, where they are long, and their rows."""
         times = self._times
         if len(times) < 2:
             return []
@@ -506,7 +507,7 @@ class _BusJudge:
             plain = [b - a for a, b in pairwise(times)]
             limit = max(20_000, 5 * sorted(plain)[len(plain) // 2])
             found = [at for at, gap in enumerate(plain) if gap > limit]
-        return [(times[at], times[at + 1]) for at in found]
+        return [(times[at], times[at + 1], at) for at in found]
 
     def _cuts_of(self, ident: int) -> list[int]:
         node = ident & node_events.NODE_MASK
@@ -572,11 +573,11 @@ class _BusJudge:
 
     def _is_silent(self, ident: int, begin: int, end: int, period: int) -> bool:
         """Say whether all of the bus is silent in a gap, and note it."""
-        at = bisect_left(self._quiet, (begin, 0))
-        for start, stop in self._quiet[max(0, at - 1) : at + 2]:
+        at = bisect_left(self._quiet, (begin, 0, 0))
+        for start, stop, row in self._quiet[max(0, at - 1) : at + 2]:
             inside = min(stop, end) - max(start, begin)
             if inside >= 0.6 * (end - begin - period) and inside > period:
-                self._silent.setdefault(start, []).append(ident)
+                self._silent.setdefault(row, []).append(ident)
                 return True
         return False
 

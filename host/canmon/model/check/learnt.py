@@ -224,7 +224,7 @@ def _bus_lines(bus: BusSummary) -> Iterator[str]:
             yield f"emcy = {json.dumps(one.emcy)} # usual"
     for ident, frame in sorted(bus.frames.items()):
         yield ""
-        yield f"[{table}.frame.{ident_text(ident).removesuffix('#')}] # {frame.name}"
+        yield f"[{table}.frame.{_key(ident_text(ident))}] # {frame.name}"
         yield f"lengths = {list(frame.lengths)}"
         yield f'kind = "{frame.kind}"'
         if frame.period_us is not None:

@@ -9,6 +9,7 @@ from random import Random
 
 import pytest
 
+from tests.host.canmon.model.check import log_mutations
 from tests.host.canmon.model.check.mutations import RULES, judge, mutated
 
 TOOL = Path(__file__).parents[5] / "tools" / "fuzz"
@@ -19,6 +20,13 @@ def test_a_mutated_rule_is_held_or_refused(seed: int) -> None:
     chance = Random(seed)
     for _ in range(40):
         judge(*mutated(chance))
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_mutated_log_is_diagnosed_and_keeps_what_is_learnt_from_it(seed: int) -> None:
+    chance = Random(seed)
+    found = {log_mutations.judge(*log_mutations.mutated(chance)) for _ in range(250)}
+    assert {"sound", "faulty"} <= found
 
 
 @pytest.mark.parametrize("rule", RULES)
