@@ -587,7 +587,7 @@ class NetworkPort(NonCopyable):
         self._next = None
 
     def _let_in(self, now_us: int) -> None:
-        """Give the line to the next host, or refuse it, as soon as this is decided."""
+        """Pass the line to the next host, or refuse it, as soon as this is decided."""
         if self._next is None:
             return
         host, peer = self._next

@@ -33,7 +33,7 @@ else:  # slow
 
 _YAML_ENDINGS = (".yml", ".yaml")
 _LOOKED_AT = 4096
-"""Characters at its beginning by which a binary file is known."""
+"""Number of characters at its start for detecting a binary file."""
 
 
 def read_document(path: Path, what: str = "FILE", encoding: str = "") -> documents.Document:
@@ -42,7 +42,7 @@ def read_document(path: Path, what: str = "FILE", encoding: str = "") -> documen
     Args:
         path: of the file.
         what: the argument or option that names it.
-        encoding: of the file, by its name in Python; empty for that which its bytes show.
+        encoding: name of its encoding in Python; empty to detect it.
     """
     try:
         data = eds.read_eds_bytes(path)
@@ -63,13 +63,13 @@ def read_document(path: Path, what: str = "FILE", encoding: str = "") -> documen
 
 
 def _is_binary(data: bytes) -> bool:
-    """Say whether more than each twentieth character is one that no text has."""
+    """Return whether more than one in twenty characters is not a text character."""
     head = eds_file.decode_text(data[:_LOOKED_AT])
     return sum(letter < " " and letter not in "\t\r\n" for letter in head) * 20 > len(head)
 
 
 def read_device_document(path: Path, what: str = "FILE") -> documents.Document:
-    """Read a file that has to describe a device; Refused if it does not."""
+    """Read a file that must describe a device; Refused if it does not."""
     document = read_document(path, what)
     if not document.rows:
         raise Refused(f"{what} " + "\n".join(map(str, document.file.errors)))

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 _FOUND: Final = 1
-"""Exit status where a finding counts."""
+"""Exit status if a finding counts."""
 
 
 _UNREAD: Final = "unread"
@@ -37,7 +37,7 @@ _UNREAD: Final = "unread"
 
 
 class _Case(NamedTuple):
-    """A finding for the report: its rule, and the line that tells it."""
+    """A finding for the report: its rule and its line."""
 
     rule: str
     text: str
@@ -49,15 +49,15 @@ class _Case(NamedTuple):
 
 @click.command()
 @click.argument("file", nargs=-1, required=True, type=PATH)
-@click.option("--strict", is_flag=True, help="Warnings count, too.")
-@click.option("--json", "as_json", is_flag=True, help="Findings as JSON, one a line.")
+@click.option("--strict", is_flag=True, help="Count warnings as errors.")
+@click.option("--json", "as_json", is_flag=True, help="Print findings as JSON, one per line.")
 @click.option("--junit", "report", type=PATH, metavar="FILE", help="Write a JUnit report.")
 def check_all(file: Sequence[Path], strict: bool, as_json: bool, report: Path | None) -> None:
-    """Tell all that is wrong in EDS files; exit status 1 if there is an error.
+    """Check EDS files and print all findings; exit status 1 if there is an error.
 
-    A finding is a line: file, line, severity, rule, what came and what was allowed,
-    what to do, and the clause that says so. Notes never count; warnings do with
-    --strict. Exit status 2: a file cannot be read, or the report not be written.
+    A finding is a line: file, line, severity, rule, the value and the allowed ones, the fix, and
+    the clause of the standard. Notes never count; warnings do with --strict. Exit status 2: a file
+    cannot be read, or the report cannot be written.
 
     \b
     canmon eds check drive.eds
@@ -84,7 +84,7 @@ def check_all(file: Sequence[Path], strict: bool, as_json: bool, report: Path | 
 
 
 def _read(files: Sequence[Path]) -> tuple[list[Document], list[_Case]]:
-    """Read the files; what cannot be read is told, and is no reason to leave out the others."""
+    """Read the files; report unreadable ones, and continue with the others."""
     documents, unread = [], []
     for path in files:
         try:
@@ -114,7 +114,7 @@ def _finding_json(one: RuleFinding) -> str:
 
 
 def _check_report(report: Path | None, files: Sequence[Path]) -> None:
-    """See before the run whether the report could be written."""
+    """Check before the run that the report can be written."""
     if report is not None:
         with refusing():
             check_file(report, "--junit")
@@ -137,41 +137,41 @@ def _write(
         write_whole(report, junit("canmon eds check", names, cases))
 
 
-# The verb `eds fix`: what needs no knowledge of the device is mended.
+# The verb `eds fix`: fix errors that need no knowledge of the device.
 
 
 _LEFT: Final = 1
-"""Exit status where something is left that needs knowledge of the device."""
+"""Exit status if errors remain that need knowledge of the device."""
 
 
 @click.command()
 @click.argument("file", type=PATH)
-@click.option("-o", "--output", type=PATH, metavar="OUT", help="Where it is written; may be FILE.")
-@click.option("--dry-run", is_flag=True, help="Show the lines that would change; write nothing.")
+@click.option("-o", "--output", type=PATH, metavar="OUT", help="Output file; may be FILE.")
+@click.option("--dry-run", is_flag=True, help="Show the changes; write nothing.")
 @click.option(
     "--encoding",
     type=click.Choice(("utf-8", "ascii")),
     default="utf-8",
-    help="Of OUT, where letters beyond ASCII are in FILE; ascii writes ö as oe.  [utf-8]",
+    help="Encoding of OUT if FILE is not ASCII; ascii writes ö as oe. [utf-8]",
 )
 @click.option(
     "--from-encoding",
     metavar="NAME",
     default="",
-    help="Of FILE, where its bytes are no Unicode, as cp1252 or cp850.  [guessed]",
+    help="Encoding of FILE if not Unicode, such as cp1252 or cp850. [guessed]",
 )
 def mend(file: Path, output: Path | None, dry_run: bool, encoding: str, from_encoding: str) -> None:
-    """Mend an EDS; exit status 1 if errors or warnings are left.
+    """Fix an EDS; exit status 1 if errors or warnings are left.
 
-    Lines that no finding names stay to the byte, unless the file is not Unicode: then
-    it becomes UTF-8, and what a byte is taken for is told. What is mended, with the lines
-    of FILE, and what is left as it needs knowledge of the device, with those of OUT, is
-    told. XDD files are not mended.
+    Lines without a finding are unchanged to the byte, unless the file is not Unicode: then it
+    becomes UTF-8, and the assumed encoding is printed. The output lists the fixes with the lines of
+    FILE, and the remaining findings, which need knowledge of the device, with those of OUT. XDD
+    files cannot be fixed.
 
     \b
-    canmon eds fix drive.eds -o mended.eds
+    canmon eds fix drive.eds -o fixed.eds
     canmon eds fix drive.eds --dry-run
-    canmon eds fix drive.eds -o mended.eds --from-encoding cp850
+    canmon eds fix drive.eds -o fixed.eds --from-encoding cp850
     """  # noqa: D301 - click wants the backspace
     if (output is None) is not dry_run:
         raise Refused("give -o OUT, or --dry-run")
@@ -187,13 +187,13 @@ def mend(file: Path, output: Path | None, dry_run: bool, encoding: str, from_enc
             click.echo(str(fixed.before(one) if output is None else replace(one, file=str(output))))
     if output is not None:
         _write_mended(output, fixed.document.data)
-    say(f"{len(fixed.mended)} mended, {len(fixed.left)} left")
+    say(f"{len(fixed.mended)} fixed, {len(fixed.left)} left")
     if fixed.left:
         click.get_current_context().exit(_LEFT)
 
 
 def _known(encoding: str) -> str:
-    """Return the name of an encoding of texts, or empty; Refused if there is none of that name."""
+    """Return the name of an encoding of texts, or empty; Refused if the name is unknown."""
     try:
         b"a".decode(encoding or "ascii")
     except LookupError:
@@ -203,27 +203,27 @@ def _known(encoding: str) -> str:
 
 
 def _mendable(file: Path, encoding: str) -> Document:
-    """Read a file that can be mended; Refused if it is XML, or describes no object."""
+    """Read a file that can be fixed; Refused if it is XML, or describes no object."""
     document = read_document(file, encoding=encoding)
     if document.file.is_xml:
-        raise Refused(f"FILE {file}: XDD files are not mended")
+        raise Refused(f"FILE {file}: XDD files cannot be fixed")
     if not document.rows:
         raise Refused(f"FILE {file}: no EDS: it describes no object")
     return document
 
 
 def _mended(one: RuleFinding) -> str:
-    """Say what was mended, and what is written instead."""
+    """Print the fixed findings and their replacements."""
     lines = [text for edit in one.edits for text in edit.lines if text]
     more = f" and {len(lines) - 1} more" if lines[1:] else ""
     left_out = any(edit.place is EditPlace.REPLACE for edit in one.edits)
     now = f"; now {shorten(lines[0].strip())}{more}" if lines else "; left out" * left_out
     where = f"[{one.section}] " if one.section else ""
-    return f"{one.file}:{max(one.line, 1)}: mended: [{one.rule.name}] {where}{one.text}{now}"
+    return f"{one.file}:{max(one.line, 1)}: fixed: [{one.rule.name}] {where}{one.text}{now}"
 
 
 def _differences(old: Document, new: Document) -> Iterator[str]:
-    """Give the lines that differ, as `diff -u`; what cannot be printed as ?."""
+    """Yield the lines that differ, as `diff -u`; unprintable characters as ?."""
     lines = difflib.unified_diff(old.texts, new.texts, old.name, new.name, n=1, lineterm="")
     for line in lines:
         yield "".join(letter if letter.isprintable() else "?" for letter in line)
@@ -249,12 +249,11 @@ _COLUMNS: Final = ("index", "sub", "type", "access", "default", "low", "high", "
 @click.argument("file", type=PATH)
 @click.argument("place", required=False, metavar="[INDEX[:SUB]]")
 @click.option("--node", type=click.IntRange(1, 127), default=1, help="Node-ID of the PDOs.  [1]")
-@click.option("--json", "as_json", is_flag=True, help="All of it as one JSON object.")
+@click.option("--json", "as_json", is_flag=True, help="Print everything as one JSON object.")
 def show(file: Path, place: str | None, node: int, as_json: bool) -> None:
     """Show the device of an EDS: head, objects, PDOs at power-on.
 
-    Index and sub-index are hexadecimal. `T` and `R` are the PDOs that may carry an
-    entry.
+    Index and sub-index are hexadecimal. `T` and `R` mark the PDOs that may carry an entry.
 
     \b
     canmon eds show drive.eds
@@ -282,7 +281,7 @@ def _place(text: str | None) -> tuple[int | None, int | None]:
 def _describe(
     document: Document, index: int | None, sub: int | None, node_id: int
 ) -> dict[str, Any]:
-    """Return what is shown; without the head and the PDOs where one object is wanted."""
+    """Return the data to show; without head and PDOs for a single object."""
     said: dict[str, Any] = {"v": 1, "file": document.name}
     if index is None:
         said["device"] = head(document)
@@ -314,7 +313,7 @@ def _pdo_lines(pdo: dict[str, Any]) -> Iterator[str]:
         yield f"        {bits:<8}{each['object']} {each['name']}".rstrip()
 
 
-# The verb `eds diff`: what is another device.
+# The verb `eds diff`: differences between devices.
 
 
 _DIFFERENT: Final = 1
@@ -323,12 +322,12 @@ _DIFFERENT: Final = 1
 @click.command()
 @click.argument("old", type=PATH)
 @click.argument("new", type=PATH)
-@click.option("--json", "as_json", is_flag=True, help="Differences as JSON, one a line.")
+@click.option("--json", "as_json", is_flag=True, help="Print differences as JSON, one per line.")
 def compare(old: Path, new: Path, as_json: bool) -> None:
     """Compare the devices of two EDS files; exit status 1 if they differ.
 
-    Objects, entries and their fields, identity, bit rates; not the text. -, + and ~
-    are what only the first one has, only the second one, and what differs.
+    It compares objects, entries and their fields, identity and bit rates, not the text. - marks
+    items only in the first file, + only in the second, ~ differences.
 
     \b
     canmon eds diff old.eds new.eds

@@ -1,1 +1,1 @@
-"""What is said to a CANopen node from outside: SDO scripts, and the conformance tester."""
+"""Communication with CANopen nodes: SDO scripts, a master, and the conformance tester."""

@@ -1,4 +1,4 @@
-"""Scripts, what is said to a node in the order in which it is said, and what runs them."""
+"""Scripts of frames to and from a node, and their execution."""
 
 # Theory of operation.
 #
@@ -352,7 +352,7 @@ class Dialogue:
     def _is_answer(
         self, step: SdoRequest, answer: sdo.Response, named: Object | None, data: bytes
     ) -> bool:
-        """Say whether a response can be the answer to a step, and to nothing else.
+        """Return whether a response can be the answer to a step, and to nothing else.
 
         A segment and an abort of 0000h:00 name no object. While other questions are open they may
         be answers to those.

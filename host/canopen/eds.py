@@ -1,4 +1,4 @@
-"""EDS, DCF, XDD and XDC files of any project, read as far as they are sound."""
+"""Read EDS, DCF, XDD and XDC files of any project, skipping invalid parts."""
 
 from __future__ import annotations
 

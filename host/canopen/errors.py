@@ -1,4 +1,4 @@
-"""What talking to a node raises where a person is to read it.
+"""Errors of the communication with a node.
 
 SdoFailed
  +-- SdoAborted                 the device or we aborted a transfer

@@ -1,4 +1,4 @@
-r"""What a gateway does for one client: SDO, NMT and its own settings (CiA 309-3, ASCII mapping).
+r"""A gateway for one client: SDO, NMT and its own settings (CiA 309-3, ASCII mapping).
 
 Lines that a client of a gateway sends (CiA 309-3, syntax of commands).
 
@@ -383,7 +383,7 @@ def _scan(lss: LssMaster, request: GatewayRequest) -> str:
 
 
 def _all_nodes(lss: LssMaster, request: GatewayRequest) -> str:
-    """Give each slave without a node-ID one; what a slave was given stands in front of OK."""
+    """Return each slave without a node-ID one; what a slave was given stands in front of OK."""
     words = _numbers(request, 0, 3)
     if len(words) == 2:
         raise GatewayError(

@@ -1,4 +1,4 @@
-"""One node of a network as a host holds it: what is said to it, and what is heard of it."""
+"""One node of a network at the host: requests to it, and its frames."""
 
 # Theory of operation.
 #

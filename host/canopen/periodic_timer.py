@@ -1,4 +1,4 @@
-"""When a period is over, told by who is asked often enough."""
+"""A timer for periods, based on regular polling."""
 
 from __future__ import annotations
 

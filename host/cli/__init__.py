@@ -1,1 +1,1 @@
-"""What the command lines of host tools and emulators share."""
+"""Common parts of the command lines of host tools and emulators."""

@@ -1,4 +1,4 @@
-"""The options of a CAN bus, as the tools of python-can take them, and the bus itself.
+"""Options of a CAN bus, as in the tools of python-can, and the bus itself.
 
 python-can is imported when a bus is opened: it takes a fifth of a second.
 """
@@ -22,12 +22,12 @@ if TYPE_CHECKING:
     import can
 
 GREEDY: Final = ("--timing", "--bus-kwargs")
-"""Options that take one or more values in python-can's tools."""
+"""Options with one or more values in python-can's tools."""
 
-"""What python-can says where its interface udp_multicast lacks a package."""
+"""Message of python-can if its interface udp_multicast lacks a package."""
 
 UNNAMED: Final = '"None"'
-"""In what python-can says where no interface is named."""
+"""Part of the message of python-can if no interface is given."""
 
 _PLAIN: Final = ("interface", "channel", "bitrate")
 _BIT_RATE: Final = re.compile(r"([0-9]{1,9})([kM]?)", re.ASCII)
@@ -38,7 +38,7 @@ _KEY_VALUE: Final = re.compile(r"([A-Za-z_][\w-]*)=(\S*)", re.ASCII)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BusOptions:
-    """Which bus, with what of it the command line says."""
+    """A bus, with its options on the command line."""
 
     interface: str | None = None
     channel: str | None = None
@@ -49,11 +49,11 @@ class BusOptions:
     data_bitrate: int | None = None
 
     def __bool__(self) -> bool:
-        """Say whether a bus outside is asked for."""
+        """Return whether an outside bus is requested."""
         return bool(self.interface or self.channel or self.timing or self.bus_kwargs)
 
     def arguments(self) -> list[str]:
-        """Return the words that say the same on another command line."""
+        """Return the equivalent words for another command line."""
         words = [f"--{name}={value}" for name in _PLAIN if (value := getattr(self, name))]
         for option, values in zip(GREEDY, (self.timing, self.bus_kwargs), strict=True):
             words += [option, *values] if values else []
@@ -65,7 +65,7 @@ def parse_bit_rate(text: str) -> int:
     """Read a bit rate: 500000, 500k, 1M.
 
     Raises:
-        ValueError: it is none.
+        ValueError: it is not a bit rate.
 
     >>> parse_bit_rate("500k"), parse_bit_rate("1M"), parse_bit_rate("125000")
     (500000, 1000000, 125000)
@@ -90,9 +90,9 @@ class _BitRate(click.ParamType):  # type: ignore[type-arg] # generic since click
 
 
 class BusCommand(HarmlessCommand):
-    """A command whose `--timing` and `--bus-kwargs` take all words KEY=VALUE that follow.
+    """A command whose `--timing` and `--bus-kwargs` accept all following words KEY=VALUE.
 
-    It is none for a command that has such words of its own.
+    Do not use it for a command with such words of its own.
     """
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
@@ -139,56 +139,56 @@ bus_options: Final[Decorator] = add_options(
         "--interface",
         metavar="INTERFACE",
         shell_complete=_complete_interface,
-        help="Driver of python-can, as socketcan, udp_multicast, slcan.",
+        help="Driver of python-can, such as socketcan, udp_multicast, slcan.",
     ),
-    click.option("-c", "--channel", metavar="CHANNEL", help="Channel of it, as can0."),
+    click.option("-c", "--channel", metavar="CHANNEL", help="Channel, such as can0."),
     click.option(
-        "-b", "--bitrate", type=_BitRate(), metavar="BITRATE", help="Bit rate in bit/s; 500k."
+        "-b", "--bitrate", type=_BitRate(), metavar="BITRATE", help="Bit rate in bit/s, or as 500k."
     ),
     click.option(
         "--timing",
         multiple=True,
         metavar="KEY=VALUE...",
-        help="Bit timing, as f_clock=8000000 tseg1=5 tseg2=2 sjw=2 brp=2 nof_samples=1.",
+        help="Bit timing, such as f_clock=8000000 tseg1=5 tseg2=2 sjw=2 brp=2 nof_samples=1.",
     ),
     click.option(
         "--bus-kwargs",
         multiple=True,
         metavar="KEY=VALUE...",
-        help="More for the driver, as port=43113.",
+        help="Further driver options, such as port=43113.",
     ),
 )
 """Add the fields of `BusOptions` as options; the command's class is `BusCommand`."""
 
 
 fd_options: Final[Decorator] = add_options(
-    click.option("--fd", is_flag=True, help="Have the driver send and receive CAN FD."),
+    click.option("--fd", is_flag=True, help="Send and receive CAN FD."),
     click.option(
         "--data-bitrate",
         type=_BitRate(),
         metavar="BITRATE",
-        help="Of data of CAN FD frames with BRS; for the load, and with --fd for the driver.",
+        help="Data bit rate of CAN FD frames with BRS; for the load, and with --fd for the driver.",
     ),
 )
-"""Add the fields of `BusOptions` that are of CAN FD, beside `bus_options`."""
+"""Add the CAN FD fields of `BusOptions`, besides `bus_options`."""
 
 
 def bus_and_rest(
     words: Sequence[str], channel: str | None, rest: str, most: int | None = None
 ) -> tuple[str | None, list[str]]:
-    """Tell the BUS of a command from what stands behind it; with -c there is no BUS.
+    """Separate the BUS of a command from the words after it; with -c there is no BUS.
 
     Args:
         words: the arguments.
-        channel: what -c says.
-        rest: what stands behind BUS, for messages.
-        most: how many of these there may be.
+        channel: value of -c.
+        rest: name of the words after BUS, for messages.
+        most: largest number of these.
 
     Returns:
-        The BUS, None where -c names it, and the rest.
+        The BUS, None if -c names it, and the rest.
 
     Raises:
-        click.UsageError: one is missing, or there are too many.
+        click.UsageError: an argument is missing, or there are too many.
     """
     bus, behind = (None, [*words]) if channel is not None else (words[0], [*words[1:]])
     if not behind:
@@ -200,17 +200,17 @@ def bus_and_rest(
 
 
 def open_raw(options: BusOptions, instead: str = "") -> tuple[can.BusABC, str, str | None]:
-    """Open such a bus for somebody who takes it as python-can gives it.
+    """Open a bus as a python-can object.
 
     Args:
         options: the bus.
-        instead: what a person may do who has none, for the message.
+        instead: alternative to a bus, for the message.
 
     Returns:
         The bus, its interface and its channel.
 
     Raises:
-        Refused: none is named; BusUnavailable: it cannot be opened.
+        Refused: no bus is given; BusUnavailable: it cannot be opened.
     """
     with loading():
         import can  # noqa: PLC0415 - slow
@@ -241,7 +241,7 @@ def open_raw(options: BusOptions, instead: str = "") -> tuple[can.BusABC, str, s
 
 
 def _let_go(error: Exception) -> None:
-    """Drop a bus that was never made whole: python-can warns that nobody has closed it."""
+    """Drop an incomplete bus without python-can's warning that it was not closed."""
     import logging  # noqa: PLC0415 - rarely wanted
     from traceback import clear_frames  # noqa: PLC0415
 
@@ -254,7 +254,7 @@ def _let_go(error: Exception) -> None:
 def check_interface(interface: str | None) -> None:
     """Refuse an interface that python-can does not have."""
     if interface is not None and interface not in (names := _interfaces()):
-        raise Refused(f"-i {interface!r} is none of python-can: {', '.join(names)}")
+        raise Refused(f"-i {interface!r} is not an interface of python-can: {', '.join(names)}")
 
 
 def _given(options: BusOptions) -> Mapping[str, Any]:
@@ -295,7 +295,7 @@ def _timing(pairs: Mapping[str, Any]) -> can.BitTiming:
 def _nothing_named(instead: str) -> str:
     names = ", ".join(_interfaces())
     return (
-        "no CAN bus is named: give -i INTERFACE -c CHANNEL, set CAN_INTERFACE and CAN_CHANNEL, or"
+        "no CAN bus is given: give -i INTERFACE -c CHANNEL, set CAN_INTERFACE and CAN_CHANNEL, or"
         f" write them into ~/.canrc{instead and f'; or {instead}'}."
         f" python-can has {names}"
     )

@@ -1,4 +1,4 @@
-"""Ask over a control socket on behalf of a command line."""
+"""Requests of command lines over a control socket."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ def request(socket: Path | str, whom: str, do: str, /, **fields: object) -> Any:
 
     Args:
         socket: the control socket.
-        whom: what is expected there, for people: `emulator`, `system`.
+        whom: expected server, for messages: `emulator`, `system`.
         do: the verb of the request.
         fields: of the request.
 
     Raises:
-        Refused: nobody answers, or with an error.
+        Refused: no answer, or an error.
     """
     with refused_by(socket, whom), ControlClient(socket) as client:
         return client.request(do, **fields)
@@ -51,11 +51,11 @@ def refused_by(socket: Path | str, whom: str) -> Iterator[None]:
         raise Refused(str(error)) from None
 
 
-# A command that runs until somebody stops it: by a signal, or over its control socket.
+# A command that runs until it is stopped, by a signal or over its control socket.
 
 
 class Waiting(Protocol):
-    """What waits, and may serve somebody meanwhile: a `ServingClock`, the loop of a server.
+    """An object that serves requests while it waits: a `ServingClock`, the loop of a server.
 
     Attributes:
         serve: called with the time in microseconds that it may take.
@@ -66,7 +66,7 @@ class Waiting(Protocol):
 
 @contextmanager
 def stopped_by_signals(stop: Callable[[], None]) -> Iterator[None]:
-    """Let Ctrl-C, SIGTERM and a closed terminal call `stop` instead of ending the process."""
+    """Make Ctrl-C, SIGTERM and a closed terminal call `stop` instead of ending the process."""
 
     def received(number: int, frame: FrameType | None) -> None:
         stop()
@@ -80,15 +80,15 @@ def stopped_by_signals(stop: Callable[[], None]) -> Iterator[None]:
 def serving_control(
     path: Path, dispatcher: RequestDispatcher, clock: Waiting
 ) -> Iterator[ControlServer]:
-    """Serve a control socket whenever the clock waits; the server is given to whoever has more.
+    """Serve a control socket whenever the clock waits, and yield the server.
 
     Args:
         path: of the socket.
         dispatcher: answers the requests.
-        clock: what the run waits by; it serves the socket meanwhile.
+        clock: clock of the run, which serves the socket while it waits.
 
     Raises:
-        Refused: no socket can be made there.
+        Refused: the socket cannot be made.
     """
     from tickrig.host.control.server import ControlServer  # noqa: PLC0415 - a TAB needs none
 

@@ -1,4 +1,4 @@
-"""Options that join a system with those of other middleware, the same for all commands."""
+"""Options that connect a system with other middleware, the same for all commands."""
 
 from __future__ import annotations
 
@@ -14,22 +14,23 @@ import click
 from tickrig.host.cli.messages import Refused
 from tickrig.host.cli.options import PATH, Decorator, add_options
 
-# What a command line says of OpenRTM: addresses, and how components are named.
+# OpenRTM options of a command line: addresses and names of components.
 
 FORMAT: Final = "%h.host_cxt/%n.rtc"
-"""OpenRTM's `naming.formats`, as it is if nobody says otherwise."""
+"""Default of OpenRTM's `naming.formats`."""
 
 _LETTERS: Final = "ntmvVchMp"
-"""Of a format: instance name, type (twice), version, vendor, category, host, manager, process."""
+"""Letters of a format: instance name, type (twice), version, vendor, category, host, manager,
+process."""
 
 _PORT: Final = 2809
 
 
 @dataclass(frozen=True, slots=True)
 class Endpoint:
-    """Where an ORB listens, and what peers are told; where a name server is.
+    """Address of an ORB for listening and for peers, or of a name server.
 
-    CORBA has no access control: who reaches the address can do all that rtshell can.
+    CORBA has no access control: anyone who reaches the address can do everything that rtshell can.
 
     Attributes:
         host: an address, or a name of one.
@@ -40,25 +41,25 @@ class Endpoint:
     port: int = 0
 
     def __str__(self) -> str:
-        """Return it as people write it."""
+        """Return it in the usual notation."""
         host = f"[{self.host}]" if ":" in self.host else self.host
         return f"{host}:{self.port}" if self.port else host
 
     @property
     def uri(self) -> str:
-        """It as omniORB wants it."""
+        """The endpoint in omniORB's notation."""
         host = f"[{self.host}]" if ":" in self.host else self.host
         return f"giop:tcp:{host}:{self.port or ''}"
 
 
 @dataclass(frozen=True, slots=True)
 class OpenRtmOptions:
-    """How the components of a process take part in a system of OpenRTM.
+    """Settings of a process in an OpenRTM system.
 
     Attributes:
-        name_server: where its name server is.
-        endpoint: where peers reach the components.
-        names: how components are named in the name server.
+        name_server: address of its name server.
+        endpoint: address for peers.
+        names: format of component names in the name server.
     """
 
     name_server: Endpoint
@@ -67,10 +68,10 @@ class OpenRtmOptions:
 
 
 def _parse_options(name_server: str, address: str = "", names: str = "") -> OpenRtmOptions:
-    """Read the words of a command line, empty for those left out.
+    """Read the words of a command line, empty for omitted ones.
 
     Raises:
-        ValueError: one of them cannot be; the line begins with the name of its option.
+        ValueError: an invalid word; the message starts with the name of its option.
     """
     return OpenRtmOptions(
         _parse_endpoint("--openrtm", name_server, _PORT),
@@ -90,7 +91,7 @@ def format_name(pattern: str, values: Mapping[str, str]) -> str:
     'robot.host_cxt/ConsoleIn0.rtc'
 
     Raises:
-        KeyError: a letter that has no value.
+        KeyError: a letter without a value.
     """
     filled = {letter: value.replace("/", "_") for letter, value in values.items()} | {"%": "%"}
     return re.sub(r"%(.?)", lambda match: filled[match[1]], pattern)
@@ -103,7 +104,7 @@ def parse_endpoint(text: str, port: int = _PORT) -> Endpoint:
     (Endpoint(host='robot', port=2809), Endpoint(host='::1', port=2810))
 
     Raises:
-        ValueError: it is none of these.
+        ValueError: another form.
     """
     match = re.fullmatch(r"(?:\[([0-9a-fA-F:.]+)\]|([\w.-]+))(?::(\d{1,5}))?", text, re.ASCII)
     if match is None or int(match[3] or 1) not in range(1, 65_536):
@@ -119,12 +120,12 @@ def _parse_endpoint(option: str, text: str, port: int) -> Endpoint:
 
 
 def _parse_format(option: str, pattern: str) -> str:
-    """Take a format that gives each component another path."""
+    """Accept a format that gives each component a different path."""
     try:
         parts = format_name(pattern, dict.fromkeys(_LETTERS, "x")).split("/")
     except KeyError as error:
         known = " ".join(f"%{letter}" for letter in _LETTERS)
-        raise ValueError(f"{option}: %{error.args[0]} is none of {known}") from None
+        raise ValueError(f"{option}: %{error.args[0]} is not one of {known}") from None
     if "%n" not in pattern or not all(parts):
         raise ValueError(f"{option}: {pattern!r} is not like {FORMAT}, with %n")
     return pattern
@@ -134,20 +135,20 @@ openrtm_options: Final[Decorator] = add_options(
     click.option(
         "--openrtm",
         metavar="HOST[:PORT]",
-        help="Components as those of OpenRTM, in its name server there (extra tickrig[openrtm]).",
+        help="Offer components as OpenRTM components in this name server (extra tickrig[openrtm]).",
     ),
     click.option(
         "--openrtm-address",
         metavar="HOST[:PORT]",
-        help="Where its peers reach them, else 127.0.0.1. CORBA has no access control.",
+        help="Address for peers, by default 127.0.0.1. CORBA has no access control.",
     ),
     click.option(
-        "--openrtm-names", metavar="FORMAT", help="As naming.formats, else %h.host_cxt/%n.rtc."
+        "--openrtm-names", metavar="FORMAT", help="As naming.formats. [%h.host_cxt/%n.rtc]"
     ),
 )
 
 ros2_options: Final[Decorator] = add_options(
-    click.option("--ros2", is_flag=True, help="Ports as topics of ROS 2 (extra tickrig[ros2])."),
+    click.option("--ros2", is_flag=True, help="Ports as ROS 2 topics (extra tickrig[ros2])."),
     click.option(
         "--ros2-table", type=PATH, metavar="FILE", help="TOML: which ports, topics and types."
     ),
@@ -155,17 +156,17 @@ ros2_options: Final[Decorator] = add_options(
         "--ros2-domain",
         type=click.IntRange(0, 232),
         metavar="ID",
-        help="Of DDS, else that of ROS_DOMAIN_ID, else 0.",
+        help="DDS domain; by default ROS_DOMAIN_ID, else 0.",
     ),
     click.option(
-        "--ros2-interface", metavar="NAME", help="Else loopback. DDS has no access control here."
+        "--ros2-interface", metavar="NAME", help="[loopback] DDS has no access control here."
     ),
 )
 
 
 @dataclass(frozen=True, slots=True)
 class EngineOptions:
-    """Which engines a command line asks for.
+    """Engines requested on a command line.
 
     Attributes:
         openrtm: OpenRTM, or None.
@@ -176,19 +177,19 @@ class EngineOptions:
     ros2: Ros2Options | None = None
 
     def __bool__(self) -> bool:
-        """Return whether it asks for any."""
+        """Return whether any engine is requested."""
         return self.openrtm is not None or self.ros2 is not None
 
 
 def take_engines(options: dict[str, Any], topics: str = "") -> EngineOptions:
-    """Take the options of engines out of those of a command.
+    """Remove the options of engines from those of a command.
 
     Args:
         options: of the command line, by name.
-        topics: table of topics that holds where none is given; all ports have one if empty.
+        topics: default table of topics; if empty, all ports have a topic.
 
     Raises:
-        Refused: options of an engine that is not asked for, or that cannot be.
+        Refused: options of an engine that is not requested, or invalid ones.
     """
     return EngineOptions(_take_openrtm(options), _take_ros2(options, topics))
 
@@ -222,23 +223,23 @@ def _take_ros2(options: dict[str, Any], topics: str) -> Ros2Options | None:
         raise Refused(str(error)) from None
 
 
-# What a command line says of ROS 2.
+# ROS 2 options of a command line.
 
 
 _DOMAIN_VARIABLE: Final = "ROS_DOMAIN_ID"
 _LAST_DOMAIN: Final = 232
-"""Beyond it there is no port left (DDSI-RTPS, 9.6.2)."""
+"""Highest domain with ports (DDSI-RTPS, 9.6.2)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Ros2Options:
-    """How a system is joined with ROS 2.
+    """Settings of a system in ROS 2.
 
     Attributes:
         domain: of DDS, 0..232.
         interface: of this machine, such as eth0; loopback if empty.
-        table: which ports have topics; None for those of the command.
-        topics: text of the table of the command; empty for a topic of each port.
+        table: ports with topics; None for those of the command.
+        topics: text of the table of the command; empty for a topic for each port.
     """
 
     domain: int = 0
@@ -250,10 +251,10 @@ class Ros2Options:
 def parse_options(
     domain: int | None, interface: str | None, table: Path | None, topics: str
 ) -> Ros2Options:
-    """Return the options; the domain is that of ROS_DOMAIN_ID, or 0, where none is given.
+    """Return the options; the default domain is ROS_DOMAIN_ID, or 0.
 
     Raises:
-        ValueError: the variable holds no domain.
+        ValueError: the variable is not a domain.
     """
     if domain is None:
         text = os.environ.get(_DOMAIN_VARIABLE, "") or "0"

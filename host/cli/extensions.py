@@ -1,4 +1,4 @@
-"""What installed packages add to ours: entry points, read when needed (docs/howto/extending.md)."""
+"""Extensions by installed packages: entry points, read when needed (docs/howto/extending.md)."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ T = TypeVar("T")
 
 
 class ExtensionError(ValueError):
-    """An extension that is not there or cannot be used; the text is one line."""
+    """A missing or unusable extension; the message is one line."""
 
 
 @dataclass(frozen=True)
 class ExtensionGroup(Generic[T]):
-    """One entry-point group: what we bring ourselves, and what other packages add.
+    """One entry-point group: built-in members and members of other packages.
 
-    Nothing is imported, and no metadata is read, before somebody asks. What is built in
-    needs no installation; an entry point of the same name does not replace it.
+    Nothing is imported, and no metadata is read, before the first access. Built-in members need no
+    installation; an entry point of the same name does not replace them.
 
     Args:
-        name: of the group, as `tickrig.devices`.
-        what: what its members are called, for people, as `device`.
-        built_in: ours by name, each as `MODULE:NAME`.
-        accepts: True for what may be a member.
-        wanted: what that is, for people, as `a DeviceType`.
+        name: of the group, such as `tickrig.devices`.
+        what: noun for its members in messages, such as `device`.
+        built_in: built-in members by name, each as `MODULE:NAME`.
+        accepts: returns whether an object may be a member.
+        wanted: description of members, such as `a DeviceType`.
     """
 
     name: str
@@ -42,14 +42,14 @@ class ExtensionGroup(Generic[T]):
     wanted: str
 
     def names(self) -> list[str]:
-        """Return all names, ours first, without loading anything."""
+        """Return all names, built-in ones first, without loading anything."""
         return [*self.built_in, *sorted({point.name for point in self._foreign()})]
 
     def load(self, name: str) -> T:
         """Return the member of this name.
 
         Raises:
-            ExtensionError: there is none, or it cannot be loaded.
+            ExtensionError: unknown name, or it cannot be loaded.
         """
         if name in self.built_in:
             return self._checked(f"{self.what} {name!r}", self.built_in[name])
@@ -59,10 +59,10 @@ class ExtensionGroup(Generic[T]):
         raise ExtensionError(f"no {self.what} {name!r}; {near(name, self.names())}")
 
     def load_all(self, notify: Callable[[str], None]) -> dict[str, T]:
-        """Return all members by name; what cannot be loaded is left out, and told in a line.
+        """Return all members by name; omit and report those that cannot be loaded.
 
         Args:
-            notify: takes a line for people.
+            notify: called with each report.
         """
         return {name: self.load(name) for name in self.built_in} | self.load_foreign(notify)
 
@@ -77,7 +77,7 @@ class ExtensionGroup(Generic[T]):
         return members
 
     def _foreign(self) -> Iterator[EntryPoint]:
-        """Give the entry points of other packages."""
+        """Yield the entry points of other packages."""
         from importlib.metadata import entry_points  # noqa: PLC0415 - slow
 
         seen = set[tuple[str, str]]()  # a package may be found twice on the path

@@ -1,4 +1,4 @@
-"""What commands say to people on standard error: remarks, warnings, refusals."""
+"""Messages of commands on standard error: remarks, warnings, refusals."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from tickrig.wire.canopen.eds.eds_file import Finding
 
 
-# What a command line says when it cannot do what was asked.
+# Messages for requests that a command cannot execute.
 
 NEEDS_YAML: Final = "a System Definition needs PyYAML: pip install 'tickrig[rtc]'"
 
@@ -28,7 +28,7 @@ class Refused(click.ClickException):
 
 
 class BusUnavailable(Refused):
-    """A bus that is named well and cannot be opened."""
+    """A valid bus that cannot be opened."""
 
 
 class BusFailed(click.ClickException):
@@ -50,7 +50,7 @@ def refused_at(option: str) -> Iterator[None]:
 def failing(*errors: type[Exception]) -> Iterator[None]:
     """Raise ClickException, which is exit status 1, in place of these errors.
 
-    An error of printing stays as it is.
+    An output error is not changed.
     """
     try:
         yield
@@ -60,7 +60,7 @@ def failing(*errors: type[Exception]) -> Iterator[None]:
 
 
 def refuse_path(what: str, error: OSError) -> NoReturn:
-    """Say that a path cannot be used, and why."""
+    """Raise Refused for an unusable path, with the reason."""
     path = error.filename2 or error.filename
     named = what if path is None else f"{what} {path}"
     raise Refused(f"{named}: {error.strerror or error}") from error
@@ -71,7 +71,7 @@ def refusing(what: str = "", wrong: type[ValueError] = ValueError) -> Iterator[N
     """Raise Refused in place of an error of the block, and of an OSError as `refuse_path` does.
 
     Args:
-        what: the option or argument that is wrong: the message begins with it.
+        what: the invalid option or argument, which starts the message.
         wrong: the error; its text is the message.
     """
     try:
@@ -83,24 +83,24 @@ def refusing(what: str = "", wrong: type[ValueError] = ValueError) -> Iterator[N
 
 
 def time_us(option: str, word: str) -> int:
-    """Read the time of an option, as `--wait`, in microseconds; Refused if it is none."""
+    """Read the time of an option such as `--wait`, in microseconds; Refused if it is invalid."""
     from tickrig.host.text.values import parse_time_us  # noqa: PLC0415 - a TAB needs none
 
     with refused_at(option):
         return parse_time_us(word)
 
 
-# What commands say to people on standard error: remarks, warnings, faults of EDS files.
+# Messages of commands on standard error: remarks, warnings, faults of EDS files.
 
 
 def say(text: str) -> None:
-    """Tell people; standard output is for programs."""
+    """Print a message on standard error; standard output is for programs."""
     click.echo(text, err=True)
 
 
 @contextmanager
 def warnings_shown() -> Iterator[None]:
-    """Show warnings of the library on standard error, a line each; else it is silent."""
+    """Show warnings of the library on standard error, one line each; without this it is silent."""
     import logging  # noqa: PLC0415 - slow, and a TAB needs none
 
     logger, handler = logging.getLogger("tickrig"), logging.StreamHandler()
@@ -113,14 +113,14 @@ def warnings_shown() -> Iterator[None]:
 
 
 def show_findings(findings: Iterable[Finding]) -> None:
-    """Say what is wrong in EDS files; what is so in many sections, once."""
+    """Print the findings in EDS files; a finding in many sections only once."""
     from tickrig.wire.canopen.eds.eds_file import finding_lines  # noqa: PLC0415 - a TAB needs none
 
     for line in finding_lines(findings):
         say(line)
 
 
-# How a verb ends that could not do all it was asked.
+# End of a verb that could not do everything.
 
 
 class SourceFailed(click.ClickException):
@@ -131,10 +131,10 @@ class SourceFailed(click.ClickException):
 
 @contextmanager
 def until_unread() -> Iterator[None]:
-    """End the block quietly when nobody reads standard output any more, as before `| head`.
+    """End the block quietly when standard output is closed, as before `| head`.
 
     Raises:
-        SourceFailed: it cannot be written, as where the disk is full.
+        SourceFailed: it cannot be written, for example because the disk is full.
     """
     try:
         yield
@@ -148,5 +148,5 @@ def until_unread() -> Iterator[None]:
 
 
 def _leave() -> None:
-    """Send what is still to be flushed, at exit too, nowhere."""
+    """Discard output that is still to be flushed, also at exit."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

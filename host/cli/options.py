@@ -1,4 +1,4 @@
-"""What console commands are, and options of which command lines are made."""
+"""Base class of console commands, and common options."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ if TYPE_CHECKING:
 
 
 class HarmlessCommand(click.Command):
-    """A console command: nothing that it prints is obeyed by a terminal."""
+    """A console command; terminals do not interpret control characters in its output."""
 
     def main(self, *args: Any, **extra: Any) -> Any:
-        """Run it."""
+        """Run the command."""
         with standard_streams():
             return super().main(*args, **extra)
 
 
 class PathType(click.Path):
-    """A path, as `click.Path(path_type=Path)`: pathlib is imported when there is one."""
+    """A path, like `click.Path(path_type=Path)`, which imports pathlib only if a path is given."""
 
     def convert(
         self,
@@ -59,7 +59,7 @@ def add_options(*options: Decorator) -> Decorator:
 
 
 class NumberRange(click.FloatRange):
-    """Numbers of a range; NaN, which compares with nothing, is none of them."""
+    """Numbers of a range; NaN is refused."""
 
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
@@ -93,7 +93,7 @@ def version_option() -> Callable[[Callable[..., Any]], Callable[..., Any]]:
 
 
 def time_option(option: str, name: str, **attributes: Any) -> Decorator:
-    """Return the option of a time, as `10s`; in microseconds, None where it is not given."""
+    """Return the option of a time such as `10s`; in microseconds, None if it is not given."""
 
     def parsed(context: click.Context, parameter: click.Parameter, text: str | None) -> int | None:
         from tickrig.host.cli.messages import Refused  # noqa: PLC0415 - a TAB needs none
@@ -110,22 +110,22 @@ def time_option(option: str, name: str, **attributes: Any) -> Decorator:
 run_code_option: Final[Decorator] = click.option(
     "--run-code", is_flag=True, help="Run the Python files that the trace names (FILE.py:Class)."
 )
-"""Of commands that make devices again of a trace."""
+"""Option of commands that rebuild devices from a trace."""
 
 
-# Commands that are imported when they are asked for, so that each starts fast: a group finds its
+# Commands that are imported on demand, so that each starts fast: a group finds its
 # commands by their paths, and a command with heavy imports finds its work by its path.
 
 
 def works_in(path: str) -> Decorator:
-    """Return a decorator: the function says what a command takes, and `path` does its work.
+    """Return a decorator: the function declares the options of a command, and `path` does its work.
 
-    Help and completion need the options alone, so the module of the work is imported when the
+    Help and completion need only the options, so the module of the work is imported when the
     command runs. The decorated function has the signature of the work and an empty body.
 
     Args:
-        path: of the function that does the work, as `MODULE:NAME`. What it returns is the exit
-            status; None is 0.
+        path: of the function that does the work, as `MODULE:NAME`. It returns the exit status; None
+            is 0.
     """
 
     def decorate(described: Callable[..., Any]) -> Callable[..., Any]:
@@ -143,12 +143,12 @@ def works_in(path: str) -> Decorator:
 
 
 class LazyCommand(click.Command):
-    """Stands in lists for a command that is not imported yet.
+    """Placeholder in lists for a command that is not imported yet.
 
     Args:
-        name: as it is asked for.
-        path: where it is, as `MODULE:NAME`.
-        short_help: how its help begins.
+        name: of the command.
+        path: its place, `MODULE:NAME`.
+        short_help: start of its help.
     """
 
     def __init__(self, name: str, path: str, short_help: str) -> None:
@@ -157,7 +157,7 @@ class LazyCommand(click.Command):
 
 
 class LazyGroup(HarmlessCommand, click.Group):
-    """A group whose commands live in modules of their own.
+    """A group whose commands are in separate modules.
 
     Args:
         commands: path and short help of each by its name, in the order of the list.
@@ -171,12 +171,12 @@ class LazyGroup(HarmlessCommand, click.Group):
         super().__init__(commands=awaited, **attributes)
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Return the names in the order in which people meet them."""
+        """Return the names in the order of the list."""
         return list(self.commands)
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Import the command that was asked for."""
+        """Import the requested command."""
         name, command, rest = super().resolve_command(ctx, args)
         return name, load(command.path) if isinstance(command, LazyCommand) else command, rest

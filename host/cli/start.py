@@ -197,9 +197,9 @@ def standard_streams() -> Iterator[None]:
 
 
 def raise_of_output(error: Exception) -> None:
-    """Raise an error of printing once more, which is no matter of what was printed.
+    """Raise an output error again, independent of the printed text.
 
-    Where somebody reads no further, as before `| head`, the command ends without a word.
+    If the reader has closed the pipe, as before `| head`, the command ends without a message.
     """
     printing = isinstance(error, OSError) and error.filename is None
     if printing and error.errno in (*FULL, errno.EPIPE):  # type: ignore[attr-defined]
@@ -215,9 +215,9 @@ def load(path: str) -> Any:
 
 @contextmanager
 def loading() -> Iterator[None]:
-    """Let Ctrl-C end the process at once, as long as nothing has to be cleaned up.
+    """Make Ctrl-C end the process at once, while there is nothing to clean up.
 
-    Where somebody else waits for Ctrl-C, that stays so; threads see none of it.
+    Other handlers of Ctrl-C are kept; threads are not affected.
     """
     handler = signal.getsignal(signal.SIGINT)
     owner = getattr(handler, "__self__", None)

@@ -1,4 +1,4 @@
-"""The other side of a control socket: ask a running emulator, wait for its answer."""
+"""Client of a control socket: sends requests to a running emulator."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ TIMEOUT_S: Final = 5.0
 
 
 class ControlRefused(ValueError):  # noqa: N818 - what the emulator did
-    """The emulator said no; the text says why."""
+    """The emulator refused a request; the message has the reason."""
 
 
 class ControlClient:
     """A connection to a control socket.
 
     Args:
-        path: where the socket is.
-        timeout_s: how long to wait for an answer.
+        path: path of the socket.
+        timeout_s: time-out of an answer.
 
     Raises:
-        OSError: nobody listens there, or nobody answers.
+        OSError: no server, or no answer.
     """
 
     def __init__(self, path: Path | str, timeout_s: float = TIMEOUT_S) -> None:
@@ -45,8 +45,8 @@ class ControlClient:
 
         Raises:
             ControlRefused: the emulator refused it.
-            OSError: the emulator does not answer, or hung up.
-            ValueError: the answer is none.
+            OSError: the emulator does not answer, or has closed the connection.
+            ValueError: invalid answer.
         """
         request = json.dumps({"v": VERSION, "do": do, **fields})
         self._socket.sendall(request.encode() + b"\n")
@@ -61,7 +61,7 @@ class ControlClient:
         return answer
 
     def close(self) -> None:
-        """Hang up."""
+        """Close the connection."""
         self._socket.close()
 
     def __enter__(self) -> Self:
@@ -74,7 +74,7 @@ class ControlClient:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        """Hang up."""
+        """Close the connection."""
         self.close()
 
     def _receive_line(self) -> bytes:
@@ -82,6 +82,6 @@ class ControlClient:
         while b"\n" not in pieces[-1]:
             pieces.append(self._socket.recv(65_536))
             if not pieces[-1]:
-                raise ConnectionResetError("the emulator hung up")
+                raise ConnectionResetError("the emulator closed the connection")
         line, _, self._received = b"".join(pieces).partition(b"\n")
         return line

@@ -1,4 +1,4 @@
-"""The time of this machine, for what runs in real time."""
+"""Clocks of this machine, for real time."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 
 class RealClock:
-    """The monotonic clock of this machine; it starts when it is first waited for."""
+    """The monotonic clock of this machine; it starts with the first wait."""
 
     def __init__(self) -> None:
         self._start_ns: int | None = None
@@ -20,13 +20,13 @@ class RealClock:
         return (time.monotonic_ns() - self._start_ns) // 1_000
 
     def wait_until(self, t_us: int, /) -> int:
-        """Sleep until a time; a late rig catches up, it never skips a tick.
+        """Sleep until a time; a late rig catches up without skipping ticks.
 
         Args:
             t_us: time since the first wait.
 
         Returns:
-            By how much it was late, in us.
+            The delay in us.
         """
         if self._start_ns is None:
             self._start_ns = time.monotonic_ns()
@@ -38,7 +38,7 @@ class RealClock:
 
 
 class ServingClock(RealClock):
-    """The monotonic clock of this machine; what it would sleep, it serves.
+    """The monotonic clock of this machine, which serves requests while it waits.
 
     Attributes:
         serve: called with the time in microseconds that it may take; at least

@@ -13,7 +13,7 @@ Object = dict[str, object]
 """A JSON object."""
 
 _Verb = tuple[Callable[[Object], Object], tuple[str, ...]]
-"""What answers a request, and the fields that it takes."""
+"""Handler of a request, and its fields."""
 
 _COMMON_FIELDS: Final = ("v", "do", "id")
 _NOT_JSON: Final = "the line is not a JSON object"
@@ -23,14 +23,14 @@ class RequestDispatcher:
     """Answers requests by a table of verbs; a bad request changes nothing.
 
     Args:
-        verbs: by what a request has in `do`. A verb raises ValueError to refuse.
+        verbs: by the value of `do` in a request. A verb raises ValueError to refuse.
     """
 
     def __init__(self, verbs: Mapping[str, _Verb]) -> None:
         self._verbs = verbs
 
     def answer_line(self, line: bytes) -> bytes:
-        """Answer a line as it came from the wire."""
+        """Answer a received line."""
         try:
             request = json.loads(line.decode(), parse_constant=_refuse_constant)
             if not isinstance(request, dict):
@@ -43,7 +43,7 @@ class RequestDispatcher:
             return refusal_line(f"{_NOT_JSON}: {error}")
 
     def answer(self, request: Object) -> Object:
-        """Answer a request: `ok`, and what was asked for or `error`."""
+        """Answer a request: `ok`, and the result or `error`."""
         head: Object = {"id": request["id"]} if _is_id(request.get("id")) else {}
         try:
             return {"v": VERSION, **head, "ok": True, **self._dispatch(request)}
@@ -67,7 +67,7 @@ class RequestDispatcher:
 
 
 def _refusal(error: str) -> Object:
-    """Return the answer to a request that cannot be done."""
+    """Return the answer to a refused request."""
     return {"v": VERSION, "ok": False, "error": error}
 
 
@@ -77,7 +77,7 @@ def refusal_line(error: str) -> bytes:
 
 
 def text_of(request: Mapping[str, object], key: str) -> str:
-    """Return a field that is a string; ValueError if it is none."""
+    """Return a string field; ValueError if it is not a string."""
     value = request.get(key)
     if not isinstance(value, str):
         raise ValueError(f"{key} is a string, not {short(value)}")
@@ -85,7 +85,7 @@ def text_of(request: Mapping[str, object], key: str) -> str:
 
 
 def whole(value: object, key: str, low: int, high: int) -> int:
-    """Return a whole number; ValueError if it is none, or none of `low` to `high`."""
+    """Return a whole number; ValueError if it is not one, or not in `low` to `high`."""
     if not isinstance(value, int) or isinstance(value, bool):
         raise ValueError(f"{key} is a whole number, not {short(value)}")
     if not low <= value <= high:
@@ -94,7 +94,7 @@ def whole(value: object, key: str, low: int, high: int) -> int:
 
 
 def short(value: object) -> str:
-    """Show what came, as JSON, cut to a sensible length."""
+    """Return a received value as JSON, truncated to a sensible length."""
     text = json.dumps(value)
     return text if len(text) <= 60 else f"{text[:60]}..."
 
@@ -116,7 +116,7 @@ def _encode(answer: Object) -> bytes:
 
 
 def _spelt(value: object) -> object:
-    """Return a value with text in place of the numbers that JSON has not."""
+    """Return a value with text in place of numbers that JSON does not have."""
     if isinstance(value, dict):
         return {key: _spelt(each) for key, each in value.items()}
     if isinstance(value, list | tuple):

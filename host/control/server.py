@@ -50,14 +50,14 @@ MAX_CLIENTS: Final = 32
 MAX_UNSENT: Final = 262_144
 _READ_BYTES: Final = 4_096
 IDLE_S: Final = 60.0
-"""A client that is silent so long makes room for another where none is left."""
+"""Idle time after which a client makes room for another if all places are taken."""
 
 Answer = Callable[[bytes], bytes]
 """Answers a line, given without its end; the answer has one."""
 
 
 class Readable(Protocol):
-    """What has a descriptor, as a socket; `select` says when that can be read."""
+    """An object with a descriptor, such as a socket, for `select`."""
 
     def fileno(self) -> int:
         """Return the descriptor."""
@@ -65,15 +65,15 @@ class Readable(Protocol):
 
 
 class LineServer:
-    """Serves a listening socket while somebody gives it time.
+    """Serves a listening socket whenever `serve` is called.
 
     A round answers at most one line of each client; a client that does not
     read its answers is not read from either.
 
     Args:
-        listener: does not block; the server closes it.
-        begin: called with each new client: what answers its lines.
-        refuse: makes an answer that says why there is none.
+        listener: non-blocking; closed by the server.
+        begin: called for each new client; returns the handler of its lines.
+        refuse: makes an answer with the reason of a refusal.
         max_line: longest line, in bytes.
         clock: monotonic time in seconds.
     """
@@ -92,16 +92,16 @@ class LineServer:
         self._attached: dict[Readable, Callable[[], None]] = {}
 
     def attach(self, source: Readable, ready: Callable[[], None]) -> None:
-        """Serve something else, too.
+        """Serve another source, too.
 
         Args:
-            source: what has a descriptor; -1 once it is closed.
-            ready: called in a round in which that can be read.
+            source: object with a descriptor; -1 after closing.
+            ready: called in a round in which it can be read.
         """
         self._attached[source] = ready
 
     def serve(self, wait_us: int) -> None:
-        """Do one round; wait for something to do, but not longer than `wait_us`."""
+        """Run one round; wait for work, but not longer than `wait_us`."""
         clients = self._clients.values()
         readers = [client.connection for client in clients if client.wants_more]
         writers = [client.connection for client in clients if client.has_unsent]
@@ -125,7 +125,7 @@ class LineServer:
             self._accept()
 
     def close(self) -> None:
-        """Send what can be sent, and hang up."""
+        """Send pending data, and close the connections."""
         for client in self._clients.values():
             client.flush()
             client.connection.close()
@@ -148,7 +148,7 @@ class LineServer:
         _dismiss(connection, self._refuse(f"there are {MAX_CLIENTS} clients already"))
 
     def _make_room(self) -> None:
-        """Hang up on the client that has been silent the longest, if that was long."""
+        """Close the connection of the longest idle client, if it was idle long enough."""
         client = min(self._clients.values(), key=lambda client: client.active_s)
         if self._clock() - client.active_s >= IDLE_S:
             del self._clients[client.connection]
@@ -198,7 +198,7 @@ class _Client:
         return self._broken or (self._closing and not self._unsent and not self.has_line)
 
     def read(self) -> None:
-        """Take what came."""
+        """Read received data."""
         try:
             data = self.connection.recv(_READ_BYTES)
         except BlockingIOError:
@@ -210,19 +210,19 @@ class _Client:
         self._receive(data)
 
     def answer(self) -> None:
-        """Answer the next whole line."""
+        """Answer the next complete line."""
         line = bytes(self._received[: self._end])
         del self._received[: self._end + 1]
         self._end = self._received.find(b"\n")
         self.send(self._too_long if len(line) > self._max_line else self._answer(line))
 
     def send(self, data: bytes) -> None:
-        """Queue an answer and send what goes at once."""
+        """Queue an answer, and send as much as possible at once."""
         self._unsent += data
         self.flush()
 
     def flush(self) -> None:
-        """Send what goes at once."""
+        """Send as much as possible at once."""
         try:
             del self._unsent[: self.connection.send(self._unsent)]
         except BlockingIOError:
@@ -245,16 +245,16 @@ class _Client:
 
 
 class ControlServer(LineServer):
-    """Serves a control socket while somebody gives it time.
+    """Serves a control socket whenever `serve` is called.
 
     Args:
-        path: where the socket is; that of a killed process is replaced.
+        path: path of the socket; that of a killed process is replaced.
         control: answers the requests.
         clock: monotonic time in seconds.
 
     Raises:
-        FileExistsError: somebody listens there, or something else.
-        OSError: no socket can be made there.
+        FileExistsError: another process listens there, or it is another file.
+        OSError: the socket cannot be made.
     """
 
     def __init__(
@@ -264,7 +264,7 @@ class ControlServer(LineServer):
         self._path, self._inode = path, path.stat().st_ino
 
     def close(self) -> None:
-        """Send what can be sent, hang up, and remove the socket."""
+        """Send pending data, close the connections, and remove the socket."""
         super().close()
         with contextlib.suppress(FileNotFoundError):
             if self._path.stat().st_ino == self._inode:

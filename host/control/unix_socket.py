@@ -16,14 +16,14 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 _MAX_PATH_BYTES: Final = 107
-"""What the kernel takes, beside the zero at the end (unix(7), sun_path)."""
+"""Longest path for the kernel, without the zero at the end (unix(7), sun_path)."""
 
 
 def unix_socket() -> socket.socket:
     """Return a new Unix socket.
 
     Raises:
-        OSError: this system has none: Python knows none on Windows.
+        OSError: not supported: Python has none on Windows.
     """
     if sys.platform == "win32":
         raise OSError(errno.EAFNOSUPPORT, "there are no Unix sockets on Windows")
@@ -39,7 +39,7 @@ def listen_at(path: Path) -> socket.socket:
     Raises:
         FileExistsError: a live process listens there, or it is not a socket.
         BlockingIOError: another program holds a lock on the folder for more than a second.
-        OSError: no socket can be made there.
+        OSError: the socket cannot be made.
     """
     listener = unix_socket()
     try:
@@ -61,7 +61,7 @@ _LOCK_AGAIN_S: Final = 0.01
 
 @contextmanager
 def _alone_in(folder: Path) -> Iterator[None]:
-    """Let two that begin at once do so one after the other; each takes milliseconds."""
+    """Serialize processes that start at the same time; each takes milliseconds."""
     held = os.open(folder, os.O_RDONLY)
     try:
         if sys.platform != "win32":
@@ -74,7 +74,7 @@ def _alone_in(folder: Path) -> Iterator[None]:
 if sys.platform != "win32":
 
     def _lock(held: int, folder: Path) -> None:
-        """Lock a folder; BlockingIOError if another program does not let go of it."""
+        """Lock a folder; BlockingIOError if another program holds the lock."""
         import fcntl  # noqa: PLC0415 - not on Windows
 
         for _ in range(_LOCK_TRIES):
@@ -87,7 +87,7 @@ if sys.platform != "win32":
 
 
 def _check(path: Path) -> None:
-    """Raise FileExistsError unless nothing is there, or the socket of a killed process."""
+    """Raise FileExistsError unless the path is free, or the socket of a killed process."""
     if _is_socket(path) and _is_live(path):
         raise FileExistsError(errno.EEXIST, "another process listens there")
     if path.is_symlink() or (path.exists() and not _is_socket(path)):
@@ -95,7 +95,7 @@ def _check(path: Path) -> None:
 
 
 def _publish(listener: socket.socket, path: Path) -> None:
-    """Listen first, then be found: who sees the path can connect.
+    """Listen first, then create the path, so that every client that sees it can connect.
 
     By a new name, not by a link: on the file system of User-Mode Linux that is another socket.
     """

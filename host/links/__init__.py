@@ -1,1 +1,1 @@
-"""How a proxy reaches its device: serial ports, CAN buses, lines that go and come back."""
+"""Links to devices: serial ports, CAN buses, reconnecting lines."""

@@ -1,4 +1,4 @@
-"""A CAN link to a real bus, or any other that python-can knows.
+"""A CAN link to a real bus, or any other bus of python-can.
 
 Frames as python-can has them.
 
@@ -47,7 +47,7 @@ _NO_MSGPACK: Final = "msgpack not installed"
 
 
 def to_message(frame: CanFrame | FdFrame, at_us: int = 0) -> can.Message:
-    """Return a message; its timestamp is in seconds, as python-can wants it."""
+    """Return a message; its timestamp is in seconds, as in python-can."""
     if isinstance(frame, FdFrame):
         return _fd_message(frame, at_us)
     return can.Message(
@@ -88,9 +88,9 @@ def to_frame(message: can.Message) -> CanFrame | None:
 
 
 def to_fd_frame(message: can.Message) -> FdFrame | None:
-    """Return a CAN FD frame, not checked; None for any other message.
+    """Return a CAN FD frame, not validated; None for any other message.
 
-    python-can takes one without data in an ASC log for a remote frame, which CAN FD has not.
+    python-can reads one without data in an ASC log as a remote frame, which CAN FD does not have.
     """
     if not message.is_fd or message.is_error_frame:
         return None
@@ -99,7 +99,7 @@ def to_fd_frame(message: can.Message) -> FdFrame | None:
 
 
 def to_error_frame(message: can.Message) -> ErrorFrame | None:
-    """Return what an error frame says; None for any other message."""
+    """Return an error frame; None for any other message."""
     if not message.is_error_frame:
         return None
     data = bytes(message.data)[:8].ljust(8, b"\0")
@@ -107,16 +107,16 @@ def to_error_frame(message: can.Message) -> ErrorFrame | None:
 
 
 _DRIFT: Final = 5_000
-"""Two clocks part by less than one in so many: 200 ppm."""
+"""Reciprocal of the largest drift between two clocks: 200 ppm."""
 
 
 class StampClock:
-    """Tells by a stamp of the driver when a frame had arrived.
+    """Computes the arrival of a frame from the time stamp of the driver.
 
-    Where the driver's clock begins is unknown (1970, power-on), and it drifts. A frame
-    is read after it has arrived, so the two clocks differ by the least difference that was
-    seen. A frame that was not there at the last look has arrived since then: so bad stamps,
-    and a driver's clock that is set, matter only while the host is late.
+    The start of the driver's clock is unknown (1970, power-on), and it drifts. A frame is read
+    after its arrival, so the two clocks differ by the smallest difference seen. A frame that was
+    missing at the last poll has arrived since then: so bad time stamps, and a driver's clock that
+    is set, matter only while the host is late.
 
     >>> clock = StampClock()
     >>> clock.at_us(7.0, 0, 100), clock.at_us(7.3, 100, 900_000)  # stopped for 0.9 s
@@ -130,11 +130,11 @@ class StampClock:
         self._stamp_us: int | None = None
 
     def at_us(self, stamp_s: float, polled_us: int, now_us: int) -> int:
-        """Return when a frame had arrived.
+        """Return the arrival time of a frame.
 
         Args:
-            stamp_s: what the driver says, in seconds on its clock; 0 if it says nothing.
-            polled_us: when the last look found nothing more.
+            stamp_s: time stamp of the driver, in seconds on its clock; 0 without one.
+            polled_us: time of the last poll without a frame.
             now_us: when the frame was read.
         """
         stamp_us = round(stamp_s * 1e6)
@@ -156,18 +156,19 @@ _IPV6_MULTICAST_ALL: Final = 29
 
 _SO_RCVBUFFORCE: Final = 33
 _RECEIVE_BYTES: Final = 4 << 20
-"""Asked of the kernel for its queue: some 10 000 frames; others than root get net.core.rmem_max."""
+"""Requested size of the kernel's queue: some 10 000 frames; without root it is limited to
+net.core.rmem_max."""
 
 
 def _receive(recv: Callable[[float], can.Message | None], timeout_s: float) -> can.Message | None:
-    """Return the next message of a bus; None if none comes in time.
+    """Return the next message of a bus; None after the timeout.
 
-    python-can measures a wait by the wall clock: where that is set back by an hour meanwhile, the
-    wait is an hour longer. Here it is measured by the monotonic clock.
+    python-can measures a wait by the wall clock: if that is set back by an hour, the wait is an
+    hour longer. Here it is measured by the monotonic clock.
 
     Args:
-        recv: of the bus. One that is not python-can's own is called as it is.
-        timeout_s: how long to wait, in seconds; 0 only looks.
+        recv: of the bus. A `recv` that is not python-can's own is called unchanged.
+        timeout_s: how long to wait, in seconds; 0 only polls.
     """
     # A bus that has a `recv` of its own waits in its own way: leave it.
     if getattr(recv, "__func__", None) is not can.BusABC.recv:
@@ -185,7 +186,7 @@ def _receive(recv: Callable[[float], can.Message | None], timeout_s: float) -> c
 
 
 def _enlarge_queue(sock: socket.socket) -> None:
-    """Let the kernel keep what comes while this process is held up: 300 frames are 40 ms."""
+    """Enlarge the kernel's queue for times when this process is delayed: 300 frames are 40 ms."""
     try:
         sock.setsockopt(socket.SOL_SOCKET, _SO_RCVBUFFORCE, _RECEIVE_BYTES)
     except OSError:  # PermissionError, and no such option beside Linux
@@ -193,12 +194,12 @@ def _enlarge_queue(sock: socket.socket) -> None:
 
 
 def prepare_bus(bus: can.BusABC, interface: str) -> None:
-    """Let a bus keep what comes while this process is held up, and hear its own group alone.
+    """Enlarge the queue of a bus, and limit it to its own multicast group.
 
-    python-can binds the socket of `udp_multicast` to a port alone. Linux then gives it what
-    comes on that port for any group that any program of this machine has joined (ip(7),
-    IP_MULTICAST_ALL). Elsewhere there is no such option, and no need. What the driver of
-    socketcand raises it logs too, with its traceback: who reads the bus reports it.
+    python-can binds the socket of `udp_multicast` only to a port. Linux then delivers data on that
+    port for any group that any program of this machine has joined (ip(7), IP_MULTICAST_ALL). Other
+    systems have no such option and do not need it. The driver of socketcand also logs the
+    exceptions that it raises, with a traceback; the reader of the bus reports them.
     """
     let_wait(bus)
     if interface == "socketcand":
@@ -227,40 +228,40 @@ def _keep_to_group(sock: socket.socket) -> None:
 
 MOST_FAULTS: Final = 100
 FAULTY_S: Final = 1.0
-"""A bus is given up when so many reads in a row have failed, and for so long at least."""
+"""Number of failed reads in a row, and their least duration, after which a bus is given up."""
 
 _TRIES: Final = 16
-"""So many reads that fail make one that gives nothing, so that nobody is kept by them."""
+"""Number of failed reads after which a read returns nothing, so that it does not block."""
 
 GONE: Final = (errno.ENODEV, errno.ENXIO, errno.ENETDOWN)
-"""What the kernel says of an adapter that was pulled out, or switched off."""
+"""Errors of the kernel for an adapter that was unplugged or switched off."""
 
 _SOCKETCAND_BUFFER: Final = "_SocketCanDaemonBus__receive_buffer"
-"""python-can's socketcand leaves a frame that it cannot read in it, and those before."""
+"""Buffer of python-can's socketcand, which keeps an unreadable frame and those before."""
 
 _log = log_of(__name__)
 
 
 class BusReceiver:
-    """Reads a bus of python-can whose driver may raise anything, and goes on.
+    """Reads a bus of python-can, and continues after exceptions of its driver.
 
-    The driver of a serial adapter raises IndexError for a line of which a byte was lost, and takes
-    a line with too few data for a frame; others raise errors of their own. All of this is counted,
-    and told for the 1st, the 10th, the 100th fault and so on.
+    The driver of a serial adapter raises IndexError for a line with a lost byte, and accepts a line
+    with too few data as a frame; others raise their own errors. All of this is counted, and
+    reported for the 1st, the 10th, the 100th fault and so on.
 
     Args:
-        bus: an open bus; nobody else may read from it.
-        name: what people call it.
+        bus: an open bus without other readers.
+        name: its name for messages.
         ends: an OSError or CanError with one of these codes ends it at once.
-        gone: makes what is raised at its end of a text.
-        raises: errors that are raised as they came.
-        read: what reads it, `recv` of the bus unless given.
+        gone: makes the exception at its end from a text.
+        raises: errors that are re-raised.
+        read: the function that reads it, by default `recv` of the bus.
 
     Attributes:
-        faults: reads that failed so far, and frames that were cut.
-        last: what the last of them was, empty if a read was well since.
-        closed: whoever reads it has closed the bus.
-        on_fault: called with what is to be told, in a line; it is logged as a warning.
+        faults: number of failed reads and of truncated frames.
+        last: the latest fault, empty after a successful read.
+        closed: the reader has closed the bus.
+        on_fault: called with each report, one line; by default it is logged as a warning.
     """
 
     def __init__(  # noqa: PLR0913 - how a bus is read, by keyword
@@ -280,13 +281,13 @@ class BusReceiver:
         self._row, self._since_s = 0, 0.0
 
     def receive(self, timeout_s: float | None) -> can.Message | None:
-        """Return the next message, None if none came in time or what came cannot be read.
+        """Return the next message, None after the timeout or if it cannot be read.
 
         Args:
-            timeout_s: how long to wait, None for ever.
+            timeout_s: how long to wait, None without limit.
 
         Raises:
-            LinkClosed: the bus is gone, or 100 reads in a row have failed for 1 s.
+            LinkClosed: the bus is gone, or 100 reads in a row failed over 1 s.
         """
         begun_s, wait_s = time.monotonic(), timeout_s
         for _ in range(_TRIES):
@@ -311,7 +312,7 @@ class BusReceiver:
         """Raise LinkClosed if the last 100 reads have failed.
 
         Args:
-            error: of the last of them.
+            error: the latest error.
         """
         if self.last and self._row >= MOST_FAULTS:
             text = f"the last {self._row} reads have failed: {self.last}"
@@ -319,7 +320,7 @@ class BusReceiver:
             raise self._gone(f"{self._name}: {text}") from error
 
     def _fail(self, error: Exception) -> None:
-        """Count a read; end the reading if there is no hope."""
+        """Count a failed read; stop reading after too many."""
         if isinstance(error, self._raises):
             raise error
         now_s = time.monotonic()
@@ -338,7 +339,7 @@ class BusReceiver:
         self._recover(error)
 
     def _recover(self, error: Exception) -> None:
-        """Have a driver drop what it could not read, and would read again with what comes next."""
+        """Make a driver drop unreadable data, which it would otherwise read again."""
         # slcan keeps the line that it could not decode in its buffer and fails with it for
         # ever.
         if isinstance(error.__cause__ or error, UnicodeError) and hasattr(self._bus, "flush"):
@@ -352,7 +353,7 @@ _TOLD: Final = frozenset(10**power for power in range(10))
 
 
 def _odd(message: can.Message) -> str:
-    """Say why a message can be no frame of a bus, empty if it can."""
+    """Return why a message is not a valid frame, empty if it is valid."""
     if message.is_error_frame:
         return ""
     if message.arbitration_id >> (29 if message.is_extended_id else 11):
@@ -364,7 +365,7 @@ def _odd(message: can.Message) -> str:
 
 
 def reason_of(error: Exception) -> str:
-    """Return in a line what a driver raised, with its type if it is no error of a bus."""
+    """Return the exception of a driver in one line, with its type if it is not a bus error."""
     text, kind = first_line(error), type(error).__name__
     return text if isinstance(error, can.CanError | OSError) or text == kind else f"{kind}: {text}"
 
@@ -376,7 +377,7 @@ def error_code(error: Exception) -> int | None:
 
 
 def close_bus(bus: can.BusABC) -> None:
-    """Close a bus; what the driver of one that is gone raises is logged."""
+    """Close a bus; log exceptions of the driver if it is gone."""
     try:
         bus.shutdown()
     except Exception as error:  # drivers raise what they like
@@ -385,26 +386,25 @@ def close_bus(bus: can.BusABC) -> None:
 
 _SEND_TIMEOUT_US: Final = 1_000_000
 _AGAIN_S: Final = 0.001
-"""A queue without room is tried again so soon: that of SocketCAN has ten places."""
+"""Retry period for a full queue: that of SocketCAN has ten places."""
 _PASSIVE = ControllerFlag.RECEIVE_PASSIVE | ControllerFlag.TRANSMIT_PASSIVE
 
 
 class CanLink:
     """A `StampedLink` over python-can.
 
-    CAN FD frames that arrive are passed over, and error frames but for what
-    they say of the error state.
+    Received CAN FD frames are ignored, and error frames except for the error state.
 
     Args:
-        bus: an open bus; nobody else may read from it.
-        name: what people call it.
-        drops: go on, without a wait, when the bus takes no frame; the frame is lost.
+        bus: an open bus without other readers.
+        name: its name for messages.
+        drops: whether to drop a frame without waiting if the bus does not accept it.
 
     Attributes:
-        lost: frames that the bus did not take.
+        lost: frames that the bus did not accept.
         reads: reads the bus, and counts the frames that its driver could not read.
-        on_error_frame: called with each error frame that the driver tells of.
-        on_error_state: called with the error state of the controller, where the driver says it.
+        on_error_frame: called with each error frame of the driver.
+        on_error_state: called with the error state of the controller, if the driver reports it.
     """
 
     def __init__(self, bus: can.BusABC, name: str, *, drops: bool = False) -> None:
@@ -421,12 +421,12 @@ class CanLink:
         """Open a bus.
 
         Args:
-            channel: which bus of the interface, as `can0`.
-            interface: python-can's name of the adapter's kind, as `socketcan`.
-            bit_rate: bits a second, where the interface sets it.
+            channel: bus of the interface, such as `can0`.
+            interface: python-can's name for the adapter type, such as `socketcan`.
+            bit_rate: bits per second, if the interface sets it.
 
         Returns:
-            A link that has the bus alone; close it.
+            A link that owns the bus; close it.
 
         Raises:
             LinkClosed: the bus cannot be opened.
@@ -446,10 +446,10 @@ class CanLink:
         """Send frames.
 
         Args:
-            traffic: the frames, the first one first.
+            traffic: the frames, in order.
 
         Raises:
-            LinkClosed: the bus is gone, or took none for 1 s.
+            LinkClosed: the bus is gone, or accepted no frame for 1 s.
         """
         for frame in traffic:
             deadline_us = self.now_us + _SEND_TIMEOUT_US
@@ -457,7 +457,7 @@ class CanLink:
                 time.sleep(_AGAIN_S)
 
     def _sent(self, frame: CanFrame, deadline_us: int) -> bool:
-        """Send a frame; False if the queue of its driver has no room for now."""
+        """Send a frame; return False if the queue of the driver is full."""
         try:
             self._bus.send(to_message(frame), 0 if self._drops else _SEND_TIMEOUT_US / 1e6)
         except Exception as error:  # drivers raise what they like
@@ -470,13 +470,13 @@ class CanLink:
         return True
 
     def receive(self, timeout_us: int, /) -> Frames:
-        """Wait for a first frame, then take all that are there.
+        """Wait for a first frame, then return all received frames.
 
         Args:
-            timeout_us: how long to wait; 0 only looks.
+            timeout_us: how long to wait; 0 only polls.
 
         Returns:
-            The frames, none if none came in time.
+            The frames, empty after the timeout.
 
         Raises:
             LinkClosed: the bus is gone.
@@ -484,10 +484,10 @@ class CanLink:
         return tuple(frame for _, frame in self.receive_stamped(timeout_us)[1])
 
     def receive_stamped(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
-        """Wait for a first frame, then take all that are there, with their times.
+        """Wait for a first frame, then return all received frames with their times.
 
         Args:
-            timeout_us: how long to wait; 0 only looks.
+            timeout_us: how long to wait; 0 only polls.
 
         Returns:
             A time, and the frames that had arrived by then, each with its own time.
@@ -495,8 +495,8 @@ class CanLink:
         Raises:
             LinkClosed: the bus is gone.
 
-        The time is of before the last look: a process that is stopped behind it knows
-        itself late, and takes nobody for silent.
+        The time is from before the last poll: a process that is stopped after it can detect its
+        delay, and does not count nodes as silent.
         """
         deadline_us = self.now_us + timeout_us
         received: list[tuple[int, CanFrame]] = []
@@ -534,19 +534,19 @@ def _open(channel: str, interface: str, bit_rate: int | None) -> can.BusABC:
 
 
 def _is_full(error: Exception) -> bool:
-    """Say whether nobody took the frames before: no other node, no plug, bus-off."""
+    """Return whether earlier frames are still unsent: no other node, unplugged, bus-off."""
     if isinstance(error, can.CanOperationError):
         return error.error_code in (None, errno.ENOBUFS, errno.EAGAIN)
     return isinstance(error, OSError) and error.errno in (errno.ENOBUFS, errno.EAGAIN)
 
 
 def _has_no_room(error: Exception) -> bool:
-    """Say whether the queue of the driver is full; each of its frames that leaves makes room."""
+    """Return whether the queue of the driver is full."""
     return error_code(error) in (errno.ENOBUFS, errno.EAGAIN)
 
 
 def _error_state(message: can.Message) -> ErrorState | None:
-    """Return the error state that an error frame of SocketCAN tells, None if it tells none."""
+    """Return the error state in an error frame of SocketCAN, None if it has none."""
     # Bits 0 to 8: the classes of linux/can/error.h that were there from the beginning.
     error = ErrorClass(message.arbitration_id & 0x1FF)
     if ErrorClass.BUS_OFF in error:
@@ -564,7 +564,7 @@ def _error_state(message: can.Message) -> ErrorState | None:
 
 
 def bus_reason(error: BaseException) -> str:
-    """Return in a line why a bus cannot be opened, and what to do where that is known."""
+    """Return in one line why a bus cannot be opened, with a remedy if known."""
     number = getattr(error, "errno", None) or getattr(error, "error_code", None)
     hint = _HINTS.get(number) if isinstance(number, int) else None
     if _NO_MSGPACK in str(error):

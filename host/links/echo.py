@@ -1,4 +1,4 @@
-"""One's own frames that come back: what tells them from those of others."""
+"""Echoes of sent frames, and their separation from frames of others."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from tickrig.host.links.link import StampedFrames, StampedLink
 from tickrig.wire.can import CanFrame, Frames
 
 ECHOING: Final = ("udp_multicast",)
-"""Interfaces that give back what they sent, whatever is asked of them."""
+"""Interfaces that always return sent frames."""
 
 ECHO_US: Final = 1_000_000
-"""An echo that has not come by then was lost."""
+"""Time after which an echo counts as lost."""
 
 
 class EchoFilter:
-    """Tells the echo of one's own frames from what others sent.
+    """Separates the echo of sent frames from frames of others.
 
-    A frame of somebody else that is the same as one whose echo is awaited is taken
-    for the echo, and the echo for it.
+    An equal frame of another node that arrives first counts as the echo, and the echo as that
+    frame.
     """
 
     def __init__(self) -> None:
@@ -27,20 +27,20 @@ class EchoFilter:
         self._awaited: dict[CanFrame, deque[int]] = {}  # by frame: a look does not take longer
 
     def sent(self, now_us: int, traffic: Frames) -> None:
-        """Await the echo of what is sent now."""
+        """Expect the echo of frames sent now."""
         for frame in traffic:
             self._sent.append((now_us, frame))
             self._awaited.setdefault(frame, deque()).append(now_us)
 
     def expire(self, now_us: int) -> None:
-        """Await no more what was sent more than `ECHO_US` ago."""
+        """Stop expecting echoes of frames sent more than `ECHO_US` ago."""
         while self._sent and self._sent[0][0] < now_us - ECHO_US:
             sent_us, frame = self._sent.popleft()
             if frame in self._awaited and self._awaited[frame][0] <= sent_us:
                 self.take(frame)
 
     def take(self, frame: CanFrame) -> bool:
-        """Return whether a frame is an awaited echo, which is then awaited no more."""
+        """Return whether a frame is an expected echo, and remove it from the expected ones."""
         if frame not in self._awaited:
             return False
         times = self._awaited[frame]
@@ -51,10 +51,10 @@ class EchoFilter:
 
 
 class EchoFreeLink:
-    """A `StampedLink` on the udp_multicast bus of python-can, which hears its own frames.
+    """A `StampedLink` on the udp_multicast bus of python-can, which receives its own frames.
 
     Args:
-        link: the link behind it.
+        link: the link with the echo.
     """
 
     def __init__(self, link: StampedLink) -> None:
@@ -62,20 +62,20 @@ class EchoFreeLink:
 
     @property
     def now_us(self) -> int:
-        """The clock of the link behind it."""
+        """The clock of the link."""
         return self._link.now_us
 
     def send(self, traffic: Frames, /) -> None:
-        """Send, and await the echo."""
+        """Send, and expect the echo."""
         self._echo.sent(self.now_us, traffic)
         self._link.send(traffic)
 
     def receive(self, timeout_us: int, /) -> Frames:
-        """Return what others sent; nothing, maybe before its time, if it was all echo."""
+        """Return frames of others; empty, possibly early, if there were only echoes."""
         return tuple(frame for _, frame in self.receive_stamped(timeout_us)[1])
 
     def receive_stamped(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
-        """Return a time, and what others sent by then."""
+        """Return a time, and the frames of others up to it."""
         now_us, received = self._link.receive_stamped(timeout_us)
         self._echo.expire(now_us)
         return now_us, tuple(
@@ -83,10 +83,10 @@ class EchoFreeLink:
         )
 
     def close(self) -> None:
-        """Close the link behind it."""
+        """Close the link."""
         self._link.close()
 
 
 def free_of_echo(link: StampedLink, interface: str) -> StampedLink:
-    """Return the link without its echo, or itself where its interface gives none."""
+    """Return the link without its echo, or the link itself if its interface has none."""
     return EchoFreeLink(link) if interface in ECHOING else link

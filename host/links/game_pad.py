@@ -13,13 +13,13 @@ EV_ABS: Final = 0x03
 ABS_X: Final = 0x00
 ABS_Y: Final = 0x01
 ABS_RX: Final = 0x03
-"""As in the kernel's input-event-codes: left stick across and along, right stick across."""
+"""Codes of the kernel's input-event-codes: left stick across and along, right stick across."""
 
 _Range = tuple[int, int]
 
 
 class StickPosition(NamedTuple):
-    """Where a hand pushes, each -1..1: forward, to the left, turning to the left."""
+    """Deflection of the sticks, each -1..1: forward, to the left, turning to the left."""
 
     forward: float = 0.0
     left: float = 0.0
@@ -28,7 +28,7 @@ class StickPosition(NamedTuple):
 
 @dataclass(slots=True)
 class Axes:
-    """Where the sticks stand, and which buttons are held.
+    """Positions of the sticks, and pressed buttons.
 
     Attributes:
         ranges: least and most value of each axis that the pad has.
@@ -40,7 +40,7 @@ class Axes:
     _values: dict[int, float] = field(default_factory=dict, init=False)
 
     def take(self, kind: int, code: int, value: int) -> None:
-        """Take an event."""
+        """Handle an event."""
         if kind == EV_KEY:
             (self.held.add if value else self.held.discard)(code)
         if kind == EV_ABS and code in self.ranges:
@@ -78,11 +78,11 @@ class EvdevPad:
 
     @property
     def held(self) -> bool:
-        """Whether a button was held when the pad was polled last."""
+        """Whether a button was pressed at the latest poll."""
         return bool(self._axes.held)
 
     def poll(self, now_us: int, /) -> StickPosition:
-        """Return where the sticks stand."""
+        """Return the positions of the sticks."""
         try:
             while (event := self._device.read_one()) is not None:
                 self._axes.take(event.type, event.code, event.value)

@@ -1,4 +1,4 @@
-"""Links: how a proxy reaches its device, emulated or real, and how one fails and closes."""
+"""Links between a proxy and its device, emulated or real, and their errors."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Final, Generic, Protocol, Self, TypeVar
 
 from tickrig.wire.can import CanFrame, Frames
 
-# What a host says about a link or a device.
+# Errors of links and devices.
 #
 # LinkError
 #  +-- LinkTimeout (TimeoutError)      no answer in time
@@ -17,11 +17,11 @@ from tickrig.wire.can import CanFrame, Frames
 # DeviceRefused                        the device answered, and said no
 
 TRACEBACK: Final = "Traceback (most recent call last)"
-"""Some drivers put one into the text of what they raise."""
+"""Start of a traceback, which some drivers put into the text of exceptions."""
 
 
 def first_line(error: BaseException) -> str:
-    r"""Return the text of an error in a line, without a traceback; its type if there is none.
+    r"""Return the text of an error in one line, without a traceback; its type if it has no text.
 
     >>> first_line(ValueError("bad frame\nTraceback (most recent call last):\n  File x"))
     'bad frame'
@@ -45,14 +45,14 @@ class LinkClosed(LinkError, ConnectionError):  # noqa: N818 - a state of the lin
 
 
 class DeviceRefused(Exception):  # noqa: N818 - what the device did
-    """The device answered, and refused.
+    """The device answered with a refusal.
 
     Args:
-        message: what people read.
-        code: what the device gave as its reason.
+        message: the text for people.
+        code: the reason given by the device.
 
     Attributes:
-        code: what the device gave as its reason, in its own notation.
+        code: the reason given by the device, in its own notation.
     """
 
     def __init__(self, message: str, code: str) -> None:
@@ -60,21 +60,21 @@ class DeviceRefused(Exception):  # noqa: N818 - what the device did
         self.code = code
 
 
-# Links: how a proxy reaches its device, emulated or real.
+# Links between a proxy and its device, emulated or real.
 
 W = TypeVar("W")  # traffic: bytes on a line, tuple[CanFrame, ...] on CAN
 
 
 class Link(Protocol[W]):
-    """A wire as a proxy sees it, with the clock that runs on it.
+    """The wire of a proxy, with its clock.
 
-    A proxy takes the time from its link and never from the machine: on a rig
-    in virtual time the same proxy waits a minute in a millisecond.
+    A proxy reads the time from its link, never from the machine: on a rig in virtual time the same
+    proxy waits a minute in a millisecond.
     """
 
     @property
     def now_us(self) -> int:
-        """Time on this link's clock in microseconds; only differences mean anything."""
+        """Time on the clock of this link in microseconds, for computing differences."""
         ...
 
     def send(self, traffic: W, /) -> None:
@@ -85,7 +85,7 @@ class Link(Protocol[W]):
         """
 
     def receive(self, timeout_us: int, /) -> W:
-        """Return what arrived, or empty traffic after `timeout_us`.
+        """Return received traffic, or empty traffic after `timeout_us`.
 
         Raises:
             LinkClosed: the line is gone.
@@ -93,18 +93,18 @@ class Link(Protocol[W]):
         ...
 
     def close(self) -> None:
-        """Give the line back; closing twice is no error."""
+        """Close the line; closing it again has no effect."""
 
 
 StampedFrames = tuple[tuple[int, CanFrame], ...]
-"""Frames, each with the time at which it had ended on the bus, on the clock of its link."""
+"""Frames, each with its end on the bus, on the clock of its link."""
 
 
 class StampedLink(Link[Frames], Protocol):
-    """A link to a CAN bus for who judges silence: late reading is no silence of the bus."""
+    """A link to a CAN bus with time stamps, which separate late reading from silence of the bus."""
 
     def receive_stamped(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
-        """Wait for a first frame; return a time, and all that had arrived by then.
+        """Wait for a first frame; return a time, and all frames received by then.
 
         Raises:
             LinkClosed: the bus is gone.
@@ -112,18 +112,18 @@ class StampedLink(Link[Frames], Protocol):
         ...
 
 
-# What a `with` block closes at its end.
+# Objects closed by a `with` block.
 
 
 class Closing(ABC):
-    """Something that a `with` block closes at its end, however it ends."""
+    """An object that a `with` block closes at its end, also after an exception."""
 
     @abstractmethod
     def close(self) -> None:
-        """Give everything back."""
+        """Release all resources."""
 
     def __enter__(self) -> Self:
-        """Return itself."""
+        """Return the object."""
         return self
 
     def __exit__(
@@ -132,19 +132,18 @@ class Closing(ABC):
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Close it."""
+        """Close the object."""
         self.close()
 
 
-# A link that is opened again after its line has gone.
+# A link that is reopened after its line was lost.
 
 
 class ReopeningLink(Generic[W]):
-    """A `Link` over links of which each is used until its line is gone.
+    """A `Link` that opens a new link after its line was lost.
 
-    A line that is gone says so to its caller, as every link does. Each `send`
-    after that tries to open it again: a cable may come back, an emulator may
-    be started again.
+    A lost line raises LinkClosed once, as in every link. Each later `send` tries to reopen it: a
+    cable may be plugged in again, an emulator restarted.
 
     Args:
         open_link: opens the line; called at once.
@@ -159,11 +158,11 @@ class ReopeningLink(Generic[W]):
 
     @property
     def now_us(self) -> int:
-        """Time on the clock of the link, also while its line is gone."""
+        """Time on the clock of the link, also while its line is lost."""
         return self._link.now_us
 
     def send(self, traffic: W, /) -> None:
-        """Send traffic, on a new link if the line was gone; LinkClosed if it is."""
+        """Send traffic, on a new link if the line was lost; LinkClosed if it cannot be opened."""
         # Only sending opens again: a reader in a loop would try as often as it looks.
         if self._gone and not self._closed:
             self._link, self._gone = self._open_link(), False
@@ -174,7 +173,7 @@ class ReopeningLink(Generic[W]):
             raise
 
     def receive(self, timeout_us: int, /) -> W:
-        """Return what arrived, or empty traffic after `timeout_us`; LinkClosed if it is gone."""
+        """Return received traffic, empty after `timeout_us`; LinkClosed if the line is lost."""
         try:
             return self._link.receive(timeout_us)
         except LinkClosed:
@@ -182,7 +181,7 @@ class ReopeningLink(Generic[W]):
             raise
 
     def close(self) -> None:
-        """Give the line back, for good."""
+        """Close the line permanently."""
         self._closed = True
         self._leave()
 

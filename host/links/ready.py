@@ -1,4 +1,4 @@
-"""Waits for descriptors, however many are open: `select` takes those below 1024 alone.
+"""Waits for any number of descriptors: `select` supports only those below 1024.
 
 >>> import os
 >>> reader, writer = os.pipe()
@@ -24,23 +24,23 @@ from types import SimpleNamespace
 from typing import Any, Final, Generic, Protocol, TypeVar
 
 SELECTABLE: Final = 1_024
-"""FD_SETSIZE: `select` knows no descriptor from here on."""
+"""FD_SETSIZE: `select` supports only descriptors below it."""
 
 _SPARE: Final = 8
-"""A port opens some more beside its own."""
+"""Spare descriptors, because a port opens several."""
 
 _FOREIGN: Final = (
     *("serial.serialposix", "serial.urlhandler.protocol_socket"),
     *("can.interfaces.socketcan.socketcan", "can.interfaces.udp_multicast.bus"),
 )
-"""Modules of others that wait with `select`."""
+"""Foreign modules that wait with `select`."""
 
 
 class HasDescriptor(Protocol):
-    """Anything with a descriptor, as a socket."""
+    """An object with a descriptor, such as a socket."""
 
     def fileno(self) -> int:
-        """Return it."""
+        """Return the descriptor."""
         ...
 
 
@@ -51,15 +51,15 @@ Written = TypeVar("Written", bound="int | HasDescriptor")
 def ready(
     readers: Iterable[Read], writers: Iterable[Written] = (), wait_s: float | None = None
 ) -> tuple[list[Read], list[Written]]:
-    """Wait until something can be read or written.
+    """Wait until descriptors can be read or written.
 
     Args:
-        readers: descriptors, or what has one.
+        readers: descriptors, or objects with one.
         writers: the same.
-        wait_s: how long to wait at most, in s; None for as long as it takes.
+        wait_s: longest wait in s; None without limit.
 
     Returns:
-        Those that can be read, and those that can be written; what is broken is among them.
+        Those that can be read, and those that can be written, including broken ones.
 
     Raises:
         OSError: a descriptor is closed.
@@ -108,7 +108,7 @@ def _number(source: int | HasDescriptor) -> int:
 
 
 def let_wait(opened: HasDescriptor) -> None:
-    """Let pyserial and python-can wait for what they opened, where its number is a high one."""
+    """Let pyserial and python-can wait for descriptors with high numbers."""
     try:
         number = opened.fileno()
     except (OSError, AttributeError, NotImplementedError):  # it has none
@@ -123,21 +123,21 @@ def let_wait(opened: HasDescriptor) -> None:
 def _select(
     readers: Sequence[Any], writers: Sequence[Any], broken: Sequence[Any], wait_s: Any = None
 ) -> tuple[list[Any], list[Any], list[Any]]:
-    """Wait as `select.select` does, but for what is broken, which the others find."""
+    """Wait like `select.select`, with broken descriptors among the others."""
     return *ready(readers, writers, wait_s), []
 
 
-# A queue whose waits end in their time.
+# A queue whose waits end on time.
 
 T = TypeVar("T")
 
 
 class WaitingQueue(Generic[T]):
-    """A queue for one thread that reads and any that write.
+    """A queue for one reading thread and any writing threads.
 
-    `queue.SimpleQueue` waits for good (CPython 3.11) where its time is over before it looks
-    again: after a signal, or where its lock happens to be free. Ctrl-C in the midst of
-    `queue.Queue` and `threading.Event` can leave their lock taken.
+    `queue.SimpleQueue` waits without end (CPython 3.11) if its timeout has passed before it checks
+    again: after a signal, or if its lock happens to be free. Ctrl-C in the middle of `queue.Queue`
+    and `threading.Event` can leave their lock taken.
     """
 
     def __init__(self) -> None:
@@ -146,19 +146,19 @@ class WaitingQueue(Generic[T]):
         self._nothing_new.acquire()
 
     def put(self, item: T) -> None:
-        """Put an item at the end; never waits."""
+        """Append an item without blocking."""
         self._items.append(item)
         with suppress(RuntimeError):  # something else is new, too
             self._nothing_new.release()
 
     def get(self, wait_s: float | None = None) -> T:
-        """Take the first item.
+        """Return the first item.
 
         Args:
-            wait_s: for how long to wait for one; None for as long as it takes.
+            wait_s: longest wait; None without limit.
 
         Raises:
-            Empty: nothing came in time.
+            Empty: nothing arrived in time.
         """
         deadline_s = None if wait_s is None else monotonic() + wait_s
         while True:
@@ -171,5 +171,5 @@ class WaitingQueue(Generic[T]):
                 raise Empty
 
     def clear(self) -> None:
-        """Forget all items."""
+        """Remove all items."""
         self._items.clear()

@@ -1,4 +1,4 @@
-"""A link that writes what passes it into a trace (docs/reference/bench/trace.md)."""
+"""A link that records its traffic in a trace (docs/reference/bench/trace.md)."""
 
 from __future__ import annotations
 
@@ -15,25 +15,24 @@ from tickrig.host.text.whole_file import LineFile
 from tickrig.wire.can import CanFrame
 
 _WIRE: Final = "wire"
-"""What the only wire is called."""
+"""Name of the only wire."""
 
 
 class RecordingLink(Generic[W]):
-    """A `Link` whose traffic, both ways, is recorded in a trace, for `tickrig compare`.
+    """A `Link` that records its traffic in both directions in a trace, for `tickrig compare`.
 
-    Each line is written at once, so that a kill loses nothing; where writing fails the
-    recording ends with one warning, and the link goes on. Two threads may use it, one of them
-    to send.
+    Each line is written at once, so that a kill loses nothing; if writing fails, the recording ends
+    with one warning, and the link continues. Two threads may use it, one of them to send.
 
     Args:
-        link: the link behind it, to bytes or to frames.
-        path: the file; one that exists is replaced.
-        name: what the device is called in it; of frames, the bus.
-        type: device type, such as `rrc`, if it is known.
+        link: the link, of bytes or frames.
+        path: the file; an existing one is replaced.
+        name: name of the device in it; for frames, of the bus.
+        type: device type, such as `rrc`, if known.
 
     Raises:
         OSError: the file cannot be opened.
-        ValueError: the name cannot stand in a trace.
+        ValueError: the name is not valid in a trace.
     """
 
     def __init__(
@@ -53,35 +52,35 @@ class RecordingLink(Generic[W]):
 
     @property
     def now_us(self) -> int:
-        """Time on the clock of the link behind it."""
+        """Time on the clock of the link."""
         return self._link.now_us
 
     @property
     def recording_error(self) -> str:
-        """Why the recording ended early, empty while all is well."""
+        """Reason for the early end of the recording, empty if there was no error."""
         return self._file.error
 
     def send(self, traffic: W, /) -> None:
-        """Send, and record it.
+        """Send and record traffic.
 
         Args:
             traffic: bytes or frames.
 
         Raises:
-            LinkClosed: the line is gone; what did not leave is not recorded.
+            LinkClosed: the line is gone; unsent data are not recorded.
         """
         at_us = self._link.now_us
         self._link.send(traffic)
         self._record(Mark.TO_DEVICE, [(at_us, item) for item in _items(traffic)])
 
     def receive(self, timeout_us: int, /) -> W:
-        """Receive, and record it.
+        """Receive and record traffic.
 
         Args:
-            timeout_us: how long to wait; 0 only looks.
+            timeout_us: how long to wait; 0 only polls.
 
         Returns:
-            What arrived, empty if nothing came in time.
+            The received traffic, empty after the timeout.
 
         Raises:
             LinkClosed: the line is gone.
@@ -95,14 +94,14 @@ class RecordingLink(Generic[W]):
         """Receive frames with their times, and record them.
 
         Args:
-            timeout_us: how long to wait; 0 only looks.
+            timeout_us: how long to wait; 0 only polls.
 
         Returns:
-            A time, and the frames that had arrived by then, each with its own time.
+            A time, and the frames received by then, each with its own time.
 
         Raises:
             LinkClosed: the bus is gone.
-            TypeError: the link behind it is not to a bus.
+            TypeError: it is not a link to a bus.
         """
         link: Any = self._link
         if not hasattr(link, "receive_stamped"):
@@ -113,11 +112,11 @@ class RecordingLink(Generic[W]):
         return now_us, stamped
 
     def note(self, name: str, value: Setting) -> None:
-        """Record what somebody did to the device by hand.
+        """Record a manual action on the device.
 
         Args:
-            name: of the physical input, as `power_button`.
-            value: what it is now.
+            name: of the physical input, such as `power_button`.
+            value: its new value.
         """
         self._write(self._link.now_us, Mark.PHYSICAL, text=change_text(name, value))
 
@@ -126,7 +125,7 @@ class RecordingLink(Generic[W]):
         self._write(self._link.now_us, Mark.PHYSICAL, text=RESET)
 
     def close(self) -> None:
-        """Write how long the recording lasted, and close the link; closing twice is no error."""
+        """Write the duration of the recording, and close the link; may be called again."""
         with self._lock:
             end_us = max(self._link.now_us - self._start_us, self._latest_us)
             self._file.close(BenchRecord(end_us, "", Mark.END).encode())
@@ -141,7 +140,7 @@ class RecordingLink(Generic[W]):
     def _write(
         self, at_us: int, mark: Mark, traffic: bytes | CanFrame = b"", text: str = ""
     ) -> None:
-        """Write a line; one that comes late, by the other way or thread, is not before its last."""
+        """Write a line; its time is never before that of the previous line."""
         with self._lock:
             self._latest_us = max(self._latest_us, at_us - self._start_us)
             record = BenchRecord(self._latest_us, self._name, mark, traffic, text)
@@ -149,7 +148,7 @@ class RecordingLink(Generic[W]):
 
 
 def _items(traffic: object) -> list[bytes | CanFrame]:
-    """Return what of traffic is a line of a trace each: all bytes, or a frame."""
+    """Return traffic split into lines of a trace: all bytes, or one frame each."""
     if isinstance(traffic, bytes):
         return [traffic] if traffic else []
     assert isinstance(traffic, tuple)

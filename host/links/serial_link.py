@@ -20,20 +20,20 @@ from serial.serialutil import Timeout
 from tickrig.host.links.link import LinkClosed
 from tickrig.host.links.ready import let_wait
 
-# What both ends of a serial line over TCP want of their connection.
+# TCP settings of both ends of a serial line over TCP.
 
 _KEEP_ALIVE: Final = {"TCP_KEEPIDLE": 10, "TCP_KEEPINTVL": 5, "TCP_KEEPCNT": 3}
 _UNANSWERED_MS: Final = 25_000
 
 
 def tune(connection: socket.socket) -> None:
-    """Send each write at once, and find a machine that vanished 25 s after its last sign.
+    """Send each write at once, and detect a vanished machine after 25 s.
 
     Args:
         connection: of TCP.
 
     Raises:
-        OSError: it is gone already, or none of TCP.
+        OSError: it is closed, or not a TCP connection.
     """
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
@@ -43,33 +43,33 @@ def tune(connection: socket.socket) -> None:
 
 
 def _give_up_unanswered(connection: socket.socket) -> None:
-    """End a connection on which something sent has had no answer of the other machine for 25 s.
+    """End a connection if the other machine has not acknowledged sent data for 25 s.
 
     Args:
         connection: of TCP.
 
     Raises:
-        OSError: it is gone already, or none of TCP.
+        OSError: it is closed, or not a TCP connection.
     """
     if sys.platform == "linux":
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, _UNANSWERED_MS)
 
 
-# pyserial's `rfc2217://` port, with time-outs that cost nothing and errors that say more.
+# pyserial's `rfc2217://` port, with cheap time-outs and better error messages.
 
 _SAID_SHOWN: Final = 200
 
 _WRITE_S: Final = 1.0
-"""How long a write waits for room; pyserial's own waits for 5 s."""
+"""How long a write waits for room (5 s in pyserial)."""
 
 
 class _Rfc2217Serial(rfc2217.Serial):
     """A serial port of another machine (RFC 2217).
 
-    pyserial agrees with the other end on all settings when one is changed, in 50 ms at least; it
-    does so even for a time-out, of which the other end knows nothing. Where the other end
-    refuses in a line of text, as ser2net and ours do, it passes the line over. And it forgets
-    what came before a connection ended.
+    pyserial negotiates all settings when one is changed, which takes at least 50 ms; it does so
+    even for a time-out, which does not concern the other end. If the other end refuses with a line
+    of text, as ser2net and ours do, it ignores the line. And it discards data received before a
+    connection ended.
 
     Args and attributes are those of `serial.Serial`; `write_timeout` cannot be set.
     """
@@ -80,8 +80,7 @@ class _Rfc2217Serial(rfc2217.Serial):
         """Open the port.
 
         Raises:
-            SerialException: nobody listens there, or nobody who knows RFC 2217; the text
-                has what was said instead.
+            SerialException: no server, or one without RFC 2217; the message has its answer.
         """
         self._agreed = None
         try:
@@ -106,7 +105,7 @@ class _Rfc2217Serial(rfc2217.Serial):
         """Return up to `size` bytes, fewer if the time-out is over or the connection has ended.
 
         Raises:
-            SerialException: it has ended, and all that came was read.
+            SerialException: it has ended, and all received data were read.
         """
         if not self.is_open or (queue := self._queue) is None:
             raise PortNotOpenError
@@ -123,7 +122,7 @@ class _Rfc2217Serial(rfc2217.Serial):
         return bytes(received)
 
     def _telnet_read_loop(self) -> None:
-        """Take what comes, in a thread; what is no telnet ends it, as the end of the line does."""
+        """Receive data in a thread; invalid telnet data end it like a closed connection."""
         try:
             with suppress(TypeError, OSError):
                 super()._telnet_read_loop()  # type: ignore[misc] # not in typeshed
@@ -133,7 +132,7 @@ class _Rfc2217Serial(rfc2217.Serial):
 
     @property
     def _queue(self) -> Queue[bytes | None] | None:
-        """What its reading thread has received, None if there was no connection yet."""
+        """Queue of the reading thread, None if there was no connection yet."""
         queue: Queue[bytes | None] | None = self._read_buffer  # type: ignore[attr-defined]
         return queue
 
@@ -146,7 +145,7 @@ class _Rfc2217Serial(rfc2217.Serial):
 
 
 _UNCOUNTED: Final = ("socket:",)
-"""URLs under which pyserial only knows whether bytes are waiting, not how many."""
+"""URL schemes for which pyserial reports only whether bytes are waiting, not how many."""
 
 _READ_BYTES: Final = 4_096
 
@@ -158,8 +157,8 @@ class SerialLink:
         url: a device path or pyserial URL: `/dev/ttyACM0`, `COM3`,
             `socket://host:port`, `rfc2217://host:port`, `loop://`.
         baud: bit rate in bit/s, 8N1.
-        exclusive: whether to keep out other programs that ask in the same way, by flock as
-            pyserial's own tools do; of two readers each would get a part.
+        exclusive: whether to lock the port by flock, as pyserial's own tools do; two readers would
+            each get a part of the data.
 
     Raises:
         LinkClosed: the port cannot be opened, or another program uses it.
@@ -191,7 +190,7 @@ class SerialLink:
             traffic: the bytes.
 
         Raises:
-            LinkClosed: the port is gone, or takes none for 1 s.
+            LinkClosed: the port is gone, or accepts no data for 1 s.
         """
         try:
             self._port.write(traffic)
@@ -199,13 +198,13 @@ class SerialLink:
             raise LinkClosed(f"cannot write to {self._url!r}: {error}") from error
 
     def receive(self, timeout_us: int, /) -> bytes:
-        """Wait for a first byte, then take all that are there.
+        """Wait for a first byte, then return all received bytes.
 
         Args:
-            timeout_us: how long to wait; 0 only looks.
+            timeout_us: how long to wait; 0 only polls.
 
         Returns:
-            The bytes, none if none came in time.
+            The bytes, empty after the timeout.
 
         Raises:
             LinkClosed: the port is gone.
@@ -233,7 +232,7 @@ class SerialLink:
 
 
 def _open_port(url: str, baud: int, *, exclusive: bool) -> serial.Serial | _Rfc2217Serial:
-    """Open what pyserial knows under a URL; one of RFC 2217 with what pyserial's lacks."""
+    """Open a pyserial URL; for RFC 2217 with our additions."""
     if not url.startswith("rfc2217:"):
         return serial.serial_for_url(
             url, baudrate=baud, timeout=0, write_timeout=1, exclusive=exclusive or None
@@ -247,11 +246,11 @@ _COMMAND_SHOWN: Final = 100
 
 
 def explain_open_error(url: str, error: Exception) -> str:
-    """Say what is wrong with a port.
+    """Return the reason why a port cannot be opened.
 
     Args:
-        url: the port, as it was asked for.
-        error: what opening it raised.
+        url: the requested port.
+        error: the exception on opening.
     """
     around = error.__context__ if error.__cause__ is None else None
     if isinstance(around, OSError) and around.strerror:
@@ -272,7 +271,7 @@ def explain_open_error(url: str, error: Exception) -> str:
 if sys.platform != "win32":
 
     def _holder(path: str) -> str:
-        """Return `: COMMAND (process NUMBER)` of who has locked a file, empty if not shown."""
+        """Return `: COMMAND (process NUMBER)` of the owner of a file lock, empty if unknown."""
         try:
             found = os.stat(path)
             locks = _LOCKS.read_text("ascii").splitlines()
@@ -294,7 +293,7 @@ if sys.platform != "win32":
         return command if len(command) <= _COMMAND_SHOWN else f"{command[:_COMMAND_SHOWN]}..."
 
     def _remedy(path: str) -> str:
-        """Say how to be let in: by the group of the file, if that may read and write."""
+        """Return how to get access: by the group of the file, if that may read and write."""
         import grp  # noqa: PLC0415 - not on Windows, which has no such files either
 
         try:

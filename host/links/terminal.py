@@ -1,4 +1,4 @@
-"""A terminal: keys as they are pressed, and output that nobody waits for."""
+"""A terminal: single keys, and output without blocking."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from typing import Final
 
 _LOCAL_FLAGS: Final = 3
 _CONTROL_CHARACTERS: Final = 6
-"""Their places in what `termios.tcgetattr` returns."""
+"""Positions in the result of `termios.tcgetattr`."""
 
 
 def take_keys(descriptor: int) -> Callable[[], None]:
-    """Let a terminal give each key at once and not show it; reading never waits.
+    """Make a terminal return each key at once without echo; reading never blocks.
 
-    Ctrl-Z does nothing: it would leave the terminal half taken.
+    Ctrl-Z is disabled, because it would leave the terminal in this mode.
 
     Args:
         descriptor: of the terminal.
 
     Returns:
-        What gives it back as it was, unless it is gone.
+        A function that restores the terminal, unless it is gone.
 
     Raises:
-        OSError: it is no terminal, or the system has none of that kind (Windows).
+        OSError: it is not a terminal, or the system has no POSIX terminals (Windows).
     """
     if sys.platform == "win32":
         raise OSError(errno.ENOTTY, "keys are read of POSIX terminals alone")
@@ -60,7 +60,7 @@ _LOOK_S: Final = 0.5
 
 
 class TerminalOutput:
-    """Writes to a terminal from a thread of its own, so that a stuck terminal blocks nobody else.
+    """Writes to a terminal from its own thread, so that a stuck one blocks nothing else.
 
     A terminal is stuck while its program is stopped, or its connection hangs. Text that does not
     fit into the queue is dropped.
@@ -91,11 +91,11 @@ class TerminalOutput:
 
     @property
     def is_behind(self) -> bool:
-        """Whether the terminal has not taken all yet."""
+        """Whether the terminal has not accepted all text yet."""
         return bool(self._waiting) or self._writing
 
     def catches_up(self, within_s: float) -> bool:
-        """Wait until the terminal has taken all; return False if it has not so soon."""
+        """Wait until the terminal has accepted all text; return False after the time-out."""
         with self._changed:
             return self._changed.wait_for(lambda: not self.is_behind, within_s)
 
@@ -112,7 +112,7 @@ class TerminalOutput:
             self._changed.notify_all()
 
     def close(self) -> bool:
-        """End the thread; return False if the terminal does not take what is left."""
+        """End the thread; return False if the terminal does not accept the remaining text."""
         with self._changed:
             self._closing = True
             self._changed.notify_all()
@@ -120,7 +120,7 @@ class TerminalOutput:
         return not (self._thread.is_alive() or self.gone)
 
     def _run(self) -> None:
-        """Write until all is written behind `close`, or the terminal is gone."""
+        """Write until all text is written after `close`, or the terminal is gone."""
         try:
             while not self._ends():
                 with self._changed:

@@ -1,4 +1,4 @@
-"""RRC: a synchronous client for the Robotic Relay Communicator, on any link, and its command."""
+"""RRC: a synchronous client for the Robotic Relay Communicator, and its command."""
 
 from tickrig._lazy import lazy
 

@@ -1,4 +1,4 @@
-"""A chair behind an RRC: guarded, driven while a dead-man key is held, stopped at the end."""
+"""A chair behind an RRC: protected, driven while a dead-man key is held, stopped at the end."""
 
 from __future__ import annotations
 
@@ -43,18 +43,18 @@ from tickrig.wire.rrc.replies import Event, Ok, RrcEvent, StatusA
 # loops look at it.
 
 DEAD_MAN_US: Final = 1_000_000
-"""A press of the dead-man key holds for so long."""
+"""How long a press of the dead-man key is valid."""
 
 STEP_US: Final = 20_000
 _RESEND_US: Final = 100_000
 _SILENT_US: Final = 300_000
-"""Status lines come each 10 ms; after so long without one, the RRC does not answer."""
+"""Status lines come each 10 ms; after this time without one, the RRC counts as silent."""
 
 _ASK_US: Final = 1_000_000
 """VR2 that is off sends no status lines; after so long without one, the RRC is asked."""
 
 _TAKEN_US: Final = 200_000
-"""After so long a status line shows what was commanded."""
+"""Time after which a status line shows a command."""
 
 _STOP_TRIES: Final = 3
 _MEET_TRIES: Final = 3
@@ -74,7 +74,7 @@ class ChairStopped(Exception):  # noqa: N818 - what happened
     """VR2 is off, or it was stopped.
 
     Attributes:
-        kind: the event that said so, None if there was none.
+        kind: the event that reported it, None without one.
     """
 
     def __init__(self, message: str, kind: RrcEvent | None = None) -> None:
@@ -83,15 +83,15 @@ class ChairStopped(Exception):  # noqa: N818 - what happened
 
 
 class NotAnRrc(LinkError):  # noqa: N818 - what is there
-    """Something else than an RRC answers."""
+    """Another device than an RRC answers."""
 
 
 @dataclass(frozen=True, slots=True)
 class Guard:
-    """What protects the chair while a program talks to it.
+    """Protection of the chair while a program controls it.
 
     Attributes:
-        watchdog_us: VR2 stops after so long without a command; 0 is off.
+        watchdog_us: time without a command after which VR2 stops; 0 is off.
         stable: whether stablemode is switched on.
     """
 
@@ -106,21 +106,21 @@ class DeadMan:
         self._until_us: int | None = None
 
     def press(self, now_us: int) -> None:
-        """Note a press."""
+        """Register a press."""
         self._until_us = now_us + DEAD_MAN_US
 
     def release(self) -> None:
-        """Release it at once."""
+        """Release the key at once."""
         self._until_us = None
 
     def holds(self, now_us: int) -> bool:
-        """Whether the latest press still holds."""
+        """Whether the latest press is still valid."""
         until_us = self._until_us
         return until_us is not None and now_us < until_us
 
 
 class _OpeningLink:
-    """A `Link[bytes]` that remembers the first bytes that came.
+    """A `Link[bytes]` that stores the first received bytes.
 
     Attributes:
         received: these bytes.
@@ -139,14 +139,14 @@ class _OpeningLink:
         self._link.send(traffic)
 
     def receive(self, timeout_us: int, /) -> bytes:
-        """Return what arrived."""
+        """Return received bytes."""
         data = self._link.receive(timeout_us)
         if len(self.received) < _KEPT_BYTES:
             self.received += data
         return data
 
     def close(self) -> None:
-        """Give the line back."""
+        """Close the line."""
         self._link.close()
 
 
@@ -163,8 +163,8 @@ class Chair(Closing):
         moved: whether the motors may run because of this program.
 
     Raises:
-        NotAnRrc: something else answers.
-        LinkTimeout: nothing answers.
+        NotAnRrc: another device answers.
+        LinkTimeout: no answer.
         LinkClosed: the line is gone.
     """
 
@@ -195,7 +195,7 @@ class Chair(Closing):
             self.client.status()
 
     def _meet(self, opening: _OpeningLink) -> None:
-        """Talk to the RRC for the first time; a line that echoes says no OK:device."""
+        """Contact the RRC; a line with an echo does not answer OK:device."""
         failure: Exception | None = None
         for _ in range(_MEET_TRIES):
             try:
@@ -220,7 +220,7 @@ class Chair(Closing):
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Stop the motors, leave the RRC as it was found, close the line."""
+        """Stop the motors, restore the initial settings of the RRC, close the line."""
         try:
             if not isinstance(error, LinkClosed):
                 self._leave()
@@ -235,7 +235,7 @@ class Chair(Closing):
         self.client.close()
 
     def leave_driving(self) -> None:
-        """Let the stick drive on after the end, without a watchdog."""
+        """Keep the stick active after the end, without a watchdog."""
         self.moved = False
 
     def _leave(self) -> None:
@@ -267,7 +267,7 @@ class Chair(Closing):
         return status
 
     def take_over(self, speed_mode: int = 1) -> None:
-        """Let the host drive, at 0, in a speed mode."""
+        """Select driving by the host, at 0, in a speed mode."""
         self.require_on()
         self.moved = True
         self.client.drive_by_host(0, 0)
@@ -279,8 +279,8 @@ class Chair(Closing):
         """Drive for 20 ms: forward and to the right, -100..100 %.
 
         Raises:
-            ChairStopped: VR2 was stopped, or does something else.
-            LinkTimeout: status lines do not come any more.
+            ChairStopped: VR2 was stopped, or deviates from the command.
+            LinkTimeout: status lines have stopped.
         """
         try:
             if (v_pct, w_pct) != self._sent or self.client.now_us >= self._resend_us:
@@ -293,7 +293,7 @@ class Chair(Closing):
         self.watch()
 
     def drive_by_stick(self, limit: Limit, speed_mode: int = 1) -> None:
-        """Let the stick drive within limits, in a speed mode."""
+        """Select driving by the stick within limits, in a speed mode."""
         self.require_on()
         self.moved = True
         self._sent = None
@@ -302,11 +302,11 @@ class Chair(Closing):
             self.client.speedmode(speed_mode)
 
     def watch(self) -> list[Arrival[Event]]:
-        """Judge what has come since the last call; return the events that end nothing.
+        """Check lines since the last call; return the events that do not end the drive.
 
         Raises:
-            ChairStopped: VR2 was stopped, or does something else than it was told.
-            LinkTimeout: status lines do not come any more, or the RRC does not answer.
+            ChairStopped: VR2 was stopped, or deviates from the command.
+            LinkTimeout: status lines have stopped, or the RRC does not answer.
         """
         self.ask_if_silent()
         events = []
@@ -350,14 +350,14 @@ class Chair(Closing):
         self._asked_us = self.client.now_us
 
     def stay_silent(self, kind: RrcEvent, most_us: int) -> int | None:
-        """Send nothing until an event comes, as a program that hangs; then begin to talk again.
+        """Send nothing until an event arrives, like a hanging program; then resume sending.
 
         Args:
-            kind: which event.
-            most_us: how long to wait for it.
+            kind: the event.
+            most_us: longest wait.
 
         Returns:
-            How long it took; None if it did not come.
+            The waiting time; None after the time-out.
         """
         lines, began_us = LineSplitter(), self.client.now_us
         wanted = Event(kind).encode().removesuffix(b"\n")
@@ -371,7 +371,7 @@ class Chair(Closing):
         return None
 
     def stop(self) -> None:
-        """Stop the motors until a status line shows it; switch VR2 off if none does."""
+        """Stop the motors, confirmed by a status line; switch VR2 off without confirmation."""
         if not self.moved:
             return
         for _ in range(_STOP_TRIES):
@@ -418,6 +418,6 @@ class Chair(Closing):
 
     @property
     def latest_status(self) -> Arrival[StatusA] | None:
-        """The newest status line; None if VR2 was off since."""
+        """The newest status line; None if VR2 has been off since."""
         latest, since_us = self.client.latest_status, self._status_since_us
         return latest if latest and since_us is not None and latest.at_us >= since_us else None

@@ -1,6 +1,6 @@
 """The line to one RRC: its pace, the watchdog's renewal, the stop after refusals.
 
-What it raises beside LinkTimeout and LinkClosed:
+Errors besides LinkTimeout and LinkClosed:
 
 DeviceRefused            (tickrig.host.links.link)
  +-- RrcRefused          ER: came for one command
@@ -95,7 +95,7 @@ class RrcRefused(DeviceRefused):
     """The RRC answered a command with ER.
 
     Attributes:
-        code: the reason as the RRC gave it: a command's name, or `CommandChecksum`, ...
+        code: the reason given by the RRC: a command's name, or `CommandChecksum`, ...
         sent: the line that was refused, without LF.
     """
 
@@ -106,7 +106,7 @@ class RrcRefused(DeviceRefused):
 
 
 class RrcStopped(DeviceRefused):
-    """The RRC refused too many times in a row, and the client sends no more commands.
+    """The RRC refused too many times in a row, and the client has stopped sending.
 
     It ends with EV:Initialized, EV:PowerOffFinished or `RrcClient.resume()`.
 
@@ -119,11 +119,11 @@ class RrcStopped(DeviceRefused):
 
 
 _PCT_US: Final = message.PERIOD_US // (message.SAFE_PCT - message.BASE_PCT - message.STATUS_PCT)
-"""What 1 % of the RRC's period takes of the time that its own work and a status line leave."""
+"""Time of 1 % of the RRC's period, without its own work and a status line."""
 
 _LINE_US: Final = message.LINE_FEED_PCT * _PCT_US
 _REPLY_US: Final = message.REPLY_PCT * _PCT_US
-"""What a line to the RRC takes, 6.25 ms, and what its answer takes, 3.75 ms."""
+"""Cost of a line to the RRC, 6.25 ms, and of its answer, 3.75 ms."""
 
 _SECOND_US: Final = 1_000_000
 
@@ -131,21 +131,21 @@ _RENEWALS: Final = 3
 """The watchdog is renewed this many times in its time: one renewal may be lost."""
 
 _FORGETTING: Final = (RrcEvent.POWER_OFF_FINISHED, RrcEvent.INITIALIZED)
-"""Events after which the RRC has none of its settings (RRC manual, notes)."""
+"""Events after which the RRC has lost its settings (RRC manual, notes)."""
 
 _log = log_of(__name__)
 
 
 @dataclass(frozen=True, slots=True)
 class RrcLoad:
-    """How busy an RRC is whose VR2 runs, as its client counts the lines of the latest second.
+    """The load of an RRC with running VR2, from the client's lines of the latest second.
 
-    What others send to the same RRC is not in it.
+    Lines of others to the same RRC are not included.
 
     Attributes:
-        load_pct: its work in per cent of its time: 30 of its own, and what the lines cost.
-        margin_pct: what this leaves of 100. The client leaves 10 or more.
-        pace_lines_s: lines that the client sends in a second at most, if none is waited for.
+        load_pct: its work in per cent of its time: 30 of its own, plus the cost of the lines.
+        margin_pct: the remainder to 100. The client leaves 10 or more.
+        pace_lines_s: largest number of lines per second without waiting for answers.
     """
 
     load_pct: int
@@ -154,7 +154,7 @@ class RrcLoad:
 
 
 class Channel:
-    """Sends commands at the RRC's pace and gives every line that comes its owner.
+    """Sends commands at the RRC's pace and assigns every received line to its owner.
 
     The watchdog is renewed by sending `watchdog` again with the same value: the
     one command that changes nothing, and with stablemode it has no answer. That
@@ -164,12 +164,12 @@ class Channel:
 
     Args:
         link: the line.
-        inbox: keeps what nobody waits for.
-        max_refusals: how many refusals in a row are too many, 1 or more.
-        on_refusals: what to do then.
+        inbox: keeps lines without a waiting request.
+        max_refusals: number of refusals in a row that is too many, 1 or more.
+        on_refusals: the reaction.
 
     Attributes:
-        matcher: what is known of the RRC and of the commands sent to it.
+        matcher: state of the RRC and of the commands sent to it.
     """
 
     def __init__(
@@ -184,19 +184,19 @@ class Channel:
 
     @property
     def load(self) -> RrcLoad:
-        """How busy the RRC is with what passed here."""
+        """The load of the RRC by this channel."""
         self._forget_costs()
         load_pct = message.BASE_PCT + sum(pct for _, pct in self._costs) // message.PERIODS_A_SECOND
         line_us = _LINE_US + _REPLY_US * (not self.matcher.settings.stable)
         return RrcLoad(load_pct, message.PERIOD_PCT - load_pct, _SECOND_US // line_us)
 
     def send(self, command: Command) -> None:
-        """Send a command that nobody waits for."""
+        """Send a command without waiting."""
         self._wait_turn(command)
         self._put_unawaited(command)
 
     def request(self, command: Command, timeout_us: int) -> str:
-        """Send a command, wait until the RRC has worked on it, return the answer's text."""
+        """Send a command, wait until the RRC has processed it, return the text of the answer."""
         self._wait_turn(command)
         exchange = Exchange(command, stable=self.matcher.settings.stable)
         for line in exchange.lines:
@@ -218,7 +218,7 @@ class Channel:
         return exchange.text
 
     def step(self, until_us: int) -> None:
-        """Listen once; RrcStopped if that brought one refusal too many."""
+        """Listen once; RrcStopped after one refusal too many."""
         self._listen(until_us)
         self._raise_alarm()
 
@@ -228,12 +228,12 @@ class Channel:
         self._alarm = None
 
     def restart(self) -> None:
-        """Forget all that was known of the RRC and the commands."""
+        """Reset the state of the RRC and the commands."""
         self.matcher.clear()
         self._alarm = None
 
     def _listen(self, until_us: int, exchange: Exchange | None = None) -> None:
-        """Take what comes next, but wait no longer than `until_us`."""
+        """Receive the next lines, waiting no longer than `until_us`."""
         if exchange is None or not exchange.changes_protocol:
             if self._renewal_us <= self._link.now_us:
                 self._put_unawaited(Watchdog(self.matcher.settings.watchdog_10ms))
@@ -261,7 +261,7 @@ class Channel:
         return max(due_us, self.matcher.unconfirmed.doubt_ends_us)  # VR2 is off meanwhile
 
     def _receive(self, until_us: int) -> bytes:
-        """Read until the line is dry, so that no ER is still unread when commands settle."""
+        """Read until no data are left, so that no ER is unread when commands settle."""
         data = self._link.receive(max(0, until_us - self._link.now_us))
         while more := self._link.receive(0) if data else b"":
             data += more

@@ -28,7 +28,7 @@ _ANGLE: Final = click.IntRange(0, 90)
 
 @dataclass(frozen=True, slots=True)
 class RrcCall:
-    """What stands before the verb.
+    """Options before the verb.
 
     Attributes:
         url: of the port; empty if none was given.
@@ -56,10 +56,10 @@ class _Url(click.ParamType):  # type: ignore[type-arg] # generic since click 8.4
 
 
 class _Verb(HarmlessCommand):
-    """A verb among whose words may be negative numbers, which are no options."""
+    """A verb whose arguments may be negative numbers, which are not options."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Put a blank before a negative number: it reads the same, and is no option."""
+        """Put a blank before a negative number, so that it is not read as an option."""
         return super().parse_args(
             ctx, [f" {a}" if a[:1] == "-" and a[1:2].isdecimal() else a for a in args]
         )
@@ -71,7 +71,7 @@ class _RrcGroup(HarmlessCommand, click.Group):
     command_class = _Verb
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Take options behind URL too, and no URL where a verb comes first: its help needs none."""
+        """Accept options after URL too, and no URL if a verb comes first, for its help."""
         options, url, rest = self._split(ctx, args)
         if url in self.commands:
             return super().parse_args(ctx, [*options, "", url, *rest])
@@ -80,7 +80,7 @@ class _RrcGroup(HarmlessCommand, click.Group):
         return super().parse_args(ctx, [*options, *more, *words, *rest])
 
     def _split(self, ctx: click.Context, args: list[str]) -> tuple[list[str], str, list[str]]:
-        """Return the options before the first other word, that word, and what follows it."""
+        """Return the options before the first other word, that word, and the rest."""
         found, rest, _ = self.make_parser(ctx).parse_args(list(args))
         word = found.get("url")
         count = len(args) - len(rest)
@@ -89,7 +89,7 @@ class _RrcGroup(HarmlessCommand, click.Group):
         return args[: count - 1], word, rest
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Return the verbs in the order in which people meet them."""
+        """Return the verbs in the order of the help."""
         return list(self.commands)
 
 
@@ -100,19 +100,18 @@ class _RrcGroup(HarmlessCommand, click.Group):
     "--pad", metavar="DEVICE", help="Drive by a game pad while a button is held: /dev/input/event5."
 )
 @time_option(
-    "--watchdog", "watchdog_us", help="VR2 stops after so long without a command.  [500ms]"
+    "--watchdog", "watchdog_us", help="Time without a command after which VR2 stops. [500ms]"
 )
-@click.option("--no-watchdog", is_flag=True, help="Set none: nothing stops VR2 if this ends badly.")
+@click.option("--no-watchdog", is_flag=True, help="No watchdog: nothing stops VR2 after a crash.")
 @click.option("--no-stablemode", is_flag=True, help="Leave CHECK and OK lines as they are.")
 @version_option()
 @click.pass_context
 def main(context: click.Context, /, url: str, *, panel: bool, **guard: Any) -> None:
     """Drive and watch an RRC, the controller of a VR2 wheelchair, real or emulated.
 
-    URL is a port: /dev/ttyACM0, COM3, rfc2217://HOST:PORT, socket://HOST:PORT.
-    Nothing moves before an RRC has answered there. Its watchdog and stablemode
-    are on while it runs. However the command ends, it stops the motors first; if it
-    is killed, the watchdog stops VR2.
+    URL is a port: /dev/ttyACM0, COM3, rfc2217://HOST:PORT, socket://HOST:PORT. Nothing moves before
+    an RRC has answered. Its watchdog and stablemode are on while the command runs. The command
+    always stops the motors before it ends; if it is killed, the watchdog stops VR2.
 
     \b
     rrc /dev/ttyACM0 status                  what is connected, and its state
@@ -160,7 +159,7 @@ def _watchdog(time_us: int | None, *, off: bool) -> int:
     return time_us
 
 
-_for_option: Final = time_option("--for", "for_us", help="End after so long.")
+_for_option: Final = time_option("--for", "for_us", help="End after this time.")
 _json_option: Final = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 _speed_option: Final = click.option(
     "--speed", type=_SPEED, default=1, show_default=True, help="Speed mode, 1 is the slowest."
@@ -173,7 +172,7 @@ _Decorator = Callable[[Callable[..., Any]], click.Command]
 @_json_option
 @works_in(f"{_VERBS}:status")
 def _status(**options: Any) -> None:
-    """Say what is connected, whether VR2 is on, and what its status line says.
+    """Show the connected device, whether VR2 is on, and its status line.
 
     \b
     rrc /dev/ttyACM0 status
@@ -186,14 +185,14 @@ def _status(**options: Any) -> None:
 @click.argument("w_pct", metavar="W", type=_SIGNED)
 @_speed_option
 @_for_option
-@click.option("--no-dead-man", is_flag=True, help="Drive without a key that is held; wants --for.")
+@click.option("--no-dead-man", is_flag=True, help="Drive without a held key; needs --for.")
 @works_in(f"{_VERBS}:drive")
 def _drive(**options: Any) -> None:
     """Drive: V forward and W to the right, -100..100 % each.
 
-    On a terminal the chair drives while SPACE is held, or pressed again within
-    1 s; q ends. With --pad it drives by the left stick while a button of the pad
-    is held, and V and W are the most. A script has neither, and gives --for.
+    On a terminal the chair drives while SPACE is held, or pressed again within 1 s; q ends. With
+    --pad it drives by the left stick while a button of the pad is held, with V and W as limits. A
+    script has neither and needs --for.
 
     \b
     rrc /dev/ttyACM0 drive 30 0
@@ -219,10 +218,10 @@ def _drive(**options: Any) -> None:
 )
 @_speed_option
 @_for_option
-@click.option("--leave", is_flag=True, help="End at once; the stick drives on, without a watchdog.")
+@click.option("--leave", is_flag=True, help="End at once; the stick stays on, without watchdog.")
 @works_in(f"{_VERBS}:limit")
 def _limit(**options: Any) -> None:
-    """Let the stick drive: V % forward and W % of rotation at most.
+    """Drive by the stick: V % forward and W % of rotation at most.
 
     It runs until Ctrl-C, and stops the chair then.
 
@@ -287,9 +286,9 @@ def _limit(**options: Any) -> None:
 )
 @works_in(f"{_VERBS}:stick")
 def _stick(**options: Any) -> None:
-    """Shape the stick: dead zones, exponents, and how it backs.
+    """Shape the stick: dead zones, exponents, and backing.
 
-    It holds until VR2 or the RRC is switched off.
+    The settings last until VR2 or the RRC is switched off.
 
     \b
     rrc /dev/ttyACM0 stick --low 10 10 --exponent 5 5
@@ -314,9 +313,9 @@ def _speed(**options: Any) -> None:
 @click.argument("times", metavar="ON [OFF ON ...]", nargs=-1, required=True)
 @works_in(f"{_VERBS}:beep")
 def _beep(**options: Any) -> None:
-    """Sound the buzzer: up to ten times, on and off by turns.
+    """Sound the buzzer: up to ten times, on and off in turn.
 
-    A time is 0..2550ms, in steps of 10ms. One 0 ends what sounds.
+    A time is 0..2550ms, in steps of 10ms. A single 0 stops the sound.
 
     \b
     rrc /dev/ttyACM0 beep 1s 1s 1s
@@ -327,7 +326,7 @@ def _beep(**options: Any) -> None:
 @main.command("poweroff")
 @works_in(f"{_VERBS}:poweroff")
 def _poweroff(**options: Any) -> None:
-    """Stop VR2 by force; its power button must be pressed afterwards.
+    """Force VR2 to stop; its power button must be pressed afterwards.
 
     \b
     rrc /dev/ttyACM0 poweroff
@@ -340,7 +339,7 @@ def _poweroff(**options: Any) -> None:
 @_json_option
 @works_in(f"{_VERBS}:watch")
 def _watch(**options: Any) -> None:
-    """Print events and changes of the status line as they come, until Ctrl-C.
+    """Print events and changes of the status line until Ctrl-C.
 
     \b
     rrc /dev/ttyACM0 watch
@@ -354,11 +353,11 @@ def _watch(**options: Any) -> None:
 )
 @works_in(f"{_VERBS}:test")
 def _test(**options: Any) -> None:
-    """Lead through the test procedure of the manual, step by step.
+    """Run the test procedure of the manual, step by step.
 
-    It sends the sample commands without CHECK, then with CHECK, and judges the
-    answers; you press buttons, move the stick, and say what you see. Two samples
-    let the motors run: lift the wheels off the ground first.
+    It sends the sample commands without CHECK, then with CHECK, and checks the answers; you press
+    buttons, move the stick, and answer questions. Two samples run the motors: lift the wheels off
+    the ground first.
 
     \b
     rrc /dev/ttyACM0 test

@@ -1,4 +1,4 @@
-"""The RRC as a host program sees it: one method a command, with events and status beside them."""
+"""A client for host programs: one method per command, with events and status lines."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tickrig.wire.rrc.replies import COMMAND_CHECKSUM, Event, RrcEvent, StatusA
 
 TIMEOUT_US: Final = 200_000
 _SETTLE_US: Final = 100_000
-"""Wait behind the dummy command at the start (RRC manual, notes)."""
+"""Wait after the dummy command at the start (RRC manual, notes)."""
 
 _UNIT_US: Final = 10_000
 """Times on the wire are multiples of 10 ms."""
@@ -30,26 +30,26 @@ T = TypeVar("T")
 class RrcClient(Closing):
     """A synchronous client of a Robotic Relay Communicator; nothing runs in the background.
 
-    Time passes only in these calls. While a watchdog is set, each of them renews
-    it in time; a program that hangs does not, and the watchdog stops VR2.
+    Time passes only in these calls. While a watchdog is set, each of them renews it in time; a
+    hanging program does not, and the watchdog stops VR2.
 
     After `max_refusals` ER lines in a row for one command the client raises
-    RrcStopped and sends nothing more but `poweroff`, until the RRC is
+    RrcStopped and sends only `poweroff`, until the RRC is
     initialized again or `resume` is called. Values out of range raise
     `BadParameters` (a ValueError) before anything is sent. Every method that
     sends a command raises what `command` raises.
 
-    It leaves the RRC a tenth of its time: a call may wait 6.25 ms for each line that was sent
-    before, and 3.75 ms for each answer. `load` says how busy the RRC is with that.
+    It leaves the RRC a tenth of its time: a call may wait 6.25 ms for each line sent before, and
+    3.75 ms for each answer. `load` returns the resulting load of the RRC.
 
-    Not checked: that the RRC received the values as they were sent. CHECK does
-    not see exchanged characters; compare with `statuses` where it matters.
+    Not checked: that the RRC received the values as they were sent. CHECK does not detect exchanged
+    characters; compare with `statuses` if it matters.
 
     Args:
         link: the line, open; the client closes it.
         timeout_us: how long to wait for the answer to a command, us.
-        max_refusals: how many refusals in a row are too many, 1 or more.
-        on_refusals: what to do then.
+        max_refusals: number of refusals in a row that is too many, 1 or more.
+        on_refusals: the reaction.
         on_unknown: called with each line that the manual does not list.
 
     Attributes:
@@ -76,13 +76,13 @@ class RrcClient(Closing):
 
     @classmethod
     def open(cls, url: str) -> Self:
-        """Open a port and start to talk.
+        """Open a port and start the communication.
 
         Args:
-            url: a device path or pyserial URL, as `SerialLink` takes it.
+            url: a device path or pyserial URL, as for `SerialLink`.
 
         Returns:
-            A client that has started; close it, or use it in a `with` block.
+            A started client; close it, or use it in a `with` block.
 
         Raises:
             LinkClosed: the port cannot be opened.
@@ -97,10 +97,10 @@ class RrcClient(Closing):
         return client
 
     def start(self) -> None:
-        """Begin to talk, as the manual's notes advise: dummy command, wait, empty the buffer.
+        """Start as the manual's notes advise: dummy command, wait, empty the buffer.
 
-        After that it is known whether an earlier program left stablemode on.
-        What was received before is dropped, events too.
+        Afterwards it is known whether an earlier program left stablemode on. Lines received before
+        are dropped, including events.
 
         Raises:
             LinkTimeout: no RRC answers.
@@ -129,7 +129,7 @@ class RrcClient(Closing):
 
     @property
     def now_us(self) -> int:
-        """Time on the link's clock, the one of all time stamps."""
+        """Time on the link's clock, which is used for all time stamps."""
         return self._link.now_us
 
     @property
@@ -149,32 +149,32 @@ class RrcClient(Closing):
 
     @property
     def latest_status(self) -> Arrival[StatusA] | None:
-        """The newest status line received in any call; look at its age."""
+        """The newest status line received in any call; check its age."""
         return self._inbox.latest_status
 
     @property
     def load(self) -> RrcLoad:
-        """How busy the RRC is with this client, and how many lines a second it may send."""
+        """The load of the RRC by this client, and its largest rate of lines."""
         return self._channel.load
 
     def resume(self) -> None:
-        """Send again after RrcStopped.
+        """Resume sending after RrcStopped.
 
-        Refusals are counted from zero.
+        The count of refusals restarts at zero.
         """
         self._channel.resume()
 
     def command(self, command: Command, *, confirm: bool | None = None) -> str:
-        """Send any command and wait until the RRC has worked on it.
+        """Send any command and wait until the RRC has processed it.
 
         Args:
-            command: what to send.
-            confirm: False to send it only, for a stream; ERs that come later
-                count. Left out, all is confirmed but `output` with stablemode on;
-                `stablemode` is confirmed in any case.
+            command: the command.
+            confirm: False to send it without waiting, for a stream; later ERs count. By default all
+                commands are confirmed, except `output` with stablemode on; `stablemode` is always
+                confirmed.
 
         Returns:
-            The answer of `device`, `version` or `date`, empty for the others.
+            The answer to `device`, `version` or `date`, empty for the others.
 
         Raises:
             RrcRefused: the RRC answered ER.
@@ -190,10 +190,10 @@ class RrcClient(Closing):
         return ""
 
     def run_for(self, duration_us: int) -> None:
-        """Let time pass, and take in what comes.
+        """Wait for a time, and receive lines.
 
         Args:
-            duration_us: for how long; 0 only takes in what is there.
+            duration_us: duration; 0 only reads available lines.
 
         Raises:
             LinkClosed: the line is gone.
@@ -204,10 +204,10 @@ class RrcClient(Closing):
             self._channel.step(until_us)
 
     def events(self, timeout_us: int) -> Iterator[Arrival[Event]]:
-        """Take events, the oldest untaken one first.
+        """Yield events, the oldest one first.
 
         Args:
-            timeout_us: how long to wait for each; then the iteration ends.
+            timeout_us: longest wait for each; then the iteration ends.
 
         Yields:
             Events, with the time at which they arrived.
@@ -215,10 +215,10 @@ class RrcClient(Closing):
         return self._drain(self._inbox.events, timeout_us)
 
     def statuses(self, timeout_us: int) -> Iterator[Arrival[StatusA]]:
-        """Take status lines, the oldest untaken one first.
+        """Yield status lines, the oldest one first.
 
         Args:
-            timeout_us: how long to wait for each; then the iteration ends.
+            timeout_us: longest wait for each; then the iteration ends.
 
         Yields:
             Status lines, with the time at which they arrived.
@@ -226,17 +226,17 @@ class RrcClient(Closing):
         return self._drain(self._inbox.statuses, timeout_us)
 
     def wait_for(self, kind: RrcEvent, timeout_us: int) -> Arrival[Event]:
-        """Take events up to the first of this kind; one that came before the call counts.
+        """Return the first event of a kind; one received before the call counts.
 
         Args:
-            kind: which event.
-            timeout_us: how long to wait for it.
+            kind: the event.
+            timeout_us: longest wait.
 
         Returns:
             The event, with the time at which it arrived.
 
         Raises:
-            LinkTimeout: it did not come; the other events stay untaken.
+            LinkTimeout: no such event; the other events are kept.
         """
         events = self._inbox.events
         until_us = self._link.now_us + timeout_us
@@ -259,14 +259,14 @@ class RrcClient(Closing):
         product_pct: int = 255,
         radius_pct: int = 255,
     ) -> None:
-        """Let the stick drive, within limits (command `limit`).
+        """Drive by the stick, within limits (command `limit`).
 
         Args:
-            v_pct: most translation, 0..100 %.
-            w_pct: most rotation, 0..100 %.
-            sum_pct: most of `|v| + |w|`, 0..255 %.
-            product_pct: most of `|v| * |w| / 100`, 0..255 %.
-            radius_pct: most of the root of v² + w², 0..255 %.
+            v_pct: largest translation, 0..100 %.
+            w_pct: largest rotation, 0..100 %.
+            sum_pct: largest `|v| + |w|`, 0..255 %.
+            product_pct: largest `|v| * |w| / 100`, 0..255 %.
+            radius_pct: largest root of v² + w², 0..255 %.
 
         Raises:
             RrcRefused: VR2 is off.
@@ -279,8 +279,8 @@ class RrcClient(Closing):
         Args:
             v_pct: translation.
             w_pct: rotation.
-            confirm: whether to wait until the RRC has it. Left out, it is waited
-                for without stablemode, and streamed with it.
+            confirm: whether to wait for its confirmation. By default it waits without stablemode,
+                and streams with it.
         """
         self.command(cmd.Output(v_pct, w_pct), confirm=confirm)
 
@@ -314,7 +314,7 @@ class RrcClient(Closing):
         self.command(shape)
 
     def watchdog(self, time_us: int) -> None:
-        """Let the RRC stop VR2 when no command came for a time.
+        """Make the RRC stop VR2 after a time without a command.
 
         From then on the client renews it in each of its calls.
 
@@ -322,15 +322,15 @@ class RrcClient(Closing):
             time_us: 0..2_550_000 us, a multiple of 10_000 us; 0 is off.
 
         Raises:
-            ValueError: another time.
+            ValueError: a time out of range.
         """
         self.command(cmd.Watchdog(_units(time_us)))
 
     def stablemode(self, *, on: bool = True) -> None:
-        """Want CHECK on each line, which the client appends, and no OK lines.
+        """Switch stablemode: CHECK on each line, appended by the client, and no OK lines.
 
         Args:
-            on: False ends it.
+            on: False to switch it off.
         """
         self.command(cmd.StableMode(int(on)))
 
@@ -338,32 +338,32 @@ class RrcClient(Closing):
         """Switch the stream of status lines, one each 10 ms while VR2 is on.
 
         Args:
-            on: False ends it.
+            on: False to switch it off.
         """
         self.command(cmd.Status(int(on)))
 
     def poweroff(self) -> None:
-        """Stop VR2 by force; it must then be switched off by its button."""
+        """Force VR2 to stop; it must then be switched off by its button."""
         self.command(cmd.PowerOff())
 
     def beep(self, *times_us: int) -> None:
         """Sound the buzzer.
 
         Args:
-            times_us: for how long it is on, off, on, ...: up to ten times of 0..2_550_000 us,
-                multiples of 10_000 us.
+            times_us: durations of on, off, on, ...: up to ten times of 0..2_550_000 us, multiples
+                of 10_000 us.
 
         Raises:
-            ValueError: another time.
+            ValueError: a time out of range.
         """
         times = tuple(_units(time_us) for time_us in times_us)
         self.command(cmd.Beep(times + (0,) * (10 - len(times))))
 
     def drive_by_host(self, v_pct: int, w_pct: int) -> None:
-        """Send `output`, and before it the slowest speed mode if the stick drove until now.
+        """Send `output`, preceded by the slowest speed mode if the stick was driving.
 
         The manual advises it for every change between limit and output. The
-        first output is confirmed. Choose the speed mode again afterwards.
+        first output is confirmed. Select the speed mode again afterwards.
 
         Args:
             v_pct: translation, -100..100 %, forward positive.
@@ -380,7 +380,7 @@ class RrcClient(Closing):
         product_pct: int = 255,
         radius_pct: int = 255,
     ) -> None:
-        """Send `limit`, and before it the slowest speed mode if the host drove until now.
+        """Send `limit`, preceded by the slowest speed mode if the host was driving.
 
         Its arguments are those of `limit`: v_pct, w_pct, sum_pct, product_pct, radius_pct.
         """
@@ -398,7 +398,7 @@ class RrcClient(Closing):
                 self._channel.step(until_us)
 
     def _slow_down_before(self, drive: type[cmd.Limit | cmd.Output]) -> bool:
-        """Send speed mode 1 unless this drive is on; return whether that was sent."""
+        """Send speed mode 1 unless this drive is active; return whether it was sent."""
         settings = self._settings
         changes = settings.drive is not drive
         if changes:

@@ -1,6 +1,6 @@
-r"""What came from the RRC: cut into lines, read, sorted and kept.
+r"""Received lines of the RRC: split, read, sorted and stored.
 
-One command and what proves that the RRC processed it.
+Exchanges: one command and the proof that the RRC processed it.
 
 Without stablemode that is `OK:name`. With stablemode there is no OK: a `device`
 query goes behind the command, and as the RRC takes one line after the other,
@@ -43,7 +43,7 @@ _STATUSES_KEPT: Final = 1_000  # 10 s
 UNKNOWN_KEPT: Final = 100
 
 _ANSWER: Final = re.compile(r"(?![A-Z]{2}:)[ -~]+")
-"""A bare line of text; `XX:...` is a newer firmware's message and answers nothing."""
+"""A bare line of text; `XX:...` is a message of newer firmware, not an answer."""
 
 T = TypeVar("T")
 Answer = Ok | Refusal | Text
@@ -52,7 +52,7 @@ _log = log_of(__name__)
 
 @dataclass(frozen=True, slots=True)
 class Arrival(Generic[T]):
-    """Something received, and when.
+    """A received item with its time.
 
     Attributes:
         at_us: time on the link's clock.
@@ -64,19 +64,18 @@ class Arrival(Generic[T]):
 
 
 class Inbox:
-    """Reads lines, keeps events and status, and hands on what somebody waits for.
+    """Reads lines, stores events and status lines, and returns the others.
 
-    Lines that the manual does not list, and SA lines that do not match their
-    CHECK, are kept in `unknown` and reported, never an error: newer firmware
-    sends some, and so does a noisy line.
+    Lines that the manual does not list, and SA lines that do not match their CHECK, are kept in
+    `unknown` and reported without an error: newer firmware and noisy lines cause them.
 
     Args:
         on_unknown: called with each of them.
 
     Attributes:
-        events: events that nobody has taken yet.
-        statuses: status lines that nobody has taken yet.
-        latest_status: the newest one, taken or not.
+        events: events not yet read.
+        statuses: status lines not yet read.
+        latest_status: the newest one, read or not.
         unknown: the latest unknown lines.
     """
 
@@ -89,12 +88,12 @@ class Inbox:
         self._lines = LineSplitter()
 
     def push(self, now_us: int, data: bytes) -> list[Reply]:
-        """Take bytes in; return what the manual lists, in order."""
+        """Add received bytes; return the lines that the manual lists, in order."""
         replies = [self._read(now_us, line) for line in self._lines.push(data)]
         return [reply for reply in replies if reply is not None]
 
     def report(self, now_us: int, line: str) -> None:
-        """Keep a line that means nothing here, and tell whoever wants to know."""
+        """Store and report an unknown line."""
         _log.info("unknown line %r", line)
         arrival = Arrival(now_us, line)
         self.unknown.append(arrival)
@@ -102,7 +101,7 @@ class Inbox:
             self._on_unknown(arrival)
 
     def clear(self) -> None:
-        """Forget all that was received, and a line that has only begun."""
+        """Discard all received items, and an incomplete line."""
         self._lines.clear()
         self.events.clear()
         self.statuses.clear()
@@ -132,24 +131,24 @@ class Inbox:
 
 
 NAMELESS: Final = (COMMAND_CHECKSUM, COMMAND_UNKNOWN, RECEIVE_BUFFER_OVERFLOW)
-"""Reasons that do not say which command was refused."""
+"""Reasons that do not name the refused command."""
 
 _QUERIES: Final = (DeviceName, Version, Date)
-"""Commands that are answered with a line of text, in stablemode too."""
+"""Commands that are answered with a line of text, also in stablemode."""
 
 
 class Exchange:
-    """A command on its way.
+    """A command in progress.
 
     Args:
-        command: what is sent.
+        command: the command.
         stable: whether stablemode is on when it is sent.
 
     Attributes:
         lines: the bytes to send, line by line.
         text: the answer to a query, empty for other commands.
-        refusal: the RRC's reason, None if it gave none.
-        done: whether the last awaited line has come.
+        refusal: the RRC's reason, None without a refusal.
+        done: whether the last expected line has arrived.
     """
 
     def __init__(self, command: Command, *, stable: bool) -> None:
@@ -172,14 +171,14 @@ class Exchange:
 
     @property
     def awaited(self) -> str:
-        """What would have ended the exchange, for people."""
+        """The expected end of the exchange, for people."""
         if self._wants_text:
             return f"the answer of {self._last}"
         return f"OK:{self.name}"
 
     @property
     def replies(self) -> int:
-        """How many lines the RRC sends if it does what was asked."""
+        """Number of lines that the RRC sends on success."""
         return (not self._stable) + self._wants_text
 
     @property
@@ -189,15 +188,15 @@ class Exchange:
 
     @property
     def changes_protocol(self) -> bool:
-        """Whether nothing else may be sent before this is settled."""
+        """Whether no other command may be sent before this is settled."""
         return isinstance(self.command, StableMode | Watchdog)
 
     def refuses_barrier_too(self, reason: str) -> bool:
-        """Whether this is the refusal of the query behind a command that was refused itself."""
+        """Whether this is the refusal of the query after a command that was refused itself."""
         return self.refusal is not None and self.has_barrier and reason == self._last
 
     def take(self, answer: Answer) -> bool:
-        """Take a line if it belongs here; True if it does."""
+        """Handle a line if it belongs to this exchange; return whether it does."""
         match answer:
             case Refusal(reason):
                 return self._take_refusal(reason)

@@ -130,7 +130,7 @@ class ChairPanel(FramedApp):
         self.refresh_bindings()
 
     def on_ready(self) -> None:
-        """Begin to look at the chair."""
+        """Start to poll the chair."""
         self.look()
         self.set_interval(REFRESH_S, self.look)
 
@@ -147,7 +147,7 @@ class ChairPanel(FramedApp):
         self._pilot.release()
 
     def action_take(self, drives: str) -> None:
-        """Choose who drives."""
+        """Choose the host or the stick as driver."""
         self._pilot.take(Drives(drives))
 
     def action_limit(self, steps: int) -> None:
@@ -163,11 +163,11 @@ class ChairPanel(FramedApp):
         self._pilot.beep()
 
     def action_power_off(self) -> None:
-        """Stop VR2 by force."""
+        """Force VR2 to stop."""
         self._pilot.power_off()
 
     def look(self) -> None:
-        """Show what there is."""
+        """Show the present state."""
         if not self.query("#lines"):  # the screen may be gone by now
             return
         view = self._pilot.view
@@ -191,7 +191,7 @@ def _pane(name: str, title: str) -> Static:
 
 
 def _state_pane(view: PilotView) -> Text:
-    """Show who drives, what comes of it, and what the RRC reports."""
+    """Show the driver, its effect, and the reports of the RRC."""
     sa, (aim_v, aim_w) = view.status, view.aim_pct
     key = (" DRIVES ", "bold black on green") if view.held else (" released ", "reverse dim")
     who = f" {view.drives.text}"
@@ -231,7 +231,7 @@ def _lines_pane(view: PilotView, height: int) -> Text:
 
 
 def run() -> None:
-    """Show the panel until it is left; the chair is stopped then."""
+    """Show the panel until it is closed; then stop the chair."""
     call = click.get_current_context().find_object(RrcCall)
     assert call is not None
     ended = Ended()
@@ -253,10 +253,10 @@ def run() -> None:
 
 
 class _Stepper:
-    """Steps a pilot in a thread of its own, for the length of a `with` block.
+    """Steps a pilot in its own thread, for the duration of a `with` block.
 
     Args:
-        pilot: what is stepped.
+        pilot: the pilot.
         failed: called from that thread if the line fails.
     """
 

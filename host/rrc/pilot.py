@@ -1,4 +1,4 @@
-"""What a panel wants of a chair, and what it shows of it: a screen and a line do not wait."""
+"""The state between a panel and a chair, so that screen and line do not wait for each other."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _KEPT_LINES: Final = 60
 
 
 class Drives(StrEnum):
-    """Who drives the chair, as far as the panel has chosen."""
+    """The driver of the chair, chosen in the panel."""
 
     STOPPED = "stopped"
     HOST = "host"
@@ -26,7 +26,7 @@ class Drives(StrEnum):
 
     @property
     def text(self) -> str:
-        """What people read."""
+        """The text for people."""
         return "stopped" if self is Drives.STOPPED else f"{self} drives"
 
 
@@ -34,24 +34,24 @@ class _PadStick(Protocol):
     """A stick with a dead-man button."""
 
     def poll(self, now_us: int, /) -> tuple[int, int]:
-        """Return what to drive in per cent, 0 while no button is held; ChairStopped if gone."""
+        """Return the values to drive in per cent, 0 without a held button; ChairStopped if gone."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class PilotView:
-    """What is known at one time.
+    """The state at one time.
 
     Attributes:
         now_us: the time.
         drives: who drives.
-        aim_pct: what is driven while the dead-man key holds.
-        held: whether it holds.
-        speed_mode: that was chosen.
+        aim_pct: values driven while the dead-man key is held.
+        held: whether it is held.
+        speed_mode: the chosen one.
         most_pct: limit of the stick.
         status: the latest status line, None while VR2 is off.
-        load: how busy the RRC is with this program.
-        lines: events and what was done, `(time, mark, text)`.
+        load: load of the RRC by this program.
+        lines: events and actions, `(time, mark, text)`.
     """
 
     now_us: int
@@ -66,14 +66,14 @@ class PilotView:
 
 
 class Pilot:
-    """Steps a chair in one thread; another one presses, aims and looks.
+    """Steps a chair in one thread, while another one controls and reads it.
 
     Args:
-        chair: guarded.
+        chair: protected.
         pad: a game pad in place of the keys.
 
     Attributes:
-        view: what is known now.
+        view: the present state.
     """
 
     def __init__(self, chair: Chair, pad: _PadStick | None = None) -> None:
@@ -100,12 +100,12 @@ class Pilot:
         self._aim_pct = 0, 0
 
     def aim(self, v_pct: int, w_pct: int) -> None:
-        """Change what is driven, in per cent."""
+        """Change the values to drive, in per cent."""
         v, w = self._aim_pct
         self._aim_pct = max(-100, min(100, v + v_pct)), max(-100, min(100, w + w_pct))
 
     def take(self, drives: Drives) -> None:
-        """Let the host or the stick drive, or stop the chair."""
+        """Choose the host or the stick as driver, or stop the chair."""
         self.release()
         self._acts.append(lambda: self._take(drives))
 
@@ -130,14 +130,14 @@ class Pilot:
         self._acts.append(lambda: self._client.beep(200_000))
 
     def power_off(self) -> None:
-        """Stop VR2 by force."""
+        """Force VR2 to stop."""
         self.release()
         self._acts.append(self._power_off)
 
     # Called by the thread of the line.
 
     def step(self) -> None:
-        """Do what was asked for, and drive or listen for 20 ms.
+        """Execute requests, and drive or listen for 20 ms.
 
         Raises:
             LinkError: the line is gone, or the RRC does not answer.

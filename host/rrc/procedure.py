@@ -29,7 +29,7 @@ from tickrig.wire.rrc.replies import RrcEvent, StatusA
 # The watchdog itself is tested by silence (`Chair.stay_silent`): the client would renew it.
 
 STEPS: Final = 21
-"""Of both rounds together."""
+"""Number of steps of both rounds together."""
 
 _PATIENCE_US: Final = 60_000_000
 _DRIVE_US: Final = 1_000_000
@@ -39,17 +39,17 @@ _TAKEN_US: Final = 100_000
 
 
 class Operator(Protocol):
-    """The person at the chair. Time passes on the chair while it is waited for."""
+    """The person at the chair. Time passes on the chair while the program waits for an answer."""
 
     def instruct(self, text: str) -> None:
-        """Say what to do."""
+        """Show an instruction."""
 
     def confirms(self, question: str) -> bool:
         """Ask a question; Quit ends the procedure."""
         ...
 
     def waits(self) -> None:
-        """Let a moment pass; Quit ends the procedure."""
+        """Wait a moment; Quit ends the procedure."""
 
 
 class Quit(Exception):  # noqa: N818 - what the operator did
@@ -58,14 +58,14 @@ class Quit(Exception):  # noqa: N818 - what the operator did
 
 @dataclass(frozen=True, slots=True)
 class StepResult:
-    """What became of a step.
+    """The result of a step.
 
     Attributes:
-        step: what it is about.
+        step: its title.
         sent: the sample, without CHECK; empty if nothing is sent.
         check: its CHECK; empty in the first round.
-        passed: whether it did what the manual says.
-        reason: why not.
+        passed: whether it behaved as in the manual.
+        reason: of a failure.
     """
 
     step: str
@@ -76,7 +76,7 @@ class StepResult:
 
 
 class _Failed(Exception):  # noqa: N818 - the verdict
-    """The RRC, or the chair, did something else."""
+    """The RRC, or the chair, behaved differently."""
 
 
 @dataclass(slots=True)
@@ -84,9 +84,9 @@ class Procedure:
     """Runs the steps of both rounds.
 
     Args:
-        chair: guarded by its watchdog, without stablemode.
+        chair: protected by its watchdog, without stablemode.
         operator: at the chair.
-        report: called with each result as it comes.
+        report: called with each result.
 
     Attributes:
         results: of all steps so far.
@@ -99,7 +99,7 @@ class Procedure:
 
     @property
     def passed(self) -> bool:
-        """Whether all steps did."""
+        """Whether all steps passed."""
         return all(each.passed for each in self.results)
 
     def run(self) -> None:
@@ -109,7 +109,7 @@ class Procedure:
             Quit: the operator ended it.
             LinkError: the RRC is gone.
         """
-        if not self.operator.confirms("Are the wheels off the ground, and is nobody in the chair?"):
+        if not self.operator.confirms("Are the wheels off the ground, and is the chair empty?"):
             raise Quit("lift the wheels first: two samples let the motors run")
         for stable in (False, True):
             self._step("VR2 starts", None, self._power_on)
@@ -145,7 +145,7 @@ class Procedure:
         self.results.append(result)
         self.report(result)
 
-    # What each step does. Its sample is the command of its row in `run`.
+    # The steps. Each sample is the command of its row in `run`.
 
     def _power_on(self) -> None:
         if self.chair.status() is not None:
@@ -254,7 +254,7 @@ class Procedure:
     def _await(
         self, holds: Callable[[StatusA], bool], what: str, within_us: int = _PATIENCE_US
     ) -> StatusA:
-        """Wait until a status line holds, and return one that shows what the RRC made of it."""
+        """Wait until a status line meets a condition, and return a later one with its effect."""
         client = self.chair.client
         until_us = client.now_us + within_us
         while client.now_us < until_us:

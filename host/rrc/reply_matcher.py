@@ -1,4 +1,4 @@
-"""Which reply of an RRC answers which command, and what follows from it."""
+"""Assignment of the replies of an RRC to commands, and its consequences."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ from tickrig.wire.rrc.replies import Ok, Refusal, Text
 # Refusals are counted for each command by itself. Who stops, and how, is in channel.py.
 
 _SETTLED_US: Final = 100_000
-"""An ER would have come by then: 10 periods of the RRC."""
+"""Time after which an ER would have arrived: 10 periods of the RRC."""
 
 _MOTION: Final = ("output", "limit")
 
 
 class OnRefusals(Enum):
-    """What the client does after too many refusals in a row (RRC manual, notes)."""
+    """Reaction of the client to too many refusals in a row (RRC manual, notes)."""
 
     POWER_OFF = "poweroff"  # send poweroff; renew the watchdog no more
     WATCHDOG = "watchdog"  # send nothing, so that the watchdog trips; poweroff if none is set
@@ -53,11 +53,11 @@ class OnRefusals(Enum):
 class _RefusalCounter:
     """Counts for each command how many times in a row it was refused.
 
-    Each command has a row of its own: a `beep` that works in between must not
+    Each command is counted separately: a `beep` that works in between must not
     hide that every `output` is refused.
 
     Args:
-        limit: how many in a row are too many.
+        limit: number in a row that is too many.
 
     Attributes:
         stopped: reason of the last refusal once there were too many, else None.
@@ -74,24 +74,24 @@ class _RefusalCounter:
         self._rows: Counter[str] = Counter()
 
     def accepted(self, name: str) -> None:
-        """Note a command that was carried out: its row ends."""
+        """Register an executed command, which ends its row."""
         del self._rows[name]
 
     def refused(self, name: str, reason: str) -> None:
-        """Note a refusal; `stopped` is set if with this one there are too many."""
+        """Register a refusal; `stopped` is set if it is one too many."""
         self._rows[name] += 1
         if self.stopped is None and self._rows[name] >= self.limit:
             self.stopped = reason
 
     def clear(self) -> None:
-        """Begin again."""
+        """Reset the counts."""
         self._rows.clear()
         self.stopped = None
 
 
 @dataclass(slots=True)
 class _BelievedSettings:
-    """Settings of the RRC that change how the client talks, as far as they are known.
+    """Known settings of the RRC that affect the client.
 
     Attributes:
         stable: stablemode: CHECK on every line, no OK.
@@ -106,14 +106,14 @@ class _BelievedSettings:
     drive: type[Limit | Output] | None = None
 
     def sent(self, command: Command) -> None:
-        """Note a command whose fate is not waited for; who drives may have changed."""
+        """Register a command sent without waiting; the driver may have changed."""
         if isinstance(command, Limit | Output) and self.drive is not type(command):
             self.drive = None
         else:
             self.accepted(command)
 
     def accepted(self, command: Command) -> None:
-        """Note a command that the RRC carried out."""
+        """Register a command that the RRC executed."""
         match command:
             case StableMode(on):
                 self.stable = bool(on)
@@ -125,7 +125,7 @@ class _BelievedSettings:
                 self.drive = type(command)
 
     def clear(self) -> None:
-        """Forget the settings, as the RRC does in Initialize."""
+        """Reset the settings, as the RRC does in Initialize."""
         self.stable, self.watchdog_10ms, self.locked, self.drive = False, 0, 0, None
 
 
@@ -139,11 +139,10 @@ class _Sent(NamedTuple):
 
 
 class _UnconfirmedCommands:
-    """Commands that were sent and that nobody waits for, until a reply or time tells their fate.
+    """Commands sent without waiting, until a reply or the time settles them.
 
-    Replies come in the order of the commands, so a reply belongs to the oldest
-    command of its name. An ER without a name goes to the account of a motion
-    command if there is one: the safe side, where it cannot be known.
+    Replies come in the order of the commands, so a reply belongs to the oldest command of its name.
+    An ER without a name is assigned to a motion command if there is one, which is the safe choice.
     """
 
     def __init__(self) -> None:
@@ -152,24 +151,24 @@ class _UnconfirmedCommands:
 
     @property
     def doubt_ends_us(self) -> int:
-        """When the fate of all that was sent before a restart will be known; 0 if it is."""
+        """When all commands sent before a restart will be settled; 0 if they are."""
         in_doubt = self._sent and self._sent[0].at_us <= self._doubted_us
         return self._doubted_us + _SETTLED_US if in_doubt else 0
 
     def doubt(self) -> None:
-        """Note that the RRC was initialized: what waits in its buffer is still to come."""
+        """Register that the RRC was initialized: commands in its buffer are still pending."""
         if self._sent:
             self._doubted_us = self._sent[-1].at_us
 
     def add(self, now_us: int, command: Command) -> None:
-        """Note a command that was just sent."""
+        """Register a sent command."""
         self._sent.append(_Sent(now_us, command))
 
     def carried_out(self, name: str) -> Command | None:
-        """Take out the command that an OK belongs to; return the newest of its name.
+        """Remove the command of an OK; return the newest of its name.
 
-        That one counts: it was carried out or will be, if the older ones were not lost with
-        the RRC's power, and this OK is its own.
+        The newest one counts: it has been or will be executed, unless older ones were lost with the
+        RRC's power and this OK is its own.
         """
         same = [sent for sent in self._sent if sent.name == name]
         if not same:
@@ -178,7 +177,7 @@ class _UnconfirmedCommands:
         return same[-1].command
 
     def refused(self, reason: str) -> str | None:
-        """Take out the command that an ER belongs to, and return its name."""
+        """Remove the command of an ER, and return its name."""
         wanted = (*_MOTION, None) if reason in NAMELESS else (reason,)
         for name in wanted:
             for sent in self._sent:
@@ -188,29 +187,29 @@ class _UnconfirmedCommands:
         return None
 
     def settle(self, now_us: int) -> list[str]:
-        """Take out those that no reply came for in time; return their names."""
+        """Remove those without a reply in time; return their names."""
         settled = []
         while self._sent and self._sent[0].at_us + _SETTLED_US <= now_us:
             settled.append(self._sent.popleft().name)
         return settled
 
     def take_all(self) -> list[str]:
-        """Take out all, return their names."""
+        """Remove all; return their names."""
         names = [sent.name for sent in self._sent]
         self._sent.clear()
         return names
 
 
 class ReplyMatcher:
-    """Gives each reply to the command it belongs to.
+    """Assigns each reply to its command.
 
     Args:
-        max_refusals: how many refusals in a row are too many, 1 or more.
+        max_refusals: number of refusals in a row that is too many, 1 or more.
 
     Attributes:
-        settings: settings of the RRC as far as they are known.
+        settings: known settings of the RRC.
         refusals: refusals in a row.
-        unconfirmed: commands that nobody waits for.
+        unconfirmed: commands sent without waiting.
     """
 
     def __init__(self, max_refusals: int) -> None:
@@ -219,12 +218,12 @@ class ReplyMatcher:
         self.unconfirmed = _UnconfirmedCommands()
 
     def sent(self, now_us: int, command: Command) -> None:
-        """Note a command that nobody waits for."""
+        """Register a command sent without waiting."""
         self.unconfirmed.add(now_us, command)
         self.settings.sent(command)
 
     def take(self, reply: Answer, exchange: Exchange | None) -> bool:
-        """Account for a reply; False if no command awaits it."""
+        """Process a reply; return False if no command expects it."""
         match reply:
             case Refusal(reason):
                 counts = exchange is None or not exchange.refuses_barrier_too(reason)
@@ -238,7 +237,7 @@ class ReplyMatcher:
                 return exchange is not None and self._take_answer(reply, exchange)
 
     def settle(self, now_us: int) -> None:
-        """With stablemode, take commands as carried out that no ER came for."""
+        """With stablemode, count commands without an ER as executed."""
         settled = self.unconfirmed.settle(now_us)
         if self.settings.stable:
             self._accept(settled)
@@ -248,26 +247,25 @@ class ReplyMatcher:
             self.refusals.accepted(name)
 
     def initialized(self) -> None:
-        """Note that the RRC was initialized: nothing that was known holds any more.
+        """Register that the RRC was initialized: all known settings are lost.
 
-        But a command that waited in its receive buffer meanwhile is carried out after that.
+        A command that waited in its receive buffer is still executed afterwards.
         """
         self.settings.clear()
         self.refusals.clear()
         self.unconfirmed.doubt()
 
     def clear(self) -> None:
-        """Forget all: the talk begins again."""
+        """Reset everything for a new start."""
         self.initialized()
         self.unconfirmed.take_all()
 
     def _refused_name(self, refusal: Refusal, exchange: Exchange | None) -> str:
-        """Return the name of the refused command, empty if that cannot be known.
+        """Return the name of the refused command, empty if unknown.
 
-        Commands are answered in order: the oldest one that can be meant is
-        meant. But where carried out commands have no answer that cannot be
-        known, and the awaited one goes first: better to report a setting as
-        refused that was not than the other way round.
+        Commands are answered in order, so the oldest candidate is assumed. If executed commands
+        have no answer this is unknown, and the awaited command comes first: it is better to report
+        an accepted setting as refused than the other way round.
         """
         if exchange is not None and exchange.has_barrier and exchange.take(refusal):
             return exchange.name
@@ -276,7 +274,7 @@ class ReplyMatcher:
         return exchange.name if exchange is not None and exchange.take(refusal) else ""
 
     def _take_unawaited(self, name: str, exchange: Exchange | None) -> bool:
-        """Account for an OK to a command that nobody waits for; False if it is not one."""
+        """Process an OK to a command sent without waiting; return False if it is not one."""
         in_doubt = self.unconfirmed.doubt_ends_us > 0
         command = self.unconfirmed.carried_out(name)
         if command is None:

@@ -111,7 +111,7 @@ def described(status: StatusA) -> dict[str, int]:
 
 
 def status(*, as_json: bool) -> None:
-    """Say what is connected and in which state."""
+    """Print the connected device and its state."""
     with open_chair(Ended()) as chair:
         client = chair.client
         found = {"device": client.device(), "version": client.version(), "date": client.date()}
@@ -289,7 +289,7 @@ _STICK_DRIVES: Final = "the stick drives, Ctrl-C ends"
 
 
 def limit(*, speed: int, for_us: int | None, leave: bool, **limits: int) -> None:
-    """Let the stick drive."""
+    """Drive by the stick."""
     if leave and for_us is not None:
         raise Refused("--leave and --for: give one of them")
     ended = Ended()
@@ -341,14 +341,14 @@ def beep(*, times: tuple[str, ...]) -> None:
 
 
 def poweroff() -> None:
-    """Stop VR2 by force."""
+    """Force VR2 to stop."""
     with open_chair(Ended()) as chair:
         chair.require_on()
         chair.client.poweroff()
 
 
 def watch(*, for_us: int | None, every: bool, as_json: bool) -> None:
-    """Print what comes."""
+    """Print events and status changes."""
     ended = Ended()
     with open_chair(ended) as chair, suppress(BrokenPipeError):
         client = chair.client
@@ -383,7 +383,7 @@ class _TerminalOperator:
     """The person who reads standard error and types answers.
 
     Args:
-        chair: time passes on it meanwhile, so that its watchdog is renewed.
+        chair: time passes on it, so that its watchdog is renewed.
         ended: a signal ends the procedure.
     """
 
@@ -421,7 +421,7 @@ class _TerminalOperator:
 
 
 def test(*, json_path: str | None) -> None:
-    """Lead through the test procedure."""
+    """Run the test procedure."""
     if sys.platform == "win32":
         raise Refused("the test procedure needs a POSIX terminal")
     else:  # noqa: RET506 - mypy leaves out the branch of the other system

@@ -1,1 +1,1 @@
-"""What people write and read: times, sizes, values, files of their own, traces; no commands."""
+"""Text formats of users: times, sizes, values, files, traces."""

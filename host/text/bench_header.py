@@ -1,4 +1,4 @@
-"""The first line of a trace of version 2: what is on the bench, and how it is built again."""
+"""The first line of a trace of version 2: the devices of the bench, and how to rebuild them."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ _VERSION: Final = 2
 PREFIX: Final = f"# tickrig-trace v{_VERSION} "
 
 NAME: Final = re.compile(r"\w[\w./:-]{0,99}", re.ASCII)
-"""What devices and wires may be called in a trace."""
+"""Allowed names of devices and wires in a trace."""
 
 
 class WireType(StrEnum):
-    """What passes on a wire."""
+    """Kind of traffic on a wire."""
 
     SERIAL = "serial"
     CAN = "can"
 
 
 class Place(StrEnum):
-    """Where it was recorded: at the devices, tick by tick, or at the host's port."""
+    """Place of the recording: at the devices, tick by tick, or at the host's port."""
 
     DEVICE = "device"
     PORT = "port"
@@ -37,8 +37,8 @@ class WireEntry:
     """A wire of a bench.
 
     Attributes:
-        type: what passes.
-        config: its settings, as the bit rate.
+        type: kind of traffic.
+        config: its settings, such as the bit rate.
     """
 
     type: WireType
@@ -47,17 +47,17 @@ class WireEntry:
 
 @dataclass(frozen=True, slots=True)
 class DeviceEntry:
-    """What a replay needs to build a device of a bench again.
+    """Data for rebuilding a device of a bench in a replay.
 
     Attributes:
         wire: name of its wire.
-        type: a device type, a model, an EDS or DCF file, or `FILE.py:Class`; empty if it was
-            made by somebody's program, and cannot be built again.
+        type: a device type, a model, an EDS or DCF file, or `FILE.py:Class`; empty if it was made
+            by a program and cannot be rebuilt.
         config: its settings.
         node_id: of a CANopen node.
-        sha256: of the file that its type names.
-        files: SHA-256 of the files that this one names, by their names.
-        stored: what it had in its non-volatile memory.
+        sha256: of the file in its type.
+        files: SHA-256 of the files referenced by this one, by name.
+        stored: its non-volatile memory.
     """
 
     wire: str
@@ -71,16 +71,16 @@ class DeviceEntry:
 
 @dataclass(frozen=True, slots=True)
 class BenchHeader:
-    """The first line: what is on the bench.
+    """The first line: the devices of the bench.
 
     Attributes:
         devices: by name.
         wires: by name.
-        seed: of all chance.
-        place: where it was recorded.
+        seed: of all random numbers.
+        place: place of the recording.
 
     Raises:
-        ValueError: a name that cannot stand in a line, or a wire that is not there.
+        ValueError: an invalid name, or an unknown wire.
     """
 
     devices: Mapping[str, DeviceEntry]
@@ -100,7 +100,7 @@ class BenchHeader:
                 )
 
     def on_can(self, name: str) -> bool:
-        """Say whether a device hears frames, not bytes."""
+        """Return whether a device hears frames, not bytes."""
         return self.wires[self.devices[name].wire].type is WireType.CAN
 
     def encode(self) -> str:
@@ -116,14 +116,14 @@ class BenchHeader:
 
 
 def _written(device: DeviceEntry) -> dict[str, object]:
-    """Return what is written of a device: what it has."""
+    """Return the entry of a device, without empty fields."""
     fields = ("wire", "type", "config", "node_id", "sha256", "files", "stored")
     found = {name: getattr(device, name) for name in fields}
     return {name: value for name, value in found.items() if value not in ("", None, {})}
 
 
 def parse_bench_header(line: str) -> BenchHeader:
-    """Read the first line; TraceError if it is none of ours."""
+    """Read the first line; TraceError if it is not a valid header."""
     if not line.startswith(PREFIX):
         raise TraceError(f"line 1 is not '{PREFIX}{{HEADER}}': {line!r:.60}")
     try:
@@ -164,7 +164,7 @@ def _wire(name: str, table: object) -> WireEntry:
 
 
 class _Reader:
-    """Takes values of a JSON object, which anybody may have written."""
+    """Reads values of a JSON object from an untrusted source."""
 
     def __init__(self, values: object, owner: str) -> None:
         if not isinstance(values, dict):
@@ -172,7 +172,7 @@ class _Reader:
         self.values, self._owner = values, owner
 
     def take(self, name: str, expected: type, *default: Any) -> Any:
-        """Return a value of a type, or the default; ValueError if there is neither."""
+        """Return a value of a type, or the default; ValueError without both."""
         value = self.values.get(name, *default)
         if type(value) is not expected and not (default and value == default[0]):
             raise ValueError(f"{self._owner} has no {name}, or a bad one: {value!r:.60}")

@@ -1,4 +1,4 @@
-r"""The text form of what happened on a bench: version 2 of traces.
+r"""The text format of bench recordings: version 2 of traces.
 
     # tickrig-trace v2 {"seed": 0, "wires": {"bus": {"type": "can", "bit_rate": 500000}}, "devices": {"left": {"wire": "bus", "type": "epos", "node_id": 5}}}
     0.000000 left < 705#00
@@ -9,11 +9,10 @@ r"""The text form of what happened on a bench: version 2 of traces.
     0.512000 left ! bus_state error-passive
     2.000000 .
 
-Times are in seconds; the name says which device, or wire. `>` went to the device, `<` came
-from it: bytes are written by `byte_text.escape`, frames one a line as candump does. `!` was
-done to the device before that tick: an input or an object set, `reset`, or what its CAN
-controller told it. `~` is a fault of a wire that began, or ended (`=0`); `.` says how long
-the run lasted.
+Times are in seconds; the name says which device, or wire. `>` went to the device, `<` came from it:
+bytes are written by `byte_text.escape`, frames one a line as candump does. `!` was done to the
+device before that tick: an input or an object set, `reset`, or a report of its CAN controller. `~`
+is a fault of a wire that started, or ended (`=0`); `.` says how long the run lasted.
 """  # noqa: E501 - a line of the file
 
 from __future__ import annotations
@@ -45,7 +44,7 @@ BUS_STATE: Final = {
         ("bus-off", ErrorState.BUS_OFF),
     )
 }
-"""What a CAN controller can tell its device, as it stands in a line."""
+"""Reports of a CAN controller to its device, as in a line."""
 
 
 class BenchRecord(NamedTuple):
@@ -54,7 +53,7 @@ class BenchRecord(NamedTuple):
     Attributes:
         at_us: the tick, or the time at the host's port.
         name: of the device, for `~` of the wire.
-        mark: what the line tells.
+        mark: kind of the line.
         traffic: for `>` and `<`.
         text: for `!` and `~`.
         line: number of the line in its file, from 1.
@@ -81,13 +80,13 @@ class BenchRecord(NamedTuple):
 
     @property
     def change(self) -> tuple[str, Setting] | None:
-        """Which input changed to what, for `!`; None for a reset, and what a controller told."""
+        """The changed input and its value, for `!`; None for a reset and controller reports."""
         name, equals, value = self.text.partition("=")
         return (name, json.loads(value)) if equals else None
 
 
 def change_text(name: str, value: Setting) -> str:
-    """Write that an input was set, as `!` has it.
+    """Return the text of a set input, for `!`.
 
     >>> change_text("0x1008", "a b"), change_text("load_nm", 0.5)
     ('0x1008="a b"', 'load_nm=0.5')
@@ -96,10 +95,10 @@ def change_text(name: str, value: Setting) -> str:
 
 
 class BenchParser:
-    """Reads the lines below a header.
+    """Reads the lines after a header.
 
     Args:
-        header: what names and wires there are.
+        header: with the names and wires.
     """
 
     def __init__(self, header: BenchHeader) -> None:
@@ -111,7 +110,7 @@ class BenchParser:
         """Read line by line; time must not run backwards, and nothing follows the end.
 
         Raises:
-            TraceError: a line is damaged.
+            TraceError: a damaged line.
         """
         before = BenchRecord(0, "", Mark.PHYSICAL)
         for number, line in enumerate(lines, 2):
@@ -141,7 +140,7 @@ class BenchParser:
         return BenchRecord(at_us, its_name, its_mark, traffic, its_text, number)
 
     def _read(self, name: str | None, mark: str, text: str) -> BenchRecord:
-        """Read what stands behind the time."""
+        """Read the part after the time."""
         if name is None:
             return BenchRecord(0, "", Mark.END)
         if mark == Mark.WIRE:

@@ -1,4 +1,4 @@
-r"""Bytes as greppable text, and back.
+r"""Conversion between bytes and greppable text.
 
 >>> escape(b"OK:beep\n\xff\\ ")
 'OK:beep\\n\\xff\\\\\\x20'
@@ -21,7 +21,7 @@ _TOKEN: Final = re.compile(r"\\x[0-9a-fA-F]{2}|\\[nrt\\]|[ -\[\]-~]+")
 
 
 def escape(data: bytes) -> str:
-    """Write bytes as printable ASCII; a blank at either end is escaped too, to be seen."""
+    """Write bytes as printable ASCII; blanks at both ends are escaped too, to be visible."""
     text = "".join(map(_TEXT.__getitem__, data))
     if text.endswith(" "):
         text = text[:-1] + r"\x20"
@@ -29,7 +29,7 @@ def escape(data: bytes) -> str:
 
 
 def unescape(text: str) -> bytes:
-    r"""Read what `escape` wrote.
+    r"""Read the text of `escape`.
 
     Raises:
         ValueError: a character or an escape that `escape` never writes.

@@ -1,4 +1,4 @@
-"""A text of a user as a tree of values, each with the line where it stands.
+"""A user's text as a tree of values, each with its line.
 
 >>> print(FileMistake(FilePlace("bus.yml", 7), "node_id: 200 is not in 1..127"))
 bus.yml:7: node_id: 200 is not in 1..127
@@ -21,17 +21,17 @@ class FilePlace(NamedTuple):
     line: int
 
     def __str__(self) -> str:
-        """Write it as compilers do."""
+        """Return the place in the form of compilers."""
         return f"{self.file or 'line '}{':' * bool(self.file)}{max(self.line, 1)}"
 
 
 class FileMistake(NamedTuple):
-    """One thing that is wrong in one of several files.
+    """One error in one of several files.
 
     Attributes:
         place: its file and line.
-        text: what came, and what was allowed.
-        rule: the name of the rule that it breaks, empty if there is none.
+        text: the invalid value, and the allowed ones.
+        rule: name of the violated rule, empty if there is none.
     """
 
     place: FilePlace
@@ -39,7 +39,7 @@ class FileMistake(NamedTuple):
     rule: str = ""
 
     def __str__(self) -> str:
-        """Write it as compilers do."""
+        """Return the error in the form of compilers."""
         return f"{self.place}: {self.text}"
 
 
@@ -49,9 +49,9 @@ class Item:
 
     Attributes:
         value: of a scalar, or the items of a list, or those of a mapping by key.
-        place: where it stands.
-        text: a scalar as it is written, so short that it fits into a line.
-        keys: where the keys of a mapping stand.
+        place: its place.
+        text: a scalar as written, shortened to one line.
+        keys: places of the keys of a mapping.
     """
 
     value: Scalar | tuple[Item, ...] | dict[Key, Item]
@@ -61,17 +61,17 @@ class Item:
 
     @property
     def fields(self) -> Mapping[Key, Item]:
-        """What a mapping holds; nothing if it is none."""
+        """The items of a mapping; empty for other values."""
         return self.value if isinstance(self.value, dict) else {}
 
     @property
     def items(self) -> tuple[Item, ...]:
-        """What a list holds; nothing if it is none."""
+        """The items of a list; empty for other values."""
         return self.value if isinstance(self.value, tuple) else ()
 
     @property
     def plain(self) -> Any:
-        """Its values alone, in lists and dictionaries."""
+        """Its plain values, in lists and dictionaries."""
         return _plain(self, {})
 
     @property
@@ -85,14 +85,14 @@ class Item:
         return isinstance(self.value, dict)
 
     def __str__(self) -> str:
-        """Say it in a message."""
+        """Return its text for a message."""
         if self.is_list:
             return "a list"
         return "a mapping" if self.is_mapping else repr(self.text) if self.text else "nothing"
 
 
 def _plain(item: Item, done: dict[int, Any]) -> Any:
-    """Return the values of an item; what an anchor names is made once, so that no file can grow."""
+    """Return the values of an item; an anchored value is made once, so no file can explode."""
     if isinstance(item.value, str | int | float | None):
         return item.value
     if (found := done.get(id(item))) is None:

@@ -1,7 +1,7 @@
-"""HTML pages that need nothing else; Jinja2 (extra `report`) fills their templates.
+"""Self-contained HTML pages from Jinja2 templates (extra `report`).
 
-A template writes a value through `harmless` and escapes it. Nothing is marked as safe but the
-style sheet and the script of the page, and their hashes are all that the page lets run.
+A template writes a value through `harmless` and escapes it. Only the style sheet and the script of
+the page are marked as safe, and the page allows only their hashes.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class PageTemplate:
 
     Args:
         package: the package.
-        names: filters and globals of the template beside those of all pages.
+        names: filters and globals of the template, besides the common ones.
         script: the file of its script, empty for none.
         page: the file of the template.
     """

@@ -1,4 +1,4 @@
-"""JUnit reports, which CI systems show: suites of test cases.
+"""JUnit reports for CI systems: suites of test cases.
 
 >>> print(junit_text([JunitSuite("check", [JunitCase("check", "no-emcy")])]))
 <?xml version='1.0' encoding='utf-8'?>
@@ -30,12 +30,12 @@ class JunitCase:
     """A test case.
 
     Attributes:
-        group: what it belongs to, its `classname`.
+        group: its group, the `classname`.
         name: of the case.
         tag: `FAILURE`, `ERROR`, `SKIPPED` or `OUTPUT`; empty if the case passed.
         message: the reason in one line; an `OUTPUT` has none.
         text: the details.
-        duration_us: how long it took, None if that is not known.
+        duration_us: duration, None if unknown.
     """
 
     group: str
@@ -53,7 +53,7 @@ class JunitSuite:
     Attributes:
         name: of the suite.
         cases: in the order of the report.
-        properties: what was tested and how, by name.
+        properties: tested object and settings, by name.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""The loggers of the library; silent unless the program that uses it wants to hear them."""
+"""The loggers of the library, silent unless the program configures logging."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Names that a person could have meant, in a line that is not too long."""
+"""Suggestions for misspelt names, in one short line."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from typing import Final
 _MOST: Final = 40
 SHOWN: Final = 8
 _LONGEST: Final = 200
-"""Characters of a name that could be a slip."""
+"""Longest name for suggestions."""
 _NUMBER: Final = re.compile(r"0x[0-9a-f]+|\d+")
 
 
 def known(names: Iterable[str]) -> str:
-    """List the names, or say how many there are and give the first ones.
+    """List the names, or the first ones and their number.
 
     >>> known(["stick", "lamp"])
     'stick, lamp'
@@ -26,7 +26,7 @@ def known(names: Iterable[str]) -> str:
 
 
 def near(name: str, names: Iterable[str]) -> str:
-    """Say which name could be meant, or which there are.
+    """Return the probable name, or the known ones.
 
     >>> near("stik", ["stick", "lamp"]), near("x", ["stick", "lamp"])
     ("did you mean 'stick'?", 'known: stick, lamp')
@@ -41,9 +41,9 @@ def near(name: str, names: Iterable[str]) -> str:
 
 
 def closest(name: str, names: Iterable[str]) -> list[str]:
-    """Return the name that could be meant, if there is one; small and capital letters are alike.
+    """Return the probable name, if there is one, ignoring case.
 
-    A name that differs in its numbers alone is another one, and no slip.
+    A name that differs only in its numbers is another name, not a misspelling.
 
     >>> closest("EPOS", ["epos", "rrc"]), closest("stik", ["left/stick", "right/stick"])
     (['epos'], ['left/stick'])
@@ -76,7 +76,7 @@ def closest(name: str, names: Iterable[str]) -> list[str]:
 
 
 def _is_another(wanted: str, name: str) -> bool:
-    """Return whether a name is another one for its numbers, however near it looks."""
+    """Return whether a name differs in its numbers, however similar it looks."""
     form = _NUMBER.sub("#", wanted)
     if any(map(str.isalpha, form)):
         return wanted != name and form == _NUMBER.sub("#", name)

@@ -1,4 +1,4 @@
-r"""Times, sizes and foreign texts as a page, a terminal and JSON for programs write them.
+r"""Times, sizes and foreign texts for pages, terminals and JSON.
 
 >>> duration(3_100), duration(2_000_000), duration(200_000_000)
 ('3.1 ms', '2.00 s', '3 min 20 s')
@@ -15,7 +15,7 @@ from typing import Any, Final
 from tickrig.host.text.values import format_time
 
 DASH: Final = "\N{EN DASH}"
-"""Where there is nothing to be told."""
+"""Placeholder for a missing value."""
 
 _MARKS: Final = (
     "\x80-\x9f\u061c\u200b-\u200f\u2028-\u202e\u2060-\u2069\ufeff\ufff9-\ufffb"
@@ -26,7 +26,7 @@ _NO_CELL: Final = re.compile(f"[\x00-\x1f\x7f{_MARKS}]")
 
 
 def harmless(value: Any) -> Any:  # a template prints values of any type
-    """Return a text in which nothing is unseen: control characters, marks that turn text round."""
+    """Return a text with visible control characters and direction marks."""
     if type(value) is not str or (value.isascii() and value.isprintable()):
         return value
     return _UNSEEN.sub(_shown, value.replace("\r\n", "\n"))
@@ -44,7 +44,7 @@ def one_line(value: str) -> str:
 
 
 def in_cells(text: str) -> str:
-    r"""Return a text of as many characters in one line, each of which takes room on a screen.
+    r"""Return a text of the same length in one line, with only printable characters.
 
     >>> in_cells("a\x1b[31m\u202eb\n")
     'a␛[31m\ufffdb␊'
@@ -55,12 +55,12 @@ def in_cells(text: str) -> str:
 
 
 def json_text(value: object, *, compact: bool = False, letters: bool = False) -> str:
-    r"""Return a value as JSON in one line, in which what a terminal obeys is escaped.
+    r"""Return a value as JSON in one line, with escaped control characters.
 
     Args:
-        value: what `json.dumps` takes.
+        value: a value for `json.dumps`.
         compact: without blanks.
-        letters: those beyond ASCII are written as they are.
+        letters: write letters beyond ASCII unescaped.
 
     >>> json_text("µ\x1b\x7f\x9b\u202e", letters=True), json_text("µ\x7f")
     ('"µ\\u001b\\u007f\\u009b\\u202e"', '"\\u00b5\\u007f"')
@@ -89,7 +89,7 @@ def _shown(match: re.Match[str]) -> str:
 
 
 def duration(us: int | None) -> str:
-    """Write how long something took."""
+    """Write a duration."""
     match us:
         case None:
             return DASH
@@ -105,7 +105,7 @@ def duration(us: int | None) -> str:
 
 
 def seconds(us: int) -> str:
-    """Write a time in seconds, no digit more than there is.
+    """Write a time in seconds, without trailing zeros.
 
     >>> seconds(630_000), seconds(2_000_000)
     ('0.63', '2')
@@ -114,7 +114,7 @@ def seconds(us: int) -> str:
 
 
 def size(characters: int) -> str:
-    """Write how long a text is.
+    """Write the length of a text.
 
     >>> size(999), size(3_600), size(1_100_000)
     ('999 bytes', '3.6 kB', '1.1 MB')

@@ -1,6 +1,6 @@
-"""A table of a user's file while it is read: its fields, and what is wrong with them.
+"""A table of a user's file while it is read: its fields and their errors.
 
-A taker takes a value as the file gives it, or raises ValueError that says what it takes instead.
+A taker converts a value of the file, or raises ValueError with the allowed values.
 
 >>> whole(1, 127)(5), duration("500ms")
 (5, 500000)
@@ -49,13 +49,13 @@ from tickrig.host.text.toml_reader import BROKEN, Mistake, TomlDocument, TomlPat
 from tickrig.host.text.values import counted, parse_size, us_of
 
 Taker = Callable[[Any], Any]
-"""Takes what TOML gives; ValueError with what was allowed."""
+"""Converts a TOML value; ValueError with the allowed values."""
 
 _LONGEST: Final = 60
 
 
 def shown(value: object) -> str:
-    """Write a value for people, in a line that is not too long.
+    """Write a value in one short line.
 
     >>> shown(True), shown({"a": 1}), shown("x")
     ('true', 'a table', "'x'")
@@ -74,26 +74,26 @@ def shown(value: object) -> str:
 
 
 def anything(value: Any) -> Any:
-    """Take any value, because `Section.sub` or `Section.tables` reads it."""
+    """Accept any value, because `Section.sub` or `Section.tables` reads it."""
     return value
 
 
 def text(value: object) -> str:
-    """Take a text that is not empty."""
+    """Accept a text that is not empty."""
     if isinstance(value, str) and value:
         return value
     raise ValueError(f"it takes a text, not {shown(value)}")
 
 
 def string(value: object) -> str:
-    """Take a text, which may be empty."""
+    """Accept a text, which may be empty."""
     if isinstance(value, str):
         return value
     raise ValueError(f"it takes a text, not {shown(value)}")
 
 
 def matching(accepts: Callable[[str], object], what: str) -> Taker:
-    """Return what takes a text that a function accepts; `what` names it for people."""
+    """Return a taker for texts that a function accepts; `what` describes them in messages."""
 
     def take(value: object) -> str:
         if isinstance(value, str) and accepts(value):
@@ -104,7 +104,7 @@ def matching(accepts: Callable[[str], object], what: str) -> Taker:
 
 
 def texts(value: object) -> tuple[str, ...]:
-    """Take a text or a list of them."""
+    """Accept a text or a list of texts."""
     values = value if isinstance(value, list) else [value]
     if values and all(isinstance(each, str) and each for each in values):
         return tuple(values)
@@ -112,7 +112,7 @@ def texts(value: object) -> tuple[str, ...]:
 
 
 def command(value: object) -> tuple[str, ...]:
-    """Take a command line, as words or as one text that is split like a shell does."""
+    """Accept a command line, as words or as one text, which is split as in a shell."""
     if isinstance(value, list):
         return texts(value)
     try:
@@ -125,35 +125,35 @@ def command(value: object) -> tuple[str, ...]:
 
 
 def path(value: object) -> str:
-    """Take the name of a file."""
+    """Accept the name of a file."""
     if isinstance(value, str) and value and "\0" not in value:
         return value
     raise ValueError(f"it takes the name of a file, not {shown(value)}")
 
 
 def flag(value: object) -> bool:
-    """Take true or false."""
+    """Accept true or false."""
     if isinstance(value, bool):
         return value
     raise ValueError(f"it takes true or false, not {shown(value)}")
 
 
 def table(value: object) -> dict[str, Any]:
-    """Take a table."""
+    """Accept a table."""
     if isinstance(value, dict):
         return value
     raise ValueError(f"it takes a table, not {shown(value)}")
 
 
 def lines(value: object) -> dict[str, str]:
-    """Take a table of texts by name."""
+    """Accept a table of texts by name."""
     if isinstance(value, dict) and all(isinstance(each, str) for each in value.values()):
         return value
     raise ValueError(f'it takes lines like name = "value", not {shown(value)}')
 
 
 def whole(low: int, high: int) -> Taker:
-    """Return what takes a whole number of a range."""
+    """Return a taker for whole numbers of a range."""
 
     def take(value: object) -> int:
         if isinstance(value, int) and not isinstance(value, bool) and low <= value <= high:
@@ -164,7 +164,7 @@ def whole(low: int, high: int) -> Taker:
 
 
 def number(low: float, high: float, *, above: bool = False) -> Taker:
-    """Return what takes a number of a range; `above` leaves its lower end out."""
+    """Return a taker for numbers of a range; `above` excludes its lower end."""
     allowed = f"above {low:g} and up to {high:g}" if above else f"{low:g}..{high:g}"
 
     def take(value: object) -> float:
@@ -178,7 +178,7 @@ def number(low: float, high: float, *, above: bool = False) -> Taker:
 
 
 def one_of(*names: str) -> Taker:
-    """Return what takes one of some words."""
+    """Return a taker for one of several words."""
 
     def take(value: object) -> str:
         if isinstance(value, str) and value in names:
@@ -191,14 +191,14 @@ def one_of(*names: str) -> Taker:
 
 
 def duration(value: object) -> int:
-    """Take a time as a text, of 1 us at least; in microseconds."""
+    """Accept a time as text, at least 1 us; return microseconds."""
     if isinstance(value, str) and (duration_us := us_of(value)):
         return duration_us
     raise ValueError(f'it takes a time as "500ms", above 0, not {shown(value)}')
 
 
 def size(value: object) -> int:
-    """Take a number of bytes, or a text as `64k`."""
+    """Accept a number of bytes, or a text such as `64k`."""
     if isinstance(value, int) and not isinstance(value, bool) and value >= 0:
         return value
     if isinstance(value, str):
@@ -207,18 +207,18 @@ def size(value: object) -> int:
 
 
 _MOST: Final = 500
-"""Characters of a mistake."""
+"""Largest number of characters of an error."""
 
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """A key that a table can have.
+    """A key of a table.
 
     Attributes:
-        field: takes its value.
-        values: what it takes, for people.
-        text: what it says, for people.
-        default: what holds without it, for people; empty where it has to be there.
+        field: converts its value.
+        values: allowed values, for people.
+        text: description, for people.
+        default: default value, for people; empty if the key is required.
     """
 
     field: Taker
@@ -228,7 +228,7 @@ class Field:
 
 
 Schema = Mapping[str, Field]
-"""The keys that a table can have."""
+"""The keys of a table."""
 
 
 def rows(schema: Schema) -> Iterator[str]:
@@ -241,12 +241,12 @@ def rows(schema: Schema) -> Iterator[str]:
 
 @dataclass(slots=True)
 class Notes:
-    """What is wrong with a document.
+    """The errors of a document.
 
     Attributes:
-        document: as it was read.
-        mistakes: so far.
-        names: of values that the file calls otherwise; empty where it is a rig file.
+        document: the document.
+        mistakes: errors so far.
+        names: other names of values in the file; empty for a rig file.
     """
 
     document: TomlDocument
@@ -254,17 +254,17 @@ class Notes:
     names: Mapping[TomlPath, str] = field(default_factory=dict)
 
     def wrong(self, keys: TomlPath, reason: str) -> None:
-        """Note what is wrong with the value at these keys."""
+        """Add an error for the value at these keys."""
         line = self.document.line_of(keys)
         self.mistakes.append(Mistake(line, f"{self.place(keys)}{' '.join(reason.split())}"))
 
     def place(self, keys: TomlPath) -> str:
-        """Return how a mistake begins: with the keys as the file has them."""
+        """Return the start of an error message: the keys as in the file."""
         return f"{self.names.get(keys) or _dotted(keys)}: " if keys else ""
 
     @property
     def all(self) -> tuple[Mistake, ...]:
-        """All mistakes by their lines, none of them twice, as they can be shown."""
+        """All errors by line, without duplicates, in printable form."""
         found = {*self.document.mistakes, *self.mistakes}
         return tuple(sorted(Mistake(line, _printable(reason)) for line, reason in found))
 
@@ -284,20 +284,20 @@ class Section:
     values: dict[str, Any]
 
     def wrong(self, reason: str, *keys: str | int) -> None:
-        """Note what is wrong with the table, or with the value at keys in it."""
+        """Add an error for the table, or for the value at keys in it."""
         self.notes.wrong((*self.keys, *keys), reason)
 
     def unknown(self, reason: str, *keys: str | int) -> None:
-        """Note that something is named which is not there, unless its table may be unread."""
+        """Add an error for an unknown name, unless its table may be unreadable."""
         if self.notes.document.whole:
             self.wrong(reason, *keys)
 
     def read(self, schema: Schema, *others: str) -> dict[str, Any]:
-        """Take the values that the schema names; a wrong one is noted, and left out.
+        """Read the values of a schema; report and omit invalid ones.
 
         Args:
             schema: the keys.
-            others: keys that somebody else reads.
+            others: keys read elsewhere.
         """
         found: dict[str, Any] = {}
         for key, value in self.values.items():
@@ -317,13 +317,13 @@ class Section:
         return found
 
     def no_key(self, key: str, known: Iterable[str]) -> None:
-        """Note a key that the table cannot have, in its own line."""
+        """Add an error for an unknown key, in its own line."""
         line = self.notes.document.line_of((*self.keys, key))
         reason = f"no key {key!r}; {near(key, list(dict.fromkeys(known)))}"
         self.notes.mistakes.append(Mistake(line, f"{self.notes.place(self.keys)}{reason}"))
 
     def sub(self, key: str) -> Section | None:
-        """Return the table of a key; None if there is none, or something else, which is noted."""
+        """Return the table of a key; None if it is missing, or not a table, which is reported."""
         value = self.values.get(key)
         if value is None or value is BROKEN:
             return None
@@ -333,7 +333,7 @@ class Section:
         return None
 
     def tables(self, key: str) -> list[Section]:
-        """Return the tables `[[key]]`; what is none of them is noted."""
+        """Return the tables `[[key]]`; report other values."""
         value = self.values.get(key, [])
         if value is BROKEN:
             return []
@@ -352,7 +352,7 @@ class Section:
         ]
 
     def subs(self, *but: str) -> Iterator[tuple[str, Section | None]]:
-        """Yield all keys but some, each with its table."""
+        """Yield all keys except some, each with its table."""
         for key in self.values:
             if key not in but:
                 yield key, self.sub(key)
@@ -365,7 +365,7 @@ def read_section(text: str) -> Section:
 
 
 def in_a_line(mistakes: Sequence[Mistake]) -> str:
-    """Write the first mistake, and how many more there are.
+    """Write the first error, and the number of others.
 
     >>> in_a_line([Mistake(3, "no key 'a'"), Mistake(4, "no key 'b'")])
     "line 3: no key 'a' (and 1 mistake more)"
@@ -376,7 +376,7 @@ def in_a_line(mistakes: Sequence[Mistake]) -> str:
 
 
 def is_broken(value: object) -> bool:
-    """Return whether a value, or a part of it, is no TOML: that is noted already."""
+    """Return whether a value, or a part of it, is invalid TOML, already reported."""
     match value:
         case dict():
             return any(map(is_broken, value.values()))
@@ -386,7 +386,7 @@ def is_broken(value: object) -> bool:
 
 
 def _printable(text: str) -> str:
-    r"""Escape what no terminal shows, and let it be no longer than a few lines.
+    r"""Escape unprintable characters, and shorten the text to a few lines.
 
     >>> _printable("us\ufeffd")
     'us\\ufeffd'

@@ -1,7 +1,7 @@
-"""Steps of scenarios and sequences: when, what, what must come, how often.
+"""Steps of scenarios and sequences: time, action, expectations, repetition.
 
-It is one model with two syntaxes: scenarios are lines at times that count from the beginning
-(docs/reference/bench/scenario.md); sequences are TOML or lines, each step after the one before
+It is one model with two syntaxes: scenarios are lines with times from the start
+(docs/reference/bench/scenario.md); sequences are TOML or lines, each step after the previous one
 (docs/reference/canmon/canmon-sending.md).
 """
 
@@ -13,24 +13,24 @@ from dataclasses import dataclass
 from typing import Final, Generic, TypeVar
 
 Place = str | tuple[str | int, ...]
-"""Where a step stands: `FILE:LINE`, or keys and indices, or the number of a line, in its file."""
+"""Place of a step in its file: `FILE:LINE`, keys and indices, or a line number."""
 
 What = TypeVar("What")
 Came = TypeVar("Came")
 
 FOREVER: Final = 0
-"""As `times` of a step."""
+"""Value of `times` for endless repetition."""
 
 _COMMENT: Final = re.compile(r"(^|\s)#.*")
 
 
 class StepError(ValueError):
-    """Steps that cannot be carried out: `FILE:LINE: what came, what is allowed`."""
+    """Invalid steps: `FILE:LINE: the value, and what is allowed`."""
 
 
 @dataclass(frozen=True)  # with slots, Python 3.11 cannot make a `Condition[str]`
 class Condition(Generic[Came]):
-    """What must come, as it was written, and what decides."""
+    """An expectation: its text, and its condition."""
 
     text: str
     matches: Callable[[Came], bool]
@@ -38,18 +38,18 @@ class Condition(Generic[Came]):
 
 @dataclass(frozen=True, kw_only=True)
 class Step(Generic[What, Came]):
-    """One step. What stands first here is done first; most steps say one of these alone.
+    """One step; its parts run in this order, and most steps have only one.
 
     Attributes:
-        place: where it stands.
-        at_us: when, microseconds: after the step before was due, of a scenario after its beginning.
-        what: what is done then; None for nothing.
-        wanted: what must come, in any order; the first that fits a condition meets it.
-        within_us: how long that is waited for, from `at_us`.
-        goes_on: carry on when it does not come; else the steps end there.
-        on_fail: steps that are done first when it does not come.
-        times: how often `steps` are done, `FOREVER` until somebody stops them; None for none.
-        steps: those that are repeated.
+        place: its place.
+        at_us: time in microseconds, after the previous step was due; in a scenario after its start.
+        what: the action; None for nothing.
+        wanted: expectations, in any order; the first match meets one.
+        within_us: time limit for them, from `at_us`.
+        goes_on: continue after a missed expectation; else the steps end.
+        on_fail: steps that run first after a missed expectation.
+        times: number of repetitions of `steps`, `FOREVER` until stopped; None for none.
+        steps: the repeated steps.
     """
 
     place: Place
@@ -64,12 +64,12 @@ class Step(Generic[What, Came]):
 
     @property
     def takes_time(self) -> bool:
-        """Whether it waits for anything, so that it may be repeated for ever."""
+        """Whether it waits for anything, so that endless repetition is allowed."""
         return bool(self.at_us or self.wanted) or any(step.takes_time for step in self.steps)
 
 
 def content_lines(text: str) -> Iterator[tuple[int, str]]:
-    """Give each line that says something, without its comment (`#`), and its number from 1."""
+    """Yield each line that says something, without its comment (`#`), and its number from 1."""
     for number, line in enumerate(text.splitlines(), 1):
         if content := _COMMENT.sub("", line).strip():
             yield number, content

@@ -1,7 +1,7 @@
-r"""Read a TOML text to its end whatever is wrong with it, with the line of each value.
+r"""Read a TOML text to its end despite errors, with the line of each value.
 
-The parser of the standard library stops at the first mistake and tells no lines of what it
-has read. This one goes statement by statement, and leaves scalars to that parser.
+The parser of the standard library stops at the first error and has no line numbers of values. This
+one reads statement by statement, and leaves scalars to that parser.
 
 >>> document = read_toml("a = 1\n[[step]]\nsend = [\n  {x = 1},\n  {y = },\n]\n[b\n")
 >>> document.values["a"], document.line_of(("step", 0, "send", 0, "x"))
@@ -20,11 +20,11 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any, Final, NamedTuple
 
-# A TOML text as it was read: its values, the line of each, and all that is wrong with it.
+# The result of reading a TOML text: its values, their lines, and all errors.
 
 
 class _Broken(Enum):
-    """In place of a value that is no TOML; its mistake is told already."""
+    """Placeholder for an invalid value, already reported."""
 
     BROKEN = "broken"
 
@@ -33,7 +33,7 @@ BROKEN: Final = _Broken.BROKEN
 
 
 class Mistake(NamedTuple):
-    """One thing that is wrong.
+    """One error.
 
     Attributes:
         line: from 1.
@@ -49,12 +49,12 @@ TomlPath = tuple[str | int, ...]
 
 @dataclass(frozen=True, slots=True)
 class TomlDocument:
-    """A text that was read.
+    """The result of reading a text.
 
     Attributes:
-        values: what it says, `BROKEN` in place of a value that is none.
-        lines: by path, where a value begins; of a table, its header.
-        mistakes: in the order of their lines.
+        values: its values, `BROKEN` in place of invalid ones.
+        lines: by path, the line of a value, or of the header of a table.
+        mistakes: errors in the order of their lines.
         whole: whether all headers were read; if not, tables may be missing.
     """
 
@@ -64,7 +64,7 @@ class TomlDocument:
     whole: bool = True
 
     def line_of(self, path: Sequence[str | int]) -> int:
-        """Return the line of a value, or of the nearest thing around it.
+        """Return the line of a value, or of the nearest enclosing one.
 
         Args:
             path: keys and indices from the top.
@@ -105,7 +105,7 @@ class Table:
         """Return the table on the way to that of a header, the last one of an array.
 
         Raises:
-            TakenError: there is something else.
+            TakenError: there is another value.
         """
         node = self.entries.setdefault(key, Table(line))
         if isinstance(node, _Array) and not node.frozen:
@@ -156,7 +156,7 @@ def _document_of(top: Table, mistakes: Iterable[Mistake], *, whole: bool) -> Tom
 
 
 def _plain(node: _Node, path: TomlPath, lines: dict[TomlPath, int]) -> Any:
-    """Return the value of a node, and enter where it and all in it stand."""
+    """Return the value of a node, and record the lines of it and its content."""
     lines[path] = node.line
     match node:
         case Table():
@@ -167,10 +167,10 @@ def _plain(node: _Node, path: TomlPath, lines: dict[TomlPath, int]) -> Any:
 
 
 _MOST_DEEP: Final = 50
-"""How deep arrays and inline tables may nest, and how many parts a key may have."""
+"""Largest depth of arrays and inline tables, and number of parts of a key."""
 
 _MOST_MISTAKES: Final = 1_000
-"""Behind so many the text is not read any further."""
+"""Number of errors after which reading stops."""
 
 ONE_LINE: Final = "an inline table stands on one line; [a.table] has lines of its own"
 
@@ -186,24 +186,24 @@ _LONG: Final = {
 }
 _PLAIN: Final = re.compile(r"[^\s,\[\]{}#\"']+(?: [0-9][^\s,\[\]{}#\"']*)?")
 _PARTS: Final = re.compile(rf"(?<![\w\"'-])(?:[\w\"'-]++[ \t]*+\.[ \t]*+){{{_MOST_DEEP}}}[\w\"'-]")
-"""A key whose reading by the standard library takes the square of its length."""
+"""A key that the standard library reads in quadratic time."""
 _WHOLE: Final = re.compile(r"0|[1-9][0-9]{0,17}")
 _SIMPLE: Final = re.compile(r"\"[^\"\\]*\"|'[^']*'")
 _STATEMENT: Final = re.compile(
     r"[ \t]*+(?:\[\[?[ \t]*(?!(?:true|false|inf|nan)\b)[A-Za-z_][^\]\n]*\]\]?[ \t]*(?:#|\n|$)"
     r"|[\w.\"' \t-]+=)"
 )
-"""What most likely begins a statement, where an array has not ended."""
+"""The probable start of a statement after an unfinished array."""
 
 
 def load_toml(text: str) -> dict[str, Any]:
-    """Return the values of a text as the parser of the standard library reads it.
+    """Return the values of a text, read by the parser of the standard library.
 
     Args:
         text: the whole.
 
     Raises:
-        TOMLDecodeError: it is no TOML, or nested deeper than anybody writes.
+        TOMLDecodeError: invalid TOML, or nested too deeply.
     """
     if found := _PARTS.search(text):
         line = text.count("\n", 0, found.start()) + 1
@@ -230,7 +230,7 @@ def read_toml(text: str) -> TomlDocument:
 
 
 class _WrongError(Exception):
-    """The statement cannot be read further than here; it may be told of another place."""
+    """The statement cannot be read further; the error may be at another place."""
 
     def __init__(self, at: int, reason: str, place: int | None = None) -> None:
         super().__init__(reason)
@@ -238,7 +238,7 @@ class _WrongError(Exception):
 
 
 class _EnoughError(Exception):
-    """There are as many mistakes as anybody reads."""
+    """Too many errors to continue."""
 
 
 class _Reader:
@@ -275,7 +275,7 @@ class _Reader:
         return bisect_right(self._starts, min(at, len(self._text)))
 
     def _go_on_behind(self, start: int, at: int) -> None:
-        """Go to the line of the mistake if the statement began before it, else to the next."""
+        """Go to the line of the error if the statement started before it, else to the next."""
         line = self._line(at)
         if at < len(self._text) and line > self._line(start):
             self._at = self._starts[line - 1]
@@ -284,7 +284,7 @@ class _Reader:
             self._at = len(self._text) if end < 0 else end
 
     def _skip(self, pattern: re.Pattern[str]) -> int:
-        """Go behind blanks, and comments that the pattern takes."""
+        """Skip blanks, and comments that match the pattern."""
         match = pattern.match(self._text, self._at)
         if match is not None:
             for line in re.finditer(r"#[^\n]*", match[0]) if "#" in match[0] else ():
@@ -297,7 +297,7 @@ class _Reader:
         return self._text.startswith(signs, self._at)
 
     def _rest(self) -> str:
-        """Return the beginning of what stands here, for people."""
+        """Return the start of the text here, for messages."""
         rest = self._text[self._at : self._at + 30].partition("\n")[0].strip()
         return repr(rest) if rest else "the end of the line"
 
@@ -407,7 +407,7 @@ class _Reader:
         return _Leaf(self._line(start), BROKEN)
 
     def _scalar(self, token: str) -> Any:
-        """Return the value of a token; tell what is wrong with it, and return BROKEN."""
+        """Return the value of a token; report an invalid one, and return BROKEN."""
         if _WHOLE.fullmatch(token):
             return int(token)
         if token.isprintable() and _SIMPLE.fullmatch(token):  # a parser for each takes long
@@ -439,7 +439,7 @@ class _Reader:
         return array
 
     def _check_unclosed(self, start: int) -> None:
-        """Stop where a statement most likely begins, on a line after that of the array."""
+        """Stop at the probable start of a statement, on a line after that of the array."""
         line = self._line(self._at)
         first = self._starts[line - 1]
         blank = _BLANK.match(self._text, first)
@@ -465,7 +465,7 @@ class _Reader:
         return table
 
     def _skip_in_inline(self, *, known: bool) -> bool:
-        """Go behind blanks; return whether there was a new line, which is a mistake known once."""
+        """Skip blanks; return whether there was a new line, an error reported once."""
         self._skip(_BLANK)
         if not (self._is("\n") or self._is("#")):
             return known

@@ -1,4 +1,4 @@
-r"""The text form of a recorded run.
+r"""The text format of a recorded run.
 
     # tickrig-trace v1 rrc {"power_on_event": "PowerOn", "seed": 0}
     0.010000 < EV:Initialized\n
@@ -28,7 +28,7 @@ VERSION: Final = 1
 RESET: Final = "reset"
 
 Config = Mapping[str, str | int | float | None]
-"""Configuration of a device, as the header of its trace carries it."""
+"""Configuration of a device, as in the header of its trace."""
 
 BEGIN: Final = "# tickrig-trace v"
 _VERSION: Final = re.compile(r"# tickrig-trace v([0-9]{1,9}) ")
@@ -38,11 +38,11 @@ _INPUT: Final = re.compile(r"(\w+)=(-?[0-9]{1,18}(?:\.[0-9]{1,20})?(?:e[+-][0-9]
 
 
 class TraceError(ValueError):
-    """A file that is no trace of this version."""
+    """A file that is not a trace of this version."""
 
 
 class Mark(StrEnum):
-    """What a line tells."""
+    """Kind of a line."""
 
     TO_DEVICE = ">"
     FROM_DEVICE = "<"
@@ -53,7 +53,7 @@ class Mark(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Header:
-    """What a replay needs to build the device again."""
+    """Data for rebuilding the device in a replay."""
 
     device: str
     config: Config = field(default_factory=dict)
@@ -69,7 +69,7 @@ class Record:
 
     Attributes:
         at_us: the tick.
-        mark: what the line tells.
+        mark: kind of the line.
         data: traffic, for `>` and `<`.
         text: for `!`: `NAME=VALUE`, or `reset`.
         line: number of the line in its file, from 1.
@@ -88,13 +88,13 @@ class Record:
 
     @property
     def change(self) -> tuple[str, Setting]:
-        """Which input changed to what, for `!`."""
+        """The changed input and its value, for `!`."""
         name, _, value = self.text.partition("=")
         return name, parse_setting(value)
 
 
 def trace_text(data: bytes) -> str:
-    """Return the text of a trace; TraceError if there is none, or no whole first line."""
+    """Return the text of a trace; TraceError if it is empty, or its first line is incomplete."""
     try:
         text = data.decode("ascii")
     except UnicodeDecodeError as error:
@@ -107,7 +107,7 @@ def trace_text(data: bytes) -> str:
 
 
 def parse_header(line: str) -> Header:
-    """Read the first line; TraceError if it is none of ours."""
+    """Read the first line; TraceError if it is not a valid header."""
     version = _VERSION.match(line)
     if version is not None and int(version[1]) != VERSION:
         raise TraceError(f"this is trace version {int(version[1])}; versions 1 and 2 are known")
@@ -123,7 +123,7 @@ def parse_header(line: str) -> Header:
 
 
 def parse_record(line: str, number: int) -> Record:
-    """Read a line of the body; TraceError if it is none of ours."""
+    """Read a line of the body; TraceError if it is invalid."""
     match = _LINE.fullmatch(line)
     if match is None:
         raise TraceError(f"line {number} is not 'SECONDS MARK TEXT': {line!r:.60}")

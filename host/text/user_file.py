@@ -19,7 +19,7 @@ def find_class(spec: str, base: type[Any]) -> type[Any]:
         base: what the class must be a subclass of.
 
     Raises:
-        ValueError: no such notation, file or class, or the file cannot be run.
+        ValueError: wrong notation, unknown file or class, or the file cannot be run.
     """
     file, colon, name = spec.rpartition(":")
     if not colon or not file.endswith(SUFFIX):
@@ -34,7 +34,7 @@ def find_class(spec: str, base: type[Any]) -> type[Any]:
 
 
 def explain_error(error: BaseException, file: str = "") -> str:
-    """Say in a line what went wrong in a user's file, and where in it if it is named."""
+    """Return an error in a user's file as one line, with its place if known."""
     if isinstance(error, SyntaxError) and error.filename == file:
         return f"line {error.lineno}: {error.msg}"
     lines = [
@@ -50,7 +50,7 @@ def explain_error(error: BaseException, file: str = "") -> str:
 
 
 def _run(path: Path) -> ModuleType:
-    """Run a user's file as a module of its own, which finds its neighbours."""
+    """Run a user's file as a separate module that can import its neighbours."""
     module = ModuleType(f"_user_{path.stem}")
     sys.modules[module.__name__] = module  # dataclasses look for it there
     sys.path.insert(0, str(path.parent))

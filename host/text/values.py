@@ -1,4 +1,4 @@
-"""Values as people write them: times (`1.5s`), sizes (`64k`), settings of inputs (`0x1F`)."""
+"""Notation of values: times (`1.5s`), sizes (`64k`), settings of inputs (`0x1F`)."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ def parse_time_us(text: str) -> int:
 
 
 def parse_time_with_unit_us(text: str) -> int:
-    """Read a time in microseconds; but for 0 its unit must be there.
+    """Read a time in microseconds; except for 0 the unit is required.
 
     Raises:
-        ValueError: not a time, or nobody knows its unit.
+        ValueError: not a time, or without a unit.
 
     >>> parse_time_with_unit_us("1.5s"), parse_time_with_unit_us("0")
     (1500000, 0)
@@ -46,8 +46,8 @@ def us_of(duration: int | str) -> int:
     """Return a duration in microseconds.
 
     Raises:
-        TypeError: a number that is not whole: nobody knows its unit.
-        ValueError: a text that is no time or has no unit, or a negative number.
+        TypeError: a number that is not whole.
+        ValueError: a text that is not a time or has no unit, or a negative number.
 
     >>> us_of("1.5s"), us_of(250)
     (1500000, 250)
@@ -61,7 +61,7 @@ def us_of(duration: int | str) -> int:
 
 
 def format_time(t_us: int) -> str:
-    """Write a time as traces and transcripts do, in seconds.
+    """Write a time in seconds, as in traces and transcripts.
 
     >>> format_time(310_000)
     '0.310000'
@@ -92,7 +92,7 @@ MOST_PORT: Final = 0xFFFF
 
 
 def parse_port(text: str) -> int | None:
-    """Read a TCP port, 0..65535; None if it is none, however many digits it has.
+    """Read a TCP port, 0..65535; None if it is invalid, with any number of digits.
 
     >>> parse_port("7000"), parse_port("007000"), parse_port("0100000"), parse_port("-1")
     (7000, 7000, None, None)
@@ -113,11 +113,11 @@ def counted(number: int, noun: str) -> str:
 
 
 Setting = int | float | str
-"""Most inputs take whole numbers alone."""
+"""Most inputs accept whole numbers only."""
 
 
 def parse_setting(word: str) -> Setting:
-    """Read a value: a number where it looks like one, else text.
+    """Read a value: a number if it looks like one, else text.
 
     >>> [parse_setting(word) for word in ("5", "-0x1F", "1e-3", "ready", "nan")]
     [5, -31, 0.001, 'ready', 'nan']
@@ -141,11 +141,11 @@ def _parse_fraction(word: str) -> float:
     return value
 
 
-# Lists with commas between, as command lines take them.
+# Comma-separated lists of command lines.
 
 
 def split_list(text: str) -> list[str]:
-    """Split a list at its commas; an item with commas stands in double quotes.
+    """Split a list at its commas; an item with commas needs double quotes.
 
     >>> split_list('"sdo_slow=1s,count=2", drop')
     ['sdo_slow=1s,count=2', 'drop']

@@ -1,4 +1,4 @@
-"""Files that are written whole or not at all, and asked before a run whether they could be."""
+"""Files that are written atomically, and checked before a run."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from tickrig.host.text.log import log_of
 
 
 def check_file(path: Path, what: str) -> None:
-    """See before a run whether a file could be written after it.
+    """Check before a run whether a file can be written after it.
 
     Args:
         path: of the file.
-        what: it is, for the message, as `report` or `--html`.
+        what: its name in messages, such as `report` or `--html`.
 
     Raises:
-        ValueError: its folder is not there or takes no file, or it is a folder itself.
+        ValueError: its folder does not exist or is not writable, or it is a folder itself.
     """
     if not path.parent.is_dir():
         raise ValueError(f"{what} {path}: no directory {path.parent}")
@@ -36,12 +36,12 @@ def check_file(path: Path, what: str) -> None:
 
 
 def check_not_read(path: Path, what: str, inputs: Iterable[Path]) -> None:
-    """See that a file is none of those that a run reads.
+    """Check that a file is not one of those that a run reads.
 
     Args:
         path: of the file.
-        what: it is, for the message, as `--html`.
-        inputs: what is read; what is no file is none.
+        what: its name in messages, such as `--html`.
+        inputs: paths that are read; others than files are ignored.
 
     Raises:
         ValueError: it is one of them.
@@ -63,10 +63,10 @@ def is_special(path: Path) -> bool:
 
 
 def check_writable(folder: Path) -> None:
-    """See whether files can be made in a folder, by making one; it may be a folder to be made.
+    """Check whether files can be made in a folder, by making one; the folder may be missing.
 
     Raises:
-        OSError: none can.
+        OSError: not possible.
     """
     while not folder.exists() and folder != folder.parent:
         folder = folder.parent
@@ -79,10 +79,10 @@ def check_writable(folder: Path) -> None:
 
 
 def write_whole(path: Path, content: str | bytes) -> None:
-    """Replace a file when its content is on the disk; what is no file, as a pipe, is written to.
+    """Replace a file when its content is on the disk; write to other paths, such as a pipe.
 
     Raises:
-        OSError: the file cannot be written; its `filename` is `path`, and the file is as it was.
+        OSError: the file cannot be written; its `filename` is `path`, and the file is unchanged.
     """
     data = content.encode("utf-8", "backslashreplace") if isinstance(content, str) else content
     with replacing(path) as beside:
@@ -91,13 +91,14 @@ def write_whole(path: Path, content: str | bytes) -> None:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Give the path of a new file, which takes the place of a file when the block is done.
+    """Yield the path of a new file, which takes the place of a file when the block is done.
 
-    It has the same name, in a folder beside that file. What is no file, as a pipe, is given itself.
+    It has the same name, in a folder beside that file. Other paths, such as a pipe, are yielded
+    themselves.
 
     Raises:
-        OSError: the file cannot be written; its `filename` is `path`, and the file is as it was.
-            An OSError of the block is raised so, too.
+        OSError: the file cannot be written; its `filename` is `path`, and the file is unchanged. An
+            OSError of the block is raised in the same way.
     """
     from tempfile import mkdtemp  # noqa: PLC0415 - slow, and a TAB needs none
 
@@ -123,7 +124,7 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def _check_place(place: Path) -> None:
-    """Refuse what a new file would replace though it is a folder, or not to be written."""
+    """Refuse to replace a folder or a read-only file."""
     if place.is_dir():
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
     if place.exists() and not os.access(place, os.W_OK):
@@ -131,7 +132,7 @@ def _check_place(place: Path) -> None:
 
 
 def _sync(path: Path) -> None:
-    """Let a file be on the disk."""
+    """Sync a file to the disk."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         if sys.platform != "win32":  # there only what is open for writing can be
@@ -145,21 +146,21 @@ def _sync(path: Path) -> None:
 _logger = log_of(__name__)
 
 _BINARY: Final[int] = getattr(os, "O_BINARY", 0)
-"""Windows would write CR LF."""
+"""Line end on all systems, because Windows would write CR LF."""
 
 
 class LineFile:
-    """A file of lines; what is written is there at once, so a kill loses nothing.
+    """A file of lines, each written at once, so that a kill loses nothing.
 
-    Where writing fails the recording ends with one warning, and the run goes on.
+    If writing fails, the recording ends with one warning, and the run continues.
 
     Args:
         path: the file; one that exists is replaced.
         first: its first line.
-        running: what goes on without it, for the warning.
+        running: what continues without it, for the warning.
 
     Attributes:
-        error: why the recording ended early, empty while all is well.
+        error: reason for the early end of the recording, empty if there was no error.
 
     Raises:
         OSError: the file cannot be opened.
@@ -185,7 +186,7 @@ class LineFile:
             self._close()
 
     def close(self, last: str) -> None:
-        """Write the last line and close the file; closing twice is no error."""
+        """Write the last line and close the file; closing it again has no effect."""
         self.write([last])
         self._close()
 

@@ -1,4 +1,4 @@
-"""YAML as a tree that knows its lines: nothing is made of it but texts, numbers and flags.
+"""YAML as a tree with line numbers, limited to texts, numbers and flags.
 
 >>> tree, wrong = read_yaml("a: 0x10", "bus.yml")
 >>> tree.value["a"].value, str(tree.value["a"].place), wrong
@@ -18,7 +18,7 @@ from tickrig.host.text.document import FileMistake, FilePlace, Item, Key, Scalar
 from tickrig.wire.canopen.eds.eds_file import shorten
 
 _WIDEST: Final = 1_000
-"""Bits of a number; a longer one stays a text."""
+"""Largest number of bits of a number; a longer one remains a text."""
 _DIGITS: Final = frozenset("0123456789.")
 _MERGE: Final = "tag:yaml.org,2002:merge"
 
@@ -41,7 +41,7 @@ _READ_APART: Final = (
     ),
     ("[-+]?[0-9]+[eE][-+][0-9]+", "{!r} is a text for PyYAML, a number for yaml-cpp"),
 )
-"""Numbers that dcfgen (PyYAML, YAML 1.1) and ros2_canopen (yaml-cpp) read apart."""
+"""Numbers that dcfgen (PyYAML, YAML 1.1) and ros2_canopen (yaml-cpp) read differently."""
 
 _LONGEST: Final = 120
 _MEANT: Final = {
@@ -51,7 +51,7 @@ _MEANT: Final = {
     "could not find expected ':'": "no colon with a space behind it, here or in the line before",
     "cannot start any token": "{}; put it into quotes",
 }
-"""What is meant by the words of PyYAML, by how they begin."""
+"""Meaning of messages of PyYAML, by their start."""
 
 
 def read_yaml(text: str, name: str) -> tuple[Item | None, tuple[FileMistake, ...]]:
@@ -59,10 +59,10 @@ def read_yaml(text: str, name: str) -> tuple[Item | None, tuple[FileMistake, ...
 
     Args:
         text: the whole file.
-        name: what places call it.
+        name: its name in places.
 
     Returns:
-        The tree, None if there is none; and what is wrong.
+        The tree, None without one; and the errors.
     """
     try:
         root = _composed(text)
@@ -88,7 +88,7 @@ def _composed(text: str) -> yaml.Node | None:
 
 
 def _said(problem: str) -> str:
-    """Return what PyYAML says in words that help."""
+    """Return a message of PyYAML in helpful words."""
     for words, meant in _MEANT.items():
         if words in problem:
             return meant.format(problem)
@@ -96,13 +96,13 @@ def _said(problem: str) -> str:
 
 
 def _in_a_line(reason: str) -> str:
-    """Return what can be printed of a reason."""
+    """Return a printable reason."""
     text = "".join(letter if letter.isprintable() else "?" for letter in " ".join(reason.split()))
     return text[:_LONGEST]
 
 
 class _Tree:
-    """Makes items of nodes; what an anchor names is made once, so that no file can grow."""
+    """Makes items from nodes; an anchored node is made once, so that files cannot explode."""
 
     def __init__(self, name: str) -> None:
         self.wrong: list[FileMistake] = []
@@ -112,7 +112,7 @@ class _Tree:
         self._open: set[int] = set()
 
     def item(self, node: yaml.Node) -> Item:
-        """Make an item of a node."""
+        """Make an item from a node."""
         key = id(node)
         if (done := self._done.get(key)) is not None:
             return done
@@ -135,7 +135,7 @@ class _Tree:
         return Item(self._scalar(node), place, shorten(str(node.value)))
 
     def _mapping(self, node: yaml.MappingNode, place: FilePlace) -> Item:
-        """Make a mapping: what `<<` brings first, then its own; of a key twice the last counts."""
+        """Make a mapping: the items of `<<`, then its own; of a duplicate key the last counts."""
         fields: dict[Key, Item] = {}
         keys: dict[Key, FilePlace] = {}
         own: list[tuple[yaml.Node, yaml.Node]] = []
@@ -161,7 +161,7 @@ class _Tree:
         return Item(fields, place, keys=keys)
 
     def _merged(self, node: yaml.Node) -> list[Item]:
-        """Return the mappings that `<<` names."""
+        """Return the mappings of `<<`."""
         nodes = node.value if isinstance(node, yaml.SequenceNode) else [node]
         items = [self.item(each) for each in nodes]
         for each, item in zip(nodes, items, strict=True):
@@ -170,7 +170,7 @@ class _Tree:
         return [item for item in items if item.is_mapping]
 
     def _check_number(self, node: yaml.Node) -> None:
-        """Note a number that the two readers of the file read apart; quotes make it a text."""
+        """Warn of a number that both readers read differently; quotes make it a text."""
         text = str(node.value)
         if not isinstance(node, yaml.ScalarNode) or node.style is not None:
             return
@@ -181,7 +181,7 @@ class _Tree:
                     return
 
     def _scalar(self, node: yaml.Node) -> Scalar:
-        """Return what YAML 1.1 makes of a scalar; dates stay texts."""
+        """Return the value of a scalar in YAML 1.1; dates remain texts."""
         try:
             value = self._plain.construct_object(node)
         except (yaml.YAMLError, ValueError, LookupError, AttributeError, TypeError, OverflowError):

@@ -1,4 +1,4 @@
-"""Devices on their wires, as a rig has them: those on a serial line, and nodes on a CAN bus."""
+"""Devices on their wires: on a serial line, or nodes on a CAN bus."""
 
 from __future__ import annotations
 
@@ -31,15 +31,15 @@ class LineMount(Copyable):
 
     Args:
         name: of the line.
-        settings: what the line is like.
-        line: the line, if it is not to be made by `settings`; its ends are of the devices, but
-            for `line.b`, which is the host's.
+        settings: parameters of the line.
+        line: the line, if it is not made by `settings`; its ends belong to the devices, except
+            `line.b`, the host's.
 
     Attributes:
         line: the line.
         devices: by name.
-        entries: what a trace says of each.
-        tap: what passes the first device's end, faults of the line included.
+        entries: the trace entry of each.
+        tap: traffic at the first device's end, after faults of the line.
     """
 
     def __init__(self, name: str, settings: LineSettings, line: ByteLine | None = None) -> None:
@@ -59,8 +59,8 @@ class LineMount(Copyable):
         Args:
             name: of the device.
             device: the device.
-            entry: what a trace says of it, if it can be built again.
-            seed: of the chance in the faults of its end.
+            entry: its trace entry, if it can be rebuilt.
+            seed: of random faults at its end.
 
         Raises:
             ValueError: the line has no end for it.
@@ -74,12 +74,12 @@ class LineMount(Copyable):
 
     @property
     def faults(self) -> FaultyPort[bytes]:
-        """Where faults are armed, and heard of: those of the first device's end."""
+        """The port on which faults are armed: the first device's end."""
         return self._ports[0]
 
     @property
     def chances(self) -> Sequence[FaultyPort[bytes]]:
-        """What has faults by chance."""
+        """Objects with random faults."""
         return self._ports
 
     @property
@@ -89,36 +89,35 @@ class LineMount(Copyable):
 
     @property
     def wire_entry(self) -> WireEntry:
-        """What a trace says of the line."""
+        """Trace entry of the line."""
         return WireEntry(WireType.SERIAL, {"baud": self.settings.baud})
 
     def stations(self, recorder: TraceRecorder | None) -> Iterator[Station[bytes]]:
-        """Return the devices on the line, recorded if that is wanted."""
+        """Return the devices on the line, recorded if requested."""
         for (name, device), port in zip(self.devices.items(), self._ports, strict=True):
             yield Station(recorder.device(name, device) if recorder else device, port)
 
     @property
     def lost(self) -> int:
-        """Bytes that found a buffer full."""
+        """Number of bytes lost because of a full buffer."""
         return self.line.a.lost + self.line.b.lost
 
 
 class BusMount(Copyable):
     """Nodes on a CAN bus.
 
-    One more end of the bus acknowledges what is sent, so that a node is never alone,
-    whether a host is there or not.
+    One more end of the bus acknowledges frames, so that a node is never alone, even without a host.
 
     Args:
         name: of the bus.
         bit_rate: in bit/s.
-        seed: of the chance in its faults.
+        seed: of its random faults.
 
     Attributes:
         wire: the bus.
         nodes: by name.
-        node_faults: where faults of each node are armed, by its name.
-        entries: what a trace says of each.
+        node_faults: objects on which faults of each node are armed, by its name.
+        entries: the trace entry of each.
     """
 
     def __init__(self, name: str, bit_rate: int = BIT_RATE, seed: int = 0) -> None:
@@ -134,26 +133,26 @@ class BusMount(Copyable):
         Args:
             name: of the node.
             slave: the slave.
-            entry: what a trace says of it, if it can be built again.
+            entry: its trace entry, if it can be rebuilt.
         """
         node = self.nodes[name] = Node(name, slave, self.wire)
         self.node_faults[name] = NodeFaults(node, self.wire)
         self.entries[name] = entry or DeviceEntry(self.name)
 
     def open_end(self, accepts: frozenset[int] | None = None) -> CanEnd:
-        """Connect an end for a host; it comes back from bus-off at once."""
+        """Connect an end for a host, which recovers from bus-off at once."""
         end = self.wire.end(accepts)
         end.auto_recovery = True
         return end
 
     @property
     def faults(self) -> WireFaults:
-        """Where faults of the bus are armed."""
+        """The object on which faults of the bus are armed."""
         return self.wire.faults
 
     @property
     def chances(self) -> Sequence[CanFaults]:
-        """What has faults by chance."""
+        """Objects with random faults."""
         return [self.wire.faults]
 
     @property
@@ -163,11 +162,11 @@ class BusMount(Copyable):
 
     @property
     def wire_entry(self) -> WireEntry:
-        """What a trace says of the bus."""
+        """Trace entry of the bus."""
         return WireEntry(WireType.CAN, {"bit_rate": self.wire.bit_rate})
 
     def stations(self, recorder: TraceRecorder | None) -> Iterator[Station[Frames]]:
-        """Return the nodes on the bus, recorded if that is wanted."""
+        """Return the nodes on the bus, recorded if requested."""
         for name, node in self.nodes.items():
             station = Station(recorder.device(name, node) if recorder else node, node.port)
             self.node_faults[name].station = station
@@ -175,7 +174,7 @@ class BusMount(Copyable):
 
     @property
     def lost(self) -> int:
-        """Frames that found a queue full."""
+        """Number of frames lost because of a full queue."""
         return sum(node.port.lost for node in self.nodes.values())
 
 

@@ -1,4 +1,4 @@
-"""Put devices on their wires: those of a rig file, or those that a test hands over."""
+"""Put devices on their wires: those of a rig file, or those passed by a test."""
 
 from __future__ import annotations
 
@@ -49,15 +49,15 @@ _logger = log_of(__name__)
 
 
 class NoNodeIdError(ValueError):
-    """A CANopen device that nobody gives a node-ID."""
+    """A CANopen device without a node-ID."""
 
 
 def parts_of(plan: RigPlan) -> Parts:
     """Make the devices of a rig file and put them on their wires.
 
     Raises:
-        ValueError: a device cannot be made, such as of an EDS that cannot be read; options that
-            its type does not take; a signal that cannot be.
+        ValueError: a device cannot be made, for example because its EDS is unreadable; unknown
+            options of its type; an invalid signal.
     """
     alone = len(plan.wires) == 1
     stores: dict[Path, StoreFile] = {}
@@ -85,7 +85,7 @@ def _settings_of(start: Mapping[str, Setting | SignalSpec]) -> dict[str, Setting
 
 
 def _signals(plan: RigPlan) -> dict[str, SignalSpec]:
-    """Return the signals by what they drive, `DEVICE/INPUT`, or by their names."""
+    """Return the signals by their target, `DEVICE/INPUT`, or by their names."""
     return {**plan.signals} | {
         f"{device.name}/{name}": value
         for device in plan.devices.values()
@@ -95,7 +95,7 @@ def _signals(plan: RigPlan) -> dict[str, SignalSpec]:
 
 
 def _begin_faults(plan: RigPlan, rig: BenchRig) -> None:
-    """Let the faults come in their time; ValueError if there is none, or it cannot be like this."""
+    """Schedule the faults; ValueError for an unknown fault or invalid arguments."""
     for fault in plan.faults:
         name = rig.state.full_fault_name(fault.owner, fault.spec.name)
         order = FaultOrder(replace(fault.spec, name=name), 0)
@@ -118,7 +118,7 @@ def _line(wire: WirePlan, devices: Sequence[DevicePlan], seed: int) -> LineMount
 def _settings(
     wire: WirePlan, made: Sequence[ConfiguredDevice]
 ) -> tuple[LineSettings, ByteLine | None]:
-    """Return what a line is like, and the line if its device does not make it."""
+    """Return the parameters of a line, and the line if its device does not make it."""
     settings = made[0].type.line
     settings = replace(settings, baud=wire.bit_rate or settings.baud)
     if not wire.given:
@@ -152,11 +152,11 @@ def _bus(
 def _slave_of(
     device: DevicePlan, stores: dict[Path, StoreFile]
 ) -> tuple[CanopenSlave, DeviceEntry]:
-    """Return a slave, and what a trace says of it; the files of `stores` are entered there.
+    """Return a slave and its trace entry; add its store file to `stores`.
 
     Raises:
         ValueError: its file cannot be read.
-        NoNodeIdError: nobody gives it a node-ID.
+        NoNodeIdError: it has no node-ID.
     """
     kind = Path(device.type) if device.kind is DeviceKind.EDS else device.type
     description = late.describe(eds_cache(), kind, device.profile or AUTO)
@@ -177,7 +177,7 @@ def _slave_of(
     return slave, node_entry(device.wire, slave, kind, profile, files)
 
 
-# The rig of a bench, with all that a rig file says of it.
+# The rig of a bench, with all settings of its rig file.
 
 NAME = "bench"
 
@@ -194,13 +194,13 @@ def rig_of(
 
     Args:
         parts: the devices on their wires.
-        plan: what else is said of them: faults, and where nodes keep what they store.
-        outside: where hosts are; without it time is virtual.
-        trace: the file in which the run is recorded.
-        keeps: whether the run is kept in memory, if it is not in a file.
+        plan: further settings: faults, and store files of nodes.
+        outside: connections for hosts; without them the time is virtual.
+        trace: the file of the recording.
+        keeps: whether to record the run in memory, without a file.
 
     Raises:
-        ValueError: an input, signal or fault that cannot be.
+        ValueError: an invalid input, signal or fault.
         OSError: the file of the trace cannot be opened.
     """
     state = RigState(
@@ -217,13 +217,13 @@ def rig_of(
     return rig
 
 
-# Devices that a test hands over.
+# Devices passed by a test.
 
 _BUS: Final = "can"
-"""The bus that nodes share where nobody says otherwise."""
+"""Default bus of nodes."""
 
 BenchedDevice = Emulated[bytes] | CanopenSlave | DeviceType | str
-"""A device, a device type, or what a rig file has as `type`: the name of a device type or CANopen
+"""A device, a device type, or a `type` as in rig files: the name of a device type or CANopen
 model, an EDS or DCF file, `FILE.py:Class`; the last three with their node-ID: `5=drive.eds`."""
 
 _NODE: Final = re.compile(r"[0-9]+=")
@@ -239,12 +239,13 @@ def mounts_of(
 
     Args:
         devices: by name.
-        seed: of all chance.
-        line: what the serial lines are like; that of their type, or 115 200 8N1, unless given.
-        sdo_timeout_us: of the SDO servers of all nodes; as it is unless given.
+        seed: of all random numbers.
+        line: parameters of the serial lines; by default those of their type, or 115 200 8N1.
+        sdo_timeout_us: of the SDO servers of all nodes; None for no change.
 
     Raises:
-        ValueError: something is no device, and no type of one; a time-out of 0, or without a node.
+        ValueError: an object that is neither a device nor a device type; a time-out of 0, or
+            without a node.
     """
     mounts: dict[str, Mount] = {}
     for name, device in devices.items():
@@ -279,15 +280,15 @@ def _set_timeout(slave: CanopenSlave, sdo_timeout_us: int | None) -> None:
 
 
 def named_device(text: str, folder: Path, name: str = "") -> DevicePlan:
-    """Return what a text names, as the `type` of a rig file does.
+    """Return the device or type named by a text, like the `type` of a rig file.
 
     Args:
         text: a name or file; the node-ID of a CANopen device may be before it: `5=drive.eds`.
-        folder: where files are looked for.
+        folder: folder of the files.
         name: of the device.
 
     Raises:
-        ValueError: it names no device.
+        ValueError: it does not name a device.
     """
     node, _, rest = text.rpartition("=") if _NODE.match(text) else ("", "", text)
     if rest.lower().endswith(RIG_SUFFIXES):
@@ -300,7 +301,7 @@ def named_device(text: str, folder: Path, name: str = "") -> DevicePlan:
 
 
 def _slave(mount: BusMount, plan: DevicePlan) -> tuple[CanopenSlave, DeviceEntry]:
-    """Return a slave that is named, and what a trace says of it."""
+    """Return a named slave and its trace entry."""
     try:
         slave, entry = _slave_of(plan, {})
     except NoNodeIdError:
@@ -315,7 +316,7 @@ def _slave(mount: BusMount, plan: DevicePlan) -> tuple[CanopenSlave, DeviceEntry
 
 
 def _check_device(name: str, device: object) -> None:
-    """Raise ValueError unless something can be a device: classes and numbers cannot."""
+    """Raise ValueError unless an object can be a device: classes and numbers cannot."""
     if isinstance(device, type) or not all(hasattr(device, each) for each in ("tick", "inputs")):
         raise ValueError(
             f"{name} is {device!r:.60}, and that is no device: on a bench are devices, device "
@@ -327,7 +328,7 @@ _NO_CONFIG: Final[Config] = {}  # a mapping proxy could not be copied with the b
 
 
 class _Made(NamedTuple):
-    """A device, what its line is like, and what a trace says of it."""
+    """A device, the parameters of its line, and its trace entry."""
 
     device: Emulated[bytes]
     line: LineSettings
@@ -336,7 +337,7 @@ class _Made(NamedTuple):
 
 
 def _of_type(device: Emulated[bytes] | DeviceType | str, seed: int) -> _Made:
-    """Return a device that is given, or that its type makes."""
+    """Return the given device, or one made by its type."""
     if isinstance(device, str):
         made = configure(device, {}, seed)
         return _Made(made.device, made.type.line, made.type.name, made.config)
@@ -353,7 +354,7 @@ def _of_type(device: Emulated[bytes] | DeviceType | str, seed: int) -> _Made:
 
 
 def name_of(device: BenchedDevice) -> str:
-    """Return what a lone device is called where nobody says it.
+    """Return the default name of a single device.
 
     >>> name_of("rtc-lite"), name_of("5=eds/drive.eds")
     ('rtc_lite', 'drive')

@@ -1,4 +1,4 @@
-"""Devices of a bench as the header of a trace has them, and made again of that."""
+"""Devices of a bench in the header of a trace, and rebuilt from it."""
 
 from __future__ import annotations
 
@@ -32,15 +32,15 @@ def node_entry(
     profile: str = AUTO,
     files: Iterable[Path] = (),
 ) -> DeviceEntry:
-    """Return what a trace says of a CANopen slave, before its first tick.
+    """Return the trace entry of a CANopen slave, before its first tick.
 
     Args:
         wire: name of the bus.
         slave: the slave.
-        device: what it was made of: EDS or DCF, the name of a model, or `FILE.py:Class`; empty
-            for the model that it says it is.
+        device: its source: EDS or DCF, the name of a model, or `FILE.py:Class`; empty for its own
+            model name.
         profile: of `choices.PROFILES`, for a file.
-        files: what else it was made of.
+        files: further source files.
 
     Raises:
         OSError: a file cannot be read.
@@ -66,17 +66,17 @@ def node_entry(
 def make_recorded(
     header: BenchHeader, name: str, folder: Path, cache: late.EdsCache, *, run_code: bool = False
 ) -> Any:
-    """Make the device that was recorded, as it was when the recording began.
+    """Make the recorded device in its state at the start of the recording.
 
     Args:
         header: of the trace.
         name: of the device.
-        folder: of the trace; its files are looked for here too.
+        folder: of the trace, searched for its files.
         cache: of EDS files.
         run_code: whether to run a Python file that the trace names.
 
     Raises:
-        ValueError: it cannot be made; the text is for people.
+        ValueError: it cannot be made.
     """
     entry, on_can = header.devices[name], header.on_can(name)
     try:
@@ -93,7 +93,7 @@ def make_recorded(
 
 
 def user_code(entries: Iterable[DeviceEntry]) -> list[object]:
-    """Return what may be a `FILE.py:Class` of a user in devices of a trace."""
+    """Return texts in devices of a trace that may be a `FILE.py:Class` of a user."""
     return [spec for entry in entries for spec in (entry.type, *entry.config.values())]
 
 
@@ -126,7 +126,7 @@ def _memory(entry: DeviceEntry, dictionary: Dictionary) -> Nonvolatile:
 
 
 def _found(entry: DeviceEntry, folder: Path) -> Path | str:
-    """Return the model, or where the very file is that was recorded."""
+    """Return the model, or the path of the recorded file."""
     if entry.type in late.MODELS:
         return entry.type
     named = _file_of(entry.type) or Path(entry.type)
@@ -142,7 +142,7 @@ def _hash(file: Path) -> str:
 
 
 def _check_same(file: Path, recorded: object) -> None:
-    """Raise ValueError unless a file has the hash that was recorded."""
+    """Raise ValueError unless a file has the recorded hash."""
     if _hash(file) != recorded:
         raise ValueError(f"{file} is another file than the one that was recorded")
 

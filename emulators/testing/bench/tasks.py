@@ -1,7 +1,7 @@
-"""Async bodies of tests: several things that are watched and done at the same time.
+"""Async bodies of tests: several observations and actions at the same time.
 
-A body awaits times and conditions of the bench; nothing here knows asyncio, whose loop has a
-clock of its own.
+A body awaits times and conditions of the bench; it is independent of asyncio, whose loop has its
+own clock.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from tickrig.host.text.byte_text import escape
 from tickrig.host.text.values import format_time
 from tickrig.wire.instant import NEVER
 
-# What something may wait for: a line or frame that passes, or any question about the bench.
+# Conditions: a line or frame, or any function about the bench.
 
 Condition = Callable[[], bool]
-"""Says whether something is so; it only looks."""
+"""Returns whether a condition is true, without side effects."""
 
 _ANY: Final = ""
 
@@ -29,15 +29,15 @@ _ORDINALS: Final = {1: "st", 2: "nd", 3: "rd"}
 
 
 class LineTrigger:
-    """True from the moment at which a line or frame has passed so often.
+    """True after a line or frame has passed a number of times.
 
     Args:
         pattern: the whole line, or the frame in candump's notation; `*` stands for anything.
-        nth: the how manieth from now on, from 1.
+        nth: number of the occurrence from now on, from 1.
         source: the wire or device; any if empty.
 
     Attributes:
-        count: how many have passed.
+        count: number of occurrences.
 
     Raises:
         ValueError: `nth` is less than 1.
@@ -51,11 +51,11 @@ class LineTrigger:
         self._nth, self._source, self.count = nth, source, 0
 
     def __call__(self) -> bool:
-        """Return whether it has passed so often."""
+        """Return whether it has passed that many times."""
         return self.count >= self._nth
 
     def __str__(self) -> str:
-        """Say what it waits for.
+        """Return a description of the condition.
 
         >>> str(LineTrigger("OK:*", nth=3))
         'the 3rd OK:*'
@@ -63,20 +63,20 @@ class LineTrigger:
         return f"the {_ordinal(self._nth)} {self._text}"
 
     def hear(self, line: WireLine) -> None:
-        """Take a line of the journal."""
+        """Handle a line of the journal."""
         if self._source in (_ANY, line.source) and line.mark in "<>":
             self.count += self._pattern.fullmatch(escape(line.data)) is not None
 
 
 def check_condition(condition: object) -> None:
-    """Raise TypeError unless something can be asked again and again."""
+    """Raise TypeError unless an object is a condition that can be called repeatedly."""
     if not callable(condition):
         wanted = 'a function, as lambda: bench.get("state") == "Off", or bench.on_line("OK:*")'
         raise TypeError(f"{condition!r:.60} cannot be waited for: give {wanted}")
 
 
 def text_of(condition: Condition) -> str:
-    """Say what somebody waits for: a line, or where the question stands."""
+    """Return a description of a condition: a line, or the place of the function."""
     if isinstance(condition, LineTrigger):
         return str(condition)
     code = getattr(condition, "__code__", None)
@@ -86,7 +86,7 @@ def text_of(condition: Condition) -> str:
 
 
 def _ordinal(number: int) -> str:
-    """Write a number as people count.
+    """Write an ordinal number.
 
     >>> [_ordinal(number) for number in (1, 2, 3, 4, 11, 22, 112)]
     ['1st', '2nd', '3rd', '4th', '11th', '22nd', '112th']
@@ -96,7 +96,7 @@ def _ordinal(number: int) -> str:
 
 
 def when(rig: BenchRig, condition: Condition, act: Callable[[], None]) -> None:
-    """Act once, between two ticks, as soon as something is so: now, or after a later step."""
+    """Act once, between two ticks, when a condition is true: now, or after a later step."""
 
     def watch(now_us: int) -> None:
         if condition():
@@ -108,12 +108,12 @@ def when(rig: BenchRig, condition: Condition, act: Callable[[], None]) -> None:
 
 
 DAY_US: Final = 86_400_000_000
-"""In virtual time a body that does not say for how long it waits has waited in vain then."""
+"""Longest wait of a body in virtual time without a limit."""
 
 T = TypeVar("T")
 
 _NO_LOOP: Final = "no running event loop"
-"""What asyncio says where there is none."""
+"""Message of asyncio without a running loop."""
 
 _WHAT_WAITS: Final = (
     "a bench waits for bench.sleep, bench.until, bench.edge, and for tasks of bench.start,"
@@ -123,24 +123,24 @@ _WHAT_WAITS: Final = (
 
 @dataclass(frozen=True, slots=True)
 class Wait:
-    """What a body waits for.
+    """A wait of a body.
 
     Attributes:
-        done: says whether it is so.
-        until_us: when it goes on even if it is not.
+        done: returns the condition.
+        until_us: when it continues without the condition.
     """
 
     done: Callable[[], bool]
     until_us: int = NEVER
 
     def __await__(self) -> Generator[Wait, bool, bool]:
-        """Wait; return whether it came to be so in time."""
+        """Wait; return whether the condition became true in time."""
         came: bool = yield self
         return came
 
 
 class TaskWait(Protocol):
-    """Whoever lets time pass for the body of a test."""
+    """An object that advances the time for the body of a test."""
 
     @property
     def now_us(self) -> int:
@@ -148,17 +148,17 @@ class TaskWait(Protocol):
         ...
 
     def wait_until(self, done: Callable[[], bool], within_us: int) -> bool:
-        """Let time pass until something is so; False if it was not in time."""
+        """Advance the time until a condition is true; return False after the time-out."""
         ...
 
 
 def run_body(waiting: TaskWait, body: Coroutine[Any, Any, T]) -> T:
-    """Run the body of a test: time passes while it waits.
+    """Run the body of a test, advancing the time while it waits.
 
     Raises:
         TypeError: it awaits something else, such as `asyncio.sleep`.
-        RuntimeError: what it waits for never comes, or not within a day of virtual time.
-        KeyboardInterrupt: Ctrl-C; the text says what it waits for, and how long.
+        RuntimeError: its condition never becomes true, or not within a day of virtual time.
+        KeyboardInterrupt: Ctrl-C; the message has the condition and the waiting time.
     """
     came: bool | None = None
     while True:
@@ -171,7 +171,7 @@ def run_body(waiting: TaskWait, body: Coroutine[Any, Any, T]) -> T:
 
 
 def _wait(waiting: TaskWait, wait: Wait) -> bool:
-    """Let time pass until something is so; False if it was not in time."""
+    """Advance the time until a condition is true; return False after the time-out."""
     begun_us, for_ever = waiting.now_us, wait.until_us == NEVER
     try:
         came = waiting.wait_until(wait.done, max(0, wait.until_us - begun_us))
@@ -187,11 +187,11 @@ def _wait(waiting: TaskWait, wait: Wait) -> bool:
 
 
 class Task(Generic[T]):
-    """A body that runs beside the test, between two ticks, whoever makes time pass.
+    """A body that runs beside the test, between two ticks.
 
     Args:
-        rig: the rig whose time it waits in.
-        body: what it does; it must not make time pass itself.
+        rig: the rig with its time.
+        body: the body; it must not advance the time itself.
     """
 
     def __init__(self, rig: BenchRig, body: Coroutine[Any, Any, T]) -> None:
@@ -205,11 +205,11 @@ class Task(Generic[T]):
 
     @property
     def done(self) -> bool:
-        """Whether it has ended, in whatever way."""
+        """Whether it has ended, with or without an exception."""
         return self._wait is None
 
     def result(self) -> T:
-        """Return what it returned, or raise what it raised.
+        """Return its result, or raise its exception.
 
         Raises:
             RuntimeError: it has not ended yet.
@@ -222,7 +222,7 @@ class Task(Generic[T]):
         return self._result[0]
 
     def check(self) -> None:
-        """Raise what it raised, unless somebody has asked for its result."""
+        """Raise its exception, unless its result was read."""
         if self._error is not None and not self._raised:
             self.result()
 
@@ -232,7 +232,7 @@ class Task(Generic[T]):
         return self.result()
 
     def cancel(self) -> None:
-        """End it where it waits; one that has ended is no error."""
+        """Cancel it at its wait; does nothing if it has ended."""
         if self._wait is not None:
             self._end()
             self._body.close()
@@ -262,7 +262,7 @@ class Task(Generic[T]):
 
 
 def _step(body: Coroutine[Any, Any, Any], came: bool | None) -> Wait:
-    """Let a body run to its next wait; one that asks for the loop of asyncio is told what to do."""
+    """Run a body to its next wait; explain what to do if it asks for the asyncio loop."""
     try:
         return _wait_of(body.send(came))
     except RuntimeError as error:

@@ -1,4 +1,4 @@
-"""Workers of a machine: each run is done, whoever is killed meanwhile."""
+"""Workers of a machine: each run is done even if workers are killed."""
 
 from __future__ import annotations
 
@@ -26,19 +26,19 @@ from tickrig.emulators.testing.campaign.order import (
     verdicts_of,
 )
 
-# A worker as who asks sees it: a process that is started, asked, and ended.
+# The parent's view of a worker: a process that is started, asked and ended.
 
 _START_S: Final = 300.0
-"""So long collecting may take."""
+"""Time-out of the collection."""
 
 _LOOK_S: Final = 1.0
 
 _MOST_BYTES: Final = 64 << 20
-"""Of an answer."""
+"""Largest size of an answer."""
 
 
 class WorkerDied(Exception):  # noqa: N818 - nobody's fault
-    """The process of a worker has ended; the text says how."""
+    """The process of a worker has ended; the message says how."""
 
 
 class RunHung(Exception):  # noqa: N818 - that of the test
@@ -46,14 +46,14 @@ class RunHung(Exception):  # noqa: N818 - that of the test
 
 
 class _WorkerProcess:
-    """A process in which pytest waits with the tests of an order.
+    """A process in which pytest has collected the tests of an order.
 
     Args:
-        order: what is collected.
+        order: the tests to collect.
 
     Raises:
         Refusal: pytest refuses it.
-        WorkerDied: the process has ended before it could say anything.
+        WorkerDied: the process has ended before its first answer.
     """
 
     def __init__(self, order: CampaignOrder) -> None:
@@ -89,7 +89,7 @@ class _WorkerProcess:
                 self.end()
 
     def request(self, runs: Sequence[Run]) -> None:
-        """Ask for runs; WorkerDied if nobody is there."""
+        """Request runs; WorkerDied if the process has ended."""
         try:
             self._conn.send(list(runs))
         except OSError:
@@ -99,8 +99,8 @@ class _WorkerProcess:
         """Wait for the verdict of a run.
 
         Raises:
-            RunHung: it did not come in time.
-            WorkerDied: it never will, or something else came.
+            RunHung: no verdict in time.
+            WorkerDied: the process has ended, or sent something else.
         """
         answer = self._receive(timeout_s)
         try:
@@ -122,7 +122,7 @@ class _WorkerProcess:
         try:
             return pickle.loads(data)
         except Exception as error:  # pickle raises anything
-            raise WorkerDied(f"when it sent what cannot be read: {error!r}") from None
+            raise WorkerDied(f"when it sent unreadable data: {error!r}") from None
 
     def _died(self) -> WorkerDied:
         with suppress(subprocess.TimeoutExpired):
@@ -138,14 +138,14 @@ class _WorkerProcess:
         return self._process.poll() is None
 
     def kill(self) -> None:
-        """End the process, and what it has started, whatever it is at."""
+        """Kill the process and its children."""
         with self._lock:
             if self._process.poll() is None:
                 os.killpg(self._process.pid, signal.SIGKILL)
                 self._process.wait()
 
     def end(self) -> None:
-        """End the process, and give back what it was spoken to by."""
+        """Kill the process, and close its pipe."""
         self.kill()
         self._conn.close()
         if self._alive >= 0:
@@ -157,10 +157,10 @@ _ATTEMPTS: Final = 3
 
 
 class Crew:
-    """Starts workers where none is idle; threads may ask at the same time.
+    """Starts workers if none is idle; usable by several threads.
 
     Args:
-        order: what they collect.
+        order: the tests to collect.
 
     Attributes:
         order: the same.
@@ -173,7 +173,7 @@ class Crew:
         self._closed = False
 
     def collect(self) -> Collected:
-        """Return what a worker has found; Refusal if pytest refuses it."""
+        """Return the collected tests; Refusal if pytest refuses them."""
         if not self._idle:
             self._idle.append(self._start())
         return self._idle[-1].collected
@@ -182,11 +182,11 @@ class Crew:
         """Do runs one after the other.
 
         Args:
-            runs: of tests that were collected.
-            digest: of the files of the tests; others are refused.
+            runs: of collected tests.
+            digest: of the files of the tests; other files are refused.
 
         Raises:
-            Refusal: they are not the same here.
+            Refusal: the files differ here.
         """
         left, verdicts = deque(runs), list[RunVerdict]()
         deaths = Counter[int]()
@@ -210,7 +210,7 @@ class Crew:
         return verdicts
 
     def _request(self, runs: Sequence[Run], digest: str) -> Iterator[RunVerdict]:
-        """Yield the verdicts of runs as they come; a worker that fails is ended."""
+        """Yield the verdicts of runs as they arrive; a failing worker is killed."""
         worker = self._take(digest)
         self._busy.add(worker)
         try:
@@ -252,7 +252,7 @@ class Crew:
         raise AssertionError
 
     def close(self) -> None:
-        """End all workers, whatever they are at."""
+        """Kill all workers."""
         self._closed = True
         while self._idle:
             self._idle.pop().end()
@@ -267,9 +267,9 @@ class LocalWorkers:
     """Processes of this machine, each with a thread that waits for it.
 
     Args:
-        crew: who has collected.
+        crew: the crew that has collected.
         digest: of the files of the tests.
-        count: how many.
+        count: number of processes.
     """
 
     def __init__(self, crew: Crew, digest: str, count: int) -> None:
@@ -277,7 +277,7 @@ class LocalWorkers:
         self._threads = ThreadPoolExecutor(count)
 
     def submit(self, runs: Sequence[Run]) -> Future[list[RunVerdict]]:
-        """Let a process do runs."""
+        """Submit runs to a process."""
         return self._threads.submit(self._crew.do, runs, self._digest)
 
     def close(self) -> None:
@@ -287,7 +287,7 @@ class LocalWorkers:
 
 
 def cores() -> int:
-    """Return how many processors this process may use."""
+    """Return the number of processors for this process."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

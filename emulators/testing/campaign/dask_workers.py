@@ -30,25 +30,25 @@ from tickrig.host.text.page_text import one_line
 
 CONNECT_S: Final = 10.0
 _SCHEDULER: Final = "Scheduler"
-"""How a scheduler calls itself, where a worker says `Worker`."""
+"""Type name of a scheduler, in place of a worker's `Worker`."""
 
 _WAIT_S: Final = 60.0
-"""So long a scheduler may be without any worker."""
+"""How long a scheduler may be without workers."""
 
 _CLOSE_S: Final = 5.0
-"""So long the cluster has to forget a campaign."""
+"""Time-out for removing a campaign from the cluster."""
 
 _GONE: Final = (OSError, RuntimeError, TimeoutError, CancelledError)
 
 _LOSSES: Final = 3
-"""So often a batch is begun again that Dask gives up for lost."""
+"""Number of retries of a batch that Dask has lost."""
 
 
 class _CrewPlugin(WorkerPlugin):
     """Gives each worker of a cluster a crew while a campaign runs.
 
     Args:
-        order: what the crew collects.
+        order: the tests that the crew collects.
     """
 
     crew: Crew
@@ -58,7 +58,7 @@ class _CrewPlugin(WorkerPlugin):
         self.name = f"tickrig-campaign-{uuid4().hex}"
 
     def setup(self, worker: Worker) -> None:
-        """Begin; processes are started when there are runs."""
+        """Start; processes are started with the first runs."""
         self.crew = Crew(self._order)
 
     def teardown(self, worker: Worker) -> None:
@@ -67,14 +67,14 @@ class _CrewPlugin(WorkerPlugin):
 
 
 class DaskWorkers:
-    """All threads of a cluster; a batch whose worker was lost is given to another one.
+    """All threads of a cluster; the batch of a lost worker goes to another one.
 
     Args:
         url: of the scheduler.
-        plan: what is done.
+        plan: the campaign.
 
     Raises:
-        Refusal: nobody is there, or no worker.
+        Refusal: no scheduler, or no worker.
     """
 
     def __init__(self, url: str, plan: CampaignPlan) -> None:
@@ -102,7 +102,7 @@ class DaskWorkers:
 
     @property
     def count(self) -> int:
-        """How many threads the workers have that are there now."""
+        """Number of threads of the present workers."""
         try:
             threads: dict[str, int] = self._client.nthreads()
             return max(1, sum(threads.values()))
@@ -110,7 +110,7 @@ class DaskWorkers:
             raise self._gone() from None
 
     def submit(self, runs: Sequence[Run]) -> Future[list[RunVerdict]]:
-        """Let a worker of the cluster do runs."""
+        """Submit runs to a worker of the cluster."""
         wanted: Future[list[RunVerdict]] = Future()
         self._try(list(runs), wanted, _LOSSES)
         return wanted
@@ -123,7 +123,7 @@ class DaskWorkers:
     def _take(
         self, runs: list[Run], wanted: Future[list[RunVerdict]], losses: int, future: Future[Any]
     ) -> None:
-        """Hand on what came of runs."""
+        """Forward the result of runs."""
         error = CancelledError() if future.cancelled() else future.exception()
         if isinstance(error, KilledWorker) and losses:
             self._try(runs, wanted, losses - 1)
@@ -146,7 +146,7 @@ class DaskWorkers:
         return CampaignRefusal(f"--scheduler {self._url} is gone; what was done is kept")
 
     def close(self) -> None:
-        """Let the cluster forget the campaign, if it still answers."""
+        """Remove the campaign from the cluster, if it still answers."""
         with suppress(*_GONE):
             self._executor.shutdown(wait=False)
         forgetting = Thread(target=self._forget, daemon=True)
@@ -156,7 +156,7 @@ class DaskWorkers:
             self._client.close(timeout=1)
 
     def _forget(self) -> None:
-        """Remove the plug-in; Dask waits without a limit for a scheduler or worker that stands."""
+        """Remove the plug-in; Dask waits without a limit for a stopped scheduler or worker."""
         with suppress(*_GONE):
             self._client.unregister_worker_plugin(self._plugin.name)
 
@@ -170,13 +170,13 @@ async def _ask_for_scheduler(url: str) -> None:
 
 
 def be_quiet() -> None:
-    """Let nobody but us tell what is lost: Dask and Tornado log tracebacks of it."""
+    """Silence the tracebacks that Dask and Tornado log for lost workers."""
     for name in ("distributed", "distributed.client", "tornado", "tornado.application", "asyncio"):
         logging.getLogger(name).handlers[:] = [logging.NullHandler()]
 
 
 def _do(name: str, runs: Sequence[Run], digest: str, version: str) -> list[RunVerdict] | str:
-    """Do runs on the worker that this is called on; a text is a refusal."""
+    """Do runs on this worker; a text as result is a refusal."""
     worker = get_worker()
     if __version__ != version:
         return f"{worker.address}: there is tickrig {__version__}, here {version}"

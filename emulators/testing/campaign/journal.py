@@ -1,4 +1,4 @@
-"""The journal of a campaign under way: a line for each verdict, safe from kills and power loss."""
+"""The journal of a running campaign: a line for each verdict, safe from kills and power loss."""
 
 from __future__ import annotations
 
@@ -17,18 +17,17 @@ SUFFIX: Final = ".journal"
 
 
 class JournalFullError(OSError):
-    """The journal takes no more; what is in it stays."""
+    """The journal cannot be extended; its content is kept."""
 
 
 class CampaignJournal:
-    """Verdicts in a file, each once; a new process goes on where the last one ended.
+    """Verdicts in a file, each once; a new process continues after the last one.
 
-    A line is a check sum and a JSON array. What is torn, or was never written, is no line, and its
-    run is done again.
+    A line is a checksum and a JSON array. Torn lines are ignored, and their runs are repeated.
 
     Args:
         path: the file.
-        head: what the campaign is, by what people call it.
+        head: properties of the campaign, by name.
 
     Attributes:
         verdicts: those of the file, and those that were added, by the number of the run.
@@ -55,7 +54,7 @@ class CampaignJournal:
             raise
 
     def _read(self, head: Mapping[str, Any]) -> None:
-        """Take up what the file has; what is no line of it is cut off or written anew."""
+        """Load the file; cut off or rewrite invalid lines."""
         data = self.path.read_bytes()
         entries = list(_entries(data))
         first = entries[0] if entries else None
@@ -72,7 +71,7 @@ class CampaignJournal:
         os.lseek(self._fd, 0, os.SEEK_END)
 
     def _rewrite(self, whole: bytes) -> None:
-        """Write the file anew; until that is done, it is as it was."""
+        """Rewrite the file atomically."""
         import fcntl  # noqa: PLC0415 - POSIX
 
         write_whole(self.path, whole)
@@ -81,17 +80,17 @@ class CampaignJournal:
         fcntl.flock(self._fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
     def _keep(self, verdict: RunVerdict) -> bool:
-        """Note a verdict; False if its run has one."""
+        """Store a verdict; return False if its run already has one."""
         if verdict.number in self.verdicts:
             return False
         self.verdicts[verdict.number] = verdict
         return True
 
     def add(self, verdicts: Iterable[RunVerdict]) -> list[RunVerdict]:
-        """Write verdicts that are not there yet, and return them; they are on the disk then.
+        """Write new verdicts to the disk, and return them.
 
         Raises:
-            JournalFullError: not all could be written; those that were not are not kept.
+            JournalFullError: not all could be written; the others are not kept.
         """
         new = [verdict for verdict in verdicts if self._keep(verdict)]
         data = b"".join(_line(list(verdict)) for verdict in new)
@@ -107,13 +106,13 @@ class CampaignJournal:
         return new
 
     def close(self) -> None:
-        """Let others have the file."""
+        """Unlock and close the file."""
         if self._fd >= 0:
             os.close(self._fd)
         self._fd = -1
 
     def remove(self) -> None:
-        """Remove the file: the table has all of it."""
+        """Remove the file after writing the table."""
         self.path.unlink(missing_ok=True)
         self.close()
 
@@ -124,7 +123,7 @@ def _line(entry: object) -> bytes:
 
 
 def _entries(data: bytes) -> Iterator[Any]:
-    """Yield what whole lines have."""
+    """Yield the content of complete lines."""
     for line in data.splitlines(keepends=True):
         check, _, text = line.rstrip(b"\n").partition(b" ")
         if line.endswith(b"\n") and check == b"%08x" % crc32(text):
@@ -135,12 +134,12 @@ def _check_head(path: Path, found: Mapping[str, Any], head: Mapping[str, Any]) -
     """Refuse the journal of another campaign."""
     if found.get("campaign") != _VERSION:
         raise CampaignRefusal(
-            f"{path}: a journal of another version of tickrig; --fresh begins anew"
+            f"{path}: a journal of another version of tickrig; --fresh starts again"
         )
     for name, value in head.items():
         if (before := found.get(name)) != value:
             changed = f"{name} {_short(before)}; now {_short(value)}"
-            raise CampaignRefusal(f"{path} is of a campaign with {changed}: --fresh begins anew")
+            raise CampaignRefusal(f"{path} is of a campaign with {changed}: --fresh starts again")
 
 
 def _short(value: object) -> str:

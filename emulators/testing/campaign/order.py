@@ -1,4 +1,4 @@
-"""What a campaign asks of its workers: which tests to collect, and how."""
+"""Requests of a campaign to its workers, and their verdicts."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ _OPTIONS: Final = (
     *("-o", "tmp_path_retention_policy=none", "-o", "bench_report=", "-o", "bench_artifacts="),
     *("-o", "bench_compare="),
 )
-"""Of pytest in a worker: nothing is shown or kept, and what was printed is not looked at."""
+"""Options of pytest in a worker: no output, no cache, no capture reports."""
 
 
 class CampaignRefusal(Exception):  # noqa: N818 - what a campaign cannot do; nothing is broken
-    """What a campaign cannot do, in a line for people."""
+    """A campaign cannot do something; the message is one line."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CampaignOrder:
-    """What a worker collects, and how long a run may take.
+    """Tests that a worker collects, and the time-out of a run.
 
     Attributes:
-        tests: files, folders and node IDs, as pytest has them.
-        parameters: as `--bench-param` has them.
+        tests: files, folders and node IDs, as for pytest.
+        parameters: as in `--bench-param`.
         bench: rig file, empty for that of the tests.
-        keyword: as `-k` has it; empty for all.
-        timeout_s: what a run takes at most.
-        folder: where they are looked for, a whole path.
+        keyword: as in `-k`; empty for all.
+        timeout_s: time-out of a run.
+        folder: absolute path in which they are searched.
         version: of tickrig.
     """
 
@@ -57,9 +57,9 @@ class CollectedTest(NamedTuple):
     """A test that runs with many seeds.
 
     Attributes:
-        nodeid: as pytest has it.
-        values: of its parameters, as they were written.
-        place: its node ID as one types it where the campaign was begun.
+        nodeid: as in pytest.
+        values: of its parameters, as written.
+        place: its node ID relative to the folder of the campaign.
     """
 
     nodeid: str
@@ -68,12 +68,12 @@ class CollectedTest(NamedTuple):
 
 
 class Collected(NamedTuple):
-    """What a worker found.
+    """Tests collected by a worker.
 
     Attributes:
         tests: those with a bench.
         left_out: node IDs of those without.
-        digest: of the files that they stand in, and of what these import from their project.
+        digest: of their files, and of the project's modules that these import.
     """
 
     tests: tuple[CollectedTest, ...]
@@ -85,9 +85,9 @@ class Run(NamedTuple):
     """A test with a seed.
 
     Attributes:
-        number: its place in the campaign.
+        number: its number in the campaign.
         nodeid: of the test.
-        seed: of all chance.
+        seed: of all random numbers.
     """
 
     number: int
@@ -99,12 +99,12 @@ class RunVerdict(NamedTuple):
     """How a run ended.
 
     Attributes:
-        number: its place in the campaign.
+        number: its number in the campaign.
         outcome: `passed`, `failed`, `error`, `blocked` or `skipped`; `hung` if it took too long,
             `died` if its process ended three times.
-        virtual_us: how old its bench was then.
-        where: file and line; empty if it passed, or nobody knows.
-        reason: why, in a line; empty if it passed.
+        virtual_us: age of its bench.
+        where: file and line; empty if it passed, or if unknown.
+        reason: the reason, in one line; empty if it passed.
     """
 
     number: int
@@ -123,8 +123,8 @@ def verdicts_of(answer: object, runs: Sequence[Run]) -> list[RunVerdict]:
     """Return the verdicts that a worker has sent.
 
     Args:
-        answer: what came from the worker.
-        runs: what it was asked for.
+        answer: the data from the worker.
+        runs: the requested runs.
 
     Raises:
         ValueError: the answer is not one verdict for each run, in their order.

@@ -30,7 +30,7 @@ def read_parquet(path: Path) -> Iterator[Sequence[str]]:
     """Yield the names of the columns, then each row as texts.
 
     Raises:
-        Refusal: it is no Parquet file.
+        Refusal: it is not a Parquet file.
         OSError: it cannot be read.
     """
     data = path.read_bytes()

@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 from tickrig.emulators.testing.campaign.order import CampaignOrder, CampaignRefusal, Collected, Run
 from tickrig.host.text.values import list_item
 
-# Seeds of a campaign, as people write them: `0-9999`, `3,17,100-199`.
+# Seeds of a campaign, in the notation of users: `0-9999`, `3,17,100-199`.
 
 LARGEST: Final = (1 << 63) - 1
 _RANGE: Final = re.compile(r"([0-9]{1,19})(?:-([0-9]{1,19}))?")
@@ -36,7 +36,7 @@ class Seeds:
         """Read seeds.
 
         Raises:
-            ValueError: what is wrong with them.
+            ValueError: invalid seeds.
         """
         return cls.of_ranges([_range(part.strip()) for part in text.split(",")])
 
@@ -80,7 +80,7 @@ def _range(text: str) -> tuple[int, int]:
 
 
 _MOST: Final = 10_000_000
-"""Runs of a campaign: their numbers fit into memory."""
+"""Largest number of runs of a campaign: their numbers fit into memory."""
 
 _KEPT: Final = "kept"
 """The folder of traces in the commands that replay."""
@@ -98,7 +98,7 @@ class Shard(NamedTuple):
 
     @classmethod
     def parse(cls, text: str) -> Shard:
-        """Read it; ValueError if it is none."""
+        """Read a shard; ValueError if it is invalid."""
         part, slash, parts = text.partition("/")
         digits = slash and part.isdecimal() and parts.isdecimal() and len(text) <= 15
         if not digits or not 1 <= int(part) <= int(parts):
@@ -117,10 +117,10 @@ class CampaignPlan:
     """The runs of a campaign: each test with each seed, seed by seed.
 
     Attributes:
-        order: how tests are run.
+        order: options of the runs.
         collected: the tests.
         seeds: of the runs.
-        shard: which of all runs are done here.
+        shard: the part of all runs done here.
     """
 
     order: CampaignOrder
@@ -159,7 +159,7 @@ class CampaignPlan:
         return Run(number, self.collected.tests[test].nodeid, self.seeds[index])
 
     def values(self, number: int) -> tuple[str, ...]:
-        """Return the values of the parameters of a run, empty where its test takes none."""
+        """Return the values of the parameters of a run, empty for those that its test lacks."""
         test = self.collected.tests[number % len(self.collected.tests)]
         return tuple(test.values.get(name, "") for name in self.parameters)
 
@@ -176,7 +176,7 @@ class CampaignPlan:
 
     @property
     def head(self) -> dict[str, str | list[str]]:
-        """What must be the same for a campaign to be gone on with, by what people call it."""
+        """Properties that must be equal to continue a campaign, by name."""
         return {
             "tests": [test.nodeid for test in self.collected.tests],
             "seeds": str(self.seeds),

@@ -1,4 +1,4 @@
-"""The table of a campaign: a row for each run, the same in whatever order they were done."""
+"""The table of a campaign: a row for each run, independent of their order."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ class CampaignRow(NamedTuple):
 
     Attributes:
         test: node ID.
-        seed: of all chance.
-        values: of the parameters, as they were written; empty where the test takes none.
+        seed: of all random numbers.
+        values: of the parameters, as written; empty if the test lacks them.
         outcome: how it ended.
-        virtual_us: how old the bench was then.
+        virtual_us: age of the bench.
         where: file and line; empty if it passed.
-        reason: why, in a line; empty if it passed.
+        reason: the reason, in one line; empty if it passed.
         replay: the command that replays it with a trace; empty if it passed.
     """
 
@@ -52,7 +52,7 @@ class CampaignRow(NamedTuple):
     replay: str
 
     def cells(self) -> tuple[str | int, ...]:
-        """Return what stands in its columns."""
+        """Return the values of its columns."""
         return (self.test, self.seed, *self.values, *self[3:])
 
 
@@ -74,7 +74,7 @@ class CampaignTable(NamedTuple):
 
 
 def table_of(plan: CampaignPlan, verdicts: Iterable[RunVerdict]) -> CampaignTable:
-    """Return the table of runs that are done."""
+    """Return the table of finished runs."""
     return CampaignTable(plan.parameters, _sorted(_row(plan, verdict) for verdict in verdicts))
 
 
@@ -104,7 +104,7 @@ def _by_value(values: str) -> list[tuple[float, str]]:
 
 
 def write_table(table: CampaignTable, path: Path) -> None:
-    """Write it, as Parquet or CSV by the suffix; the file is there whole or as it was.
+    """Write it atomically, as Parquet or CSV by the suffix.
 
     Raises:
         OSError: it cannot be written.
@@ -121,10 +121,10 @@ def write_table(table: CampaignTable, path: Path) -> None:
 
 
 def read_table(path: Path) -> CampaignTable:
-    """Read what `write_table` wrote.
+    """Read a table of `write_table`.
 
     Raises:
-        Refusal: it is no table of a campaign.
+        Refusal: it is not a table of a campaign.
         OSError: it cannot be read.
     """
     if path.suffix == PARQUET:
@@ -158,10 +158,10 @@ def _rows(
 
 
 def merge_tables(tables: Sequence[tuple[Path, CampaignTable]]) -> CampaignTable:
-    """Join the tables of shards; a run that is in several counts once.
+    """Join the tables of shards; a run in several tables counts once.
 
     Raises:
-        Refusal: their columns differ, or a run has ended otherwise in two.
+        Refusal: their columns differ, or a run ended differently in two tables.
     """
     first, table = tables[0]
     rows: dict[tuple[str, int], tuple[CampaignRow, Path]] = {}
@@ -178,21 +178,21 @@ def merge_tables(tables: Sequence[tuple[Path, CampaignTable]]) -> CampaignTable:
     return CampaignTable(table.parameters, _sorted(row for row, _ in rows.values()))
 
 
-# What a campaign found, for people.
+# Summary of a campaign, for people.
 
 _ORDER: Final = ("passed", "failed", "error", "blocked", "hung", "died", "skipped")
 _COMMANDS: Final = 10
-"""So many commands are shown for each way to fail; the table has them all."""
+"""Number of commands shown for each failure; the table has them all."""
 
 _MOST: Final = 120
-"""Characters of a reason."""
+"""Largest number of characters of a reason."""
 
 _LISTED: Final = 200
-"""Characters of seeds that are listed."""
+"""Largest number of characters of the list of seeds."""
 
 
 def summary(table: CampaignTable, file: str) -> Iterator[str]:
-    """Yield the lines: how many ended how, and of what did not pass why, where, and the commands.
+    """Yield the lines of the summary: counts by outcome; reason, place and commands of failures.
 
     Args:
         table: the runs.
@@ -229,7 +229,7 @@ def _seeds(rows: Sequence[CampaignRow]) -> str:
 
 
 def missing_seeds(table: CampaignTable) -> Iterator[str]:
-    """Say of each test between which seeds runs are missing: a shard that was forgotten."""
+    """Report for each test the seeds between which runs are missing, as after a lost shard."""
     tests: dict[str, list[int]] = {}
     for row in table.rows:
         tests.setdefault(row.test, []).append(row.seed)

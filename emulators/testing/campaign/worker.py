@@ -1,9 +1,9 @@
-"""A worker: pytest in a process of its own, whose tests run as often as they are asked for.
+"""A worker: pytest in its own process, which runs collected tests on request.
 
     python -m tickrig.emulators.testing.campaign.worker CONNECTION ALIVE
 
-CONNECTION is the file descriptor of the pipe to who asks, ALIVE that of one which is closed when he
-is no more.
+CONNECTION is the file descriptor of the pipe to the parent, ALIVE that of a pipe which closes when
+the parent ends.
 """
 
 from __future__ import annotations
@@ -40,10 +40,10 @@ from tickrig.emulators.testing.plugin.stash import BENCHED
 from tickrig.emulators.testing.report.bench_report import Outcome
 
 _IDLE_S: Final = 60.0
-"""Who asks for nothing for so long has forgotten the worker; another one is started when needed."""
+"""Idle time after which a worker ends; another one is started when needed."""
 
 _MOST: Final = 300
-"""Characters of a reason."""
+"""Largest number of characters of a reason."""
 
 _REPORTER: Final = "terminalreporter"
 """The name of the plug-in that writes to the terminal."""
@@ -52,11 +52,11 @@ _ADDRESS: Final = re.compile(r"\b0x[0-9a-f]{8,16}\b")
 
 
 class _Worker:
-    """The plug-in that stands in the place of pytest's loop over all tests.
+    """The plug-in that replaces pytest's loop over all tests.
 
     Args:
-        conn: the pipe to who asks.
-        order: what was asked for.
+        conn: the pipe to the parent.
+        order: the request.
     """
 
     def __init__(self, conn: Connection, order: CampaignOrder) -> None:
@@ -73,7 +73,7 @@ class _Worker:
         config.pluginmanager.register(self._silent, _REPORTER)
 
     def pytest_collectreport(self, report: pytest.CollectReport) -> None:
-        """Note the first file that cannot be collected."""
+        """Record the first file that cannot be collected."""
         if report.failed and not self.refusal:
             crash = getattr(report.longrepr, "reprcrash", None)
             text = crash.message if crash else report.longreprtext
@@ -83,7 +83,7 @@ class _Worker:
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtestloop(self, session: pytest.Session) -> bool:
-        """Run what is asked for, until nothing is any more."""
+        """Run requested tests until there are no more requests."""
         if session.testsfailed:
             return True
         session.config.stash[SNAPSHOTS] = {}
@@ -97,11 +97,11 @@ class _Worker:
         return True
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """Note how a phase of the test ended."""
+        """Record the result of a phase of the test."""
         self._reports.append(report)
 
     def _run(self, item: pytest.Item, run: Run) -> RunVerdict:
-        """Run a test as if it were alone; what belongs to the session stays."""
+        """Run a test as if it were alone; session fixtures are kept."""
         settings = item.config.stash[SETTINGS]
         item.config.stash[SETTINGS] = settings._replace(seed=run.seed)
         del item.user_properties[:], item._report_sections[:], self._reports[:]
@@ -134,7 +134,7 @@ def _where(item: pytest.Item, reports: list[pytest.TestReport]) -> str:
 
 
 def _one_line(reason: str) -> str:
-    """Return a reason that is the same in each process: no address, and no end of a line.
+    """Return a reason that is the same in each process: without addresses and line ends.
 
     >>> _one_line("<Lamp object at 0x7f3d9cdb2d10> is dark")
     '<Lamp object at 0x...> is dark'
@@ -153,13 +153,13 @@ def collected(session: pytest.Session) -> Collected:
 
 
 def _place(config: pytest.Config, item: pytest.Item) -> str:
-    """Return a node ID as one types it where the campaign was begun."""
+    """Return a node ID relative to the folder of the campaign."""
     file, *names = str(item.nodeid).split("::")
     return "::".join([relpath(config.rootpath / file, config.invocation_params.dir), *names])
 
 
 def _digest(config: pytest.Config, items: list[pytest.Item]) -> str:
-    """Return the hash of the files of tests, what they import from their project, the rig file."""
+    """Return the hash of the test files, their imports in the project, and the rig file."""
     files = {item.path for item in items}
     for module in [*sys.modules.values()]:
         file = Path(getattr(module, "__file__", None) or "/")
@@ -175,7 +175,7 @@ def _digest(config: pytest.Config, items: list[pytest.Item]) -> str:
 
 
 def main(conn: Connection, alive: int) -> None:
-    """Do what is asked over a pipe."""
+    """Serve requests from a pipe."""
     threading.Thread(target=_end_with, args=(alive,), daemon=True).start()
     order: CampaignOrder = conn.recv()
     worker, said = _Worker(conn, order), io.StringIO()
@@ -191,14 +191,14 @@ def main(conn: Connection, alive: int) -> None:
 
 
 def _last_line(said: str) -> str:
-    """Return what pytest ended with: the line of its error."""
+    """Return the error line with which pytest ended."""
     lines = [line.removeprefix("ERROR: ").strip() for line in said.splitlines() if line.strip()]
     errors = [line for line in lines if "error:" in line]
     return (errors or lines or ["no tests were collected"])[0]
 
 
 def _end_with(alive: int) -> None:
-    """End when who asks has ended, even in the middle of a test that never does."""
+    """Exit when the parent has ended, even in the middle of a stuck test."""
     os.read(alive, 1)
     os._exit(1)
 

@@ -1,1 +1,1 @@
-"""tickrig run, check, init, record, compare."""
+"""The commands `tickrig run`, `check`, `init`, `record`, `compare`, `campaign` and others."""

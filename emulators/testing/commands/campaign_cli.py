@@ -14,16 +14,16 @@ _OUTPUT: Final = "Table to write, .csv or .parquet; may be repeated."
 
 
 class _CampaignGroup(click.Group):
-    """A group whose first command need not be named: `tickrig campaign tests --seeds 0-9`."""
+    """A group with a default command: `tickrig campaign tests --seeds 0-9`."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Read the words behind the command; those that name no command are for `run`."""
+        """Read the words after the command; without a command name they are for `run`."""
         if args and args[0] not in (*self.commands, *ctx.help_option_names):
             args = [_RUN, *args]
         return super().parse_args(ctx, args)
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[Any]:
-        """Complete commands, and what `run` takes."""
+        """Complete commands, and the arguments of `run`."""
         run = self.commands[_RUN]
         with run.make_context(_RUN, [], parent=ctx, resilient_parsing=True) as own:
             return [
@@ -35,7 +35,7 @@ class _CampaignGroup(click.Group):
 
 @click.group(cls=_CampaignGroup)
 def campaign() -> None:
-    """Run tests that have a bench with many seeds and parameters, on all cores or a cluster.
+    """Run bench tests with many seeds and parameters, on all cores or a cluster.
 
     \b
     tickrig campaign tests/test_stop.py --seeds 0-9999
@@ -44,14 +44,14 @@ def campaign() -> None:
     tickrig campaign tests --seeds 0-9999 --scheduler tcp://10.0.0.5:8786
     tickrig campaign merge part1.csv part2.csv -o all.csv
 
-    The word run may be left out: see 'tickrig campaign run --help' for the options. After Ctrl-C or
-    a kill the same command goes on where it ended.
+    The word run may be omitted: see 'tickrig campaign run --help' for the options. After Ctrl-C or
+    a kill the same command continues where it ended.
     """  # noqa: D301 - click wants the backspace
 
 
 @campaign.command(_RUN)
 @click.argument("tests", nargs=-1, required=True, type=click.Path())
-@click.option("--seeds", required=True, help="As 0-9999, or 3,17,100-199.")
+@click.option("--seeds", required=True, help="Seeds, such as 0-9999 or 3,17,100-199.")
 @click.option(
     "--param",
     "parameters",
@@ -63,14 +63,14 @@ def campaign() -> None:
 @click.option(
     "-o", "--output", "outputs", multiple=True, type=PATH, help=_OUTPUT + "  [campaign.csv]"
 )
-@click.option("-j", "--workers", type=click.IntRange(1, 1000), help="Processes.  [one a core]")
-@time_option("--timeout", "timeout_us", default="60s", help="What a run takes at most.  [60s]")
+@click.option("-j", "--workers", type=click.IntRange(1, 1000), help="Processes. [one per core]")
+@time_option("--timeout", "timeout_us", default="60s", help="Time-out of a run. [60s]")
 @click.option("--bench", default="", metavar="RIG.TOML", help="Rig file of the bench.")
 @click.option(
-    "-k", "keyword", default="", metavar="EXPRESSION", help="Tests by name, as of pytest."
+    "-k", "keyword", default="", metavar="EXPRESSION", help="Tests by name, as for pytest."
 )
 @click.option("--scheduler", default="", metavar="URL", help="Run on this Dask cluster.")
-@click.option("--fresh", is_flag=True, help="Begin anew, whatever is there.")
+@click.option("--fresh", is_flag=True, help="Start again, and replace earlier results.")
 @works_in("tickrig.emulators.testing.commands.campaign_run:run")
 def run(**options: Any) -> None:
     """Run TESTS (files, folders or node IDs) with each seed and each value, in virtual time.
@@ -88,7 +88,7 @@ def run(**options: Any) -> None:
 @click.option("-o", "--output", "outputs", multiple=True, required=True, type=PATH, help=_OUTPUT)
 @works_in("tickrig.emulators.testing.commands.campaign_run:merge")
 def merge(tables: tuple[Path, ...], outputs: tuple[Path, ...]) -> None:
-    """Join the tables of shards, and say what they found.
+    """Join the tables of shards, and print their summary.
 
     \b
     tickrig campaign merge part1.csv part2.csv -o all.csv

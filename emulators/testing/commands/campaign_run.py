@@ -73,39 +73,39 @@ else:
 # kept, the command to go on is printed), refused (nothing begun). The table is written
 # before the journal goes.
 
-# A campaign under way: runs are handed out, and verdicts come back, until all are done.
+# A running campaign: runs are submitted, and verdicts returned, until all are done.
 
 _BATCH_S: Final = 1.0
-"""So long a batch takes, about: what a kill costs, and the handing out of each."""
+"""Target duration of a batch: a balance of the loss after a kill and the cost of submission."""
 
 _MOST: Final = 500
-"""Runs of a batch."""
+"""Limits of the number of runs in a batch."""
 
 
 class _Workers(Protocol):
-    """Who does runs: on this machine, or on a cluster."""
+    """Workers: on this machine, or on a cluster."""
 
     @property
     def count(self) -> int:
-        """How many runs are done at the same time."""
+        """Number of parallel runs."""
         ...
 
     def submit(self, runs: Sequence[Run]) -> Future[list[RunVerdict]]:
-        """Let runs be done; the future may raise CampaignRefusal."""
+        """Submit runs; the future may raise CampaignRefusal."""
         ...
 
     def close(self) -> None:
-        """End all that is under way."""
+        """Stop all workers."""
         ...
 
 
 class Campaign:
-    """Runs that are to be done, and what became of them.
+    """Runs to be done, and their verdicts.
 
     Args:
         plan: all runs.
-        journal: where verdicts are kept; runs that it has are not done again.
-        workers: who does them.
+        journal: storage of verdicts; its runs are not repeated.
+        workers: the workers.
     """
 
     def __init__(self, plan: CampaignPlan, journal: CampaignJournal, workers: _Workers) -> None:
@@ -117,11 +117,11 @@ class Campaign:
         self._size = 1
 
     def verdicts(self) -> Iterator[list[RunVerdict]]:
-        """Do all runs; give verdicts as they are on the disk.
+        """Do all runs; yield verdicts when they are on the disk.
 
         Raises:
-            CampaignRefusal: the workers cannot go on.
-            JournalFullError: nothing can be written any more.
+            CampaignRefusal: the workers cannot continue.
+            JournalFullError: the journal cannot be written.
         """
         while self._submit():
             done, _ = wait(self._under_way, return_when=FIRST_COMPLETED)
@@ -132,7 +132,7 @@ class Campaign:
                 yield self._journal.add(verdicts)
 
     def _submit(self) -> bool:
-        """Keep all workers busy, and a batch for each ready; False if all is done."""
+        """Keep all workers busy, with one batch each in reserve; return False when all is done."""
         workers = self._workers.count
         while len(self._under_way) < 2 * workers:
             numbers = list(islice(self._left, self._batch(workers)))
@@ -143,11 +143,11 @@ class Campaign:
         return bool(self._under_way)
 
     def _batch(self, workers: int) -> int:
-        """Return how many runs are next: less towards the end, so that all workers end together."""
+        """Return the size of the next batch: smaller towards the end, so that all end together."""
         return max(1, min(self._size, self._count // (4 * workers)))
 
     def _learn(self, took_s: float) -> None:
-        """Make batches larger or smaller; how long they wait for another one counts, too."""
+        """Adapt the size of batches to their duration, including waits."""
         if took_s < _BATCH_S:
             self._size = min(_MOST, 2 * self._size)
         elif took_s > 4 * _BATCH_S:
@@ -160,20 +160,20 @@ _NEEDS_ARROW: Final = "Parquet needs pyarrow: pip install 'tickrig[campaign]'"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _CampaignOptions:
-    """What the command line says.
+    """Options of the command line.
 
     Attributes:
         tests: files, folders and node IDs.
-        seeds: as `0-9999`.
-        parameters: as `flip=0.0001,0.001`.
-        shard: as `3/8`.
+        seeds: such as `0-9999`.
+        parameters: such as `flip=0.0001,0.001`.
+        shard: such as `3/8`.
         outputs: tables to write.
-        workers: processes; None for one a core.
-        timeout_us: what a run takes at most.
+        workers: processes; None for one per core.
+        timeout_us: time-out of a run.
         bench: rig file, empty for that of the tests.
         keyword: as pytest's `-k`.
         scheduler: of a Dask cluster, empty for this machine.
-        fresh: whether what is there is replaced.
+        fresh: whether to replace earlier results.
         version: of tickrig.
     """
 
@@ -192,14 +192,14 @@ class _CampaignOptions:
 
     @property
     def output_paths(self) -> tuple[Path, ...]:
-        """Where the tables go; a shard's have its numbers unless they are given."""
+        """Paths of the tables; default names for a shard contain its numbers."""
         shard = Shard.parse(self.shard)
         part = f"-{shard.part}-of-{shard.parts}" if shard.parts > 1 else ""
         return self.outputs or (Path(f"campaign{part}{_CSV}"),)
 
     @property
     def order(self) -> CampaignOrder:
-        """What workers are asked for."""
+        """The request to workers."""
         return CampaignOrder(
             tests=self.tests,
             parameters=self.parameters,
@@ -215,10 +215,10 @@ class _CampaignRun:
     """The run of a campaign.
 
     Args:
-        options: what the command line says.
+        options: of the command line.
 
     Raises:
-        CampaignRefusal: what cannot be.
+        CampaignRefusal: invalid options.
     """
 
     def __init__(self, options: _CampaignOptions) -> None:
@@ -235,7 +235,7 @@ class _CampaignRun:
         self._check_old()
 
     def _check_old(self) -> None:
-        """Refuse to replace a table, unless it is of a campaign whose end was cut off."""
+        """Refuse to replace a table, unless its campaign was interrupted at the end."""
         if self._options.fresh:
             self._journal_path.unlink(missing_ok=True)
             return
@@ -246,10 +246,10 @@ class _CampaignRun:
             )
 
     def run(self) -> CampaignTable:
-        """Do all that is left to do, and write the tables.
+        """Do the remaining runs, and write the tables.
 
         Raises:
-            CampaignRefusal: it cannot be done; what was done is kept.
+            CampaignRefusal: it is impossible; finished runs are kept.
         """
         crew = Crew(self._options.order)
         try:
@@ -316,7 +316,7 @@ class _CampaignRun:
                 bar.update(len(verdicts), len(verdicts))
 
     def _end(self, status: int, why: str) -> NoReturn:
-        """End before all is done; say how to go on."""
+        """Stop early, and print how to continue."""
         if not hasattr(self, "_journal"):
             say(f"{why}; nothing was begun")
         else:

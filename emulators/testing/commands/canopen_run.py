@@ -1,4 +1,4 @@
-"""Run CANopen slaves as the command line asks: on a CAN bus, or a scenario."""
+"""Run CANopen slaves for a command line: on a CAN bus, or a scenario."""
 
 from __future__ import annotations
 
@@ -53,11 +53,11 @@ _NO_NODE: Final = (
 
 
 class _BusYml(NamedTuple):
-    """A bus.yml that the nodes are those of.
+    """A bus.yml with the nodes.
 
     Attributes:
         file: the file, None for none.
-        urdf: the robot with its joints, None for none, or that which the file names.
+        urdf: the robot with its joints, None for none, or the one named in the file.
     """
 
     file: Path | None = None
@@ -69,8 +69,8 @@ class BusPortOpener(NamedTuple):
 
     Attributes:
         port: the bus.
-        name: what people call it.
-        channel: what logs call it.
+        name: its name for messages.
+        channel: its name in logs.
     """
 
     port: CountingPort
@@ -79,10 +79,10 @@ class BusPortOpener(NamedTuple):
 
 
 def open_bus(options: BusOptions, stack: ExitStack) -> BusPortOpener:
-    """Open the bus that options, environment or configuration files of python-can name.
+    """Open the bus from options, environment or configuration files of python-can.
 
     Raises:
-        Refused: none is named, or it cannot be opened.
+        Refused: no bus is given, or it cannot be opened.
     """
     instead = "give --scenario FILE, which runs in virtual time"
     bus, interface, channel = open_raw(options, instead)
@@ -93,11 +93,11 @@ def open_bus(options: BusOptions, stack: ExitStack) -> BusPortOpener:
 
 
 class RigNodes(NamedTuple):
-    """What a rig file says.
+    """Content of a rig file.
 
     Attributes:
-        nodes: its nodes, by the names that it gives them.
-        body: what they move, None if nothing.
+        nodes: its nodes, by their names in it.
+        body: the body they move, None without one.
     """
 
     nodes: tuple[build.Described, ...] = ()
@@ -111,11 +111,11 @@ class _CanopenOptions(RunOptions):
     Attributes:
         specs: the nodes.
         rig: nodes of a rig file, beside `specs`, and the body that they move.
-        bus_yml: what names the nodes instead of both.
+        bus_yml: source of the nodes instead of both.
         profile: of nodes of files; see `choices.PROFILES`.
         bus: the bus outside.
         store: file in which nodes keep what 1010h and LSS store.
-        sdo: what the SDO servers of all nodes put up with.
+        sdo: limits of the SDO servers of all nodes.
     """
 
     specs: tuple[NodeSpec, ...] = ()
@@ -163,7 +163,7 @@ class _CanopenRun(EmulatorRun[_CanopenOptions]):
         return operator, ScenarioParser(device, operator, senders={"send": parse_send})
 
     def _describe(self) -> list[build.Described]:
-        """Read the files of the nodes; ValueError with all that is wrong."""
+        """Read the files of the nodes; ValueError with all errors."""
         options, (file, urdf) = self._options, self._options.bus_yml
         if file is None:
             given = build.describe_nodes(options.specs, options.profile)
@@ -255,7 +255,7 @@ class _CanopenRun(EmulatorRun[_CanopenOptions]):
         self._say_how(_HOW)
 
     def _greet_bus(self, bench: RunningEmulator, file: Path) -> None:
-        """Say which nodes there are, a line each."""
+        """Print the nodes, one line each."""
         say(f"{counted(len(self._described), 'CANopen slave')} of {file} on {bench.link}:")
         for item in self._described:
             what = item.about or _PROFILE_TEXTS[profile_name(item.description.application)]
@@ -286,7 +286,7 @@ def emulate(
     bus_yml: tuple[Path | None, Path | None],
     options: dict[str, Any],
 ) -> int:
-    """Run slaves as the command line says, and return the exit status."""
+    """Run slaves for a command line, and return the exit status."""
     given = {f"--{name}": options.pop(name) for name in _DEVICES}
     _check_bus_yml(*bus_yml, {**given, "--node-id": node_id, "--node": nodes, "--rig": rig})
     bus = BusOptions(**{name: options.pop(name) for name in _BUS_FIELDS})
@@ -313,7 +313,7 @@ def read_rig(path: Path) -> RigNodes:
     """Read the nodes of a rig file, and the body that they move.
 
     Raises:
-        Refused: it cannot be read, has mistakes, or has more than nodes on one bus.
+        Refused: it cannot be read, has errors, or has more than nodes on one bus.
     """
     try:
         if is_bus_file(path.read_bytes()):
@@ -329,7 +329,7 @@ def read_rig(path: Path) -> RigNodes:
 
 
 def _beyond_nodes(plan: RigPlan) -> str:
-    """Return what of a rig file this command does not run, empty if nothing."""
+    """Return the part of a rig file that this command does not support, empty if none."""
     for device in plan.devices.values():
         if device.kind is DeviceKind.SERIAL:
             return f"device {device.name}"
@@ -350,7 +350,7 @@ def _described(device: DevicePlan) -> build.Described:
 
 
 def _check_bus_yml(file: Path | None, urdf: Path | None, others: Mapping[str, object]) -> None:
-    """Refuse --bus beside what names nodes too, and --urdf without --bus."""
+    """Refuse --bus together with other node options, and --urdf without --bus."""
     if file is None:
         if urdf is not None:
             raise Refused("--urdf belongs to --bus: it has the joints of a bus.yml")

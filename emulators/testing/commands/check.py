@@ -1,4 +1,4 @@
-"""Check rig files and bus.yml for `tickrig check`: print findings, or what is on the bench."""
+"""Check rig files and bus.yml for `tickrig check`: print findings, or the devices of the bench."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ _MISTAKES: Final = 1
 _UNREADABLE: Final = 2
 _EDS_ENDINGS: Final = (".eds", ".dcf", ".xdd", ".xdc")
 _LOOKED_AT: Final = 65_536
-"""Bytes at its beginning by which a bus.yml is known."""
+"""Number of bytes at its start for recognising a bus.yml."""
 
 
 def check_files(files: tuple[Path, ...], strict: bool) -> int:
-    """Check files, and return the exit status: 1 for mistakes, 2 for one that cannot be read."""
+    """Check files, and return the exit status: 1 for errors, 2 for an unreadable file."""
     return max([_check(file, strict) for file in files])
 
 
@@ -53,7 +53,7 @@ def _check(file: Path, strict: bool) -> int:
 
 
 def _kind(file: Path) -> str:
-    """Say what a file in YAML is, empty for others; a pipe is not looked into: it is read once."""
+    """Return the kind of a YAML file, empty for others and for pipes, which are read once."""
     with suppress(OSError):
         if file.is_file():
             with file.open("rb") as opened:
@@ -75,7 +75,7 @@ def _check_bus(file: Path, *, strict: bool) -> int:
     """Check a bus.yml, and return the exit status.
 
     Args:
-        file: whose name is said.
+        file: with its name for messages.
         strict: warnings count, too.
 
     Raises:

@@ -1,4 +1,4 @@
-"""The command `tickrig check`: what a rig file or a bus.yml says, or all that is wrong with it."""
+"""The command `tickrig check`: the content of a rig file or bus.yml, or all its errors."""
 
 from __future__ import annotations
 
@@ -11,16 +11,15 @@ from tickrig.host.cli.options import PATH, works_in
 
 @click.command()
 @click.argument("files", metavar="FILE...", nargs=-1, required=True, type=PATH)
-@click.option("--strict", is_flag=True, help="Warnings count, too: a bus.yml has some.")
+@click.option("--strict", is_flag=True, help="Warnings of a bus.yml count as errors, too.")
 @works_in("tickrig.emulators.testing.commands.check:check_files")
 def check(**options: Any) -> None:
-    """Check rig files and bus.yml: say what is on the bench, or all that is wrong.
+    """Check rig files and bus.yml: list the devices on the bench, or all errors.
 
-    Each mistake is a line FILE:LINE: REASON. Devices are made once to see that their
-    options, inputs and faults are right, so a FILE.py that one names is run; nothing is
-    opened. The bus.yml of dcfgen and ros2_canopen is known by its content, and held
-    against the EDS files that it names.
-    Exit status 0: all is well; 1: there are mistakes; 2: a file cannot be read.
+    Each error is a line FILE:LINE: REASON. Devices are made once to check their options, inputs and
+    faults, so a FILE.py in the rig file is run; nothing is opened. The bus.yml of dcfgen and
+    ros2_canopen is recognised by its content, and checked against its EDS files. Exit status 0: no
+    errors; 1: errors; 2: a file cannot be read.
 
     \b
     tickrig check rig.toml

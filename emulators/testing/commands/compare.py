@@ -1,4 +1,4 @@
-"""What tickrig compare does: both runs of a device or a bus, and what it prints of them."""
+"""The command `tickrig compare`: both runs of a device or a bus, and its output."""
 
 from __future__ import annotations
 
@@ -35,13 +35,13 @@ from tickrig.host.text.values import counted, format_time, parse_setting
 from tickrig.wire.can import CanFrame, ErrorFrame
 from tickrig.wire.instant import NEVER
 
-# What a device on a serial line said, and what an emulator says to the same host.
+# Recorded output of a device on a serial line, and output of an emulator for the same host.
 
 _SEARCHED_US: Final = 10_000_000
-"""So long after it was switched on an emulator may say the first that was recorded."""
+"""Time after power-on within which an emulator may send the first recorded line."""
 
 _PHASES: Final = 8
-"""So many places of the emulator's ticks are tried; a port does not show where they begin."""
+"""Number of tick phases to try; a port does not show where ticks start."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,8 +49,8 @@ class _ComparedRun:
     """Two runs of a device, in the time of the recording.
 
     Attributes:
-        recorded: what was recorded.
-        emulated: what the emulator says.
+        recorded: recorded output.
+        emulated: output of the emulator.
     """
 
     recorded: list[Said]
@@ -60,12 +60,12 @@ class _ComparedRun:
 def _compare_ticks(
     recording: replay.BenchRecording, name: str, configured: ConfiguredDevice
 ) -> _ComparedRun:
-    """Feed the emulator tick by tick, as the recorded device was.
+    """Replay the recorded ticks on the emulator.
 
     Args:
         recording: recorded at the device.
         name: of the device.
-        configured: a fresh one.
+        configured: a new one.
     """
     split = configured.type.line.splitter or line_splitter
     said = replay.traffic_of(recording.of(name), Mark.FROM_DEVICE)
@@ -82,17 +82,16 @@ def _compare_port(
     tolerance: Tolerance,
     settle_us: int,
 ) -> _ComparedRun:
-    """Let the recorded host talk to the emulator over a line, at its times.
+    """Replay the recorded host on a line with the emulator, at its times.
 
     Args:
         recording: recorded at the host's port.
         name: of the device.
         make: makes the device.
-        tolerance: how long after the end the emulator may still answer.
-        settle_us: how long the emulator has been on when the recording begins. If what the
-            device said first is what it says by itself when it is switched on, that is tried
-            too; so are other places of its ticks where something was set for less than one.
-            The closest counts.
+        tolerance: time after the end in which the emulator may still answer.
+        settle_us: how long the emulator is on before the recording starts. If the first recorded
+            output is the greeting after power-on, that is tried too; other tick phases are tried if
+            an input was set for less than a tick. The closest run counts.
     """
     records, device = recording.of(name), make().device
     until_us = recording.until_us + tolerance.allowed_us(recording.until_us)
@@ -122,12 +121,12 @@ def _has_short_change(records: Iterable[BenchRecord], tick_us: int) -> bool:
 
 
 def _begin_with(first: Said, alone: Iterable[Said], tolerance: Tolerance) -> list[int]:
-    """Return when a recording began, if the device said that by itself.
+    """Return the start of a recording relative to power-on, if its first output is a greeting.
 
     Args:
-        first: what it said first.
-        alone: what the emulator says since it was switched on, if nobody does anything.
-        tolerance: what counts as the same.
+        first: its first output.
+        alone: output of the emulator after power-on without input.
+        tolerance: the tolerances.
     """
     found = (said.at_us for said in alone if tolerance.same(first.text, said.text))
     return [at_us - first.at_us for at_us in islice(found, 1)]
@@ -146,7 +145,7 @@ def _closest(runs: Iterable[_ComparedRun], until_us: int, tolerance: Tolerance) 
 def _play(
     configured: ConfiguredDevice, records: Iterable[BenchRecord], begin_us: int, end_us: int
 ) -> list[Said]:
-    """Return what the emulator says, from the begin of the recording."""
+    """Return the output of the emulator, from the start of the recording."""
     emulator = Emulator(configured.type.name, configured.device, line=configured.type.line)
     said: list[Said] = []
 
@@ -166,7 +165,7 @@ def _play(
 
 
 def _act(emulator: Emulator, record: BenchRecord, now_us: int) -> None:
-    """Do what the recorded host did, or the hand at the device."""
+    """Repeat an action of the recorded host or operator."""
     if isinstance(record.traffic, bytes) and record.mark is Mark.TO_DEVICE:
         emulator.send(now_us, record.traffic)
     else:
@@ -174,17 +173,17 @@ def _act(emulator: Emulator, record: BenchRecord, now_us: int) -> None:
 
 
 def cut(split: Splitter, traffic: Iterable[tuple[int, object, int]]) -> Iterator[Said]:
-    """Yield the lines of what passed, each with the time and the line of its end."""
+    """Yield the lines of the traffic, each with time and line number of its end."""
     for at_us, data, line in traffic:
         assert isinstance(data, bytes)
         for whole in split(at_us, data):
             yield Said(at_us, escape(whole), line)
 
 
-# What nodes on a CAN bus said, and what emulated nodes say to the same master.
+# Recorded frames of nodes on a CAN bus, and frames of emulated nodes for the same master.
 
 _ALWAYS: Final = (0x080, 0x580, 0x700)
-"""CAN-IDs that a node has without an object: EMCY, answers of its SDO server, heartbeat."""
+"""CAN-IDs of a node without an object: EMCY, answers of its SDO server, heartbeat."""
 
 EMCY: Final = (0x1014, 0)
 _SDO_SERVERS: Final = range(0x1200, 0x1280)
@@ -194,12 +193,12 @@ _CAN_ID: Final = 0x1FFF_FFFF
 
 
 def _compare_node_ticks(recording: replay.BenchRecording, name: str, node: Node) -> _ComparedRun:
-    """Feed a node tick by tick, as the recorded one was.
+    """Replay the recorded ticks on a node.
 
     Args:
         recording: recorded at the device.
         name: of the node.
-        node: a fresh one.
+        node: a new one.
     """
     recorded = [
         Said(at_us, str(frame), line)
@@ -223,15 +222,14 @@ def _compare_bus(
 ) -> _ComparedRun:
     """Put the recorded frames of all others on a bus with emulated nodes, at their times.
 
-    What a node sends is known by its CAN-IDs, as its dictionary has them at that time.
+    Frames of a node are identified by its CAN-IDs in its dictionary at that time.
 
     Args:
         recording: recorded at a port of the bus.
         make: makes the nodes on a bus.
-        tolerance: how long after the end they may still answer.
-        settle_us: how long the nodes have been on when the recording begins. If what was said
-            first is what one of them says by itself when it is switched on, that is tried too,
-            and the closer one counts.
+        tolerance: time after the end in which they may still answer.
+        settle_us: how long the nodes are on before the recording starts. If the first frame is one
+            after power-on, that is tried too, and the closer run counts.
         bit_rate: of the bus in bit/s.
     """
     records = [x for x in recording.records if isinstance(x.traffic, CanFrame) or x.text]
@@ -251,7 +249,7 @@ def _compare_bus(
 
 
 class _Bus:
-    """Emulated nodes, and all others as they were recorded."""
+    """Emulated nodes, and recorded frames of all others."""
 
     def __init__(
         self, make: Callable[[CanWire], Sequence[Node]], bit_rate: int, begin_us: int
@@ -268,7 +266,7 @@ class _Bus:
         self._said: list[Said] = []
 
     def play(self, records: Iterable[BenchRecord], end_us: int) -> list[Said]:
-        """Return what the nodes say up to a time, from the begin of the recording."""
+        """Return the frames of the nodes up to a time, from the start of the recording."""
         for number, record in enumerate(records):
             at_us = max(0, self._begin_us + record.at_us)
             early = self._begin_us + record.at_us < 0
@@ -281,7 +279,7 @@ class _Bus:
         return isinstance(traffic, CanFrame) and any(x.has(traffic) for x in self._ids.values())
 
     def _act(self, record: BenchRecord, early: bool, now_us: int) -> None:
-        """Do what the host or a hand did; `early` is before the nodes were switched on."""
+        """Repeat an action of host or operator; `early` means before the nodes were switched on."""
         frame = record.traffic
         if not isinstance(frame, CanFrame):
             self._do(record)
@@ -291,7 +289,7 @@ class _Bus:
             self._host.send(now_us, (frame,))
 
     def _do(self, record: BenchRecord) -> None:
-        """Do what was done to a node by hand: `5/power_off=1`, or to the only one."""
+        """Repeat a manual action on a node: `5/power_off=1`, or on the only one."""
         prefix, slash, text = record.text.partition("/")
         node = self._nodes.get(prefix) if slash else next(iter(self._nodes.values()))
         if node is None:
@@ -304,7 +302,7 @@ class _Bus:
 
 
 class _Produced:
-    """Which frames a slave sends."""
+    """Frames of a slave."""
 
     def __init__(self, slave: CanopenSlave) -> None:
         self._slave = slave
@@ -324,7 +322,7 @@ class _Produced:
 # What `tickrig compare` prints: the first difference, the others, and a table of all.
 
 _SHOWN: Final = 20
-"""So many differences are listed."""
+"""Largest number of listed differences."""
 
 _HEAD: Final = ("", "recorded", "emulated", "different", "worst")
 
@@ -332,13 +330,13 @@ _HEAD: Final = ("", "recorded", "emulated", "different", "worst")
 def report(
     file: str, pairs: Mapping[str, Sequence[Pair]], tolerance_us: int, *, everything: bool
 ) -> tuple[list[str], bool]:
-    """Return the lines of a comparison, and whether all is the same.
+    """Return the lines of a comparison, and whether the runs are equal.
 
     Args:
         file: name of the trace.
-        pairs: what was said, by device.
+        pairs: output pairs, by device.
         tolerance_us: of the times.
-        everything: list what is the same too.
+        everything: also list equal lines.
     """
     rows = sorted(
         ((name, pair) for name, said in pairs.items() for pair in said),
@@ -411,7 +409,7 @@ _BIT_RATE: Final = 1_000_000
 
 
 def run_compare(file: Path, *, verbose: bool, **options: Any) -> int:
-    """Compare as the command line asks, and return the exit status."""
+    """Compare for a command line, and return the exit status."""
     tolerance = _read_tolerance(options)
     try:
         recording = replay.read_bench_recording(file.read_bytes())
@@ -437,7 +435,7 @@ def run_compare(file: Path, *, verbose: bool, **options: Any) -> int:
 
 
 def _given_code(options: Mapping[str, Any]) -> list[str]:
-    """Return what may be a `FILE.py:Class` of a user in --node and --config."""
+    """Return texts in --node and --config that may be a `FILE.py:Class` of a user."""
     return [text.partition("=")[2] for text in (*options["nodes"], *options["config"])]
 
 
@@ -478,7 +476,7 @@ def _ticked(
 def _on_line(
     recording: replay.BenchRecording, name: str, tolerance: Tolerance, options: Mapping[str, Any]
 ) -> _ComparedRun:
-    """Compare what passed a serial port."""
+    """Compare the traffic of a serial port."""
     recorded = recording.header.devices[name].type
     if not (recorded or options["type_name"]):
         raise ValueError("it does not say of which type the device is: add --type, as --type rrc")
@@ -492,7 +490,7 @@ def _on_line(
 def _on_bus(
     recording: replay.BenchRecording, name: str, tolerance: Tolerance, options: Mapping[str, Any]
 ) -> _ComparedRun:
-    """Compare what passed a bus."""
+    """Compare the traffic of a bus."""
     try:
         specs = [spec for text in options["nodes"] for spec in parse_node(text)]
         described = describe_nodes(specs)

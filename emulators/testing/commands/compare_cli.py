@@ -17,24 +17,24 @@ _device: Final = add_options(
     click.option(
         "--node", "nodes", multiple=True, metavar="ID=DEVICE", help="On a bus: 5=epos, 5=drive.eds."
     ),
-    time_option("--settle", "settle_us", default="1s", help="On for so long before it.  [1s]"),
+    time_option("--settle", "settle_us", default="1s", help="Time on before the recording. [1s]"),
 )
 _tolerance: Final = add_options(
-    time_option("--tolerance", "time_us", default="20ms", help="Of each time.  [20ms]"),
+    time_option("--tolerance", "time_us", default="20ms", help="Tolerance of times. [20ms]"),
     click.option(
         "--number",
         "numbers",
         multiple=True,
         metavar="PATTERN=MOST",
-        help="Numbers in such lines may differ: 'EV:batt*=5', '181#*[2:4]=1%'.",
+        help="Tolerance of numbers in lines: 'EV:batt*=5', '181#*[2:4]=1%'.",
     ),
-    click.option("--ignore", multiple=True, metavar="PATTERN", help="Lines not compared."),
+    click.option("--ignore", multiple=True, metavar="PATTERN", help="Lines to ignore."),
     click.option(
         "--kind",
         "kinds",
         multiple=True,
         metavar="PATTERN",
-        help="Lines in an order of their own.",
+        help="Lines with an independent order.",
     ),
 )
 
@@ -44,13 +44,13 @@ _tolerance: Final = add_options(
 @_device
 @_tolerance
 @run_code_option
-@click.option("-v", "--verbose", is_flag=True, help="All that was said, the same too.")
+@click.option("-v", "--verbose", is_flag=True, help="List all lines, also equal ones.")
 @works_in("tickrig.emulators.testing.commands.compare:run_compare")
 def compare_command(**options: Any) -> None:
-    """Let the host of a recorded run talk to an emulator; say where it answers otherwise.
+    """Replay the host of a recorded run against an emulator; report different answers.
 
-    FILE is a trace of 'tickrig record', of an emulator or of a bench. Exit status 0 if the
-    emulator says the same, 1 if not, 2 if it cannot be compared.
+    FILE is a trace of 'tickrig record', of an emulator or of a bench. Exit status 0 if the emulator
+    answers the same, 1 if not, 2 if they cannot be compared.
 
     \b
     tickrig record /dev/ttyUSB0 --out run.trace --type rrc --link /tmp/rrc

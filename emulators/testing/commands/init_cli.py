@@ -1,4 +1,4 @@
-"""The command `tickrig init`: a rig file to begin with."""
+"""The command `tickrig init`: write an initial rig file."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ def _complete_type(context: click.Context, parameter: click.Parameter, begun: st
 @click.option("-o", "--output", "file", type=PATH, default=_RIG, help=f"File to write.  [{_RIG}]")
 @works_in("tickrig.emulators.testing.commands.rig_template:init")
 def init(types: tuple[str, ...], file: Path) -> None:
-    """Write a rig file to begin with: devices, and all that can be said of them.
+    """Write an initial rig file: devices with all their options.
 
-    It checks and runs as it is; comments propose inputs, faults, ports. A file that is
-    there is left alone; - is standard output.
+    It is valid and runs unchanged; comments propose inputs, faults, ports. An existing file is not
+    changed; - is standard output.
 
     \b
     tickrig init

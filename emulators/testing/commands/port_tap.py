@@ -1,4 +1,4 @@
-"""A tap between a host and a real port: what passes is recorded, unchanged and at once."""
+"""A tap between a host and a real port: records the traffic and forwards it at once."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ from tickrig.host.text.names import near
 from tickrig.host.text.values import parse_setting
 
 _LOOK_S: Final = 0.05
-"""How often the tap looks whether it is to end."""
+"""Period at which the tap checks whether to stop."""
 
 _STOPPED_S: Final = 0.5
-"""A look that is later than this was not made in time: the process was stopped, or starved."""
+"""Delay from which a check counts as late: the process was stopped, or starved."""
 
 _READ_BYTES: Final = 4_096
 
@@ -44,14 +44,14 @@ class _PortTap:
 
     Args:
         link: the port, recorded.
-        pty: where the host is.
+        pty: the host's terminal.
         typed: called with each line that an operator types.
-        late: called with how many seconds the tap had not been running.
+        late: called with the seconds in which the tap was not running.
 
     Attributes:
         sent: bytes that went to the device.
         received: bytes that came from it.
-        gone: why the port is gone, empty while it is there.
+        gone: reason of a lost port, empty while it exists.
     """
 
     def __init__(
@@ -71,7 +71,7 @@ class _PortTap:
         """Pass bytes until `stop` is called or the port is gone.
 
         Args:
-            terminal: descriptor where the operator types, None if there is nobody.
+            terminal: descriptor of the operator's terminal, None without one.
         """
         reader = threading.Thread(target=self._read_port, daemon=True)
         reader.start()
@@ -92,11 +92,11 @@ class _PortTap:
         reader.join()
 
     def stop(self) -> None:
-        """Let `run` end."""
+        """Stop `run`."""
         self._stopped = True
 
     def _read_port(self) -> None:
-        """Hand on what the device says, in a thread of its own."""
+        """Forward data of the device, in its own thread."""
         try:
             while not self._stopped:
                 if data := self._link.receive(round(_LOOK_S * 1e6)):
@@ -107,7 +107,7 @@ class _PortTap:
             self.gone = self.gone or str(error)
 
     def _read_pty(self) -> None:
-        """Hand on what the host says, and what it had no room for before."""
+        """Forward data of the host, and send it buffered data."""
         try:
             with self._lock:
                 data = self._pty.poll(self._link.now_us)
@@ -118,7 +118,7 @@ class _PortTap:
             self.gone = self.gone or str(error)
 
     def _read_terminal(self, terminal: int) -> bool:
-        """Take what was typed; False at its end."""
+        """Read typed lines; return False at the end."""
         try:
             data = os.read(terminal, _READ_BYTES)
         except OSError:  # it is gone, or this job is in the background
@@ -139,7 +139,7 @@ _RECORDING_ENDED: Final = 3
 
 
 def record_port(port: str, out: Path, type_name: str, link: Path | None, baud: int | None) -> int:
-    """Record as the command line asks, and return the exit status."""
+    """Record for a command line, and return the exit status."""
     usual_baud, inputs = _known(type_name)
     with ExitStack() as stack:
         stack.enter_context(warnings_shown())
@@ -205,11 +205,11 @@ def _greet(path: str, port: str) -> None:
 
 
 def _late(seconds: float) -> None:
-    say(f"stopped for {seconds:.1f} s: what passed meanwhile has the time when it was handed on")
+    say(f"stopped for {seconds:.1f} s: traffic of this time has the time when it was forwarded")
 
 
 def _terminal() -> int | None:
-    """Return where the operator types."""
+    """Return the descriptor of the operator's terminal."""
     signal.signal(signal.SIGTTIN, signal.SIG_IGN)  # a job in the background reads nothing
     try:
         return sys.stdin.fileno()
@@ -218,7 +218,7 @@ def _terminal() -> int | None:
 
 
 def _typing(link: RecordingLink[bytes], inputs: Inputs | None) -> Callable[[str], None]:
-    """Return what takes a line that was typed."""
+    """Return a function for typed lines."""
 
     def take(line: str) -> None:
         try:
@@ -234,7 +234,7 @@ def _typing(link: RecordingLink[bytes], inputs: Inputs | None) -> Callable[[str]
 
 
 def _changes(line: str, inputs: Inputs | None) -> Iterator[tuple[str, int | float | str]]:
-    """Read `NAME=VALUE`, of a group `NAME=VALUE,VALUE`; ValueError if it is none."""
+    """Read `NAME=VALUE`, of a group `NAME=VALUE,VALUE`; ValueError for another form."""
     name, equals, rest = (word.strip() for word in line.partition("="))
     if not equals or not rest or not NAME.fullmatch(name):
         raise ValueError(f"{line!r:.60} is not NAME=VALUE, and not reset")

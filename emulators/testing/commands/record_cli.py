@@ -13,19 +13,19 @@ from tickrig.host.cli.options import PATH, works_in
 @click.command("record")
 @click.argument("port")
 @click.option("-o", "--out", type=PATH, required=True, metavar="FILE", help="The trace.")
-@type_option("Device type, as of 'tickrig emu': rrc.")
+@type_option("Device type, as for 'tickrig emu': rrc.")
 @click.option("--link", type=PATH, help="Symbolic link to make to the host's terminal.")
-@click.option("--baud", type=click.IntRange(1), help="Of the port.  [that of the type, or 115200]")
+@click.option("--baud", type=click.IntRange(1), help="Bit rate. [that of the type, or 115200]")
 @works_in("tickrig.emulators.testing.commands.port_tap:record_port")
 def record_command(**options: Any) -> None:
-    """Record what passes between a host and the device at PORT, for `tickrig compare`.
+    """Record the traffic between a host and the device at PORT, for `tickrig compare`.
 
-    The host opens the terminal that is printed, or --link, instead of PORT: a device path
-    or a URL of pyserial. Bytes pass unchanged and at once. What is done to the device by hand
-    is typed here, and is in the trace: NAME=VALUE sets an input, as power_button=1;
-    reset says that it was switched off and on. Ctrl-C ends.
+    The host opens the terminal that is printed, or --link, instead of PORT: a device path or a URL
+    of pyserial. Bytes pass unchanged and at once. Type manual actions on the device here to record
+    them: NAME=VALUE for an input, such as power_button=1; reset for switching it off and on. Ctrl-C
+    ends.
 
-    Exit status 1 if the port is gone, 3 if the recording is not whole.
+    Exit status 1 if the port is lost, 3 if the recording is incomplete.
 
     \b
     tickrig record /dev/ttyUSB0 --out run.trace --type rrc --link /tmp/rrc

@@ -1,1 +1,1 @@
-"""The conformance tester as a library: any slave in virtual time, one pytest test a check."""
+"""The conformance tester as a library: any slave in virtual time, one pytest test per check."""

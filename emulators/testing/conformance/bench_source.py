@@ -1,4 +1,4 @@
-"""A node on a bench in virtual time, as the tester finds it."""
+"""A node on a bench in virtual time, as a source for the tester."""
 
 from __future__ import annotations
 
@@ -27,18 +27,18 @@ from tickrig.host.canopen.conform.conform_run import ConformRun
 from tickrig.host.canopen.eds import open_eds
 from tickrig.wire.errors import FieldError
 
-# Moves the inputs of a slave of ours from the inside, in the words of the tester.
+# Stimuli of the tester for our slaves, set from the inside.
 
 _LINES: Final = 8
-"""`di1` is lines 1 to 8, `di2` those that follow."""
+"""Lines per group: `di1` is lines 1 to 8, `di2` the next ones."""
 
 _ANALOGUE: Final = 0x6401
 _INPUTS: Final = {0x6000: "di", _ANALOGUE: "ai"}
-"""Objects of CiA 401 that show what is at the inputs."""
+"""Objects of CiA 401 that show the inputs."""
 
 
 class SlaveStimulus:
-    """The hands at a slave.
+    """Stimuli of a slave.
 
     Args:
         slave: the slave; its supply is switched elsewhere.
@@ -48,7 +48,7 @@ class SlaveStimulus:
         self._slave, self._application = slave, Application.of(slave)
 
     def __call__(self, *words: str) -> str:
-        """Do it, and return what was read; NotAllowed if the slave has nothing of the kind."""
+        """Execute a stimulus, and return the read value; NotAllowed if it is not supported."""
         slave, application = self._slave, self._application
         match words:
             case ("input", name, data) if ":" in name:
@@ -71,7 +71,7 @@ class SlaveStimulus:
         return ""
 
     def _assign(self, name: str, data: bytes) -> None:
-        """Write an object from the inside; one that shows inputs by moving these."""
+        """Write an object from the inside; an input object by setting the inputs."""
         index, sub = (int(part, 16) for part in name.split(":"))
         if isinstance(self._application, Ds401) and index in _INPUTS:
             value = int.from_bytes(data, "little", signed=index == _ANALOGUE)
@@ -89,7 +89,7 @@ class SlaveStimulus:
 
 
 def _module(module: Ds401, words: tuple[str, ...]) -> str:
-    """Move lines, eight at once and in hex, and channels, in counts, of a CiA 401 module."""
+    """Set lines (eight at once, in hex) and channels (in counts) of a CiA 401 module."""
     try:
         match words[0], words[1][:2], int(words[1][2:]), words[2:]:
             case "input", "di", number, (data,):
@@ -110,7 +110,7 @@ def _module(module: Ds401, words: tuple[str, ...]) -> str:
 
 
 def _set_counts(module: Ds401, number: int, counts: int) -> None:
-    """Let an analogue input have what its converter turns into these counts."""
+    """Set an analogue input to the value that its converter turns into these counts."""
     found = (each.channel for each in module.analogue_inputs if each.number == number)
     channel = next(found, None)
     if channel is None:
@@ -126,22 +126,22 @@ def _unknown(words: tuple[str, ...]) -> NotAllowed:
     return NotAllowed(f"{' '.join(words)}: the device has nothing of the kind")
 
 
-# Moves the inputs of a device on a bench.
+# Stimuli for a device on a bench.
 
 
 class _BenchStimulus:
-    """The hands at a device of a bench in virtual time.
+    """Stimuli of a device of a bench in virtual time.
 
     Args:
         device: a CANopen node.
-        slave: what it is.
+        slave: its slave.
     """
 
     def __init__(self, device: BenchDevice, slave: CanopenSlave) -> None:
         self._device, self._inside = device, SlaveStimulus(slave)
 
     def __call__(self, *words: str) -> str:
-        """Do it, and return what was read."""
+        """Execute a stimulus, and return the read value."""
         match words:
             case ("power", "on"):
                 self._device.switch_on()
@@ -153,7 +153,7 @@ class _BenchStimulus:
 
 
 _BOOT_US = 100_000
-"""All nodes have booted by then."""
+"""Time after which all nodes have booted."""
 
 _Buses = dict[str, dict[str, CanopenSlave]]
 """The slaves on each CAN bus, by their names."""
@@ -162,17 +162,17 @@ _Buses = dict[str, dict[str, CanopenSlave]]
 def bench_source(
     mode: BenchMode, node_id: int | None = None, name: str = "", device: str = ""
 ) -> ConformSource:
-    """Return where the nodes of a bench are; some time passes on it.
+    """Return the source with the nodes of a bench; some time passes on the bench.
 
     Args:
         mode: of the bench; its time is virtual.
-        node_id: of the node whose bus it is; that of the first node if nobody says it.
+        node_id: of the node whose bus it is; None for the first node.
         name: of the bench, for people.
-        device: of which the bus is wanted, by its name; empty for any.
+        device: name of the device whose bus to use; empty for any.
 
     Raises:
-        ValueError: it is in another mode, has no CANopen node, none of this node-ID, or some on
-            several buses; or the device is none.
+        ValueError: the bench is in another mode, has no CANopen node, no node with this node-ID, or
+            several on different buses; or the device is not a node.
     """
     if not isinstance(mode, VirtualMode):
         raise ValueError("the bench is not in virtual time: canmon conform judges what is there")
@@ -202,7 +202,7 @@ def bench_source(
 
 
 def _bus_of(buses: _Buses, node_id: int | None, name: str) -> str:
-    """Return the bus on which a node is; that of the lowest node-ID if none is given."""
+    """Return the bus of a node; by default that of the lowest node-ID."""
     nodes = sorted((slave.node_id, bus) for bus, on in buses.items() for slave in on.values())
     if not nodes:
         raise ValueError(f"{name} has no CANopen node")
@@ -216,7 +216,7 @@ def _bus_of(buses: _Buses, node_id: int | None, name: str) -> str:
 
 
 def describe_slave(slave: CanopenSlave) -> NodeDescription:
-    """Return what the EDS of a slave of ours would say."""
+    """Return the EDS of one of our slaves."""
     description = slave.dictionary.description
     return NodeDescription.of_table(description, description.objects)
 
@@ -231,7 +231,7 @@ def _slaves(rig: BenchRig) -> _Buses:
 
 
 def _watch_nodes(mount: BusMount) -> dict[str, Crashes]:
-    """Let what their programs raise be no end of the bench."""
+    """Keep the bench running if programs of slaves raise exceptions."""
     crashes = {name: Crashes(name) for name in mount.nodes}
     for name, node in mount.nodes.items():
         node.on_crash = crashes[name]
@@ -244,7 +244,7 @@ def _watch_no_more(mount: BusMount) -> None:
 
 
 def _watch(crashes: dict[str, Crashes], name: str, run: ConformRun) -> None:
-    """Let a crash be a failure of the node under test; that of another one disturbs."""
+    """Count a crash as a failure of the node under test; report one of another node."""
     for each, crash in crashes.items():
         crash.watch(run.crash if each == name else lambda reason, where: run.disturb(reason))
 
@@ -255,20 +255,19 @@ def _mount(rig: BenchRig, bus: str) -> BusMount:
     return mount
 
 
-# Rig files as where `canmon conform` finds its node: in virtual time, without a bus outside.
+# Rig files as sources of `canmon conform`: in virtual time, without a bus outside.
 
 
 def open_rig(path: Path, node_id: int | None = None) -> ConformSource:
-    """Open a rig file, whatever it says of real time.
+    """Open a rig file in virtual time, ignoring its settings for real time.
 
     Args:
         path: of the file.
-        node_id: of the node whose bus it is; that of the first node if nobody says it.
+        node_id: of the node whose bus it is; None for the first node.
 
     Raises:
         OSError: it cannot be read.
-        ValueError: something is wrong in it, a device cannot be made, or no node of it has this
-            node-ID.
+        ValueError: the file has errors, a device cannot be made, or no node has this node-ID.
     """
     plan = read_rig_file(path)
     bench = Bench.of_plan(plan)
@@ -285,7 +284,7 @@ def open_rig(path: Path, node_id: int | None = None) -> ConformSource:
 
 
 def _eds_files(plan: RigPlan, nodes: dict[int, str]) -> Iterator[tuple[int, Path]]:
-    """Yield the files that nodes were made of: what they say is judged too."""
+    """Yield the files of the nodes, which are checked too."""
     for node_id, name in nodes.items():
         device = plan.devices[name]
         if device.kind is DeviceKind.EDS:

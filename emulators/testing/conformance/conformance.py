@@ -1,4 +1,4 @@
-"""The conformance tester as a function: any slave in virtual time in, a report out."""
+"""The conformance tester as a function: takes a slave in virtual time, returns a report."""
 
 from __future__ import annotations
 
@@ -54,14 +54,14 @@ from tickrig.wire.instant import NEVER
 class PoweredSlave:
     """A slave that can be switched off and on.
 
-    What it raises is told, and then its program begins anew, as after a watchdog; one that cannot
-    is dead until the power is switched.
+    Its exceptions are reported, and then its program restarts, as after a watchdog; if that fails
+    it is dead until the power is switched.
 
     Args:
-        slave: what is judged; it is on.
+        slave: the slave under test, switched on.
 
     Attributes:
-        on_crash: is told what it has raised.
+        on_crash: called with its exceptions.
     """
 
     def __init__(self, slave: Slave) -> None:
@@ -71,22 +71,22 @@ class PoweredSlave:
 
     @property
     def tick_us(self) -> int:
-        """That of the slave."""
+        """The tick of the slave."""
         return self.slave.tick_us
 
     @property
     def due_us(self) -> int:
-        """That of the slave, `NEVER` while it is off."""
+        """When the slave is due, `NEVER` while it is off."""
         if not self._on or self._dead:
             return NEVER
         return 0 if self._woken else self.slave.due_us
 
     def reset(self) -> None:
-        """Lose and get back the power."""
+        """Switch the power off and on."""
         self.slave.reset()
 
     def tick(self, now_us: int, rx: Frames, /) -> Frames:
-        """Let the slave do what it does, if it is on."""
+        """Tick the slave, if it is on."""
         self._woken = False
         if not self._on or self._dead:
             return ()
@@ -98,7 +98,7 @@ class PoweredSlave:
             return ()
 
     def switch(self, *, on: bool) -> None:
-        """Switch the power; on when it is on does nothing."""
+        """Switch the power; no effect if already in this state."""
         if on and not self._on:
             self._reset()
         self._on = on
@@ -116,22 +116,22 @@ class PoweredSlave:
             self.on_crash(error)
 
 
-# A slave of anybody on a bus of its own, in virtual time.
+# Any slave on its own bus, in virtual time.
 
 _BOOT_US = 100_000
-"""The slave has booted by then."""
+"""Time after which the slave has booted."""
 
 
 class SlaveBench:
     """A slave and the tester on a bus.
 
     Args:
-        slave: what is judged.
+        slave: the slave under test.
         bit_rate: of the bus, 10 000 to 1 000 000 bit/s.
-        stimulus: moves its inputs; `power` never reaches it: the supply is switched here.
+        stimulus: sets its inputs; not called with `power`: the supply is switched here.
 
     Attributes:
-        source: where the tester finds it.
+        source: its source for the tester.
     """
 
     def __init__(self, slave: Slave, bit_rate: int, stimulus: Stimulus | None = None) -> None:
@@ -151,12 +151,12 @@ class SlaveBench:
         rig.run_for(_BOOT_US)
 
     def stimulate(self, *words: str) -> str:
-        """Move an input, or switch the supply; NotAllowed if nobody can."""
+        """Set an input, or switch the supply; NotAllowed if not supported."""
         if words[0] == "power":
             self._slave.switch(on=words[1] == "on")
             return ""
         if self._stimulus is None:
-            raise NotAllowed(f"{' '.join(words)}: nobody moves the inputs of this slave")
+            raise NotAllowed(f"{' '.join(words)}: no stimulus sets the inputs of this slave")
         return self._stimulus(*words)
 
 
@@ -166,7 +166,7 @@ _LEVELS: Final = tuple(level.word for level in Level)
 
 Called = Callable[[], SlaveCall]
 Node = Slave | CanopenSlave | BenchDevice | Called
-"""What can be judged."""
+"""Objects that can be tested."""
 
 
 def conformance(  # noqa: PLR0913 - by keyword
@@ -182,29 +182,30 @@ def conformance(  # noqa: PLR0913 - by keyword
     seed: int = 0,
     bit_rate: int = BIT_RATE,
 ) -> Report:
-    """Judge a CANopen slave in virtual time; the same slave gives the same report.
+    """Test a CANopen slave in virtual time; the same slave gives the same report.
 
     Args:
-        node: a slave that is told the time (`Slave`), as those of `tickrig.device` are; a device
-            of a bench in virtual time; or a callable that makes, at each power-on, a callable
-            which takes the time in microseconds and frames, and returns frames.
-        node_id: 1..127; that of the slave unless given, if it has one.
-        eds: its EDS, DCF or XDD; without one our slaves tell of themselves, others are asked.
-        level: `read-only`, `communication` or `intrusive`. Unless given it is `intrusive`, where
-            `canmon conform` only reads: in virtual time nothing can move.
-        only: groups or ids of checks, with * and ?, as `"NMT,HB"` or one by one; all unless given.
+        node: a slave that gets the time as argument (`Slave`), such as those of `tickrig.device`; a
+            device of a bench in virtual time; or a callable that makes, at each power-on, a
+            callable which takes the time in microseconds and frames, and returns frames.
+        node_id: 1..127; by default that of the slave, if it has one.
+        eds: its EDS, DCF or XDD; without one our slaves describe themselves, others are queried.
+        level: `read-only`, `communication` or `intrusive`. The default is `intrusive` (`canmon
+            conform` only reads), because nothing real can move in virtual time.
+        only: groups or ids of checks, with * and ?, as `"NMT,HB"` or a sequence; by default all.
         allow: indices of profile objects, 6000h..9FFFh, that may be written.
-        never: indices of objects that are never written, whatever else is allowed.
-        stimulus: moves inputs: takes `"input", "6000:01", "01"`, `"emergency", "5000", "01"` and
-            such, returns what `"output", NAME` asks for; of a `Slave` power is switched here.
-        seed: of what is left to chance.
+        never: indices of objects that are never written, with priority over `allow`.
+        stimulus: sets inputs: called with `"input", "6000:01", "01"`, `"emergency", "5000", "01"`
+            and similar, returns the value for `"output", NAME`; the power of a `Slave` is switched
+            here.
+        seed: of random choices.
         bit_rate: of the bus, 10 000..1 000 000 bit/s.
 
     Returns:
-        What was judged; `tickrig.testing.conformance(node).exit_status` is 0 where all passed.
+        The report; `tickrig.testing.conformance(node).exit_status` is 0 if all checks passed.
 
     Raises:
-        ValueError: a node-ID, level or check that cannot be, or that nobody knows.
+        ValueError: a missing or invalid node-ID, level or check.
         OSError: the EDS cannot be read.
 
     >>> from tickrig.device import make_epos
@@ -239,7 +240,7 @@ def conformance(  # noqa: PLR0913 - by keyword
 def _source(
     node: Node, node_id: int | None, bit_rate: int, stimulus: Stimulus | None
 ) -> ConformSource:
-    """Return the bus on which a node is."""
+    """Return the bus of a node."""
     if isinstance(node, CanopenSlave):  # alone: a bench and its journal took a quarter more
         source = SlaveBench(node, bit_rate, stimulus or SlaveStimulus(node)).source
         own = node.node_id
@@ -257,14 +258,14 @@ def _source(
 
 
 def level_of(word: str) -> Level:
-    """Return a level; ValueError if it is none."""
+    """Return a level; ValueError if it is unknown."""
     if word not in _LEVELS:
-        raise ValueError(f"level {word!r} is none of {', '.join(_LEVELS)}")
+        raise ValueError(f"level {word!r} is not one of {', '.join(_LEVELS)}")
     return Level(_LEVELS.index(word))
 
 
 def names_of(only: str | Iterable[str]) -> tuple[str, ...]:
-    """Return groups and ids, each for itself; ValueError if one names no check."""
+    """Return separate groups and ids; ValueError if one matches no check."""
     names = patterns(only)
     for text in unknown(names):
         raise ValueError(f"only {text}")
@@ -272,7 +273,7 @@ def names_of(only: str | Iterable[str]) -> tuple[str, ...]:
 
 
 def node_id_of(node: Node, node_id: int | None) -> int:
-    """Return the node-ID that was given, or that of the slave; ValueError if there is none."""
+    """Return the given node-ID, or that of the slave; ValueError if there is none."""
     if node_id is None and isinstance(node, BenchDevice):
         node_id = int(node.get("node_id"))
     if node_id is None:
@@ -286,7 +287,7 @@ def _eds(eds: Path | str | EdsFile | None) -> EdsFile | None:
     return open_eds(Path(eds)) if isinstance(eds, Path | str) else eds
 
 
-# A report as text and as files: what `canmon conform` writes, for who judges in a program.
+# A report as text and as files, as from `canmon conform`, for programs.
 
 _KINDS: Final[Mapping[str, str]] = {
     ".html": "--html",
@@ -299,15 +300,15 @@ _JSON: Final = ".json"
 
 
 def conformance_text(report: Report, *, baseline: Path | str | None = None) -> str:
-    """Return a report as `canmon conform` prints it.
+    """Return a report as printed by `canmon conform`.
 
     Args:
         report: of `conformance`.
-        baseline: a file of known failures, which are named and not shown.
+        baseline: a file of known failures, which are listed without details.
 
     Raises:
         OSError: the baseline cannot be read.
-        ValueError: it is none.
+        ValueError: invalid baseline.
     """
     return text_report(report, known_failures(baseline), decoded_frames({}))
 
@@ -315,19 +316,19 @@ def conformance_text(report: Report, *, baseline: Path | str | None = None) -> s
 def write_conformance(
     report: Report, path: Path | str, *, baseline: Path | str | None = None
 ) -> None:
-    """Write a report into a file, whole or not at all.
+    """Write a report to a file atomically.
 
     Args:
         report: of `conformance`.
-        path: its ending says what is written: `.html` one page with all frames, `.xml` JUnit,
+        path: its suffix selects the format: `.html` one page with all frames, `.xml` JUnit,
             `.svg` a badge, `.md` the failures to file as issues, `.json`, or `.txt` the failures
             as a baseline.
         baseline: a file of known failures.
 
     Raises:
         OSError: a file cannot be written or read.
-        ValueError: another ending, or a baseline that is none.
-        ImportError: a page, and Jinja2 is not there (extra `report`).
+        ValueError: unknown suffix, or invalid baseline.
+        ImportError: Jinja2 for a page is missing (extra `report`).
     """
     known, ending = known_failures(baseline), Path(path).suffix
     if ending == _JSON:
@@ -336,16 +337,16 @@ def write_conformance(
         text = file_text(_KINDS[ending], report, known, decoded_frames({}))
     else:
         endings = ", ".join([*_KINDS, _JSON])
-        raise ValueError(f"{path}: nobody knows what to write, its ending is none of {endings}")
+        raise ValueError(f"{path}: unknown format, the suffix is not one of {endings}")
     write_whole(Path(path), text)
 
 
 def known_failures(path: Path | str | None) -> Baseline:
-    """Read a baseline, none without a file; an id in it that is no check is warned of.
+    """Read a baseline, empty without a file; warn of ids that are not checks.
 
     Raises:
         OSError: it cannot be read.
-        ValueError: it is none.
+        ValueError: invalid baseline.
     """
     if path is None:
         return NONE_KNOWN

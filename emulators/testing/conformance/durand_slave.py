@@ -20,14 +20,14 @@ from tickrig.wire.instant import NEVER
 
 _Call = Callable[[], object]
 _Entry = tuple[int, int, _Call]
-"""When, the how-many-eth, and what is called."""
+"""Time, sequence number and callback."""
 
 
 class DurandSlave:
-    """A `durand.Node`, called as its own network and scheduler would.
+    """A `durand.Node`, called as by its own network and scheduler.
 
-    The scheduler of durand is one for the whole process: it is exchanged while the node is
-    called, and put back.
+    durand has one scheduler for the whole process: it is replaced while the node is called, and
+    restored.
 
     Args:
         make: makes the node on a network; called once more at each power-on.
@@ -45,21 +45,21 @@ class DurandSlave:
 
     @property
     def due_us(self) -> int:
-        """When it boots, or something of its scheduler is due."""
+        """When it boots, or its scheduler is due."""
         return 0 if self.node is None or self._actions else self._scheduler.due_us
 
     def reset(self) -> None:
-        """Forget the node; another one is made in the next tick."""
+        """Drop the node; another one is made in the next tick."""
         self.node = None
         self._scheduler, self._network = _Scheduler(), _Network()
         self._actions: list[Callable[[Node], object]] = []
 
     def act(self, action: Callable[[Node], object]) -> None:
-        """Let its application do something at the beginning of the next tick; it has booted."""
+        """Schedule a call of its application for the start of the next tick, after booting."""
         self._actions.append(action)
 
     def tick(self, now_us: int, rx: Frames, /) -> Frames:
-        """Do what is due, then hand over what arrived."""
+        """Run due callbacks, then deliver received frames."""
         with self._scheduler.in_use():
             self._scheduler.run(now_us)
             if self.node is None:
@@ -73,18 +73,18 @@ class DurandSlave:
 
 
 class _Network(NetworkABC):  # type: ignore[misc]  # durand has no types
-    """A network that keeps what is sent."""
+    """A network that collects sent frames."""
 
     def __init__(self) -> None:
         self._subscriptions: dict[int, Callable[[int, bytes], None]] = {}
         self._sent: list[CanFrame] = []
 
     def add_subscription(self, cob_id: int, callback: Callable[[int, bytes], None]) -> None:
-        """Listen to a COB-ID."""
+        """Subscribe to a COB-ID."""
         self._subscriptions[cob_id] = callback
 
     def remove_subscription(self, cob_id: int) -> None:
-        """Listen to it no more; KeyError if nobody did, as on its bus."""
+        """Unsubscribe from a COB-ID; KeyError if not subscribed, as on its bus."""
         self._subscriptions.pop(cob_id)
 
     def send(self, cob_id: int, msg: bytes) -> None:
@@ -92,7 +92,7 @@ class _Network(NetworkABC):  # type: ignore[misc]  # durand has no types
         self._sent.append(CanFrame(cob_id & 0x7FF, bytes(msg)))
 
     def take(self, frame: CanFrame) -> None:
-        """Hand a frame to who listens to it, as durand's listener does."""
+        """Deliver a frame to its subscribers, as durand's listener does."""
         callback = self._subscriptions.get(frame.can_id)
         if frame.remote or frame.extended or callback is None:
             return
@@ -102,7 +102,7 @@ class _Network(NetworkABC):  # type: ignore[misc]  # durand has no types
             logging.getLogger(__name__).info("%s: %r", frame, error)
 
     def taken(self) -> Frames:
-        """Return what is to be sent, and forget it."""
+        """Return the collected frames, and clear them."""
         sent, self._sent = tuple(self._sent), []
         return sent
 
@@ -122,7 +122,7 @@ class _Scheduler(AbstractScheduler):  # type: ignore[misc]  # durand has no type
 
     @property
     def lock(self) -> Lock:
-        """A lock that nobody else has."""
+        """A lock without contention."""
         return self._lock
 
     def add(
@@ -139,13 +139,13 @@ class _Scheduler(AbstractScheduler):  # type: ignore[misc]  # durand has no type
         return entry
 
     def cancel(self, entry: _Entry) -> None:
-        """Do not call it, if it was not called already."""
+        """Cancel a callback that has not been called."""
         if entry in self._entries:
             self._entries.remove(entry)
             self._entries.sort()
 
     def run(self, now_us: int) -> None:
-        """Call what is due, each at its time."""
+        """Run due callbacks, each at its time."""
         while self.due_us <= now_us:
             self._now_us, _, call = heappop(self._entries)
             call()
@@ -153,7 +153,7 @@ class _Scheduler(AbstractScheduler):  # type: ignore[misc]  # durand has no type
 
     @contextmanager
     def in_use(self) -> Iterator[None]:
-        """Be the scheduler of the process for the time of a block."""
+        """Act as the scheduler of the process within a block."""
         before = get_scheduler()
         set_scheduler(self)
         try:

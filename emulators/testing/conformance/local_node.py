@@ -18,11 +18,11 @@ Data = bytes | bytearray | Iterable[int] | None
 
 
 class LocalNodeSlave:
-    """A `canopen.LocalNode`, called as the library's own network and its timers would.
+    """A `canopen.LocalNode`, called as by the library's own network and timers.
 
-    It boots as the library's documentation has it (`nmt.send_command(0)`, then
-    Pre-operational); what an application would do beside that, such as restoring values at a
-    reset or sending TPDOs, nobody does.
+    It boots as in the library's documentation (`nmt.send_command(0)`, then Pre-operational);
+    further work of an application, such as restoring values at a reset or sending TPDOs, is
+    missing.
 
     Args:
         make: makes the node, with its dictionary; called once more at each power-on.
@@ -45,13 +45,13 @@ class LocalNodeSlave:
         return min((task.due_us for task in self._network.tasks), default=NEVER)
 
     def reset(self) -> None:
-        """Make the node anew."""
+        """Make a new node."""
         self._booted = False
         self._network = _Network(self)
         self.node = self._make()
 
     def tick(self, now_us: int, rx: Frames, /) -> Frames:
-        """Hand over what arrived, then send what is due."""
+        """Deliver received frames, then send due ones."""
         self.now_us = now_us
         if not self._booted:
             self._boot()
@@ -67,7 +67,7 @@ class LocalNodeSlave:
 
 
 class _Network(canopen.Network):
-    """A network that keeps what is sent, and whose periodic frames follow the slave's time."""
+    """A network that collects sent frames; its periodic frames follow the slave's time."""
 
     def __init__(self, slave: LocalNodeSlave) -> None:
         super().__init__()
@@ -76,11 +76,11 @@ class _Network(canopen.Network):
 
     @property
     def has_sent(self) -> bool:
-        """Whether something is to be sent."""
+        """Whether there are frames to send."""
         return bool(self._sent)
 
     def take(self, frame: CanFrame) -> None:
-        """Hand a frame to who listens to it, as the library's listener does."""
+        """Deliver a frame to its subscribers, as the library's listener does."""
         if frame.remote or frame.extended:
             return
         try:
@@ -89,7 +89,7 @@ class _Network(canopen.Network):
             logging.getLogger(__name__).info("%s: %s", frame, error)
 
     def taken(self, now_us: int) -> Frames:
-        """Return what is to be sent by now, and forget it."""
+        """Return the frames due by now, and clear them."""
         for task in self.tasks:
             while task.due_us <= now_us:
                 task.due_us += task.period_us
@@ -111,7 +111,7 @@ class _Network(canopen.Network):
 
 
 class _Periodic(canopen.network.PeriodicMessageTask):
-    """A frame that is sent again and again."""
+    """A periodic frame."""
 
     def __init__(
         self, tasks: list[_Periodic], can_id: int, data: Data, period_us: int, due_us: int
@@ -120,7 +120,7 @@ class _Periodic(canopen.network.PeriodicMessageTask):
         self.period_us, self.due_us = max(TICK_US, period_us), due_us
 
     def stop(self) -> None:
-        """Send it no more."""
+        """Stop sending it."""
         if self in self._tasks:
             self._tasks.remove(self)
 

@@ -1,4 +1,4 @@
-"""The conformance tester as a pytest suite: one test a check."""
+"""The conformance tester as a pytest suite: one test per check."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from tickrig.wire.canopen.eds.eds_device import EdsDevice, read_device
 
 _MOST_LINES: Final = 60
 _ANY_NODE_ID: Final = 1
-"""Names of checks do not depend on the node-ID."""
+"""Node-ID for the names of checks, which do not depend on it."""
 
 Test = Callable[..., None]
 
@@ -51,23 +51,23 @@ def conformance_tests(
 ) -> Test:
     """Return a test function for pytest, which has a parameter for each check.
 
-    The checks of one function are judged in one run, when the first of them is asked for, and
-    only those that pytest has selected. A check that is not applicable is skipped; one that
-    could not be judged is blocked, which is no failure of the device.
+    The checks of one function run together when the first of them is executed, limited to those
+    that pytest has selected. A check that is not applicable is skipped; one without a verdict is
+    blocked, which is not a failure of the device.
 
     Args:
-        node: makes what is judged, as `conformance` takes it, or is what `conformance` calls at
-            each power-on; or the name of a device of the fixture `bench`, which then is judged
-            check by check, each on a fresh bench.
+        node: makes the slave for `conformance`, or is the callable that `conformance` calls at each
+            power-on; or the name of a device of the fixture `bench`, which is then tested check by
+            check, each on a new bench.
         eds: its EDS, DCF or XDD; its objects have tests of their own.
-        level: `read-only`, `communication` or `intrusive`, as `conformance` has it.
-        only: groups or ids of checks, with * and ?, as `"NMT,HB"` or one by one; all unless given.
-        baseline: a file of known failures, an id a line: these are expected to fail; an id that
-            is no check is warned of.
+        level: `read-only`, `communication` or `intrusive`, as for `conformance`.
+        only: groups or ids of checks, with * and ?, as `"NMT,HB"` or a sequence; by default all.
+        baseline: a file of known failures, one id per line: these are expected to fail; ids that
+            are not checks cause a warning.
         options: further arguments of `conformance`.
 
     Raises:
-        ValueError: the level is none, a word of `only` names no check, or nobody says the node-ID.
+        ValueError: unknown level, a word of `only` that matches no check, or no node-ID.
         OSError: the EDS or the baseline cannot be read.
 
     >>> from tickrig.device import make_epos
@@ -94,13 +94,13 @@ def conformance_tests(
 
 
 def _judged_of(make: Callable[[], Node]) -> Node:
-    """Return what `conformance` takes: what is made, or what makes a callable at each power-on."""
+    """Return the argument of `conformance`: the made object, or a factory for each power-on."""
     made = make()
     return cast("Node", make) if is_step(made) else made
 
 
 def _told_by(made: Node) -> EdsDevice | None:
-    """Return what a slave of ours tells of itself."""
+    """Return the description of one of our slaves."""
     return describe_slave(made).device if isinstance(made, CanopenSlave) else None
 
 
@@ -115,14 +115,14 @@ def _test_on_bench(name: str, options: dict[str, Any], baseline: Baseline) -> Te
 
 @dataclass
 class _Unmade:
-    """A run that could not be: raised once, as each raise makes its traceback longer."""
+    """A failed run: raised once, because each raise makes its traceback longer."""
 
     error: Exception
     raised: bool = False
 
 
 class _Run:
-    """The run of the selected checks, made when the first one asks for it."""
+    """The run of the selected checks, started by the first of them."""
 
     def __init__(
         self, make: Callable[[], Node], options: dict[str, Any], baseline: Baseline
@@ -153,7 +153,7 @@ class _Run:
         return report
 
     def _judged(self, wanted: Iterable[str]) -> Report | _Unmade:
-        """Judge once; what cannot be made is not tried again for each test."""
+        """Run once; a failure is not repeated for each test."""
         try:
             return conformance(_judged_of(self._make), only=sorted(wanted), **self._options)
         except Exception as error:
@@ -161,14 +161,14 @@ class _Run:
 
 
 def _selected(item: pytest.Function) -> Iterable[str]:
-    """Yield the checks of this function that pytest was told to run."""
+    """Yield the checks of this function that pytest has selected."""
     for each in item.session.items:
         if isinstance(each, pytest.Function) and each.function is item.function:
             yield str(each.callspec.params["check_id"])
 
 
 def _judge(report: Report, check_id: str, baseline: Baseline) -> None:
-    """Pass, fail, skip or be blocked, as a check was."""
+    """Report the verdict of a check: pass, fail, skip or blocked."""
     result = next((one for one in report.results if one.check.id == check_id), None)
     if result is None:
         raise BenchBlocked(report.aborted or f"{check_id} was not judged")

@@ -1,4 +1,4 @@
-"""What the conformance tester can judge in virtual time: a slave that is told the time."""
+"""Slaves for the conformance tester in virtual time, which get the time as argument."""
 
 from __future__ import annotations
 
@@ -19,34 +19,34 @@ TICK_US: Final = 1_000
 
 
 class Slave(Protocol):
-    """A CANopen slave as a machine: frames in with the time, frames out.
+    """A CANopen slave as a state machine: time and frames in, frames out.
 
     A slave of `tickrig.device` is one. Yours is, too, if it takes the time as an argument and
-    says when it next wants to be called; it may be written around a library in C.
+    reports when it must be called next; it may wrap a C library.
     """
 
     @property
     def tick_us(self) -> int:
-        """How often it looks, in microseconds: it is called at multiples of it, 1000 is usual."""
+        """Its period in microseconds: it is called at multiples of it; 1000 is usual."""
         ...
 
     @property
     def due_us(self) -> int:
-        """When it would do something without being sent anything, in microseconds.
+        """When it acts next without receiving a frame, in microseconds.
 
-        A time that has passed means: in the next tick. `tickrig.wire.instant.NEVER`: not by
-        itself. It is not called before, unless a frame arrives.
+        A time in the past means the next tick, `tickrig.wire.instant.NEVER` not by itself. It is
+        not called before, unless a frame arrives.
         """
         ...
 
     def reset(self) -> None:
-        """Lose and get back the power: it boots in the next tick, and keeps what was stored."""
+        """Switch the power off and on: it boots in the next tick, and keeps stored parameters."""
 
     def tick(self, now_us: int, rx: Frames, /) -> Frames:
-        """Do what is to be done.
+        """Run one tick.
 
         Args:
-            now_us: time since the beginning in microseconds, a multiple of `tick_us`.
+            now_us: time since the start in microseconds, a multiple of `tick_us`.
             rx: frames that arrived since the last call, in their order.
 
         Returns:
@@ -56,10 +56,10 @@ class Slave(Protocol):
 
 
 SlaveCall = Callable[[int, Frames], Frames]
-"""The `tick` of a slave alone, called each millisecond."""
+"""A bare `tick` of a slave, called each millisecond."""
 
 _MEMBERS: Final = ("tick", "due_us", "tick_us", "reset")
-"""What a `Slave` has."""
+"""Members of a `Slave`."""
 
 
 def is_slave(node: object) -> TypeGuard[Slave]:
@@ -67,7 +67,7 @@ def is_slave(node: object) -> TypeGuard[Slave]:
     return all(hasattr(node, name) for name in _MEMBERS)
 
 
-# A slave of a callable: what makes it at each power-on, or what is wrong with that.
+# A slave from a callable: its factory for each power-on, and error messages.
 
 STEP: Final = (0, ())
 """A time and frames."""
@@ -75,17 +75,17 @@ _EXAMPLE: Final = "what makes the slave at each power-on, as `lambda: Mini(5).st
 
 
 class NoFrames(Exception):  # noqa: N818 - what the slave has returned
-    """What a slave has returned cannot go onto a bus; the text says what it was."""
+    """The result of a slave cannot be sent on a bus; the message describes it."""
 
 
 class CalledSlave:
-    """A slave of a callable: it is called each millisecond.
+    """A slave from a callable, which is called each millisecond.
 
     Args:
-        make: makes the callable, fresh from power-on; called once more at each power-on.
+        make: makes the callable, in its state after power-on; called again at each power-on.
 
     Raises:
-        ValueError: it makes none.
+        ValueError: it does not make a callable.
     """
 
     tick_us: int = TICK_US
@@ -104,25 +104,25 @@ class CalledSlave:
         self._make, self._call, self.due_us = make, call, 0
 
     def reset(self) -> None:
-        """Make it anew."""
+        """Make a new callable."""
         self._call, self.due_us = self._make(), 0
 
     def tick(self, now_us: int, rx: Frames, /) -> Frames:
-        """Call it."""
+        """Call the callable."""
         self.due_us = now_us + self.tick_us
         return self._call(now_us, rx)
 
 
 def is_step(node: object) -> bool:
-    """Return whether it is what is called each millisecond, not what makes it."""
+    """Return whether it is the callable for each millisecond, not its factory."""
     return not is_slave(node) and _takes(node, *STEP) and not _takes(node)
 
 
 def checked_frames(sent: object) -> Frames:
-    """Return what a slave has sent, if that can go onto a bus.
+    """Return the frames of a slave if they can be sent on a bus.
 
     Raises:
-        NoFrames: it cannot.
+        NoFrames: they cannot.
     """
     if type(sent) is tuple and all(map(_is_plain, sent)):
         return sent
@@ -143,7 +143,7 @@ def checked_frames(sent: object) -> Frames:
 
 
 def _is_plain(frame: object) -> bool:
-    """Say whether it is a data frame with an 11-bit CAN-ID: most are, and need no closer look."""
+    """Return whether it is a data frame with an 11-bit CAN-ID, which needs no further check."""
     if type(frame) is not CanFrame or frame.remote or frame.extended:
         return False
     sound = type(frame.can_id) is int and type(frame.data) is bytes and len(frame.data) <= 8
@@ -151,7 +151,7 @@ def _is_plain(frame: object) -> bool:
 
 
 def _takes(call: object, *given: object) -> bool:
-    """Return whether it can be called so; of what C has made nobody knows it."""
+    """Return whether it accepts these arguments; unknown for C functions."""
     if not callable(call):
         return False
     try:
@@ -180,19 +180,19 @@ def _short(thing: object) -> str:
 
 
 _MOST: Final = 120
-"""Characters of what a slave has returned."""
+"""Largest number of characters shown of a slave's result."""
 
 
-# What the program of a slave, or the hands at it, have raised, in a line, and where.
+# Exceptions of a slave's program or its stimuli, in one line, with their place.
 
 _OURS: Final = "tickrig."
 
 
 class Crashes:
-    """What a program raises: kept until somebody wants to be told.
+    """Exceptions of a program, kept until a callback is set.
 
     Args:
-        who: whose program it is, for people.
+        who: owner of the program, for people.
     """
 
     def __init__(self, who: str) -> None:
@@ -200,18 +200,18 @@ class Crashes:
         self._report: Crash = lambda reason, where: self._kept.append((reason, where))
 
     def __call__(self, error: Exception) -> None:
-        """Take what it has raised."""
+        """Record an exception."""
         self._report(_crash_text(error, self._who), _crash_lines(error))
 
     def watch(self, report: Crash) -> None:
-        """Tell of them from now on, and of those before."""
+        """Report exceptions from now on, and earlier ones."""
         self._report = report
         for reason, where in self._kept:
             report(reason, where)
 
 
 def guarded(stimulus: Stimulus) -> Stimulus:
-    """Let a check be inconclusive when the hands at the inputs raise what they should not."""
+    """Make a check inconclusive if its stimuli raise unexpected exceptions."""
 
     def act(*words: str) -> str:
         try:
@@ -225,7 +225,7 @@ def guarded(stimulus: Stimulus) -> Stimulus:
 
 
 def _crash_text(error: Exception, who: str) -> str:
-    """Return what was raised, in a line.
+    """Return an exception as one line.
 
     >>> _crash_text(KeyError("x"), "your slave")
     "your slave raised KeyError: 'x'"
@@ -239,7 +239,7 @@ def _crash_text(error: Exception, who: str) -> str:
 
 
 def _crash_lines(error: Exception) -> list[str]:
-    """Return the lines at which it was raised, outermost first, but for ours before its own."""
+    """Return the traceback lines, outermost first, without ours before the user's."""
     if isinstance(error, NoFrames):
         return []
     return list(_lines(error, _OURS)) or list(_lines(error, "no module"))

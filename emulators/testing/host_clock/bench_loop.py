@@ -19,7 +19,7 @@ T = TypeVar("T")
 Ts = TypeVarTuple("Ts")
 
 _EXECUTOR_S: Final = 5.0
-"""So long, in real time, a loop waits for a function that it runs in a thread."""
+"""How long, in real time, a loop waits for a function that it runs in a thread."""
 
 _Events = list[tuple[SelectorKey, int]]
 
@@ -27,11 +27,11 @@ _Events = list[tuple[SelectorKey, int]]
 class _BenchLoop(asyncio.SelectorEventLoop):
     """An event loop whose time is that of a rig.
 
-    Where it would wait for its next timer, time passes; what has come meanwhile from files,
-    sockets and other threads it finds then, but it does not wait for them.
+    Instead of waiting for its next timer it advances the time; then it handles events of files,
+    sockets and other threads, but it does not wait for them.
 
     Args:
-        passing: whose time passes.
+        passing: the object whose time advances.
     """
 
     def __init__(self, passing: Passing) -> None:
@@ -47,10 +47,10 @@ class _BenchLoop(asyncio.SelectorEventLoop):
     def run_in_executor(
         self, executor: Executor | None, func: Callable[[*Ts], T], *args: *Ts
     ) -> asyncio.Future[T]:
-        """Run a function in a thread, and wait for it: meanwhile no virtual time passes.
+        """Run a function in a thread, and wait for it without advancing the virtual time.
 
         Args:
-            executor: as asyncio takes it.
+            executor: as in asyncio.
             func: the function.
             args: its arguments.
         """
@@ -63,23 +63,23 @@ class _BenchLoop(asyncio.SelectorEventLoop):
         return asyncio.wrap_future(running, loop=self)
 
     def close(self) -> None:
-        """Close it, and let its threads end."""
+        """Close the loop, and end its threads."""
         if self._threads is not None:
             self._threads.shutdown(wait=False)
         super().close()
 
     def _called(self) -> bool:
-        """Return whether something is to be called at once, by whom that may be."""
+        """Return whether a callback is due at once."""
         ready: object = vars(self).get("_ready")
         return bool(ready)
 
 
 @contextmanager
 def bench_loops(passing: Passing) -> Iterator[None]:
-    """Let `asyncio.run` and all that makes an event loop make one in the time of a rig.
+    """Make `asyncio.run` and others create event loops in the time of a rig.
 
     Args:
-        passing: whose time passes, in this thread alone.
+        passing: the object whose time advances, in this thread only.
     """
     owner, original = get_ident(), asyncio.events.new_event_loop
 
@@ -94,7 +94,7 @@ def bench_loops(passing: Passing) -> Iterator[None]:
 
 
 class _PassingSelector(selectors.BaseSelector):
-    """A selector that lets the time of a rig pass instead of waiting."""
+    """A selector that advances the time of a rig instead of waiting."""
 
     def __init__(self, passing: Passing, called: Callable[[], bool]) -> None:
         self._passing, self._called = passing, called
@@ -116,7 +116,7 @@ class _PassingSelector(selectors.BaseSelector):
         self._inner.close()
 
     def select(self, timeout: float | None = None) -> _Events:
-        """Return what is there; if nothing is, let time pass until something is, or the timeout."""
+        """Return ready events; without any, advance the time until there are, or to the timeout."""
         found: _Events = self._inner.select(0)
 
         def come() -> bool:
@@ -128,7 +128,7 @@ class _PassingSelector(selectors.BaseSelector):
         timeout_s = None if timeout is None else ceil(timeout * 1e6) / 1e6
         if not self._passing.wait(come, timeout_s) and timeout is None:
             raise HostTimeError(
-                "an event loop waits for ever: nothing that happens on the bench ends it, and"
+                "an event loop waits endlessly: nothing that happens on the bench ends it, and"
                 " neither threads nor sockets are waited for in virtual time"
             )
         return found

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 else:
     bench_loop = LazyModule("tickrig.emulators.testing.host_clock.bench_loop")  # imports asyncio
 
-# What hosts find in place of functions that tell the time, and that wait.
+# Replacements for functions that read the time or wait.
 
 # Theory of operation
 # ===================
@@ -59,7 +59,7 @@ else:
 # left alone.
 
 _FOR_EVER: Final = (
-    "waits for ever: nothing that happens on the bench ends it, and another thread cannot"
+    "waits endlessly: nothing that happens on the bench ends it, and another thread cannot"
 )
 
 
@@ -67,14 +67,14 @@ _OTHER_CLOCKS: Final = {
     "freezegun": ("freezegun.api", ("freeze_factories",)),
     "time-machine": ("time_machine", ("traveller_stack", "coordinates_stack")),
 }
-"""Packages that replace the clock, and where each keeps what replaces it at present."""
+"""Packages that replace the clock, and the place of their present replacement."""
 
 
 def _check_clock() -> None:
     """Raise HostTimeError if freezegun or time-machine has replaced the clock.
 
-    Both tell `datetime` and `time` another time, and freezegun's `monotonic` stands still, so
-    that a host that polls until a deadline never reaches it.
+    Both change `datetime` and `time`, and freezegun's `monotonic` is frozen, so that a host that
+    polls until a deadline never reaches it.
     """
     for package, (module, stacks) in _OTHER_CLOCKS.items():
         if (found := sys.modules.get(module)) and any(getattr(found, s, None) for s in stacks):
@@ -85,14 +85,14 @@ def _check_clock() -> None:
 
 
 class _ClockWaits:
-    """What hosts find in place of what waits.
+    """Replacements for waiting functions.
 
     Args:
-        passing: whose time passes.
+        passing: the object whose time advances.
         clock: its functions of `time`.
 
     Attributes:
-        refusals: who waited where nobody can: in another thread, or called back by the rig.
+        refusals: refused waits: in another thread, or in a callback of the rig.
     """
 
     def __init__(self, passing: Passing, clock: SimTime) -> None:
@@ -103,7 +103,7 @@ class _ClockWaits:
         self._others = {thread.ident for thread in threading.enumerate()} - {self._owner}
 
     def acts(self) -> patches.Acts:
-        """Return them all."""
+        """Return all replacements."""
         return {
             **{(time, name): self._look(name) for name in patches.LOOKS},
             (time, "sleep"): self._waiting("time.sleep", self._sleep),
@@ -225,7 +225,7 @@ class _ClockWaits:
 
 
 class _Standing:
-    """A time that does not pass by itself, for threads that only look."""
+    """A frozen time for threads that only read it."""
 
     def __init__(self, passing: Passing) -> None:
         self._passing = passing
@@ -239,7 +239,7 @@ class _Standing:
 
 
 class _ForEver(Exception):  # noqa: N818 - it is told in another one
-    """What is waited for without a timeout does not come."""
+    """The event of a wait without a timeout never happens."""
 
 
 def _other_thread() -> str:
@@ -252,20 +252,20 @@ def _other_thread() -> str:
 
 @contextmanager
 def patched_time(passing: Passing) -> Iterator[SimTime]:
-    """Let hosts live in the time of a rig.
+    """Run hosts in the time of a rig.
 
-    What their code calls of `time` (`sleep`, `time`, `monotonic`, `perf_counter`, and in
-    nanoseconds) is on the clock of `passing`; so are `wait` and `wait_for` of threading's events
-    and conditions, `get` and `put` of queues, and a `select` of nothing with a timeout. Each look
-    at the clock takes 100 us, so that a loop that only looks comes to its end. Event loops of
-    asyncio that are made meanwhile, if it was imported before, have the time of `passing` too.
+    Calls of `time` in their code (`sleep`, `time`, `monotonic`, `perf_counter`, and in nanoseconds)
+    use the clock of `passing`; so are `wait` and `wait_for` of threading's events and conditions,
+    `get` and `put` of queues, and a `select` of nothing with a timeout. Each read of the clock
+    takes 100 us, so that a loop that only reads it ends. Event loops of asyncio that are created in
+    the block, if it was imported before, use the time of `passing` too.
 
-    Code of a host is all that is not Python's own, pytest's, Hypothesis's, coverage's, pyserial's,
-    python-can's, canopen's or ours. It is found in its modules whatever it has kept: names
-    (`from time import sleep`), attributes of classes, defaults of arguments. Threads that run
-    already keep their time. Of the others, only that of the caller can wait.
+    Host code is all code except Python's own, pytest's, Hypothesis's, coverage's, pyserial's,
+    python-can's, canopen's and ours. The functions are replaced in its modules wherever they are
+    stored: names (`from time import sleep`), attributes of classes, defaults of arguments. Threads
+    that already run keep their time. Of the others, only that of the caller can wait.
 
-    Not patched: what an object has kept before, `datetime`, `socket`, `Thread.join`,
+    Not patched: functions stored in objects before, `datetime`, `socket`, `Thread.join`,
     semaphores, `threading.Timer`, `queue.SimpleQueue`.
 
     Args:
@@ -275,9 +275,9 @@ def patched_time(passing: Passing) -> Iterator[SimTime]:
         The clock.
 
     Raises:
-        HostTimeError: another thread waited, or something that the rig had called back; it is
-            raised there, and once more at the end: such things are swallowed easily. Or freezegun
-            or time-machine has replaced the clock.
+        HostTimeError: another thread or a callback of the rig waited; it is raised there, and again
+            at the end, because hosts often swallow it. Or freezegun or time-machine has replaced
+            the clock.
     """
     _check_clock()
     clock = SimTime(passing)
@@ -289,7 +289,7 @@ def patched_time(passing: Passing) -> Iterator[SimTime]:
 
 
 def _loops(passing: Passing) -> AbstractContextManager[None]:
-    """Return what lets event loops have this time; nothing where asyncio is not in use."""
+    """Return a context that gives event loops this time; an empty one without asyncio."""
     if "asyncio" not in sys.modules:
         return nullcontext()
     return bench_loop.bench_loops(passing)
@@ -298,10 +298,10 @@ def _loops(passing: Passing) -> AbstractContextManager[None]:
 # Hosts that look at the clock of this machine while their bench is in virtual time.
 
 _WAITS: Final = ("sleep", "monotonic", "monotonic_ns")
-"""What nobody calls but who waits."""
+"""Functions called only for waiting."""
 
 _STAMPS: Final = ("time", "time_ns")
-"""What installed packages may call: they stamp what they write."""
+"""Functions that installed packages may call for time stamps."""
 
 _IN_A_THREAD: Final = (
     "is called in a thread, which cannot make virtual time pass: let the test poll, or mark it"
@@ -318,17 +318,16 @@ _WHAT_TO_DO: Final = (
 def unpatched_time_fails(
     allowed: Collection[str] = (), others: Collection[threading.Thread] | None = None
 ) -> Iterator[None]:
-    """Raise UnpatchedTimeError where a host sleeps, or looks at a clock that does not pass.
+    """Raise UnpatchedTimeError if a host sleeps, or reads a clock that does not advance.
 
-    It is raised at the first such call with its file and line, and once more at the end if the
-    host has swallowed it; if another exception came of that, it is a note of that one. Whose code
-    it is that counts, `patched_time` says; where that holds nothing is refused. `perf_counter` is
-    let through, and `time.time` in installed packages, and what a test has put in place of these
-    functions.
+    It is raised at the first such call with its file and line, and again at the end if the host has
+    swallowed it; if that caused another exception, it is a note of that one. `patched_time` defines
+    host code; within its block nothing is refused. `perf_counter` is allowed, `time.time` in
+    installed packages, and replacements of these functions by a test.
 
     Args:
-        allowed: names of packages that may do so.
-        others: threads that may do so; unless given, those that run already.
+        allowed: names of allowed packages.
+        others: allowed threads; by default those that already run.
     """
     others = threading.enumerate() if others is None else others
     refusals: list[str] = []

@@ -1,1 +1,1 @@
-"""What `canmon conform` stands on: where the node is, who moves its inputs, what is asked."""
+"""Parts of `canmon conform`: source of the node, stimuli, questions, reports."""

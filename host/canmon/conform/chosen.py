@@ -1,4 +1,4 @@
-"""Which checks `--only` names, and the list of `--list`."""
+"""Selection of checks by `--only`, and the list of `--list`."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tickrig.wire.canopen.eds.eds_device import EdsDevice
 
 
 def patterns(only: str | Iterable[str]) -> tuple[str, ...]:
-    """Return the groups and ids that were named, each for itself.
+    """Return the given groups and ids separately.
 
     >>> patterns("NMT,HB"), patterns(["PR-*", "UE-01"])
     (('NMT', 'HB'), ('PR-*', 'UE-01'))
@@ -24,7 +24,7 @@ def patterns(only: str | Iterable[str]) -> tuple[str, ...]:
 
 
 def unknown(words: Iterable[str]) -> list[str]:
-    """Say of each word that names no check that it does not, and what could be meant.
+    """Yield an error for each word that matches no check, with a suggestion.
 
     Args:
         words: groups or ids, with * and ?.
@@ -39,13 +39,13 @@ def unknown(words: Iterable[str]) -> list[str]:
 
 
 def _chosen(only: Sequence[str]) -> list[Check]:
-    """Return the checks of the suite that were chosen, whatever their level.
+    """Return the selected checks of the suite, of any level.
 
     Args:
         only: groups or ids, with * and ?; all if empty.
 
     Raises:
-        Refused: a word that names none.
+        Refused: a word that matches no check.
     """
     for text in unknown(only):
         raise Refused(f"--only {text}; see --list")
@@ -53,7 +53,7 @@ def _chosen(only: Sequence[str]) -> list[Check]:
 
 
 def _near(word: str) -> str:
-    """Say which name could be meant, or which groups there are."""
+    """Return the probable name, or the groups."""
     groups = list(group_titles())
     if close := closest(word.upper(), sorted([*groups, *(check.id for check in suite_checks())])):
         return f"did you mean {close[0]!r}?"
@@ -61,7 +61,7 @@ def _near(word: str) -> str:
 
 
 def check_chosen(only: Sequence[str], level: Level) -> None:
-    """Refused if a word names no check, or none that this level allows."""
+    """Raise Refused if a word matches no check, or none of this level."""
     _chosen(only)
     for word in only:
         named = _chosen([word])
@@ -70,21 +70,21 @@ def check_chosen(only: Sequence[str], level: Level) -> None:
             raise Refused(f"--only {word} needs --{least.word}")
 
 
-# The list of checks: names, levels, titles, and what their groups are about.
+# The list of checks: names, levels, titles, and descriptions of their groups.
 
 _ANY_NODE_ID: Final = 1
 _NAMED: Final = ", which --eds FILE names"
 
 
 def listed_checks(only: Sequence[str], device: EdsDevice | None) -> Iterator[str]:
-    """Yield a line a check, whatever its level, and then a line a group.
+    """Yield a line for each check, of any level, and then a line for each group.
 
     Args:
         only: groups or ids, with * and ?, in any case; all if empty.
-        device: what an EDS says, for the checks of its objects.
+        device: device of an EDS, for the checks of its objects.
 
     Raises:
-        Refused: a word that names none.
+        Refused: a word that matches no check.
     """
     checks = [*_chosen(only), *_of_objects(only, device)]
     wide = max((len(check.id) for check in checks), default=0) + 2

@@ -1,4 +1,4 @@
-"""Where the node under test is: a bus of python-can, or a rig file in virtual time."""
+"""Sources of the node under test: a python-can bus, or a rig file in virtual time."""
 
 from __future__ import annotations
 
@@ -36,23 +36,23 @@ _RIGS: Final = ExtensionGroup[Any](
     callable,
     "a function",
 )
-"""What opens a rig file: hosts know no emulators, so it is loaded by its name."""
+"""The function that opens a rig file, loaded by name because hosts do not import emulators."""
 
 
 _LOCAL: Final = ("virtual", "udp_multicast")
-"""Interfaces of python-can whose bus is between processes, most often of one machine."""
+"""Interfaces of python-can whose bus connects processes, mostly of one machine."""
 
 
 def _leave() -> None:
-    """Leave all as it is."""
+    """Do nothing."""
 
 
 def _know_nothing(node_id: int) -> None:
-    """Know no node beforehand."""
+    """Return None: nothing is known about the node."""
 
 
 def _watch_nothing(node_id: int, run: ConformRun) -> None:
-    """Nothing disturbs here."""
+    """Return no watch."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,17 +61,17 @@ class ConformSource:
 
     Attributes:
         link: the bus.
-        name: what people call it.
-        adapter: what it is behind, for people.
-        bit_rate: in bit/s, None if nobody says it.
-        virtual: nobody else is on it, and its time is none of this machine.
-        shared_host: its nodes may be processes of this machine.
-        nodes: what is known to be on it, by node-ID.
+        name: its name for messages.
+        adapter: description of the adapter.
+        bit_rate: in bit/s, None if unknown.
+        virtual: whether it has no other participants and runs in virtual time.
+        shared_host: whether its nodes may be processes of this machine.
+        nodes: known nodes, by node-ID.
         eds: names of the EDS of these nodes, by node-ID; the files need not exist.
-        describe: returns what is known about a node beforehand, None if it has no EDS.
-        stimulus: makes what moves the inputs of a node; None where nobody can.
-        close: gives the bus back.
-        watch: tells a run at a node what disturbs on the bus, and what programs of nodes raise.
+        describe: returns the known description of a node, None if it has no EDS.
+        stimulus: makes the stimuli of a node; None if there are none.
+        close: closes the bus.
+        watch: reports disturbances of the bus and exceptions of nodes to a run.
     """
 
     link: StampedLink
@@ -91,16 +91,16 @@ class ConformSource:
 def open_conform_source(
     word: str | None, node_id: int | None, options: BusOptions
 ) -> ConformSource:
-    """Open what a SOURCE word names.
+    """Open a SOURCE.
 
     Args:
-        word: `can0`, `slcan:/dev/ttyACM0@500k`, a rig file as `bench.toml`; None where the options
-            name a bus.
-        node_id: of the node, which says the bus of a rig that has several; None for the first.
-        options: interface, bit rate and such of a bus.
+        word: `can0`, `slcan:/dev/ttyACM0@500k`, a rig file such as `bench.toml`; None if the
+            options name a bus.
+        node_id: of the node, which selects the bus of a rig with several; None for the first.
+        options: interface, bit rate and others of a bus.
 
     Raises:
-        Refused: it is nothing that can be asked anything.
+        Refused: it is not a bus with nodes.
         SourceFailed: it cannot be opened.
     """
     if word is None and not options:
@@ -161,7 +161,7 @@ def _open_bus(spec: BusSpec, options: BusOptions) -> ConformSource:
 
 
 def _is_local(interface: str, channel: object) -> bool:
-    """Return whether a bus is one between processes of this machine, as vcan."""
+    """Return whether a bus connects processes of this machine, such as vcan."""
     if interface in _LOCAL:
         return True
     net = Path("/sys/class/net", str(channel))

@@ -1,4 +1,4 @@
-"""One call of `canmon conform`: opens, asks, judges, tells."""
+"""One call of `canmon conform`: open the source, ask, run the checks, report."""
 
 from __future__ import annotations
 
@@ -49,19 +49,19 @@ from tickrig.host.cli.start import INTERRUPTED
 from tickrig.host.text.page_text import one_line
 from tickrig.host.text.whole_file import check_file, check_not_read, write_whole
 
-# The files of a conformance run, asked before it and written after it, and frames in them.
+# The files of a conformance run, checked before it and written after it, and frames in them.
 
 
-# The files of a conformance run: asked before it whether they can be, and written after it.
+# The files of a conformance run: checked before it, and written after it.
 
 _HTML: Final = "--html"
 
 
 def check_files(files: Mapping[str, Path]) -> None:
-    """See whether the files could be written; Refused if one could not.
+    """Check that the files can be written; Refused if one cannot.
 
     Args:
-        files: by the option that names it.
+        files: by option.
     """
     for option, path in files.items():
         with refusing():
@@ -74,11 +74,11 @@ def check_files(files: Mapping[str, Path]) -> None:
 
 
 def _keep_inputs(files: Mapping[str, Path], inputs: Iterable[Path]) -> None:
-    """See that no report goes into what the run reads; Refused if one would.
+    """Check that no report overwrites an input of the run; Refused if one would.
 
     Args:
-        files: by the option that names it.
-        inputs: what is read; what is no file is none.
+        files: by option.
+        inputs: paths that are read; others than files are ignored.
     """
     read = tuple(inputs)
     for option, path in files.items():
@@ -89,12 +89,12 @@ def _keep_inputs(files: Mapping[str, Path], inputs: Iterable[Path]) -> None:
 def _write_files(
     report: Report, files: Mapping[str, Path], baseline: Baseline, show: ShowFrames
 ) -> bool:
-    """Write the files; say which could not be, and return whether all could.
+    """Write the files; report those that fail, and return whether all were written.
 
     Args:
         report: the run.
-        files: by the option that names it.
-        baseline: failures that are known.
+        files: by option.
+        baseline: known failures.
         show: writes frames.
     """
     written = True
@@ -108,12 +108,12 @@ def _write_files(
 
 
 def file_text(option: str, report: Report, baseline: Baseline, show: ShowFrames) -> str:
-    """Return what the file that an option names holds.
+    """Return the content of the file of an option.
 
     Args:
         option: `--html`, `--junit`, `--badge`, `--issue`, else the failures as a baseline.
         report: the run.
-        baseline: failures that are known.
+        baseline: known failures.
         show: writes frames.
     """
     match option:
@@ -131,17 +131,17 @@ def file_text(option: str, report: Report, baseline: Baseline, show: ShowFrames)
             return baseline_text(report)
 
 
-# The frames of a conformance check, and what they mean: lines as `canmon dump` shows them.
+# The decoded frames of a conformance check, as in `canmon dump`.
 
 
 def decoded_frames(eds: Mapping[int, Path | EdsObjects]) -> ShowFrames:
-    """Return what writes the lines of a check; each call begins anew, knowing only the EDS.
+    """Return a writer for the lines of a check; each call starts with the EDS only.
 
-    Between two checks there are frames that no evidence has: what was open or mapped in one
-    says nothing of the next.
+    Frames between two checks are not in the evidence, so transfers and mappings of one check are
+    not valid in the next.
 
     Args:
-        eds: an EDS, or what was read of one, by node-ID.
+        eds: an EDS, or the result of reading one, by node-ID.
 
     Raises:
         OSError: an EDS cannot be read.
@@ -178,12 +178,12 @@ class Conformance:
     """One call.
 
     Args:
-        word: SOURCE; None where the options name a bus.
-        bus: what the options say of a bus.
+        word: SOURCE; None if the options name a bus.
+        bus: options of a bus.
         options: the others, by name.
 
     Raises:
-        Refused: something that was asked for cannot be; nothing was sent.
+        Refused: impossible options; nothing was sent.
     """
 
     def __init__(self, word: str | None, bus: BusOptions, options: dict[str, Any]) -> None:
@@ -205,7 +205,7 @@ class Conformance:
         self._document = read_device_document(self._eds, "--eds") if self._eds else None
 
     def _inputs(self) -> Iterator[Path]:
-        """Yield the files that are read; a baseline may be written anew."""
+        """Yield the files that are read; a baseline may be overwritten."""
         options = self._options
         if self._word and self._word.lower().endswith(RIG_FILE):
             yield Path(self._word)
@@ -218,10 +218,10 @@ class Conformance:
             yield from map(Path, (words, *words.split()))
 
     def run(self) -> int:
-        """Do it; return the exit status."""
+        """Run it; return the exit status."""
         node_id: int | None = self._options["node"]
         if node_id is None and (self._files or self._options["as_json"]):
-            raise Refused("--node is missing: without it nothing is judged, and nothing reported")
+            raise Refused("--node is missing: it is needed for checks and reports")
         with ExitStack() as held:
             source = open_conform_source(self._word, node_id, self._bus)
             held.callback(source.close)
@@ -232,7 +232,7 @@ class Conformance:
         return INTERRUPTED if report is None else self._show(report)
 
     def _judge(self, source: ConformSource, node_id: int) -> Report | None:
-        """Return the report; None if it was ended before it had begun."""
+        """Return the report; None if it was interrupted before the start."""
         consent = Consent(
             yes=self._options["yes"], virtual=source.virtual, alone=len(source.nodes) == 1
         )
@@ -270,7 +270,7 @@ class Conformance:
     def _completed(
         self, report: Report, source: ConformSource, known: NodeDescription | None
     ) -> Report:
-        """Add what the tester itself does not know: versions, adapter, what is wrong in the EDS."""
+        """Add data from outside the tester: versions, adapter, findings in the EDS."""
         settings = {"tickrig": VERSION, "adapter": source.adapter, **report.settings}
         if known is None:
             return replace(report, settings=settings)
@@ -298,7 +298,7 @@ class Conformance:
         )
 
     def _show(self, report: Report) -> int:
-        """Write all that was asked for; return the exit status."""
+        """Write all requested files; return the exit status."""
         eds = {} if self._eds is None else {report.node_id: self._eds}
         with until_unread():
             if self._options["as_json"]:
@@ -315,7 +315,7 @@ class Conformance:
         return status if written or status else BUS_FAILED
 
     def _again(self, report: Report) -> str:
-        """Return the command that judges the node again."""
+        """Return the command that repeats the run."""
         words = ["canmon", "conform", *([self._word] if self._word else []), *self._bus.arguments()]
         words += ["--node", str(report.node_id), f"--{report.level.word}"]
         words += ["--eds", str(self._eds)] if self._eds else []
@@ -337,7 +337,7 @@ def _read_baseline(path: Path | None) -> Baseline:
 
 
 def _findings(document: Document) -> str:
-    """Say how much `canmon eds check` finds in an EDS."""
+    """Return the number of findings of `canmon eds check` in an EDS."""
     command = shlex.join(["canmon", "eds", "check", document.name])
     return f"{severities(check(document))}: {command}"
 
@@ -347,7 +347,7 @@ def _indices(option: str, words: Iterable[str]) -> frozenset[int]:
 
 
 def _index(option: str, word: str) -> int:
-    """Read an index, as 6200h or 0x6200."""
+    """Read an index, such as 6200h or 0x6200."""
     digits = word.lower().removeprefix("0x").removesuffix("h")
     try:
         index = int(digits, 16)

@@ -1,4 +1,4 @@
-"""Who moves the inputs of the device: a command, an operator, or an emulator's control socket."""
+"""Stimuli of the device: a command, an operator, or an emulator's control socket."""
 
 from __future__ import annotations
 
@@ -31,20 +31,20 @@ from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.errors import FieldError
 
-# Moves inputs of an emulated device by names of its signals (docs/reference/bench/control.md).
+# Sets inputs of an emulated device by signal name (docs/reference/bench/control.md).
 
 _HEX = "hex:"
-"""Begins the bytes of an octet string or a domain."""
+"""Prefix of the bytes of an octet string or a domain."""
 
 _LINES: Final = 8
-"""`di1` is lines 1 to 8, `di2` those that follow."""
+"""Lines per group: `di1` is lines 1 to 8, `di2` the next ones."""
 _CHANNEL: Final = re.compile(r"(di|do|ai)([1-9][0-9]{0,2})")
 _INPUTS: Final = {"6000": "di", "6401": "ai"}
-"""Objects of CiA 401 that show what is at the inputs."""
+"""Objects of CiA 401 that show the inputs."""
 
 
 class LinearConverter(NamedTuple):
-    """A linear converter: from `low` to `high` its object holds `first` to `last` by `step`."""
+    """A linear converter: from `low` to `high` the object goes from `first` to `last` by `step`."""
 
     low: float
     high: float
@@ -54,14 +54,14 @@ class LinearConverter(NamedTuple):
 
 
 class SignalStimulus(ABC):
-    """Takes the words of a check, and sets, reads and switches by name."""
+    """Executes the words of a check: sets, reads and switches by name."""
 
     def __call__(self, *words: str) -> str:
-        """Do it, and return what was read.
+        """Execute a stimulus, and return the read value.
 
         Raises:
-            NotAllowed: the device has nothing of the kind.
-            Disturbed: it has, and it could not be done.
+            NotAllowed: the device does not support it.
+            Disturbed: it failed.
         """
         try:
             return self._act(*words)
@@ -90,7 +90,7 @@ class SignalStimulus(ABC):
         return ""
 
     def _input(self, name: str, value: str) -> None:
-        """Set an input; of a CiA 401 module eight lines or counts, as an object of it too."""
+        """Set an input; for a CiA 401 module eight lines or counts, also by object."""
         module = "di1" in self.names() or self._channels("ai1")
         index, _, sub = name.partition(":")
         if module and index in _INPUTS:
@@ -107,7 +107,7 @@ class SignalStimulus(ABC):
             self.set(signal, _value(value, self.unit(signal)))
 
     def _quantity(self, name: str, counts: int) -> float:
-        """Return what a converter turns into these counts."""
+        """Return the value that a converter turns into these counts."""
         span = self.span(name)
         if span is None:
             raise ValueError(f"{name} takes {self.unit(name)}, and its counts are not known here")
@@ -121,7 +121,7 @@ class SignalStimulus(ABC):
         return [each for each in self.names() if each.startswith(f"{name}_")]
 
     def _set_lines(self, number: int, levels: int) -> None:
-        """Set eight lines; those that there are not can only be low."""
+        """Set eight lines; missing lines can only be low."""
         for bit in range(_LINES):
             line, level = f"di{_LINES * (number - 1) + bit + 1}", levels >> bit & 1
             if line in self.names():
@@ -138,14 +138,14 @@ class SignalStimulus(ABC):
         return _hex(self.get(signal), self.unit(signal))
 
     def _set_emergency(self, code: int) -> None:
-        """Let an error come or go: there is one at a time."""
+        """Start or clear an error; only one at a time is possible."""
         if code and self.get("emergency"):
             raise NotAllowed("a second error at once: the device takes one by hand")
         self.set("emergency", code)
 
     @abstractmethod
     def set(self, name: str, value: Setting) -> None:
-        """Set an input; ValueError if it cannot be."""
+        """Set an input; ValueError if that is impossible."""
 
     @abstractmethod
     def get(self, name: str) -> Setting:
@@ -161,15 +161,15 @@ class SignalStimulus(ABC):
 
     @abstractmethod
     def span(self, name: str) -> LinearConverter | None:
-        """Return what the converter of an input tells, None where that is not known."""
+        """Return the converter of an input, None if unknown."""
 
     @abstractmethod
     def switch(self, *, on: bool) -> None:
-        """Switch its supply."""
+        """Switch the supply."""
 
 
 def _signal_name(name: str) -> str:
-    """Return what an emulator calls an object of a check.
+    """Return the emulator's name for an object of a check.
 
     >>> _signal_name("6000:01"), _signal_name("2000:00"), _signal_name("stick")
     ('0x6000:1', '0x2000', 'stick')
@@ -181,7 +181,7 @@ def _signal_name(name: str) -> str:
 
 
 def _value(text: str, unit: str) -> Setting:
-    """Read the bytes of an object as its type, what is none as a number."""
+    """Read the bytes of an object as its type, or as a number."""
     if unit not in DataType.__members__:
         return parse_setting(text)
     value = DataType[unit].decode(bytes.fromhex(text))
@@ -189,7 +189,7 @@ def _value(text: str, unit: str) -> Setting:
 
 
 def _hex(value: Setting, unit: str) -> str:
-    """Write the value of an object as it goes over the bus."""
+    """Write the value of an object as on the bus."""
     if unit not in DataType.__members__:
         return str(value)
     if isinstance(value, str) and value.startswith(_HEX):
@@ -200,23 +200,23 @@ def _hex(value: Setting, unit: str) -> str:
 _OPERATOR: Final = "ask"
 CONTROL: Final = "control:"
 _CANNOT: Final = 77
-"""Exit status by which a command says that it has no such input, as in test suites of C."""
+"""Exit status of a command for an unsupported input, as in C test suites."""
 _PATIENCE_S: Final = 30
-"""A command that moves an input is done by then."""
+"""Time-out of a command."""
 
 
 def open_stimulus(text: str) -> Stimulus:
-    """Return who moves the inputs.
+    """Return the stimuli for the inputs.
 
     Args:
         text: `ask`, `control:PATH` or the path of a control socket, else the words of a command.
 
     Raises:
-        Refused: it is none of them.
+        Refused: another form.
     """
     if text == _OPERATOR:
         if not sys.stdin.isatty():
-            raise Refused("--stimulus ask wants somebody at a terminal")
+            raise Refused("--stimulus ask needs a terminal")
         return _ask_operator
     place = text.removeprefix(CONTROL)
     if place and (place != text or Path(place).is_socket()):
@@ -231,7 +231,7 @@ def open_stimulus(text: str) -> Stimulus:
 
 
 def _ask_operator(*words: str) -> str:
-    """Let a person do it; what is read of an output is typed."""
+    """Ask a person; values of outputs are typed in."""
     text = one_line(" ".join(words))
     if words[0] == "output":
         return str(click.prompt(f"What is {text}, in hex", err=True))
@@ -241,7 +241,7 @@ def _ask_operator(*words: str) -> str:
 
 
 class CommandStimulus:
-    """Calls a command with the words behind its own; no shell is between.
+    """Calls a command with the words of the check appended, without a shell.
 
     Args:
         words: the command.
@@ -251,11 +251,11 @@ class CommandStimulus:
         self._words = words
 
     def __call__(self, *words: str) -> str:
-        """Call it, and return the first line that it prints.
+        """Call the command, and return its first line of output.
 
         Raises:
             NotAllowed: it ends with `_CANNOT`.
-            Disturbed: it cannot be run, does not end, or ends with another status than 0.
+            Disturbed: it cannot be run, does not end, or ends with an exit status other than 0.
         """
         line = " ".join([*self._words, *words])
         try:
@@ -286,7 +286,7 @@ class _ControlStimulus(SignalStimulus):
         path: of the socket.
 
     Raises:
-        Refused: nobody answers there.
+        Refused: no answer.
     """
 
     def __init__(self, path: Path) -> None:
@@ -303,7 +303,7 @@ class _ControlStimulus(SignalStimulus):
             raise Refused(f"--stimulus {path}: no emulator: what it describes is none") from None
 
     def _learn(self, described: Any) -> None:
-        """Take names, units and converters, as docs/reference/bench/control.md has them."""
+        """Read names, units and converters (docs/reference/bench/control.md)."""
         for item in (*described.get("inputs", ()), *described.get("outputs", ())):
             self._units[item["name"]] = str(item.get("unit", ""))
             if "counts" in item:
@@ -322,19 +322,19 @@ class _ControlStimulus(SignalStimulus):
         return value
 
     def names(self) -> Collection[str]:
-        """Return the names that the emulator tells."""
+        """Return the names reported by the emulator."""
         return self._units.keys()
 
     def unit(self, name: str) -> str:
-        """Return the unit that the emulator names."""
+        """Return the unit reported by the emulator."""
         return self._units.get(name, "")
 
     def span(self, name: str) -> LinearConverter | None:
-        """Return what the emulator tells of a converter."""
+        """Return the converter reported by the emulator."""
         return self._spans.get(name)
 
     def switch(self, *, on: bool) -> None:
-        """Let the fault `power_off` come or go."""
+        """Start or clear the fault `power_off`."""
         if on:
             self._request("clear", name="power_off")
         else:
@@ -345,20 +345,20 @@ class _ControlStimulus(SignalStimulus):
             return client.request(do, **fields)
 
 
-# What a person is asked before something on the bus could move, and how far a run is.
+# Questions before anything on the bus may move, and the progress of a run.
 
 
-# Which nodes are on a bus, by what they say: nobody is asked anything.
+# Nodes on a bus, found by listening only.
 
 _LISTEN_US: Final = 1_500_000
-"""Longer than most heartbeat periods; a silent node is not heard."""
+"""Listening time, longer than most heartbeat periods; silent nodes are not found."""
 
 _FUNCTIONS: Final = (0x080, 0x180, 0x280, 0x380, 0x480, 0x580, 0x700)
-"""What slaves send, in the pre-defined connection set (CiA 301 v4.2, 7.3.5)."""
+"""Frames of slaves in the pre-defined connection set (CiA 301 v4.2, 7.3.5)."""
 
 
 def list_nodes(source: ConformSource) -> int:
-    """List the nodes that are on a bus, for who did not name one; return the exit status."""
+    """List the nodes on a bus if no node was given; return the exit status."""
     lines = [f"node {node_id}  {name}" for node_id, name in source.nodes.items()]
     ended = source.virtual
     with until_interrupted():
@@ -371,18 +371,16 @@ def list_nodes(source: ConformSource) -> int:
             click.echo(line)
     if lines or not ended:
         return 0 if lines else INTERRUPTED
-    say(
-        f"nobody was heard within {_LISTEN_US / 1e6:.1f} s; who says nothing by itself is not heard"
-    )
+    say(f"no frames within {_LISTEN_US / 1e6:.1f} s; a node that sends nothing itself is not found")
     return NOTHING_JUDGED
 
 
 def nodes_heard(link: StampedLink, span_us: int = _LISTEN_US) -> dict[int, int]:
-    """Listen; return how many frames were heard of which node-ID.
+    """Listen; return the number of frames by node-ID.
 
     Args:
-        link: the bus; what is heard is taken from it.
-        span_us: for how long, in microseconds.
+        link: the bus; received frames are consumed.
+        span_us: duration in microseconds.
     """
     heard: dict[int, int] = {}
     until_us = link.now_us + span_us
@@ -394,7 +392,7 @@ def nodes_heard(link: StampedLink, span_us: int = _LISTEN_US) -> dict[int, int]:
 
 
 def _node_of(frame: CanFrame) -> int | None:
-    """Return the node-ID of who sent a frame, as far as its CAN-ID tells; None if it does not."""
+    """Return the node-ID of the sender by the CAN-ID of a frame; None if unknown."""
     node_id = frame.can_id & 0x7F
     sent = not (frame.extended or frame.remote) and node_id
     return node_id if sent and frame.can_id & 0x780 in _FUNCTIONS else None
@@ -414,23 +412,23 @@ _Confirm = Callable[[str], bool]
 _DOES = {
     Level.READ_ONLY: "is only read",
     Level.COMMUNICATION: (
-        "is started, stopped and configured anew, objects below 6000h are written with what they"
+        "is started, stopped and reconfigured, objects below 6000h are written with what they"
         " must refuse; SYNC and PDOs are sent"
     ),
     Level.INTRUSIVE: (
-        "is reset, configured anew, stored and restored, objects below 6000h are written;"
+        "is reset, reconfigured, stored and restored, objects below 6000h are written;"
         " SYNC, PDOs, LSS are sent"
     ),
 }
 
 
 class Consent:
-    """Asks a person, or has their word already.
+    """Asks the user, or has the consent already.
 
     Args:
-        yes: `--yes`: all was said yes to.
-        virtual: all is in a rig in virtual time, where nothing moves.
-        alone: no other node is there.
+        yes: `--yes`: consent to all.
+        virtual: a rig in virtual time, where nothing moves.
+        alone: there is no other node.
     """
 
     def __init__(self, *, yes: bool, virtual: bool, alone: bool = False) -> None:
@@ -438,14 +436,14 @@ class Consent:
 
     @property
     def can_ask(self) -> bool:
-        """Whether there is somebody to be asked."""
+        """Whether there is a terminal for questions."""
         return sys.stdin.isatty() and sys.stderr.isatty()
 
     def begin(self, node_id: int, level: Level, others: dict[int, int]) -> None:
-        """Say who else is on the bus, and ask before the first frame that changes anything.
+        """Show other nodes on the bus, and ask before the first frame that changes anything.
 
         Raises:
-            Refused: the answer is no, or nobody is there who could give one.
+            Refused: the answer is no, or there is no terminal to ask.
         """
         if others:
             say(f"also on this bus: {_listed(others)}")
@@ -453,15 +451,15 @@ class Consent:
             return
         what = f"node {node_id} {_DOES[level]}: what it drives may move, other nodes may trip"
         if not self.can_ask:
-            raise Refused(f"{what}. Nobody is here to be asked: give --yes, or --read-only")
+            raise Refused(f"{what}. There is no terminal to ask: give --yes, or --read-only")
         say(what)
         if not self.confirm("Go on?"):
-            raise Refused("not begun")
+            raise Refused("not started")
 
     def confirm(self, question: str) -> bool:
-        """Ask; no where nobody is there.
+        """Ask the user; the answer is no without a terminal.
 
-        In a rig there is nothing to be asked but for LSS, which other nodes would answer too.
+        In a rig only LSS needs a question, because other nodes would answer too.
         """
         if self._yes:
             return True
@@ -473,7 +471,7 @@ class Consent:
 
 
 class Progress:
-    """A line on a terminal that says how far a run is; none in a pipe.
+    """A progress line of a run on a terminal; none in a pipe.
 
     Args:
         shown: whether there is a terminal.
@@ -483,7 +481,7 @@ class Progress:
         self._shown, self._judged, self._failed = shown, 0, 0
 
     def begin(self, node_id: int) -> None:
-        """Say what lasts before the first result."""
+        """Show the activity before the first result."""
         if self._shown:
             paint(sys.stderr, f"\r\x1b[Knode {node_id} is read")
 

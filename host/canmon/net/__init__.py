@@ -1,1 +1,1 @@
-"""The verbs of `canmon net`: a CANopen network set to work."""
+"""The verbs of `canmon net`: set up a CANopen network."""

@@ -1,4 +1,4 @@
-"""The verb `net`: a CANopen network, set to work."""
+"""The verb `net`: set up a CANopen network."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tickrig.host.cli.options import LazyGroup, time_option
 
 _HERE: Final = "tickrig.host.canmon.net"
 VERBS: Final = {
-    "scan": (f"{_HERE}.node_verbs:scan", "Say which nodes are there."),
+    "scan": (f"{_HERE}.node_verbs:scan", "List the nodes on the bus."),
     "nmt": (f"{_HERE}.node_verbs:nmt", "Send an NMT command to NODE, or to all."),
     "lss": (
         f"{_HERE}.lss_verb:command",
@@ -20,24 +20,24 @@ VERBS: Final = {
     ),
     "read": (f"{_HERE}.object_verbs:read", "Read objects of NODE."),
     "write": (f"{_HERE}.object_verbs:write", "Write objects of NODE."),
-    "dcf": (f"{_HERE}.object_verbs:dcf", "Write what the DCF or XDC FILE configures into NODE."),
+    "dcf": (f"{_HERE}.object_verbs:dcf", "Write the configuration of the DCF or XDC FILE to NODE."),
     "compare": (f"{_HERE}.object_verbs:compare", "Compare NODE with a DCF, or with another node."),
     "store": (f"{_HERE}.object_verbs:store", "Store parameters of NODE (1010h)."),
     "restore": (f"{_HERE}.object_verbs:restore", "Restore the defaults of NODE (1011h)."),
-    "program": (f"{_HERE}.program_verb:command", "Download FILE into NODE by block transfer."),
-    "boot": (f"{_HERE}.node_verbs:boot", "Boot NODE as an NMT master does (CiA 302-2)."),
+    "program": (f"{_HERE}.program_verb:command", "Download FILE to NODE by block transfer."),
+    "boot": (f"{_HERE}.node_verbs:boot", "Boot NODE like an NMT master (CiA 302-2)."),
 }
 _ANSWER_US: Final = 500_000
 
 
 @dataclass(frozen=True, slots=True)
 class NetCall:
-    """What stands before the verb.
+    """Options before the verb.
 
     Attributes:
-        word: SOURCE; None where the options name a bus.
-        bus: what the options say of a bus.
-        timeout_us: how long an answer is waited for.
+        word: SOURCE; None if the options name a bus.
+        bus: options of a bus.
+        timeout_us: time-out of an answer.
     """
 
     word: str | None
@@ -49,7 +49,7 @@ class _NetGroup(LazyGroup):
     """A group with SOURCE before its verbs, unless options name the bus."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Put an empty SOURCE where a verb comes first."""
+        """Insert an empty SOURCE if a verb comes first."""
         args = spread(args)
         found, rest, _ = self.make_parser(ctx).parse_args(list(args))
         if found.get("source") in self.commands:
@@ -59,17 +59,17 @@ class _NetGroup(LazyGroup):
 
 @click.group(cls=_NetGroup, commands=VERBS, subcommand_metavar="VERB [ARGS]...")
 @click.argument("source", required=False)
-@time_option("--timeout", "timeout_us", help="How long a node may take to answer.  [500ms]")
+@time_option("--timeout", "timeout_us", help="Time-out of a node's answer. [500ms]")
 @bus_options
 @click.pass_context
 def command(
     context: click.Context, /, source: str | None, timeout_us: int | None, **options: Any
 ) -> None:
-    """Set a CANopen network to work: find, address, configure and program its nodes.
+    """Set up a CANopen network: find, address, configure and program its nodes.
 
-    SOURCE is a bus, or a rig file in virtual time. In place of it -i and -c name
-    interface and channel of a bus, as python-can does. What writes asks first, or
-    wants --yes; what may turn a motor says so. In a rig nobody is asked.
+    SOURCE is a bus, or a rig file in virtual time. Instead -i and -c may name interface and channel
+    of a bus, as in python-can. Verbs that write ask first, or need --yes; they warn if a motor may
+    turn. In a rig they do not ask.
 
     \b
     canmon net can0 scan                          which nodes are there?

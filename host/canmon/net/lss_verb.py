@@ -18,7 +18,7 @@ from tickrig.host.cli.options import time_option
 from tickrig.wire.canopen.lss import LssAddress, LssMode
 from tickrig.wire.canopen.nmt import NmtState
 
-# What `canmon net lss` does: finds slaves, looks at them, configures them, leaves them waiting.
+# The work of `canmon net lss`: find, inspect and configure slaves, and leave them waiting.
 
 _UNCONFIGURED = 0xFF
 _BOOT_UP_US = 5_000_000
@@ -27,16 +27,16 @@ _DEVICE_TYPE = 0x1000
 
 @dataclass(frozen=True, slots=True)
 class LssSettings:
-    """What the command line says.
+    """Options of the command line.
 
     Attributes:
-        address: of the slave that is meant; None for those that a fastscan finds.
-        only_node: the one slave on the bus is meant.
+        address: of the slave; None for those found by fastscan.
+        only_node: for the only slave on the bus.
         node_ids: new node-IDs, for one slave each; empty for none.
         bit_rate: in bit/s, None for none.
-        delay_ms: the bit rate is activated with this delay; None: it is not.
-        store: both are stored.
-        dry_run: nothing is configured.
+        delay_ms: delay for activating the bit rate; None for no activation.
+        store: store both.
+        dry_run: configure nothing.
     """
 
     address: LssAddress | None = None
@@ -49,11 +49,11 @@ class LssSettings:
 
     @property
     def configures(self) -> bool:
-        """Whether something is to be changed."""
+        """Whether anything is to be changed."""
         return bool(self.node_ids or self.bit_rate or self.store)
 
     def steps(self, node_id: int | None) -> list[str]:
-        """Return what is done to one slave."""
+        """Return the steps for one slave."""
         steps = [] if node_id is None else [f"node-ID {node_id}"]
         if self.bit_rate is not None:
             steps.append(f"bit rate {self.bit_rate // 1_000}k")
@@ -69,8 +69,8 @@ class LssWork:
 
     Args:
         session: the bus.
-        master: speaks LSS there.
-        settings: what is to be done.
+        master: LSS master on the bus.
+        settings: the request.
     """
 
     def __init__(
@@ -79,10 +79,10 @@ class LssWork:
         self._session, self._master, self._settings = session, master, settings
 
     def run(self, *, yes: bool) -> None:
-        """Do it.
+        """Execute the request.
 
         Raises:
-            Refused: a node-ID is taken, or the answer was no.
+            Refused: a node-ID is in use, or the user declined.
             NodeFailed: a slave refused, or there is none.
         """
         settings = self._settings
@@ -115,7 +115,7 @@ class LssWork:
         self._session.confirm(f"LSS: {', '.join(steps)} for {who}", yes=yes, risk=risk)
 
     def _check_free(self, node_id: int) -> None:
-        """Refuse a node-ID that somebody has."""
+        """Refuse a node-ID that is in use."""
         try:
             self._session.bus.read(node_id, _DEVICE_TYPE, 0)
         except SdoAborted:
@@ -125,7 +125,7 @@ class LssWork:
         raise Refused(f"node-ID {node_id} is taken: a node answers there")
 
     def _configure_all(self) -> int:
-        """Configure one slave after the other; return how many there were."""
+        """Configure one slave after the other; return their number."""
         ids = iter(self._settings.node_ids)
         found = 0
         for address, old_id in self._slaves():
@@ -137,7 +137,7 @@ class LssWork:
         return found
 
     def _show_slave(self, address: LssAddress, old_id: int) -> None:
-        """Show who was found; NodeFailed if several were, and are to be configured."""
+        """Show the found slave; NodeFailed if several with this identity are to be configured."""
         count = self._master.count()
         shared = f", {count} nodes with this identity" if count > 1 else ""
         click.echo(f"{_text(address)}  {_id_text(old_id)}{shared}")
@@ -148,7 +148,7 @@ class LssWork:
             )
 
     def _slaves(self) -> Iterator[tuple[LssAddress, int]]:
-        """Yield each slave that is meant, in configuration, with its node-ID."""
+        """Yield each slave to configure, in state configuration, with its node-ID."""
         master, settings = self._master, self._settings
         if settings.only_node:
             master.switch_all(LssMode.CONFIGURATION)
@@ -160,7 +160,7 @@ class LssWork:
             yield from self._scanned()
 
     def _scanned(self) -> Iterator[tuple[LssAddress, int]]:
-        """Yield what fastscans find: who was found is in configuration, and answers no more."""
+        """Yield the results of fastscans: a found slave is in configuration and stays silent."""
         seen = set[LssAddress]()
         most = len(self._settings.node_ids) or lss_master.MOST_FOUND
         while len(seen) < most and (address := self._master.fastscan()) is not None:
@@ -194,7 +194,7 @@ class LssWork:
         say(f"done: {', '.join(steps)}")
 
     def _see_boot(self, node_id: int, old_id: int) -> None:
-        """Have a slave without a node-ID boot with its new one; say when that of another counts."""
+        """Boot a slave without a node-ID with its new one; report when others take effect."""
         if old_id != _UNCONFIGURED:
             say(f"node-ID {node_id} counts from its next reset: nmt reset-node {old_id}")
             return
@@ -229,14 +229,14 @@ _KBIT: Final = {"k": 1_000, "M": 1_000_000}
 @click.command()
 @click.option("--identity", metavar="V:P:R:S", help="Vendor, product, revision, serial, in hex.")
 @click.option("--fastscan", is_flag=True, help="The nodes without a node-ID, one by one.")
-@click.option("--only-node", is_flag=True, help="The only node on the bus, whatever it is.")
+@click.option("--only-node", is_flag=True, help="The only node on the bus, of any identity.")
 @click.option("--node-id", "ids", metavar="N|N-M", help="1..127; a range for several.")
-@click.option("--bit-rate", metavar="RATE", help="As 500k; counts when activated or at power-on.")
-@click.option("--store", is_flag=True, help="Let the node keep both.")
-@time_option("--activate", "activate_us", help="Switch the bit rate after a delay, as 200ms.")
-@time_option("--wait", "wait_us", help="For answers to each question of a fastscan.  [20ms]")
-@click.option("--dry-run", is_flag=True, help="Find and look; configure nothing.")
-@click.option("--yes", is_flag=True, help="Ask nothing.")
+@click.option("--bit-rate", metavar="RATE", help="As 500k; used when activated or at power-on.")
+@click.option("--store", is_flag=True, help="Store both in the node.")
+@time_option("--activate", "activate_us", help="Switch the bit rate after a delay, such as 200ms.")
+@time_option("--wait", "wait_us", help="Time-out of each request of a fastscan. [20ms]")
+@click.option("--dry-run", is_flag=True, help="Find nodes without configuring them.")
+@click.option("--yes", is_flag=True, help="Do not ask.")
 @click.pass_obj
 def command(  # noqa: PLR0913, PLR0917 - options
     call: NetCall,
@@ -253,11 +253,10 @@ def command(  # noqa: PLR0913, PLR0917 - options
 ) -> None:
     """Configure node-ID and bit rate of nodes by LSS (CiA 305).
 
-    Without options it lists the nodes without a node-ID, by fastscan. Which node is
-    meant says --identity (1018h, as `scan` shows it), --fastscan, or --only-node. A node
-    without a node-ID boots with its new one at once, others with their next reset;
-    without --store it is lost with the power. However it ends, all nodes are back in
-    LSS waiting.
+    Without options it lists the nodes without a node-ID, by fastscan. Select the node by --identity
+    (1018h, as shown by `scan`), --fastscan, or --only-node. A node without a node-ID boots with its
+    new one at once, others at their next reset; without --store it is lost at power-off. In any
+    case all nodes are back in LSS waiting at the end.
 
     \b
     canmon net can0 lss                           who has no node-ID?
@@ -309,7 +308,7 @@ def _bit_rate(text: str) -> int:
     rate = int(number) * factor if number.isascii() and number.isdecimal() else 0
     if rate not in lss_master.INDICES:
         known = ", ".join(f"{each // 1_000}k" for each in sorted(lss_master.INDICES))
-        raise Refused(f"--bit-rate {text!r} is none of CiA 305: {known}")
+        raise Refused(f"--bit-rate {text!r} is not a bit rate of CiA 305: {known}")
     return rate
 
 

@@ -1,4 +1,4 @@
-"""The objects of a node by name: from its EDS, else those that CiA 301 and CiA 402 name."""
+"""The objects of a node by name: from its EDS, else with names of CiA 301 and CiA 402."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from tickrig.wire.canopen.pdo import PdoDescription
 # Names of CiA 301 as an EDS writes them in full, for nodes of which there is none.
 
 _PDOS: Final = 64
-"""PDOs of each direction that have names."""
+"""Number of PDOs with names in each direction."""
 
 
 @cache
@@ -62,22 +62,22 @@ _ADDRESS: Final = re.compile(
 _COMMUNICATION: Final = range(0x1000, 0x2000)
 _DRIVE: Final = range(0x6000, 0x6100)
 _SUBS: Final = range(9)
-"""Of the objects that CiA 301 names, to be found by name without an EDS."""
+"""Objects with names in CiA 301, for use without an EDS."""
 
 
 class NamedObjects:
-    """What is known of the objects of one node.
+    """The known objects of one node.
 
     Args:
         node_id: the node.
         file: its EDS, None without one.
-        known: what the EDS says, where it is known without a file.
-        name: of the EDS then.
+        known: the EDS, if known without a file.
+        name: of that EDS.
 
     Attributes:
         node_id: as given.
         file: as given.
-        device: what the EDS says.
+        device: the device of the EDS.
         rows: its entries, by index and sub-index.
     """
 
@@ -100,11 +100,11 @@ class NamedObjects:
 
     @property
     def is_drive(self) -> bool:
-        """Whether it is a drive of CiA 402, as far as is known."""
+        """Whether it is known to be a drive of CiA 402."""
         return self._memory.is_drive
 
     def learn(self, entry: Entry, data: bytes) -> None:
-        """Take what the node says of itself, as its device type."""
+        """Store a value read from the node, such as its device type."""
         self._memory.read(entry, data)
 
     def text(self, entry: Entry) -> node_memory.ObjectText:
@@ -112,7 +112,7 @@ class NamedObjects:
         return self._memory.describe(*entry)
 
     def size(self, entry: Entry) -> int:
-        """Return the size of an object in bytes, 0 where it varies or nobody knows."""
+        """Return the size of an object in bytes, 0 if it varies or is unknown."""
         kind = self.text(entry).kind
         return 0 if kind is None else kind.size
 
@@ -121,10 +121,10 @@ class NamedObjects:
         return f"{write_entry(entry)} {self.text(entry).name}".rstrip()
 
     def find(self, word: str) -> Entry:
-        """Return the object that a word names: `statusword`, `1018h:1`, `0x6041`.
+        """Return the object of a word: `statusword`, `1018h:1`, `0x6041`.
 
         Raises:
-            Refused: none is called so.
+            Refused: no such object.
         """
         if (entry := self._names.get(word.casefold())) is not None:
             return entry
@@ -157,7 +157,7 @@ class NamedObjects:
 
 @cache  # 0.1 s where a node has no EDS
 def _names_by_standard(is_drive: bool) -> Mapping[str, Entry]:
-    """Return the objects that CiA 301 names, and those of CiA 402 if it is a drive."""
+    """Return the objects with names in CiA 301, and in CiA 402 for a drive."""
     found: dict[str, Entry] = {}
     for index in _COMMUNICATION:
         for sub in _SUBS:
@@ -180,7 +180,7 @@ def known_objects(
     what: str = "--eds",
     strict: bool = False,
 ) -> NamedObjects:
-    """Return what is known of the objects of a node; who it is is read from it.
+    """Return the known objects of a node; its identity is read from it.
 
     Args:
         session: the bus.
@@ -244,21 +244,21 @@ _TYPES: Final = {
     "text": DataType.VISIBLE_STRING,
     "hex": DataType.OCTET_STRING,
 }
-"""Types as they stand before a value, where no EDS names one: `u16:5`."""
+"""Types written before a value without an EDS: `u16:5`."""
 
 
-# Values of objects, as people read and write them, and held against others.
+# Values of objects in the notation of users, and their comparison.
 
 
-# Values of objects, as people read and write them.
+# Values of objects in the notation of users.
 
 _STATUSWORD: Final = (0x6041, 0)
 _MOST_SHOWN: Final = 64
-"""Bytes of a domain; of longer ones the number is told."""
+"""Largest number of shown bytes of a domain; of longer ones only the size is shown."""
 
 
 def shown(objects: NamedObjects, entry: Entry, data: bytes) -> str:
-    """Write a value with its unit; whole numbers in hex too, identifiers and bits in hex alone."""
+    """Write a value with its unit; integers also in hex, identifiers and bits only in hex."""
     text = objects.text(entry)
     if len(data) > _MOST_SHOWN and (text.kind is None or text.kind is DataType.DOMAIN):
         return f"{len(data)} bytes, {data[:8].hex(' ').upper()} ..."
@@ -274,10 +274,10 @@ def shown(objects: NamedObjects, entry: Entry, data: bytes) -> str:
 
 
 def encoded(objects: NamedObjects, entry: Entry, words: str) -> bytes:
-    """Return the bytes of a value, as `100`, `0x64`, `-1.5` in the object's unit, `u16:100`.
+    """Return the bytes of a value, such as `100`, `0x64`, `-1.5` in the object's unit, `u16:100`.
 
     Raises:
-        Refused: it is no value of this object.
+        Refused: it is not a value of this object.
     """
     text = objects.text(entry)
     kind, colon, rest = words.partition(":")
@@ -296,7 +296,7 @@ def encoded(objects: NamedObjects, entry: Entry, words: str) -> bytes:
 
 
 def _range(text: node_memory.ObjectText) -> str:
-    """Say which numbers a whole number may be."""
+    """Return the allowed range of a whole number, for a message."""
     kind = text.kind
     if kind is None or not kind.is_integer:
         return ""
@@ -307,7 +307,7 @@ def _range(text: node_memory.ObjectText) -> str:
 
 
 def limits(objects: NamedObjects, entry: Entry) -> str:
-    """Say what the EDS allows of a value; empty where it says nothing."""
+    """Return the range of a value in the EDS, for a message; empty without one."""
     row = objects.rows.get(entry)
     if row is None or (row.low is None and row.high is None):
         return ""
@@ -315,17 +315,17 @@ def limits(objects: NamedObjects, entry: Entry) -> str:
     return f"; the EDS allows {low} to {high}"
 
 
-# Values of a node held against others: those of a DCF, or of another node.
+# Comparison of a node's values with those of a DCF or of another node.
 
 
 class ValueDifference(NamedTuple):
-    """An object whose value is another than wanted.
+    """An object with a different value.
 
     Attributes:
         entry: index and sub-index.
-        wanted: as it goes over the wire.
-        found: likewise, None if the node refuses to tell it.
-        why: it refuses.
+        wanted: as on the wire.
+        found: likewise, None if the node refuses the read.
+        why: reason of the refusal.
     """
 
     entry: Entry
@@ -354,14 +354,14 @@ def differences(
 
 
 def line(objects: NamedObjects, one: ValueDifference, where: str) -> str:
-    """Say what is here, and what is there."""
+    """Return both values of a difference, as text."""
     there = f"{shown(objects, one.entry, one.wanted)} {where}"
     here = one.why if one.found is None else f"{shown(objects, one.entry, one.found)} here"
     return f"{objects.title(one.entry)}: {here}, {there}"
 
 
 def values_of(session: NetSession, node_id: int, entries: Collection[Entry]) -> Values:
-    """Read objects of a node; what it refuses to tell is left out."""
+    """Read objects of a node; omit those that it refuses."""
     found: Values = {}
     for entry in sorted(entries):
         try:

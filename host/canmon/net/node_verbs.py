@@ -33,14 +33,14 @@ _WAIT_US: Final = 500_000
 
 
 @click.command()
-@time_option("--wait", "wait_us", help="For the last answers, and heartbeats.  [500ms]")
-@click.option("--json", "as_json", is_flag=True, help="Nodes as JSON, one a line.")
+@time_option("--wait", "wait_us", help="Wait for the last answers and heartbeats. [500ms]")
+@click.option("--json", "as_json", is_flag=True, help="Print nodes as JSON, one per line.")
 @click.pass_obj
 def scan(call: NetCall, wait_us: int | None, as_json: bool) -> None:
-    """Say which nodes are there; exit status 1 if none is.
+    """List the nodes on the bus; exit status 1 if there are none.
 
-    Each node-ID is asked for its device type (1000h) by SDO; nothing is changed. Who
-    is only heard is listed too. A state is known of nodes with a heartbeat.
+    The device type (1000h) of each node-ID is read by SDO; nothing is changed. Nodes that only send
+    other frames are listed too. The state is known for nodes with a heartbeat.
 
     \b
     canmon net can0 scan
@@ -56,7 +56,7 @@ def scan(call: NetCall, wait_us: int | None, as_json: bool) -> None:
     if scan.unconfigured:
         say("nodes without a node-ID are there: canmon net SOURCE lss")
     if not found:
-        say("no node answered or was heard")
+        say("no node answered or sent anything")
         raise click.exceptions.Exit(_NOBODY)
     say(counted(len(found), "node"))
 
@@ -93,7 +93,7 @@ def _json(node: NodeFound) -> str:
     )
 
 
-# The verb `net nmt`: NMT commands, and what comes of them.
+# The verb `net nmt`: NMT commands and their effect.
 
 
 _COMMANDS: Final = {
@@ -116,20 +116,20 @@ _ALL: Final = "all"
 _BOOT_UP_US: Final = 5_000_000
 _LISTEN_US: Final = 1_500_000
 _PERIODS: Final = 3
-"""So many heartbeat periods are waited for a state."""
+"""Number of heartbeat periods to wait for a state."""
 
 
 @click.command()
 @click.argument("word", type=click.Choice(list(_COMMANDS)), metavar="COMMAND")
 @click.argument("node", metavar="NODE|all")
-@click.option("--yes", is_flag=True, help="Ask nothing.")
+@click.option("--yes", is_flag=True, help="Do not ask.")
 @click.pass_obj
 def nmt(call: NetCall, word: str, node: str, yes: bool) -> None:
     """Send an NMT command to NODE, or to all: start, stop, pre-op, reset-node, reset-comm.
 
-    Then it is waited for the state, or after a reset for the boot-up; only a node with
-    a heartbeat (1017h) tells its state. Exit status 1 if it reports another one, does
-    not boot, or nothing of it is heard.
+    Then the command waits for the state, or after a reset for the boot-up; only a node with a
+    heartbeat (1017h) reports its state. Exit status 1 if it reports another one, does not boot, or
+    does not answer.
 
     \b
     canmon net can0 nmt start 5
@@ -186,7 +186,7 @@ def _command_one(
 
 
 def _number(session: NetSession, node_id: int, index: int) -> int | None:
-    """Return an object, None if the node does not tell it: one that is Stopped has no SDO."""
+    """Return an object, None if it cannot be read: a node in Stopped has no SDO."""
     try:
         return int.from_bytes(session.bus.read(node_id, index, 0), "little")
     except SdoAborted:
@@ -213,7 +213,7 @@ def _command_all(session: NetSession, command: NmtCommand, word: str, *, yes: bo
 # The verb `net boot`: the boot-up of a node after CiA 302-2, step by step.
 
 
-# What is expected of a node at its boot-up: by a bus.yml, by its EDS or DCF, or nothing.
+# Expectations for the boot-up of a node: from a bus.yml, its EDS or DCF, or none.
 
 _HEARTBEAT: Final = (0x1017, 0)
 _U16_BYTES: Final = 2
@@ -221,10 +221,10 @@ _U32: Final = 0xFFFF_FFFF
 
 
 def _of_bus_file(path: Path, node_id: int) -> SlaveAssignment:
-    """Return what a bus.yml expects of a slave.
+    """Return the expectations of a bus.yml for a slave.
 
     Raises:
-        Refused: it cannot be read, is wrong, or has no such slave.
+        Refused: it cannot be read, has errors, or has no such slave.
     """
     try:
         bus = read_bus_file(path)
@@ -243,9 +243,9 @@ def _of_bus_file(path: Path, node_id: int) -> SlaveAssignment:
 
 
 def _of_eds(path: Path, node_id: int) -> SlaveAssignment:
-    """Return what an EDS expects: the device, and of a DCF its configuration; Refused if none.
+    """Return the expectations of an EDS: the device, and for a DCF its configuration.
 
-    Revision and serial number of an EDS are those of one device: any will do.
+    Revision and serial number of an EDS are those of one device and are not compared.
     """
     objects = NamedObjects(node_id, read_device_document(path, "--eds").file)
     file, device = objects.file, objects.device
@@ -272,7 +272,7 @@ def _of_eds(path: Path, node_id: int) -> SlaveAssignment:
 
 
 def _risk(assignment: SlaveAssignment) -> str:
-    """Say what the boot-up may move."""
+    """Return the risk of the boot-up, for the question."""
     resets = not assignment.reset_communication or assignment.restore_sub or assignment.program
     if resets:
         return nmt_risk(NmtCommand.RESET_NODE, assignment.device_type or None)
@@ -282,7 +282,7 @@ def _risk(assignment: SlaveAssignment) -> str:
 
 
 def _changes(assignment: SlaveAssignment) -> list[str]:
-    """Say what the boot-up does to the node, beside reading."""
+    """Return the changes of the boot-up to the node, besides reading."""
     found = []
     if not assignment.reset_communication:
         found.append("reset communication, unless it is Operational")
@@ -296,7 +296,7 @@ def _changes(assignment: SlaveAssignment) -> list[str]:
 
 
 def _nothing_expected(node_id: int) -> SlaveAssignment:
-    """Return what is expected where nobody says anything: that it answers."""
+    """Return the default expectation: that the node answers."""
     say("no --bus and no --eds: nothing is expected of the node but that it answers")
     return SlaveAssignment(node_id)
 
@@ -323,11 +323,11 @@ def boot(  # noqa: PLR0913, PLR0917 - options
     start: bool,
     yes: bool,
 ) -> None:
-    """Boot NODE as an NMT master does (CiA 302-2); exit status 1 if it does not boot.
+    """Boot NODE like an NMT master (CiA 302-2); exit status 1 if it does not boot.
 
-    Device type, identity, state, software, configuration, error control, in the order
-    of Lely's master; the error status is a letter A to O. What is expected says --bus,
-    as the master of that bus.yml has it, or --eds: its device, and of a DCF its values.
+    Device type, identity, state, software, configuration, error control, in the order of Lely's
+    master; the error status is a letter A to O. The expectations come from --bus, for the master of
+    that bus.yml, or from --eds: its device, and for a DCF its values.
 
     \b
     canmon net can0 boot 5 --explain

@@ -59,9 +59,9 @@ def read(
 ) -> None:
     """Read objects of NODE, by name or index; without any all that its EDS names.
 
-    A name is that of the EDS in small letters with _ for what is no letter, as
-    position_actual_value or identity_object.vendor_id, else that of CiA 301 or 402.
-    Exit status 1 if the node refuses one.
+    A name is that of the EDS in small letters with _ for other characters, such as
+    position_actual_value or identity_object.vendor_id, else that of CiA 301 or 402. Exit status 1
+    if the node refuses one.
 
     \b
     canmon net can0 read 5 statusword 1018h:1 --eds drive.eds
@@ -90,7 +90,7 @@ def _wanted(objects: NamedObjects, names: Sequence[str]) -> list[Entry]:
 
 
 def _read(session: NetSession, objects: NamedObjects, entry: Entry, as_json: bool) -> str | None:
-    """Return a line with the value; None if the node refuses, which is told."""
+    """Return a line with the value; None if the node refuses, which is reported."""
     node_id = objects.node_id
     try:
         data = session.bus.read(node_id, *entry, objects.size(entry))
@@ -124,9 +124,9 @@ def write(
 ) -> None:
     """Write objects of NODE, by name or index, in this order.
 
-    Values are decimal, hex (0x1F), in the unit of the object where its EDS gives one,
-    texts, or bytes in hex. Where no type is known it stands before the value: u16:5.
-    The first that is refused ends it; those before it stay written.
+    Values are decimal, hex (0x1F), in the unit of the object if its EDS has one, texts, or bytes in
+    hex. If the type is unknown, write it before the value: u16:5. The command stops at the first
+    refused object; earlier ones stay written.
 
     \b
     canmon net can0 write 5 heartbeat_time=100 --yes
@@ -167,13 +167,13 @@ def _write_one(session: NetSession, objects: NamedObjects, entry: Entry, data: b
 
 
 def _hint(entry: Entry) -> str:
-    """Say what a PDO wants before its mapping is changed; empty for other objects."""
+    """Return a hint for changing the mapping of a PDO; empty for other objects."""
     if entry[0] not in _PDO_MAPPINGS:
         return ""
     return f"; disable the PDO first: {entry[0] - _MAPPING_OFFSET:04X}h:01 with bit 31"
 
 
-# The verb `net compare`: a node held against a DCF, or another node.
+# The verb `net compare`: compare a node with a DCF, or another node.
 
 
 _DIFFERENT: Final = 1
@@ -187,9 +187,9 @@ _DIFFERENT: Final = 1
 def compare(call: NetCall, node: int, other: str, eds: Path | EdsFolder | None) -> None:
     """Compare NODE with a DCF, or with another node; exit status 1 if they differ.
 
-    Of a DCF its ParameterValues count; of a file without any, as an EDS, the defaults of
-    all parameters. Of two nodes all parameters of the EDS are compared; values that are
-    relative to the node-ID in the EDS are compared without it. Nothing is written.
+    A DCF is compared by its ParameterValues; a file without any, such as an EDS, by the defaults of
+    all parameters. For two nodes all parameters of the EDS are compared; values relative to the
+    node-ID are compared without it. Nothing is written.
 
     \b
     canmon net can0 compare 5 drive.dcf
@@ -217,7 +217,7 @@ def compare(call: NetCall, node: int, other: str, eds: Path | EdsFolder | None) 
 
 
 def _other_id(word: str) -> int:
-    """Return the node-ID that a word is, 0 if it is none."""
+    """Return the node-ID of a word, 0 if it is not one."""
     number = int(word) if word.isascii() and word.isdecimal() else 0
     if number > 127:
         raise Refused(f"{word} is no node-ID 1..127")
@@ -234,7 +234,7 @@ def _of_file(objects: node_objects.NamedObjects) -> Values:
 
 
 def _of_node(session: NetSession, objects: node_objects.NamedObjects, other_id: int) -> Values:
-    """Return the parameters of another node, as this one would have them."""
+    """Return the parameters of another node, converted to the node-ID of this one."""
     rows = {at: row for at, row in objects.rows.items() if is_parameter(row)}
     if not rows:
         raise Refused("which objects? give the EDS of both nodes (--eds FILE)")
@@ -266,12 +266,13 @@ _COMMUNICATION: Final = 2
 
 
 def save(session: NetSession, node_id: int, sub: int) -> None:
-    """Have a node store parameters; NodeFailed if it cannot.
+    """Make a node store parameters; NodeFailed if it cannot.
 
     Args:
         session: the bus.
         node_id: the node.
-        sub: 1 for all, 2 for 1000h to 1FFFh, 3 for 6000h to 9FFFh, others as its maker says.
+        sub: 1 for all, 2 for 1000h to 1FFFh, 3 for 6000h to 9FFFh, others are
+            manufacturer-specific.
     """
     with of_node(node_id):
         data = session.bus.read(node_id, _STORE, sub)
@@ -285,14 +286,14 @@ def save(session: NetSession, node_id: int, sub: int) -> None:
 
 
 def _load_defaults(session: NetSession, node_id: int, sub: int) -> None:
-    """Have a node forget what was stored; it counts from its next reset."""
+    """Make a node erase stored parameters, effective from its next reset."""
     with of_node(node_id):
         session.bus.write(node_id, _RESTORE, sub, b"load", _PATIENCE_US)
     say(f"node {node_id}: restored; the defaults count from its next reset")
 
 
 def reset(session: NetSession, node_id: int, sub: int) -> None:
-    """Reset a node, or its communication where only that was restored; wait for its boot-up."""
+    """Reset a node, or only its restored communication; wait for its boot-up."""
     communication = sub == _COMMUNICATION
     command = NmtCommand.RESET_COMMUNICATION if communication else NmtCommand.RESET_NODE
     session.bus.command(command, node_id)
@@ -307,14 +308,14 @@ def _sub(word: str) -> int:
         return _AREAS[word]
     number = int(word) if word.isascii() and word.isdecimal() else 0
     if not 1 <= number <= 0x7F:
-        raise Refused(f"{word!r} is none of {', '.join(_AREAS)}, and no sub-index 1..127")
+        raise Refused(f"{word!r} is not {', '.join(_AREAS)} or a sub-index 1..127")
     return number
 
 
 @click.command()
 @click.argument("node", type=NODE_ID)
 @click.argument("area", default="all")
-@click.option("--yes", is_flag=True, help="Ask nothing.")
+@click.option("--yes", is_flag=True, help="Do not ask.")
 @click.pass_obj
 def store(call: NetCall, node: int, area: str, yes: bool) -> None:
     """Store parameters of NODE (1010h): all, communication, application or a sub-index.
@@ -334,13 +335,13 @@ def store(call: NetCall, node: int, area: str, yes: bool) -> None:
 @click.command()
 @click.argument("node", type=NODE_ID)
 @click.argument("area", default="all")
-@click.option("--reset", "then_reset", is_flag=True, help="Reset it, so that they count at once.")
-@click.option("--yes", is_flag=True, help="Ask nothing.")
+@click.option("--reset", "then_reset", is_flag=True, help="Reset it, so that they apply at once.")
+@click.option("--yes", is_flag=True, help="Do not ask.")
 @click.pass_obj
 def restore(call: NetCall, node: int, area: str, then_reset: bool, yes: bool) -> None:
     """Restore the defaults of NODE (1011h): all, communication, application or a sub-index.
 
-    They count from its next reset.
+    They take effect at its next reset.
 
     \b
     canmon net can0 restore 5 --reset
@@ -349,7 +350,7 @@ def restore(call: NetCall, node: int, area: str, then_reset: bool, yes: bool) ->
     sub = _sub(area)
     risk = "Limits and gains of a drive become those of its maker"
     if then_reset:
-        risk += "; it lets go of its motor: what hangs on it may fall"
+        risk += "; its motor is released: a hanging load may fall"
     with net_session(call, node) as session:
         session.confirm(f"node {node} forgets its parameters: {area}", yes=yes, risk=risk)
         session.work.plan("restore", *(["reset"] if then_reset else []))
@@ -360,18 +361,18 @@ def restore(call: NetCall, node: int, area: str, then_reset: bool, yes: bool) ->
             session.work.done()
 
 
-# The verb `net dcf`: what a DCF says goes into a node.
+# The verb `net dcf`: write the configuration of a DCF to a node.
 
 
 @click.command()
 @click.argument("node", type=NODE_ID)
 @click.argument("file", type=PATH)
-@click.option("--all", "whole", is_flag=True, help="Write what is there already, too.")
-@click.option("--skip", multiple=True, metavar="OBJECT", help="Is not written; may be repeated.")
-@click.option("--store", is_flag=True, help="Store all of it then (1010h:01).")
-@click.option("--other-device", is_flag=True, help="Though FILE is of another device.")
-@click.option("--dry-run", is_flag=True, help="Say what differs; write nothing.")
-@click.option("--yes", is_flag=True, help="Ask nothing.")
+@click.option("--all", "whole", is_flag=True, help="Also write unchanged values.")
+@click.option("--skip", multiple=True, metavar="OBJECT", help="Object to omit; may be repeated.")
+@click.option("--store", is_flag=True, help="Then store all parameters (1010h:01).")
+@click.option("--other-device", is_flag=True, help="Accept a FILE of another device.")
+@click.option("--dry-run", is_flag=True, help="Show the differences; write nothing.")
+@click.option("--yes", is_flag=True, help="Do not ask.")
 @click.pass_obj
 def dcf(  # noqa: PLR0913, PLR0917 - options
     call: NetCall,
@@ -384,11 +385,11 @@ def dcf(  # noqa: PLR0913, PLR0917 - options
     dry_run: bool,
     yes: bool,
 ) -> None:
-    """Write what the DCF or XDC FILE configures into NODE, as far as it differs.
+    """Write the configuration of the DCF or XDC FILE to NODE, where it differs.
 
-    That is its ParameterValues. PDOs are disabled while they change, as CiA 301 has it,
-    1020h is written last. The first object that is refused ends it, and what was
-    written is told. A file of another device (1000h, 1018h) is refused.
+    The configuration is its ParameterValues. PDOs are disabled while they change (CiA 301), and
+    1020h is written last. The command stops at the first refused object, and reports the written
+    ones. A file of another device (1000h, 1018h) is refused.
 
     \b
     canmon net can0 dcf 5 drive.dcf --dry-run
@@ -425,7 +426,7 @@ def _dcf_values(objects: node_objects.NamedObjects, skip: Sequence[str]) -> Valu
 
 
 def _changed(session: NetSession, objects: node_objects.NamedObjects, values: Values) -> Values:
-    """Return what differs in the node, and say it."""
+    """Return and print the differences of the node."""
     found = list(node_objects.differences(session, objects, values))
     for one in found:
         click.echo(one_line(node_objects.line(objects, one, "in the file")))
@@ -436,7 +437,7 @@ def _changed(session: NetSession, objects: node_objects.NamedObjects, values: Va
 def _steps(
     session: NetSession, objects: node_objects.NamedObjects, changed: Values, file: Path
 ) -> list[Write]:
-    """Return what is written; Refused if the file asks for what cannot be."""
+    """Return the writes; Refused if the file has impossible ones."""
     writable = {at for at, row in objects.rows.items() if row.writable}
 
     def number(at: node_objects.Entry) -> int:

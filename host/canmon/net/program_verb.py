@@ -1,4 +1,4 @@
-"""The verb `net program`: firmware into a node."""
+"""The verb `net program`: download firmware to a node."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tickrig.host.cli.messages import Refused, refusing, say
 from tickrig.host.cli.options import NODE_ID, PATH
 from tickrig.host.cli.start import paint
 
-# A line on a terminal that says how far a transfer is; none in a pipe.
+# A progress line on a terminal; none in a pipe.
 
 _WIDTH = 30
 _LEAST_S = 1
@@ -27,7 +27,7 @@ _S_US = 1_000_000
 
 
 class ProgressBar:
-    """Bytes done, of how many, and how fast.
+    """Progress of a transfer: bytes, total and rate.
 
     Args:
         total: bytes in all.
@@ -65,7 +65,7 @@ class ProgressBar:
 
 
 _MOST_BYTES: Final = 256 << 20
-"""A larger file is no firmware."""
+"""Largest size of firmware."""
 _IDENTIFICATION: Final = re.compile(r"(?:0x)?([0-9a-f]{1,8})h?", re.IGNORECASE)
 _NAMES: Final = {
     0x1F50: "program data",
@@ -73,10 +73,10 @@ _NAMES: Final = {
     0x1F56: "program software identification",
     0x1F57: "flash status",
 }
-_RISK: Final = "The program stops: a drive lets go of its motor, what hangs on it may fall"
+_RISK: Final = "The program stops: a drive releases its motor, a hanging load may fall"
 _HALF: Final = (
     "the node has no whole program; a transfer cannot go on in its middle:"
-    " the same command begins it anew"
+    " the same command starts it again"
 )
 
 
@@ -84,11 +84,11 @@ _HALF: Final = (
 @click.argument("node", type=NODE_ID)
 @click.argument("file", type=PATH, required=False)
 @click.option("--number", type=click.IntRange(1, 254), default=1, metavar="N", help="Program.  [1]")
-@click.option("--control", type=click.Choice(list(COMMANDS)), help="Command its program alone.")
-@click.option("--expect", metavar="ID", help="1F56h of FILE, in hex; if it is there, all is done.")
-@click.option("--no-start", is_flag=True, help="Leave it stopped.")
+@click.option("--control", type=click.Choice(list(COMMANDS)), help="Only command its program.")
+@click.option("--expect", metavar="ID", help="1F56h of FILE, in hex; skip if the node has it.")
+@click.option("--no-start", is_flag=True, help="Leave the program stopped.")
 @click.option("--tries", type=click.IntRange(1, 99), default=3, metavar="N", help="Transfers.  [3]")
-@click.option("--yes", is_flag=True, help="Ask nothing.")
+@click.option("--yes", is_flag=True, help="Do not ask.")
 @click.pass_obj
 def command(  # noqa: PLR0913, PLR0917 - options
     call: NetCall,
@@ -101,12 +101,11 @@ def command(  # noqa: PLR0913, PLR0917 - options
     tries: int,
     yes: bool,
 ) -> None:
-    """Download FILE into NODE by block transfer (CiA 302-3); without FILE say what it runs.
+    """Download FILE to NODE by block transfer (CiA 302-3); without FILE show its program.
 
-    Stop and clear (1F51h), download (1F50h), wait for the flash (1F57h), identification
-    (1F56h), start. Steps that are done are left out, so the same command again goes on
-    where it ended; a transfer that broke off begins anew, which CiA 301 leaves no
-    choice in. Blocks that are lost are sent again.
+    Stop and clear (1F51h), download (1F50h), wait for the flash (1F57h), identification (1F56h),
+    start. Finished steps are skipped, so the same command continues where it ended; an interrupted
+    transfer starts again, as CiA 301 requires. Lost blocks are sent again.
 
     \b
     canmon net can0 program 5
@@ -148,7 +147,7 @@ def command(  # noqa: PLR0913, PLR0917 - options
 
 
 def _title(entry: Entry) -> str:
-    """Name an object of a program."""
+    """Return the name of an object of a program."""
     return f"{write_entry(entry)} {_NAMES.get(entry[0], '')}".rstrip()
 
 
@@ -179,7 +178,7 @@ def _download(  # noqa: PLR0913 - steps
     tries: int,
     start: bool,
 ) -> None:
-    """Take each step, with what is left behind if it is the last one."""
+    """Run each step, with the message for an end after it."""
     work = session.work
     work.plan("stop", "clear", "download", "identification", *(["start"] if start else []))
     program.stop()

@@ -1,4 +1,4 @@
-"""One call of a verb of `canmon net`: its bus, what is asked, and how it ends."""
+"""One call of a verb of `canmon net`: its bus, its question to the user, and its end."""
 
 from __future__ import annotations
 
@@ -39,10 +39,10 @@ class NodeFailed(click.ClickException):
 
 
 class _Work:
-    """What is to be done, step by step, so that an end in the middle can say how far it came.
+    """The planned steps, so that the message of an early end can list the finished ones.
 
     Attributes:
-        ending: how the nodes are left, however it ends; empty if there is nothing to be said.
+        ending: final state of the nodes, in any case; empty if there is nothing to report.
     """
 
     def __init__(self) -> None:
@@ -51,15 +51,15 @@ class _Work:
         self._done = 0
 
     def plan(self, *steps: str) -> None:
-        """Add steps, in their order."""
+        """Add steps, in order."""
         self._steps += steps
 
     def done(self) -> None:
-        """Note that the next step is done."""
+        """Mark the next step as done."""
         self._done += 1
 
     def progress(self) -> str:
-        """Say what was done and what was not; empty where nothing was planned."""
+        """Return the finished and the open steps; empty if none were planned."""
         done, left = self._steps[: self._done], self._steps[self._done :]
         parts = (("done", done), ("not done", left))
         said = [f"{word}: {_listed(items)}" for word, items in parts if items]
@@ -67,7 +67,7 @@ class _Work:
 
 
 def _listed(steps: list[str]) -> str:
-    """List a few steps; of many the first and the last one."""
+    """List a few steps, or the first and the last one of many."""
     if len(steps) <= _MOST_LISTED:
         return ", ".join(steps)
     return f"{steps[0]}, ... {steps[-1]} ({len(steps)} in all)"
@@ -77,12 +77,12 @@ class NetSession:
     """An open bus.
 
     Args:
-        source: the bus, and what is known of its nodes.
-        timeout_us: how long an answer is waited for.
+        source: the bus, and the known nodes.
+        timeout_us: time-out of an answer.
 
     Attributes:
-        bus: speaks with its nodes.
-        work: what is to be done.
+        bus: communicates with its nodes.
+        work: the planned steps.
     """
 
     def __init__(self, source: ConformSource, timeout_us: int) -> None:
@@ -90,15 +90,15 @@ class NetSession:
         self.bus, self.work = NodeBus(source.link, timeout_us), _Work()
 
     def confirm(self, what: str, *, yes: bool, risk: str = "") -> None:
-        """Ask before something is changed; in a rig in virtual time nobody is.
+        """Ask before a change; not for a rig in virtual time.
 
         Args:
-            what: is done.
-            yes: `--yes`: it was said yes to.
-            risk: what it may do in the world, as a sentence; empty for nothing.
+            what: the change.
+            yes: `--yes`: do not ask.
+            risk: physical risk, as a sentence; empty for none.
 
         Raises:
-            Refused: the answer is no, or nobody is there who could give one.
+            Refused: the answer is no, or there is no terminal to ask.
         """
         text = one_line(f"{what}. {risk}" if risk else f"{what}.")
         if yes or self.source.virtual:
@@ -106,22 +106,22 @@ class NetSession:
                 say(text)
             return
         if not (sys.stdin.isatty() and sys.stderr.isatty()):
-            raise Refused(f"{text.removesuffix('.')}. Nobody is here to be asked: give --yes")
+            raise Refused(f"{text.removesuffix('.')}. There is no terminal to ask: give --yes")
         say(text)
         if not click.confirm("Go on?", default=False, err=True):
-            raise Refused("not begun")
+            raise Refused("not started")
 
 
 @contextmanager
 def net_session(call: NetCall, node_id: int | None = None) -> Iterator[NetSession]:
-    """Open the bus, and give it back; what goes wrong ends the verb with a line.
+    """Open the bus, and close it at the end; an error ends the verb with one line.
 
     Args:
-        call: what the command line says of the bus.
-        node_id: of the node, which says the bus of a rig that has several; None for the first.
+        call: options of the bus.
+        node_id: of the node, which selects the bus of a rig with several; None for the first.
 
     Raises:
-        Refused: it is nothing that can be asked anything.
+        Refused: it is not a bus with nodes.
         NodeFailed: a node refused or did not answer.
         SourceFailed: the bus failed.
         Exit: it was interrupted.
@@ -151,7 +151,7 @@ def _with_work(text: str, session: NetSession) -> str:
 
 
 def failure_text(error: SdoFailed, title: _Title = write_entry) -> str:
-    """Say why a transfer failed, in words."""
+    """Return the reason of a failed transfer as text."""
     at = title((error.index, error.sub))
     match error:
         case SdoAborted() if error.code in _LOCAL:
@@ -165,7 +165,7 @@ def failure_text(error: SdoFailed, title: _Title = write_entry) -> str:
 
 @contextmanager
 def of_node(node_id: int, title: _Title = write_entry) -> Iterator[None]:
-    """Name the node, and the object, in what goes wrong in the block; NodeFailed then."""
+    """Raise NodeFailed with node and object for errors in the block."""
     try:
         yield
     except SdoFailed as error:

@@ -1,1 +1,1 @@
-"""The bus.yml of Lely's dcfgen and ros2_canopen: which slaves and which master it means."""
+"""The bus.yml of Lely's dcfgen and ros2_canopen: its slaves and its master."""

@@ -1,4 +1,4 @@
-"""What is wrong between the nodes of a bus, and what the container of ros2_canopen refuses."""
+"""Checks between the nodes of a bus, and restrictions of the container of ros2_canopen."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ def _is_double(one: BusSlave | None, other: BusSlave) -> bool:
 
 
 def _pdos(slaves: Mapping[str, BusSlave]) -> Iterator[tuple[str, int, FilePlace, BusSlave, bool]]:
-    """Give the PDOs that are on with 11 bits, TPDOs first: what they are, CAN-ID, place, slave."""
+    """Yield the PDOs that are on with 11 bits, TPDOs first: what they are, CAN-ID, place, slave."""
     for transmit in (True, False):
         for slave in slaves.values():
             places = final_places(slave.writes)

@@ -1,4 +1,4 @@
-"""Read a bus.yml: its slaves and its master, and all that is wrong with it."""
+"""Read a bus.yml: its slaves, its master, and all its errors."""
 
 # How a bus.yml becomes a bus
 # ---------------------------
@@ -105,7 +105,7 @@ def _bit_rate(section: BusFileSection) -> int:
     rate = section.whole("baudrate", 1000, 1, 1000)
     if rate not in BIT_RATES_KBIT:
         allowed = ", ".join(map(str, BIT_RATES_KBIT))
-        section.note("bit-rate", "baudrate", f"baudrate: {rate} kbit/s is none of {allowed}")
+        section.note("bit-rate", "baudrate", f"baudrate: {rate} kbit/s is not one of {allowed}")
     return rate
 
 

@@ -1,4 +1,4 @@
-"""What a bus.yml says of the master and of a slave, with the places where it says so."""
+"""The values of master and slaves in a bus.yml, with their places."""
 
 from __future__ import annotations
 

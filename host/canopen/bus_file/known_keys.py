@@ -1,4 +1,4 @@
-"""The keys of a bus.yml, by section, and what the settings of drivers may be."""
+"""The keys of a bus.yml, by section, and the allowed settings of drivers."""
 
 from __future__ import annotations
 

@@ -77,7 +77,7 @@ def _cogen_nodes(top: BusFileSection) -> dict[str, BusFileSection]:
 
 
 def _named(section: BusFileSection) -> Iterator[str]:
-    """Give the names of nodes; one that is no text is noted."""
+    """Yield the names of nodes; one that is no text is noted."""
     for key in section.fields:
         if isinstance(key, str):
             yield key

@@ -1,4 +1,4 @@
-"""What is wrong with a bus.yml, collected while its sections are read."""
+"""Errors of a bus.yml, collected while its sections are read."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The PDO sections of a node: what is written, and what both sides have then."""
+"""The PDO sections of a node: their writes, and the resulting PDOs of both sides."""
 
 from __future__ import annotations
 

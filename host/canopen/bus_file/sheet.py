@@ -1,4 +1,4 @@
-"""The EDS or DCF of a node: where it is, and what dcfgen takes from it."""
+"""The EDS or DCF of a node: its path, and the values that dcfgen uses."""
 
 from __future__ import annotations
 
@@ -131,7 +131,7 @@ class Sheets:
         return None
 
     def _candidates(self, name: str, dcf_path: str) -> Iterator[Path]:
-        """Give the places where a file may be."""
+        """Yield the places where a file may be."""
         folder, given = self._folder, Path(self._expanded(name))
         yield folder / given
         if dcf_path:

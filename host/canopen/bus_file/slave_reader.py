@@ -1,4 +1,4 @@
-"""A node of the file and its EDS become a slave."""
+"""Make slaves from the nodes of the file and their EDS."""
 
 from __future__ import annotations
 

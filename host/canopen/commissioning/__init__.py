@@ -1,1 +1,1 @@
-"""What sets a CANopen network to work: its nodes found, addressed, configured, programmed."""
+"""Commissioning of a CANopen network: find, address, configure and program its nodes."""

@@ -1,4 +1,4 @@
-"""The configuration that a DCF says: what it holds, what differs in a node, how it gets there."""
+"""The configuration in a DCF: its values, differences in a node, and writing them."""
 
 from __future__ import annotations
 
@@ -56,14 +56,14 @@ def default_values(device: EdsDevice, node_id: int) -> Values:
 
 
 def is_parameter(row: EntryDescription) -> bool:
-    """Say whether an entry is set once, and not a value that comes and goes with a process."""
+    """Return whether an entry is set once, and not a value that comes and goes with a process."""
     mapped = Access.RPDO in row.access or Access.TPDO in row.access
     kept = row.readable and row.writable and not mapped
     return kept and row.index not in _COMMANDS and row.data_type is not DataType.DOMAIN
 
 
 def same(row: EntryDescription | None, wanted: bytes, found: bytes) -> bool:
-    """Say whether two values mean the same: texts without the zeros at their end."""
+    """Return whether two values mean the same: texts without the zeros at their end."""
     if row is not None and row.data_type in _TEXTS:
         return wanted.rstrip(b"\0") == found.rstrip(b"\0")
     return wanted == found

@@ -190,7 +190,7 @@ class LssMaster:
         self._configure(message(LssCommand.STORE))
 
     def _scan(self, request: FastScan, wait_us: int) -> bool:
-        """Say whether somebody answers; late answers of others belong to this question too."""
+        """Return whether somebody answers; late answers of others belong to this question too."""
         self._bus.send(LSS_MASTER_COB_ID, request.encode())
         return any(answer[0] == LssCommand.IDENTIFIED for answer in self._gather(wait_us))
 

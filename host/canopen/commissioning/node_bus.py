@@ -1,4 +1,4 @@
-"""A CAN bus as a commissioning tool uses it: one thing after the other, each waited for."""
+"""A CAN bus for commissioning tools: sequential requests with time-outs."""
 
 from __future__ import annotations
 

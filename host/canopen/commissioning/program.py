@@ -248,7 +248,7 @@ class Program:
         return number
 
     def _is_there(self) -> bool:
-        """Say whether the node answers at all; a frame or two may be lost."""
+        """Return whether the node answers at all; a frame or two may be lost."""
         for _ in range(_LOOKS):
             try:
                 self._read(boot_slave.CONTROL)

@@ -1,1 +1,1 @@
-"""The conformance tester: judges one CANopen node from outside, by clause, over any CAN link."""
+"""The conformance tester: tests one CANopen node from outside, by clause, over any CAN link."""

@@ -1,4 +1,4 @@
-"""What a conformance check is: its clause, what it may do, what it needs, and its steps.
+"""Conformance checks: clause, level, requirements and steps.
 
 A step is an action, as `Write` or `Expect`. docs/reference/canopen/conform.md has the notation of
 steps, and `parse_step` reads it. Where the notation has names, as `$heartbeat`, `bind_check` puts
@@ -315,7 +315,7 @@ class ConformancePlan:
     shared_host: bool = False
 
     def chooses(self, check: Check) -> bool:
-        """Say whether a check was chosen: by its level, and by its name or group."""
+        """Return whether a check was chosen: by its level, and by its name or group."""
         if check.level > self.level:
             return False
         named = (check.id.upper(), check.group)
@@ -324,7 +324,7 @@ class ConformancePlan:
         )
 
     def may_choose(self, group: str, place: str = "") -> bool:
-        """Say whether a check of a group may be chosen, before it is made.
+        """Return whether a check of a group may be chosen, before it is made.
 
         Args:
             group: of the check.

@@ -1,4 +1,4 @@
-"""A run of the tester: which checks are judged, in which order, and what came of them."""
+"""A run of the tester: selection and order of the checks, and their verdicts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Judges one check: may it be done, what came of it, and once more if it failed."""
+"""Runs one check: permission, verdict, and a repetition after a failure."""
 
 # Theory of operation.
 #

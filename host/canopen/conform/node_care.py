@@ -1,4 +1,4 @@
-"""Brings the node into the state in which checks begin, gets it back, and leaves it as it was."""
+"""Prepares the node for checks, recovers it, and restores its initial state."""
 
 from __future__ import annotations
 
@@ -425,7 +425,7 @@ class NodeCare:
             self._state.tidy_after({_RESET_COMMUNICATION}, written)
 
     def _has_errors(self) -> bool:
-        """Say whether a check left an error behind: those of before the run may have gone."""
+        """Return whether a check left an error behind: those of before the run may have gone."""
         number = self._client.number(*_ERROR_REGISTER)
         if number is None:
             self._probe()  # absent, or is the node gone?

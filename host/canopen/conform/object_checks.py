@@ -47,7 +47,7 @@ _DRIVE_OBJECTS: Final = (0x6040, 0x6041)
 
 
 def _profile_checks(device: EdsDevice, node_id: int) -> Iterator[check.Check]:
-    """Give the check of 1000h, if the EDS says what it holds.
+    """Yield the check of 1000h, if the EDS says what it holds.
 
     Args:
         device: what the EDS says.

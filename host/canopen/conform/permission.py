@@ -1,4 +1,4 @@
-"""What a level lets through to the bus: looked at frame by frame, behind all checks."""
+"""Permissions of a level, checked for each frame sent to the bus."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The node under test: what it has, and what it says of itself."""
+"""The node under test: its properties and its description."""
 
 from __future__ import annotations
 

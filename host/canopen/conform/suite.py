@@ -1,4 +1,4 @@
-"""The checks that are written down: one file a group, in `checks/`."""
+"""The written checks: one file per group, in `checks/`."""
 
 from __future__ import annotations
 

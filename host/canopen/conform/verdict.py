@@ -1,4 +1,4 @@
-"""What came of a check, and of a run of them."""
+"""The results of a check, and of a run."""
 
 from __future__ import annotations
 

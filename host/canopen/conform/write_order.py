@@ -48,12 +48,12 @@ def in_order(values: Mapping[Address, bytes], number: _Number) -> Iterator[Write
 
 
 def is_standard(at: Address, value: bytes) -> bool:
-    """Say whether a COB-ID or a number of mapped objects is as long as CiA 301 has it."""
+    """Return whether a COB-ID or a number of mapped objects is as long as CiA 301 has it."""
     return len(value) == (_bytes_of(at) or len(value))
 
 
 def is_too_long(at: Address, value: bytes) -> bool:
-    """Say whether a COB-ID or a number of mapped objects does not fit into its object."""
+    """Return whether a COB-ID or a number of mapped objects does not fit into its object."""
     return bool((size := _bytes_of(at)) and value[size:].strip(b"\0"))
 
 

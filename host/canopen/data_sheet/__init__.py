@@ -1,1 +1,1 @@
-"""EDS files held against rules, mended, compared and shown."""
+"""EDS files: checking by rules, fixing, comparing and showing."""

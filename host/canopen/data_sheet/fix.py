@@ -1,4 +1,4 @@
-"""What a file is when all is mended that needs no knowledge of the device."""
+"""Fixes of an EDS that need no knowledge of the device."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a rule for EDS files is, and what it finds."""
+"""Rules for EDS files, and their findings."""
 
 from __future__ import annotations
 

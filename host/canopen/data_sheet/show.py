@@ -1,4 +1,4 @@
-"""What a file says of a device, for people and programs: head, objects, PDOs."""
+"""The device of a file, for people and programs: head, objects, PDOs."""
 
 from __future__ import annotations
 
@@ -147,7 +147,7 @@ def _pdo(document: Document, name: str, index: int, node_id: int) -> dict[str, A
 
 
 def _mapped(document: Document, index: int) -> Iterator[dict[str, Any]]:
-    """Give the objects that a PDO carries, from its first bit on."""
+    """Yield the objects that a PDO carries, from its first bit on."""
     count = document.rows.get((index, 0))
     rows = [row for row in document.entries(index) if row.sub]
     used = int.from_bytes(count.default, "little") if count and count.has_default else len(rows)

@@ -1,4 +1,4 @@
-"""What a master knows of its network and of each slave: 1016h and 1F80h to 1F8Ah as values."""
+"""The configuration of a master: network and slaves, 1016h and 1F80h to 1F8Ah as values."""
 
 from __future__ import annotations
 

@@ -257,7 +257,7 @@ def state_text(state: NmtState) -> str:
 
 
 def _is_value(data: bytes, expected: int) -> bool:
-    """Say whether data is a number of 32 bits."""
+    """Return whether data is a number of 32 bits."""
     return len(data) == _U32 and int.from_bytes(data, "little") == expected
 
 
@@ -431,7 +431,7 @@ class SlaveBoot:
                 self._talk.compare(f"1018h:{sub:02X} {name}", data, expected, status)
 
     def _is_at_work(self) -> Script[bool]:
-        """Say whether the slave is Operational; reset its communication if it is not."""
+        """Return whether the slave is Operational; reset its communication if it is not."""
         slave, status = self._slave, BootStatus.NO_HEARTBEAT
         wait_us, what = slave.heartbeat_us, "heartbeat"
         if not wait_us:
@@ -462,7 +462,7 @@ class SlaveBoot:
         return False
 
     def _is_configured(self) -> Script[bool]:
-        """Say whether the configuration of the slave is of the expected date and time."""
+        """Return whether the configuration of the slave is of the expected date and time."""
         date, time = self._slave.configuration_date, self._slave.configuration_time
         if not (date and time):
             return False

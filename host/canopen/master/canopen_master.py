@@ -1,4 +1,4 @@
-"""A master on a bus: what a test or a script holds in its hand."""
+"""A CANopen master on a bus, for tests and scripts."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class _Named(dict[str, V]):
 
 
 class CanopenMaster(Closing):
-    """A master; time passes only in its calls, and meanwhile it does what is due.
+    """A master; time passes only in its calls, in which it does due work.
 
     Args:
         link: the bus, as `bench.link` or a `CanLink`; the master closes it.

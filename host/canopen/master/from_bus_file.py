@@ -1,4 +1,4 @@
-"""What a bus.yml says to a master, as the values that it works with."""
+"""The configuration of a master from a bus.yml."""
 
 from __future__ import annotations
 

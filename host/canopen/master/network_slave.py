@@ -1,4 +1,4 @@
-"""One slave as the master sees it: its boot-up, its state, its error control."""
+"""One slave of the master: boot-up, state and error control."""
 
 from __future__ import annotations
 
@@ -164,7 +164,7 @@ class NetworkSlave:
         self._booted(self)
 
     def _may_try_again(self) -> bool:
-        """Say whether the boot time of a mandatory slave is not over; of others it never is."""
+        """Return whether the boot time of a mandatory slave is not over; of others it never is."""
         if not self.assignment.mandatory or not self._boot_time_us:
             return True
         return self._now_us - self.began_us < self._boot_time_us

@@ -1,4 +1,4 @@
-"""The NMT master: boots its slaves, starts them, watches them (CiA 302-2, NMT start-up)."""
+"""The NMT master: boots, starts and monitors its slaves (CiA 302-2, NMT start-up)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The objects of a slave that PDOs carry, as its master has them."""
+"""The process image of a slave: the values of its PDO objects at the master."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Operations that wait for something to become so, several of them at once."""
+"""Operations that wait for conditions, several at once."""
 
 from __future__ import annotations
 

@@ -49,8 +49,8 @@ def test_a_second_node_of_a_node_id_is_told_once(
 ) -> None:
     hear(emulator, other, "705#00 705#7F 706#05 705#7F")
     assert said(caplog) == [
-        "node-ID 5 is on the bus twice: somebody else sent 705#00; end one of the two",
-        "node-ID 6 is on the bus twice: somebody else sent 706#05; end one of the two",
+        "node-ID 5 is on the bus twice: another node sent 705#00; stop one of the two",
+        "node-ID 6 is on the bus twice: another node sent 706#05; stop one of the two",
     ]
     hear(emulator, other, "705#7F")
     assert len(said(caplog)) == 2

@@ -102,7 +102,7 @@ def test_greedy_options_leave_words_that_are_no_values(
 
 def test_without_a_name_it_says_what_to_do() -> None:
     said = refused()
-    assert said.startswith("no CAN bus is named: give -i INTERFACE -c CHANNEL, set CAN_INTERFACE")
+    assert said.startswith("no CAN bus is given: give -i INTERFACE -c CHANNEL, set CAN_INTERFACE")
     assert "slcan, socketcan," in said
     assert "; or give --scenario FILE, which runs in virtual time. python-can has" in said
     assert "\n" not in said

@@ -117,9 +117,9 @@ class Terminal:
                         host(_POLL_US)
                 line = terminal.readline()
         except OSError as error:
-            raise OperatorRefused(f"nobody is at the terminal ({error.strerror})") from None
+            raise OperatorRefused(f"there is no terminal ({error.strerror})") from None
         if not line:
-            raise OperatorRefused("nobody is at the terminal (end of input)")
+            raise OperatorRefused("the terminal was closed (end of input)")
         return line.decode("utf-8", "replace").strip()
 
     def have_done(self, text: str) -> None:
@@ -238,7 +238,7 @@ class _HumanOperator:
     def clear(self, fault: str) -> None:
         """Ask to clear a physical fault."""
         item = self._find_fault(fault)
-        self.have_done(f"mend this fault: {item.text} ({item.name})")
+        self.have_done(f"clear this fault: {item.text} ({item.name})")
         self._record.set(fault, 0)
 
     def sees(self, text: str) -> bool | None:
@@ -273,9 +273,9 @@ class _HumanOperator:
     def _wish(self, item: InputSignal, value: Setting) -> str:
         """Return the request for the new value of an input."""
         if item.type is SignalType.FAULT:
-            return f"{'make' if value else 'mend'} this fault: {item.text}"
+            return f"{'make' if value else 'clear'} this fault: {item.text}"
         if item.type is SignalType.BUTTON:
-            return f"{'press' if value else 'let go'} the {item.text}"
+            return f"{'press' if value else 'release'} the {item.text}"
         unit = f" {item.unit}" if item.unit else ""
         return f"set {item.name} ({item.text}) to {value}{unit}"
 

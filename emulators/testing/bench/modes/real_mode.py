@@ -1,4 +1,4 @@
-"""A bench in real time: the rig runs in a thread of its own, hosts are at ptys and buses."""
+"""A bench in real time: the rig runs in its own thread, hosts are at ptys and buses."""
 
 from __future__ import annotations
 
@@ -31,22 +31,22 @@ if TYPE_CHECKING:
     pass
 
 
-# A rig in real time, in a thread of its own, and what others have done to it there.
+# A rig in real time, in its own thread, with calls from other threads.
 
 T = TypeVar("T")
 
 _JOIN_S: Final = 10.0
-"""A step that has not ended by then never will."""
+"""Time after which a step counts as stuck."""
 
 
 class _RigThread:
-    """Runs an emulator; between two of its ticks it does what other threads ask for.
+    """Runs an emulator, and executes calls of other threads between two of its ticks.
 
-    Before `start` and after its end time stands still, and callers do it themselves. What a
-    device raised ends it; that is raised once, in whoever asks for something next, or stops it.
+    Before `start` and after its end the time stands still, and callers execute calls themselves. An
+    exception of a device ends it, and is raised once, in the next caller or in `stop`.
 
     Args:
-        emulator: what is run.
+        emulator: the emulator.
         clock: its clock, which waits here.
     """
 
@@ -69,13 +69,13 @@ class _RigThread:
         return self._thread is not None and not self._ended
 
     def start(self) -> None:
-        """Let time pass; it begins once."""
+        """Start the time; only the first call has an effect."""
         if self._thread is None:
             self._thread = threading.Thread(target=self._run, name="tickrig bench", daemon=True)
             self._thread.start()
 
     def call(self, do: Callable[[], T]) -> T:
-        """Do something between two ticks; return its result, or raise what it raises."""
+        """Run a function between two ticks; return its result, or raise its exception."""
         if not self.here and (future := self._await()):
             self._calls.put(partial(_settle, future, do))
             result: T = self._result(future)
@@ -83,14 +83,14 @@ class _RigThread:
         return do()
 
     def wait_until(self, done: Callable[[], bool], until_us: int) -> bool:
-        """Wait until something is so, looking after each step.
+        """Wait until a condition is true, checked after each step.
 
         Args:
-            done: is asked in this thread; what it raises is raised in the caller's.
+            done: is called in this thread; its exception is raised in the caller's.
             until_us: the first step at or after this time is the last, in the time of the rig.
 
         Returns:
-            False if it was not so by then.
+            False after the time-out.
 
         Raises:
             BenchError: no time passes, or the caller is in this thread.
@@ -103,7 +103,7 @@ class _RigThread:
         return bool(self._result(future))
 
     def stop(self) -> None:
-        """Let time stand still."""
+        """Stop the time."""
         if self._thread is not None:
             self._calls.put(self._note_stop)
             self._thread.join(_JOIN_S)
@@ -112,7 +112,7 @@ class _RigThread:
         self._raise_error()
 
     def _await(self) -> Future[Any] | None:
-        """Return what this thread will settle, None if time stands still."""
+        """Return a future that this thread will resolve, None if time stands still."""
         with self._lock:
             if self.running:
                 future: Future[Any] = Future()
@@ -135,7 +135,7 @@ class _RigThread:
             raise error
 
     def _watch(self, future: Future[bool], done: Callable[[], bool], until_us: int) -> None:
-        """Look now and after each step, until there is an answer."""
+        """Check now and after each step, until there is an answer."""
         rig = self._emulator.rig
 
         def look(now_us: int) -> None:
@@ -162,11 +162,11 @@ class _RigThread:
             self._ended = True
         for future in tuple(self._awaited):
             if not future.done():
-                future.set_exception(self._error or BenchError("the bench was closed meanwhile"))
+                future.set_exception(self._error or BenchError("the bench was closed"))
                 self._error = None
 
     def _serve(self, wait_us: int) -> None:
-        """Do one thing that was asked for, within a time."""
+        """Execute one requested call, within a time."""
         with suppress(Empty):
             self._calls.get(wait_us / 1e6)()
 
@@ -175,32 +175,32 @@ class _RigThread:
 
 
 def _settle(future: Future[T], do: Callable[[], T]) -> None:
-    """Give a future what comes of something."""
+    """Set a future to the result of a function."""
     try:
         future.set_result(do())
     except BaseException as error:
         future.set_exception(error)
 
 
-# The control socket of a bench, in a thread of its own.
+# The control socket of a bench, in its own thread.
 
 _LOOK_US: Final = 100_000
-"""How often it looks whether it is to end."""
+"""Period at which it checks whether to stop."""
 
 _Call = Callable[[Callable[[], bytes]], bytes]
-"""Does something between two ticks."""
+"""Runs a function between two ticks."""
 
 
 class _ControlThread:
-    """Serves a control socket, and has each request answered between two ticks of the rig.
+    """Serves a control socket, and answers each request between two ticks of the rig.
 
     Args:
         path: of the socket.
-        control: answers.
-        call: does something between two ticks.
+        control: answers requests.
+        call: runs a function between two ticks.
 
     Raises:
-        OSError: no socket can be made there.
+        OSError: the socket cannot be made.
     """
 
     def __init__(self, path: Path, control: EmulatorControl, call: _Call) -> None:
@@ -210,7 +210,7 @@ class _ControlThread:
         self._thread.start()
 
     def close(self) -> None:
-        """Hang up, and remove the socket."""
+        """Close the connections, and remove the socket."""
         self._closing = True
         self._thread.join()
         self._server.close()
@@ -221,7 +221,7 @@ class _ControlThread:
 
 
 class _Answers(RequestDispatcher):
-    """Has requests answered elsewhere."""
+    """Forwards requests to another thread."""
 
     def __init__(self, control: EmulatorControl, call: _Call) -> None:
         super().__init__({})
@@ -239,7 +239,7 @@ class HostInCondition(BaseException):
 
 
 class _Watch(HostPace):
-    """Knows how late the host is, and keeps it out of the rig's thread."""
+    """Measures how late the host is, and keeps it out of the rig's thread."""
 
     def __init__(self, thread: _RigThread) -> None:
         super().__init__()
@@ -250,15 +250,15 @@ class _Watch(HostPace):
             raise HostInCondition
 
     def passed(self, mark: Mark, traffic: Any) -> None:
-        """The rig hears it itself."""
+        """Do nothing: the rig records it itself."""
 
 
 class RealMode(EmulatedMode):
-    """A `BenchMode` whose time is that of this machine; it begins with the first door or wait.
+    """A `BenchMode` in real time; it starts with the first connection or wait.
 
     Args:
         rig: the rig, with the clock and the bridges of `outside`.
-        outside: where hosts find its wires; closed in the end.
+        outside: addresses of its wires for hosts; closed at the end.
     """
 
     name = "real"
@@ -284,12 +284,12 @@ class RealMode(EmulatedMode):
 
         Args:
             mounts: the wires with their devices.
-            plan: where hosts find them.
+            plan: addresses for hosts.
             rig_at: makes the rig, with the clock and the bridges of the outside.
 
         Raises:
             PortGone: a bus cannot be opened.
-            OSError: no port is to be had, or no link or socket can be made.
+            OSError: no free port, or a link or socket cannot be made.
         """
         outside = OutsideEnds(mounts, plan)
         with ExitStack() as undo:
@@ -303,7 +303,7 @@ class RealMode(EmulatedMode):
 
     @property
     def now_us(self) -> int:
-        """The time of the rig; between two ticks that of this machine."""
+        """The time of the rig; between two ticks interpolated by the machine's clock."""
         rig = self._rig.rig
         if self._thread.here and rig.acting_us is not None:
             return rig.acting_us
@@ -316,18 +316,18 @@ class RealMode(EmulatedMode):
         return self._rig.state.assembly.tick_us
 
     def act(self, action: Callable[[BenchRig], T]) -> T:
-        """Do something to the rig between two ticks."""
+        """Run a function on the rig between two ticks."""
         return self._thread.call(partial(action, self._rig))
 
     def run_for(self, duration_us: int) -> None:
-        """Let time pass."""
+        """Wait for a time."""
         self.wait_until(lambda: False, duration_us)
 
     def wait_until(self, done: Callable[[], bool], within_us: int) -> bool:
-        """Let time pass until something is so; False if it was not in time.
+        """Wait until a condition is true; return False after the time-out.
 
-        It is asked between the ticks. If it wants to hear a device it is asked in the thread of
-        the caller instead, once a tick.
+        It is checked between the ticks. If it receives from a device it is called in the thread of
+        the caller instead, once per tick.
         """
         if self._judging and self._thread.here:
             raise HostInCondition
@@ -363,14 +363,14 @@ class RealMode(EmulatedMode):
                 time.sleep(left_us / 1e6)
 
     def _begin(self) -> None:
-        """Let time pass from now on."""
+        """Start the time."""
         if not self._begun:
             self._begun = True
             self._stack.enter_context(keeping_time())
             self._thread.start()
 
     def too_slow(self) -> str:
-        """Say why no failure is to be believed: real time was not kept; empty if it was."""
+        """Return why failures are not valid, if real time was not kept; else empty."""
         rig, behind_us = self._rig.rig, 0
         if self._thread.running:
             behind_us = self._clock.now_us - rig.now_us - self._tick_us
@@ -381,16 +381,16 @@ class RealMode(EmulatedMode):
         )
 
     def fork(self) -> NoReturn:
-        """Refuse: what is outside cannot be copied."""
+        """Raise NotOnThisBench: connections to the outside cannot be copied."""
         raise NotOnThisBench("a twin goes on in virtual time: this bench is in real time")
 
     def close(self) -> None:
-        """Give everything back; raise what a device raised, unless it was raised before."""
+        """Release all resources; raise an exception of a device not raised before."""
         self._begun = True
         self._stack.close()
 
     def _watch_settings(self, outside: OutsideEnds) -> None:
-        """Note what a host sets its port to, if the device is not like that."""
+        """Record a port setting of a host that differs from the device's."""
         for wire, ports in outside.ports.items():
             mount = self._rig.state.mounts[wire]
             assert isinstance(mount, LineMount)

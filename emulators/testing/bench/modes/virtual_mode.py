@@ -1,4 +1,4 @@
-"""A bench in virtual time: waiting is free, and nothing passes unless somebody waits."""
+"""A bench in virtual time: time passes only in waits, at no cost."""
 
 from __future__ import annotations
 
@@ -38,19 +38,19 @@ else:  # python-can and canopen are slow
     sim_network = LazyModule("tickrig.emulators.can.outside.sim_network")
 
 
-# The time of a rig, for hosts that look at a clock.
+# The time of a rig, for hosts that read a clock.
 
 _LONGEST_US: Final = 3_600_000_000
-"""Who waits without a timeout waits an hour at most."""
+"""Longest wait without a timeout: an hour."""
 
 
 class RigPassing:
     """A `Passing` that is a rig's time.
 
-    What is called back in the middle of a step may look at the clock, but not wait.
+    Callbacks in the middle of a step may read the clock, but not wait.
 
     Args:
-        rig: stepped while somebody waits.
+        rig: advanced while a caller waits.
     """
 
     def __init__(self, rig: Rig) -> None:
@@ -62,12 +62,12 @@ class RigPassing:
         return EPOCH_S + self._rig.now_us / 1e6
 
     def wait(self, done: Callable[[], bool], timeout_s: float | None) -> bool:
-        """Let time pass until `done()`; False if the timeout was first.
+        """Advance the time until `done()`; return False after the timeout.
 
-        Without a timeout it is False once nothing happens any more, or after an hour.
+        Without a timeout it returns False when there are no more events, or after an hour.
 
         Raises:
-            HostTimeError: it is the rig that has called, in the middle of a step.
+            HostTimeError: called by the rig, in the middle of a step.
         """
         timeout_us = _LONGEST_US if timeout_s is None else max(0, round(timeout_s * 1e6))
         if not self._rig.in_step:
@@ -81,23 +81,23 @@ T = TypeVar("T")
 
 
 class _Offers:
-    """What programs find under names; a snapshot takes back what was offered since."""
+    """Offered names; a snapshot withdraws later ones."""
 
     def __init__(self) -> None:
         self._open: list[AbstractContextManager[object]] = []
 
     def enter(self, offer: AbstractContextManager[T]) -> None:
-        """Offer something until it is taken back."""
+        """Offer a name until it is withdrawn."""
         offer.__enter__()
         self._open.append(offer)
 
     def close(self, left: int = 0) -> None:
-        """Take back the latest, but for so many."""
+        """Withdraw the latest names, keeping a number of the first ones."""
         while len(self._open) > left:
             self._open.pop().__exit__(None, None, None)
 
     def way_back(self) -> Callable[[], None]:
-        """Return what takes back what is offered from now on."""
+        """Return a function that withdraws names offered from now on."""
         return partial(self.close, len(self._open))
 
 
@@ -138,17 +138,17 @@ class _VirtualDoors:
         return sim_network.SimNetwork(self._rig, self._bus(wire).open_end())
 
     def address(self, wire: str) -> Address:
-        """Return where a program opens a wire by itself."""
+        """Return the address at which a program can open a wire itself."""
         if wire not in self._addresses:
             self._addresses[wire] = self._offer(wire)
         return self._addresses[wire]
 
     def close(self) -> None:
-        """Offer nothing any more."""
+        """Withdraw all names."""
         self._offers.close()
 
     def _offer(self, wire: str) -> Address:
-        """Offer a wire under a name that nobody else has."""
+        """Offer a wire under a unique name."""
         mount = self._mounts[wire]
         if isinstance(mount, LineMount):
             name = _free(wire, SERIAL_PORTS.names)
@@ -159,7 +159,7 @@ class _VirtualDoors:
         return {"interface": "tickrig", "channel": name}
 
     def _side(self, wire: str) -> SerialSide:
-        """Return the host's side of a line, where one host is at a time."""
+        """Return the host's side of a line, for one host at a time."""
         mount = self._mounts[wire]
         if isinstance(mount, BusMount):
             raise ValueError(f"{wire} is a CAN bus, not a serial line")
@@ -178,7 +178,7 @@ class _VirtualDoors:
 
 
 def _free(name: str, taken: tuple[str, ...]) -> str:
-    """Return a name that is not taken: it itself, or with a number behind it.
+    """Return an unused name: the given one, or with a number appended.
 
     >>> _free("rrc", ("rrc", "rrc-2"))
     'rrc-3'
@@ -189,13 +189,13 @@ def _free(name: str, taken: tuple[str, ...]) -> str:
 
 _LOOK_US: Final = 1_000
 _LOOKS: Final = 10_000
-"""A condition is looked at each millisecond, in long waits so often."""
+"""Period for checking a condition in long waits; else each millisecond."""
 
 _EXACT: Final = Tolerances(stick_pct=0, time_us=0)
 
 
 class VirtualMode(EmulatedMode):
-    """A `BenchMode` whose time is that of its rig, stepped by whoever waits.
+    """A `BenchMode` with the time of its rig, advanced by waits.
 
     Args:
         rig: the rig.
@@ -214,20 +214,20 @@ class VirtualMode(EmulatedMode):
         return rig.now_us if rig.acting_us is None else rig.acting_us
 
     def act(self, action: Callable[[BenchRig], T]) -> T:
-        """Do something to the rig between two ticks."""
+        """Run a function on the rig between two ticks."""
         return action(self._rig)
 
     def run_for(self, duration_us: int) -> None:
-        """Let time pass."""
+        """Advance the time."""
         self._check_open()
         self._rig.rig.run_for(duration_us)
 
     def wait_until(self, done: Callable[[], bool], within_us: int) -> bool:
-        """Let time pass until something is so; False if it was not in time.
+        """Advance the time until a condition is true; return False after the time-out.
 
-        Without an end it is waited for until nothing happens any more, or for a day.
-        It is looked at after each step, and now and then between: a host that is polled in it
-        may have something to do.
+        Without a limit the wait ends when there are no more events, or after a day. The condition
+        is checked after each step, and periodically between: a host that is polled in it may have
+        work.
         """
         self._check_open()
         rig = self._rig.rig
@@ -246,18 +246,18 @@ class VirtualMode(EmulatedMode):
             raise BenchError("the bench is closed: no time passes")
 
     def patched_time(self) -> AbstractContextManager[object]:
-        """Let hosts that look at a clock live in the rig's time; see `patched_time`."""
+        """Run hosts that read a clock in the rig's time; see `patched_time`."""
         return patched_time(RigPassing(self._rig.rig))
 
     def too_slow(self) -> str:
-        """Say nothing: virtual time is always kept."""
+        """Return an empty text: virtual time is always kept."""
         return ""
 
     def fork(self) -> VirtualMode:
-        """Return a twin that goes on by itself from here; it has no hosts, no triggers."""
+        """Return a twin that continues independently, without hosts and triggers."""
         return VirtualMode(BenchRig(self._rig.name, twin(self._rig.state)))
 
     def close(self) -> None:
-        """Give everything back; no time passes any more."""
+        """Release all resources; time stops."""
         self._closed = True
         self.doors.close()

@@ -1,1 +1,1 @@
-"""What checks stand on at one node: the objects and PDOs that their names mean, its features."""
+"""Binding of checks to one node: its objects, PDOs and features."""

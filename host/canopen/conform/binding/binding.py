@@ -1,4 +1,4 @@
-"""What the names in checks mean on this node: an object or PDO of the kind that each asks for."""
+"""Binding of the names in checks to objects and PDOs of the node."""
 
 from __future__ import annotations
 
@@ -248,7 +248,7 @@ def _not_free(wanted: WantedObject, fitting: list[EntryDescription]) -> str:
 
 
 def _is_free(search: _Search, entry: EntryDescription) -> bool:
-    """Say whether an object takes any value of its type: in the profile area few do."""
+    """Return whether an object takes any value of its type: in the profile area few do."""
     if entry.index not in PROFILE_AREA:
         return True
     profile = (search.reader.number(_DEVICE_TYPE, 0) or 0) & 0xFFFF
@@ -256,7 +256,7 @@ def _is_free(search: _Search, entry: EntryDescription) -> bool:
 
 
 def _may_write(search: _Search, index: int) -> bool:
-    """Say whether an object may be written, with a value or to be refused."""
+    """Return whether an object may be written, with a value or to be refused."""
     if index in search.never:
         return False
     return index not in PROFILE_AREA or index in search.allow

@@ -1,4 +1,4 @@
-"""What a node can do, in the words that checks need: what its EDS says, confirmed by the node."""
+"""Capabilities of a node, as needed by checks: from its EDS, confirmed by the node."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Reads objects of a node, each once, and notes what contradicts their descriptions."""
+"""Reads objects of a node, each once, and reports contradictions to their descriptions."""
 
 from __future__ import annotations
 

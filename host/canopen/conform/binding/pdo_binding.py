@@ -74,7 +74,7 @@ class _PdoKind(NamedTuple):
 
 
 def _kinds(way: str) -> Iterator[_PdoKind]:
-    """Give the kinds that both directions have."""
+    """Yield the kinds that both directions have."""
     pdo = way.upper()
     yield _PdoKind(way, pdo, lambda pdo: True)
     yield _PdoKind(f"{way}_enabled", f"{pdo} that is enabled", lambda pdo: pdo.enabled)
@@ -113,7 +113,7 @@ CARRIED: Final[dict[str, tuple[int, int]]] = {
 
 
 def _carrying(way: str) -> Iterator[_PdoKind]:
-    """Give the kinds that carry an object."""
+    """Yield the kinds that carry an object."""
     for name, (index, sub) in CARRIED.items():
         if name.startswith(way):
             what = f"{way.upper()} that is enabled, event-driven and carries {index:04X}h:{sub:02X}"

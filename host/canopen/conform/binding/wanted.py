@@ -1,4 +1,4 @@
-"""The names of objects in checks, and which object of a dictionary is of that kind."""
+"""The names of objects in checks, and the matching objects of a dictionary."""
 
 from __future__ import annotations
 

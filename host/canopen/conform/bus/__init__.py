@@ -1,1 +1,1 @@
-"""What is said to the node under test and heard of it, with the times of the bus."""
+"""Communication with the node under test, with the times of the bus."""

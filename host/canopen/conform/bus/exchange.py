@@ -1,4 +1,4 @@
-"""Frames to and from the node under test, judged by the time stamps of its bus."""
+"""Frames to and from the node under test, checked by the time stamps of its bus."""
 
 from __future__ import annotations
 
@@ -539,7 +539,7 @@ class BusExchange:
         if not frame.extended and any(frame.can_id in ids for ids in self._others_by):
             self.others.update({frame.can_id & _NODE_ID_MASK} - {self.played})
         if can_id in self._reserved:
-            self.disturb(f"somebody else sent {frame}")
+            self.disturb(f"another node sent {frame}")
         if self._foreign.add(at_us, frame):
             self.disturb("other nodes load the bus too much")
 

@@ -1,4 +1,4 @@
-"""SDO frames of a check, one by one: what is said, and what must be answered."""
+"""SDO frames of a check: requests and expected answers."""
 
 from __future__ import annotations
 

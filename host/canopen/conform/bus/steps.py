@@ -1,4 +1,4 @@
-"""What each step of a check does on the bus."""
+"""Execution of the steps of a check on the bus."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Failures that are known, so that those which are new stand out.
+"""Known failures, which separate new ones.
 
 A baseline is a text file: the id of a check a line, what follows a `#` is for people.
 """
@@ -47,7 +47,7 @@ class Baseline:
         return cls(frozenset(filter(None, (_id(path, *each) for each in enumerate(lines, 1)))))
 
     def knows(self, result: verdict.Result) -> bool:
-        """Say whether it is a failure that is known."""
+        """Return whether it is a failure that is known."""
         return result.outcome.verdict is verdict.CheckVerdict.FAIL and result.check.id in self.known
 
     def new(self, report: verdict.Report) -> list[verdict.Result]:

@@ -1,4 +1,4 @@
-"""A report as JUnit, for what shows the tests of CI: one suite a group, one case a check."""
+"""A report as JUnit for CI systems: one suite per group, one case per check."""
 
 from __future__ import annotations
 

@@ -132,7 +132,7 @@ SAME: Final = "first: the same"
 
 
 def same_go(first: CheckOutcome, again: CheckOutcome) -> bool:
-    """Say whether two goes differ in nothing but their times."""
+    """Return whether two goes differ in nothing but their times."""
     one, other = ([line[1:] for line in each.evidence] for each in (first, again))
     return (first.verdict, first.reason, one) == (again.verdict, again.reason, other)
 

@@ -1,4 +1,4 @@
-"""A conformance run as one HTML page that needs nothing else."""
+"""A conformance run as one self-contained HTML page."""
 
 from __future__ import annotations
 

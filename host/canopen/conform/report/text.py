@@ -1,4 +1,4 @@
-"""A report for a terminal: a line a group, and the failures with their frames."""
+"""A report for a terminal: one line per group, and the failures with their frames."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def _not_applicable(report: Report) -> list[str]:
 
 
 def _was_begun(result: Result) -> bool:
-    """Say whether a check has something of its own to tell."""
+    """Return whether a check has something of its own to tell."""
     return result.outcome.verdict is CheckVerdict.FAIL or bool(result.outcome.evidence)
 
 

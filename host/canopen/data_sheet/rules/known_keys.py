@@ -1,4 +1,4 @@
-"""Which sections and keywords CiA 306 knows, and how it spells them."""
+"""The sections and keywords of CiA 306, and their spelling."""
 
 from __future__ import annotations
 

@@ -109,7 +109,7 @@ def _judge(
 def _faults(
     document: Document, each: ObjectList, present: set[int], seen: set[int]
 ) -> Iterator[tuple[str, str, int | str]]:
-    """Give rule, text and line of each fault of a list."""
+    """Yield rule, text and line of each fault of a list."""
     if each.title not in document.file.sections:
         return
     for line, index in each.entries:
@@ -169,7 +169,7 @@ def _may_be_set(said: int | None, listed: int, wanted: int) -> bool:
 
 
 def _rewritten(document: Document, each: ObjectList, wanted: list[int]) -> Iterator[Edit]:
-    """Give the edits of those lines of a list that change."""
+    """Yield the edits of those lines of a list that change."""
     lines = [line for line, _ in each.entries]
     for at, index in enumerate(wanted[: len(lines)]):
         if (lines[at].key, each.entries[at][1]) != (str(at + 1), index):

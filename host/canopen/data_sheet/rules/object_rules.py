@@ -1,4 +1,4 @@
-"""Rules over the sections of objects: what each has to say, and how many sub-indices it has."""
+"""Rules over the sections of objects: mandatory keywords, and number of sub-indices."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ def _highest(document: Document, index: int, section: str, said: int) -> Iterato
 
 
 def _section_of(row: EntryDescription) -> Iterator[str]:
-    """Give the section of an entry; without a default where it has none."""
+    """Yield the section of an entry; without a default where it has none."""
     yield ""
     for line in entry_lines(row):
         yield "DefaultValue=" if line.startswith("DefaultValue=") and not row.has_default else line

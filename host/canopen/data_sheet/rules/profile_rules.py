@@ -1,4 +1,4 @@
-"""Rules over what the standards want to be there: communication area, profiles."""
+"""Rules over mandatory objects: communication area, profiles."""
 
 from __future__ import annotations
 

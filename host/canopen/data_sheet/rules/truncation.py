@@ -1,4 +1,4 @@
-"""The rule that tells a file that was cut off: what it still promises is not there."""
+"""The rule that detects a truncated file by missing objects."""
 
 from __future__ import annotations
 

@@ -294,7 +294,7 @@ def _doubled_section(
 def _again(
     document: Document, title: eds_value.EdsLine
 ) -> Iterator[tuple[eds_value.EdsLine, eds_value.EdsLine | None]]:
-    """Give the keywords behind a title, each with the line that counts."""
+    """Yield the keywords behind a title, each with the line that counts."""
     lines = document.file.lines  # a slice would be all of the rest, for each title
     behind = (lines[at] for at in range(title.number, len(lines)))
     for line in takewhile(lambda other: not other.title, behind):

@@ -1,1 +1,1 @@
-"""A drive of CiA 402 as ros2_canopen's 402 driver drives it."""
+"""Drives of CiA 402, operated as by ros2_canopen's 402 driver."""

@@ -1,4 +1,4 @@
-"""How much of a bus the periods of its drives take: what is polled by SDO, and PDOs."""
+"""The bus load of drives: SDO polling and PDOs."""
 
 from __future__ import annotations
 

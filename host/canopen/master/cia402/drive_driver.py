@@ -1,4 +1,4 @@
-"""One axis of a drive as ros2_canopen's 402 driver drives it."""
+"""One axis of a drive, operated as by ros2_canopen's 402 driver."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class DriveSettings:
 
 
 def is_drive(slave: BusSlave) -> bool:
-    """Say whether a slave is driven as a drive: by its driver, or else its device type."""
+    """Return whether a slave is driven as a drive: by its driver, or else its device type."""
     if slave.driver:
         return "402" in slave.driver
     return slave.identity.device_type & 0xFFFF == _DRIVE_PROFILE
@@ -369,7 +369,7 @@ class DriveDriver:
         await self.switch_to(drive_state.DriveState.OPERATION_ENABLED)
 
     async def _supports(self, number: drive_mode.ModeNumber) -> bool:
-        """Say whether 6502h has a mode."""
+        """Return whether 6502h has a mode."""
         modes = await self._exchange(self._read(_SUPPORTED))
         return bool(modes >> number - 1 & 1)
 

@@ -70,7 +70,7 @@ def test_a_worker_that_sends_something_else_is_replaced(folder: Path, tickrig: C
     tickrig("test_rrc.py", "--seeds", "0-5", "-j", "1", status=1)
     outcomes = [row["outcome"] for row in rows(folder / "campaign.csv")]
     assert outcomes == ["passed"] * 4 + ["died", "passed"]
-    assert "when it sent what cannot be read" in rows(folder / "campaign.csv")[4]["reason"]
+    assert "when it sent unreadable data" in rows(folder / "campaign.csv")[4]["reason"]
 
 
 def test_the_table_is_the_same_in_shards_and_by_any_number_of_processes(

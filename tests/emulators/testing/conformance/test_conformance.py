@@ -325,7 +325,7 @@ def test_the_same_slave_gives_the_same_bytes() -> None:
 
 
 def test_what_cannot_be_is_refused() -> None:
-    with pytest.raises(ValueError, match="level 'careful' is none of read-only"):
+    with pytest.raises(ValueError, match="level 'careful' is not one of read-only"):
         conformance(make_epos(5), level="careful")
     with pytest.raises(ValueError, match=r"node_id is 1\.\.127, not None"):
         conformance(local_node())

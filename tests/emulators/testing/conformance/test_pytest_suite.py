@@ -130,7 +130,7 @@ def test_a_callable_of_yours_is_given_as_it_is_or_made(
 @pytest.mark.parametrize(
     ("given", "why"),
     [
-        ("power_on, node_id=5, level='read_only'", "level 'read_only' is none of read-only, *"),
+        ("power_on, node_id=5, level='read_only'", "level 'read_only' is not one of read-only, *"),
         ("power_on", "node_id is 1..127, not None; this slave does not tell it itself"),
         ("lambda: power_on, eds='r1.eds'", "node_id is 1..127, not None; *"),
     ],

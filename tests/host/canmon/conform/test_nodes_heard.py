@@ -23,7 +23,7 @@ def test_nodes_are_known_by_what_slaves_send() -> None:
     ("frames", "status", "out", "err"),
     [
         (("705#7F", "705#7F", "190#00"), 0, "node 5  2 frames\nnode 16  1 frame\n", ""),
-        (("080#",), 5, "", "nobody was heard within 1.5 s; who says nothing by itself is not"),
+        (("080#",), 5, "", "no frames within 1.5 s; a node that sends nothing itself is not"),
     ],
 )
 def test_who_is_heard_is_listed_for_programs(

@@ -30,7 +30,7 @@ def at_terminal() -> pexpect.spawn[str]:
 def test_no_begins_nothing() -> None:
     child = at_terminal()
     child.sendline("")
-    child.expect_exact("Error: not begun")
+    child.expect_exact("Error: not started")
     child.expect(pexpect.EOF)
     child.close()
     assert child.exitstatus == 2
@@ -52,7 +52,7 @@ def test_in_a_pipe_it_refuses_and_says_how() -> None:
         [sys.executable, *WORDS], capture_output=True, text=True, timeout=PATIENCE_S, check=False
     )
     assert done.returncode == 2
-    assert "Nobody is here to be asked: give --yes, or --read-only" in done.stderr
+    assert "There is no terminal to ask: give --yes, or --read-only" in done.stderr
     assert not done.stdout
 
 
@@ -62,4 +62,4 @@ def test_without_a_node_it_says_who_was_heard() -> None:
         [sys.executable, *line], capture_output=True, text=True, timeout=PATIENCE_S, check=False
     )
     assert (done.returncode, done.stdout) == (5, "")
-    assert done.stderr.startswith("nobody was heard within 1.5 s; who says nothing")
+    assert done.stderr.startswith("no frames within 1.5 s; a node that sends")

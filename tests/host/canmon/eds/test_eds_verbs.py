@@ -116,7 +116,7 @@ def test_a_report_has_a_case_for_each_rule_of_each_file(
         (("fix", "empty.eds"), "give -o OUT, or --dry-run"),
         (("fix", "empty.eds", "-o", "a.eds", "--dry-run"), "give -o OUT, or --dry-run"),
         (("fix", "empty.eds", "-o", "a.eds"), "FILE empty.eds: no EDS: it describes no object"),
-        (("fix", "a.xdd", "-o", "a.eds"), "FILE a.xdd: XDD files are not mended"),
+        (("fix", "a.xdd", "-o", "a.eds"), "FILE a.xdd: XDD files cannot be fixed"),
         (("show", "large.eds"), "FILE large.eds: more than 32,000,000 bytes: no EDS"),
         (("show", "empty.eds"), "FILE empty.eds: has no objects (no-objects)"),
         (("diff", "empty.eds", "empty.eds"), "FILE empty.eds: has no objects (no-objects)"),
@@ -206,9 +206,9 @@ def test_fix_writes_a_file_and_tells_what_is_left(odd: Path, tmp_path: Path) -> 
     assert result.exit_code == 1
     assert out.read_bytes() == DEFECT.replace("NrOfRXPDO=7", "NrOfRXPDO=4").encode()
     mended, left = result.stdout.splitlines()
-    assert mended.startswith(f"{odd}:29: mended: [pdo-count] [DeviceInfo] NrOfRXPDO=7")
+    assert mended.startswith(f"{odd}:29: fixed: [pdo-count] [DeviceInfo] NrOfRXPDO=7")
     assert f"[{OUT_OF_LIMITS}] [2006] the default 9 is not in 16..32" in left
-    assert result.stderr == "1 mended, 1 left\n"
+    assert result.stderr == "1 fixed, 1 left\n"
 
 
 def test_fix_writes_utf_8_or_ascii_and_tells_which_letter_it_took(tmp_path: Path) -> None:
@@ -337,5 +337,5 @@ def test_what_is_left_is_told_with_the_lines_of_where_it_is_written(tmp_path: Pa
     assert at > line
     assert left.replace(f"{out}:{at}", f"{file}:{at + 1}") == shown[-1]
     assert (
-        f"{file}:30: mended: [doubled-key] [DeviceInfo] NrOfRXPDO is there twice: 4" in (written[0])
+        f"{file}:30: fixed: [doubled-key] [DeviceInfo] NrOfRXPDO is there twice: 4" in (written[0])
     )

@@ -243,7 +243,7 @@ def test_a_node_that_dies_in_the_middle_is_told(
         (("compare", "5", "nosuch"), 2, "FILE nosuch: No such file"),
         (("compare", "5", "128"), 2, "128 is no node-ID 1..127"),
         (("compare", "5", "7"), 1, "node 7: 1005h:00 cob_id_sync: no answer within 500 ms"),
-        (("store", "5", "some"), 2, "'some' is none of all, communication, application"),
+        (("store", "5", "some"), 2, "'some' is not all, communication, application"),
         (("store", "5", "9"), 1, "1010h:09: refused: sub-index does not exist"),
         (("restore", "5", "9"), 1, "1011h:09: refused: sub-index does not exist"),
     ],

@@ -38,7 +38,7 @@ def test_firmware_is_downloaded_and_runs(rig: str, file: str) -> None:
     assert after == f"node 17: running; identification {ID}h; flash: no error"
     assert result.stderr.splitlines() == [
         "10240 bytes of firmware.bin into program 1 of node 17."
-        " The program stops: a drive lets go of its motor, what hangs on it may fall",
+        " The program stops: a drive releases its motor, a hanging load may fall",
         "node 17: stopped: the boot loader runs",
         "node 17: cleared",
         "10240 bytes written",

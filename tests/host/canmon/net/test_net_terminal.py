@@ -17,7 +17,7 @@ PATIENCE_S = 60
 
 def test_no_begins_nothing_and_yes_begins() -> None:
     for answer, status, told in (
-        ("", 2, "Error: not begun"),
+        ("", 2, "Error: not started"),
         ("y", 1, "Error: node 5: sent, but nothing answers as node 5"),
     ):
         child = pexpect.spawn(
@@ -48,7 +48,7 @@ def test_in_a_pipe_it_refuses_and_says_how() -> None:
     status, said = run(*BUS, "nmt", "start", "all")
     assert status == 2
     assert "This may turn a motor" in said
-    assert said.endswith("Nobody is here to be asked: give --yes\n")
+    assert said.endswith("There is no terminal to ask: give --yes\n")
 
 
 def test_a_node_that_is_silent_is_told() -> None:

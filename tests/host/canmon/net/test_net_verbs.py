@@ -225,7 +225,7 @@ def test_another_file_is_no_source(tmp_path: Path) -> None:
 def test_where_nobody_is_there_the_question_ends_with_a_full_stop(drive: SlaveBench) -> None:
     result = net("a-bus", "write", "5", "target_position=1")
     assert result.exit_code == 2
-    assert "target position. Nobody is here to be asked: give --yes" in result.stderr
+    assert "target position. There is no terminal to ask: give --yes" in result.stderr
 
 
 def test_a_bus_that_cannot_be_made_is_one_line() -> None:
@@ -241,7 +241,7 @@ def test_a_bus_that_cannot_be_made_is_one_line() -> None:
 def test_a_bus_may_stand_in_options() -> None:
     result = net("-i", "nosuch", "-c", "x", "scan")
     assert result.exit_code == 2
-    assert "-i 'nosuch' is none of python-can" in result.stderr
+    assert "-i 'nosuch' is not an interface of python-can" in result.stderr
 
 
 @pytest.mark.parametrize(

@@ -177,7 +177,7 @@ def test_a_bus_that_cannot_be_opened_fails() -> None:
 
 
 def test_an_unknown_interface_is_refused() -> None:
-    with pytest.raises(Refused, match="'nothing' is none of python-can"):
+    with pytest.raises(Refused, match="'nothing' is not an interface of python-can"):
         open_source(["nothing:0"])
 
 

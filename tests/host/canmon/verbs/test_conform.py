@@ -205,7 +205,7 @@ def test_what_eds_check_finds_in_the_eds_is_counted(rig: str, tmp_path: Path) ->
         (("--node", "5", "-b", "250000"), "--bitrate=250000 is of a bus: in "),
         (("--node", "5", "--stimulus", "'"), "--stimulus: No closing quotation"),
         (("--node", "5", "--stimulus", "control:/nosuch"), "--stimulus /nosuch: No such file"),
-        (("--node", "5", "--stimulus", "ask"), "--stimulus ask wants somebody at a terminal"),
+        (("--node", "5", "--stimulus", "ask"), "--stimulus ask needs a terminal"),
         (("--node", "0"), "0 is not in the range 1<=x<=127"),
         (("--node", "5", "--max-load", "0"), "0 is not in the range 1<=x<=100"),
         (("--node", "5", "--max-load", "0.01"), "0.01 is not in the range 1<=x<=100"),

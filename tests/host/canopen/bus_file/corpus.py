@@ -137,7 +137,7 @@ CORPUS: Final = (
     Case("no-master", ROS_NODE[ROS_NODE.index("axis") :], 0, "it has no section master"),
     Case("slaves-only", NODE.removeprefix(MASTER), 0, "it has no section master"),
     Case("sync-period", "master: {sync_period: 10}\n", 1, "a SYNC each 10 µs"),
-    Case("bit-rate", "master: {baudrate: 42}\n", 1, "42 kbit/s is none of 10, 20, 50, "),
+    Case("bit-rate", "master: {baudrate: 42}\n", 1, "42 kbit/s is not one of 10, 20, 50, "),
     Case("no-value", NODE + "  sdo: [{index: 0x6081}]\n", 5, "6081h:00: no value"),
     Case("driver-class", ROS_CLASS.format("ProxiDriver", "proxy"), 6, "mean 'ProxyDriver'?"),
     Case("driver-class", ROS_CLASS.format("ProxyDriver", "402"), 7, "is in canopen_proxy_driver"),

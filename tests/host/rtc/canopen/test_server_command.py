@@ -79,7 +79,7 @@ def test_a_file_that_cannot_be_used_is_one_line(
         (("--for", "soon"), "--for: 'soon' is not a time: write 1.5s, 200ms or 250us"),
         (("--component", "Logger0"), "--component 'Logger0' is not NAME=FILE.py:Class"),
         (("--component", "A=none.py:B"), "--component A: none.py: No such file or directory"),
-        (("-i", "carrier-pigeon"), "-i 'carrier-pigeon' is none of python-can"),
+        (("-i", "carrier-pigeon"), "-i 'carrier-pigeon' is not an interface of python-can"),
         (("-i", "virtual", "-c", "x", "--log", "/none/x"), "--log /none/x: No such file"),
     ],
 )

@@ -35,7 +35,7 @@ STICK = "from tickrig.host.rtc.canopen.robots import Joystick as Stick"
         ("--openrtm a:b", "--openrtm: 'a:b' is not HOST:PORT with a port 1..65535"),
         ("--openrtm a:0", "--openrtm: 'a:0' is not HOST:PORT with a port 1..65535"),
         ("--openrtm a --openrtm-address a/b", "--openrtm-address: 'a/b' is not HOST:PORT"),
-        ("--openrtm a --openrtm-names %h/%x.rtc", "--openrtm-names: %x is none of %n %t %m"),
+        ("--openrtm a --openrtm-names %h/%x.rtc", "--openrtm-names: %x is not one of %n %t %m"),
         ("--openrtm a --openrtm-names %h", "--openrtm-names: '%h' is not like %h.host_cxt/%n.rtc"),
         ("--openrtm a --openrtm-names %n//a", "--openrtm-names: '%n//a' is not like"),
         ("--openrtm-names %n.rtc", "--openrtm-names is for --openrtm"),

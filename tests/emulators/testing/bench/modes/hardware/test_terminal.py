@@ -70,7 +70,7 @@ def test_what_is_typed_is_the_answer(prompt: pexpect.spawn[bytes]) -> None:
 @pytest.mark.realtime
 def test_nobody_at_the_terminal_is_told(prompt: pexpect.spawn[bytes]) -> None:
     prompt.sendeof()
-    prompt.expect_exact("refused: nobody is at the terminal (end of input)")
+    prompt.expect_exact("refused: the terminal was closed (end of input)")
 
 
 @pytest.mark.realtime
