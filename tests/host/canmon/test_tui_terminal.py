@@ -21,6 +21,7 @@ pytestmark = pytest.mark.realtime
 BUS = (f"udp:{GROUP}", "--bus-kwargs", f"port={PORT}")
 BURST = 10_000
 ALTERNATE, NORMAL = "\x1b[?1049h", "\x1b[?1049l"
+F2 = "\x1bOQ"
 
 
 @pytest.fixture
@@ -161,3 +162,28 @@ def test_enter_triggers_a_recording_of_dump(bus: can.BusABC, tmp_path: Path) -> 
     frames = [text.split()[-1] for text in part.read_text("ascii").splitlines()]
     assert [text for text in frames if text.startswith("181")] == ["181#A5", "181#A6"]
     assert "# trigger: key" in part.read_text("ascii").splitlines()
+
+
+def test_settings_change_a_bus_for_a_log_and_the_workspace_keeps_it(
+    bus: can.BusABC, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    log, kept = tmp_path / "run.log", tmp_path / "bench.toml"
+    log.write_text("(1.000000) can0 705#00\n(2.000000) can0 705#05\n", "ascii")
+    terminal = Terminal("tui", *BUS, "-w", str(kept), columns=100)
+    terminal.wait_for("LISTEN-ONLY")
+    tell(bus, 0xA5)
+    terminal.wait_for("[1] A5")
+    terminal.child.send(F2)
+    terminal.wait_for("EDS of nodes")
+    for name, then in (("no.log", "No such file"), ("run.log", "end of the log")):
+        terminal.child.send("\x15")  # Ctrl-U empties the field
+        terminal.wait_for("as can0, slcan")
+        terminal.child.send(name)
+        terminal.wait_for(name)
+        terminal.child.send("\r")
+        terminal.wait_for(then)
+    terminal.wait_for("operational")
+    by_key(terminal)
+    assert terminal.end() == 0
+    assert 'source = ["run.log"]' in kept.read_text("utf-8")
