@@ -94,7 +94,7 @@ def _number(bus: NodeBus, node_id: int, sub: int) -> int | None:
 def chosen_eds(eds: Path | eds_folder.EdsFolder | None, bus: NodeBus, node_id: int) -> Path | None:
     """Return the EDS of a node: the file that is named, or that of a folder which fits the node.
 
-    Which file of a folder it is, or that none fits, is said.
+    A line on standard error names the file of a folder, or says that none fits.
 
     Raises:
         LinkClosed: the bus is gone.
@@ -171,7 +171,7 @@ def read_eds_paths(
 ) -> eds_folder.EdsFiles:
     """Read files by node-ID; Refused if one cannot be read, or is no EDS.
 
-    What is wrong in a file, and not used, is told on standard error.
+    It reports mistakes in a file, which are not used, on standard error.
 
     Args:
         paths: the files.

@@ -185,9 +185,9 @@ def known_objects(
     Args:
         session: the bus.
         node_id: the node.
-        eds: its EDS, as somebody names it, or a folder that has it.
-        what: names it so.
-        strict: an EDS of another device is refused; else it is told.
+        eds: its EDS, or a folder that has it.
+        what: the option or argument that names it, for messages.
+        strict: refuse an EDS of another device; else warn.
 
     Raises:
         Refused: the EDS cannot be used.
