@@ -175,6 +175,7 @@ class SystemControl(RequestDispatcher):
                 "reset": (self._move(manager.reset), ("name",)),
                 "delete": (self._move(manager.delete), ("name",)),
                 "set_parameter": (self._set_parameter, ("name", "parameter", "value", "set")),
+                "add_set": (self._add_set, ("name", "set", "like")),
                 "activate_set": (self._activate_set, ("name", "set")),
                 "seen": (self._seen, ("port", "since")),
                 "inject": (self._inject, ("port", "value")),
@@ -255,6 +256,18 @@ class SystemControl(RequestDispatcher):
         set_id = text_of({"set": "", **request}, "set")
         value = text_of(request, "value")
         self._configuration(request).set(text_of(request, "parameter"), value, set_id)
+        return {}
+
+    def _add_set(self, request: Object) -> Object:
+        """Add a configuration set with the values of another one."""
+        configuration = self._configuration(request)
+        set_id, like = text_of(request, "set"), text_of(request, "like")
+        if not set_id or set_id in configuration.sets:
+            raise RtcRefused(f"configuration set {short(set_id)} has no name, or is there already")
+        if like not in configuration.sets:
+            known = ", ".join(configuration.sets)
+            raise RtcRefused(f"no configuration set {short(like)}; known: {known}")
+        configuration.add_set(set_id, configuration.sets[like])
         return {}
 
     def _activate_set(self, request: Object) -> Object:

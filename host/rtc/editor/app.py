@@ -132,6 +132,7 @@ class SystemScreen(FramedApp):
         Binding("c", "connect", "connect"),
         Binding("x", "disconnect", "disconnect"),
         Binding("e", "edit", "edit"),
+        Binding("plus", "add_set", "new set", key_display="+"),
         Binding("ctrl+s", "save", "save", key_display="^s"),
     ]
 
@@ -262,6 +263,22 @@ class SystemScreen(FramedApp):
 
         where = f" of the set {set_id}" if set_id else ""
         self.push_screen(QuestionScreen(f"{name}: {parameter}{where}", value), answered)
+
+    def action_add_set(self) -> None:
+        """Ask for a name, and make a configuration set like the one under the cursor."""
+        component, row = self._component(), self.details.row
+        if component is None or not component["configuration"]["parameters"]:
+            self._refuse("go to a component with parameters")
+            return
+        name, like = component["name"], component["configuration"]["active"]
+        if row is not None and row.item.set_id:
+            like = row.item.set_id
+
+        def answered(set_id: str | None) -> None:
+            if set_id is not None:
+                self._request("add_set", name=name, set=set_id.strip(), like=like)
+
+        self.push_screen(QuestionScreen(f"{name}: new set with the values of {like}", ""), answered)
 
     def action_save(self) -> None:
         """Ask for a file, and write the system as it is."""

@@ -61,6 +61,11 @@ class Bench(Chain):
         ("disconnect", {"ports": []}, "ports are one or two names, not 0"),
         ("activate", {"name": 5}, "name is a string, not 5"),
         ("set_parameter", {"name": "ConfigSample0", "value": 5}, "value is a string, not 5"),
+        (
+            "add_set",
+            {"name": "ConfigSample0", "set": "x", "like": "none"},
+            'no configuration set "none"; known: default',
+        ),
         ("seen", {"port": "ConsoleIn0.out", "since": "1"}, 'since is a whole number, not "1"'),
         ("inject", {"port": "ConsoleOut0.in"}, "inject needs a value"),
         ("save", {"format": "yaml"}, 'format is toml or xml, not "yaml"'),
@@ -132,7 +137,7 @@ def test_a_component_whose_constructor_raises_ends_nothing() -> None:
 
 VERBS = (
     *("create", "describe", "connect", "disconnect", "activate", "deactivate", "reset", "delete"),
-    *("set_parameter", "activate_set", "seen", "inject", "save", "status", "stop"),
+    *("set_parameter", "add_set", "activate_set", "seen", "inject", "save", "status", "stop"),
 )
 FIELDS: dict[str, list[Any]] = {
     "names": [["ConsoleIn0"], ["localhost/ConsoleOut0.rtc"], []],
@@ -141,7 +146,8 @@ FIELDS: dict[str, list[Any]] = {
     "name": ["ConsoleIn0", "ConsoleOut0", "ConfigSample0", "localhost/ConsoleIn0.rtc", ""],
     "parameter": ["int_param0", "vector_param0", "str_param1"],
     "value": [5, "5", "1,2", [1], {"data": 3}],
-    "set": ["default", ""],
+    "set": ["default", "fast", ""],
+    "like": ["default", "none"],
     "type": ["ConsoleIn", "SeqOut"],
     "rate_hz": [10, 0.5],
     "port": ["ConsoleIn0.out", "ConsoleOut0.in", ":", "."],

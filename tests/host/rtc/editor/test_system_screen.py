@@ -191,6 +191,28 @@ def test_configuration_sets_are_shown_edited_and_activated(system: Served) -> No
         at_desk(system.path, act)
 
 
+def test_a_configuration_set_is_added_with_the_values_of_another(system: Served) -> None:
+    configuration = system.manager.find("ConfigSample0").configuration
+    configuration.set("int_param0", "5")
+
+    async def act(desk: Desk) -> None:
+        await desk.press("plus")
+        assert desk.said[-1] == "go to a component with parameters"
+        await desk.go_to("ConfigSample0")
+        await desk.press("plus")
+        await desk.answer("slow")
+        assert configuration.sets["slow"] == configuration.sets["default"]
+        assert configuration.sets["slow"]["int_param0"] == "5"
+        assert "set slow" in desk.shown(desk.app.details)
+        for name in ("slow", " "):
+            await desk.press("plus")
+            await desk.answer(name)
+            assert desk.said[-1].endswith("has no name, or is there already")
+
+    with system:
+        at_desk(system.path, act)
+
+
 def test_what_does_not_fit_is_refused(system: Served) -> None:
     async def act(desk: Desk) -> None:
         for at, key, why in (
