@@ -209,7 +209,7 @@ class FrameLog:
 
     @property
     def gap_alone(self) -> bool:
-        """Whether silence alone ends frames, so that each one that has begun may be whole."""
+        """Whether silence alone ends frames, so that an unfinished one may be whole."""
         return self._rule.cut is _never_whole
 
     @property

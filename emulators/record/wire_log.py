@@ -73,7 +73,7 @@ class WireLog:
         self._wake: Callable[[int], None] | None = None
 
     def follow(self, rig: Rig, name: str) -> None:
-        """Let frames end by a silence when it is over, not when something is heard later.
+        """End frames as soon as a silence ends them, not when the next traffic comes.
 
         Args:
             rig: whose time passes.
@@ -116,7 +116,7 @@ class WireLog:
             self._wake(due_us)
 
     def unfinished(self, *, by_gap: bool = False) -> tuple[WireLine, ...]:
-        """Return what has begun and did not end, of each direction; not numbered.
+        """Return the unfinished line or frame of each direction; it has no number.
 
         Args:
             by_gap: return the frames that silence alone ends instead: each may be whole.

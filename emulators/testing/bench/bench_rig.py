@@ -142,7 +142,7 @@ class Journal(WireLog):
         return hear
 
     def follow(self, rig: Rig, name: str = "") -> None:
-        """Let frames end by a silence when it is over."""
+        """End frames as soon as a silence ends them."""
         for source, log in self._logs:
             log.follow(rig, source)
 
@@ -153,7 +153,7 @@ class Journal(WireLog):
             log.end_silent(at_us)
 
     def unfinished(self, *, by_gap: bool = False) -> tuple[WireLine, ...]:
-        """Return what has begun on serial lines and did not end, by the time of its last byte."""
+        """Return the unfinished lines and frames, sorted by the time of their last byte."""
         found = [
             replace(line, source=name)
             for name, log in self._logs

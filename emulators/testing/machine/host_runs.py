@@ -258,7 +258,7 @@ class HostFailure:
     passed: str
 
     def is_like(self, other: HostFailure) -> bool:
-        """Say whether another run failed in the same way."""
+        """Return whether another run failed in the same way."""
         return type(self.error) is type(other.error) and self.violated == other.violated
 
     @property

@@ -111,17 +111,17 @@ class TickrigDriver(ConsoleExpectMixin, Driver, ConsoleProtocol, PowerProtocol):
 
     @Driver.check_active
     def on(self) -> None:
-        """Give the device its supply."""
+        """Switch the supply on."""
         self.device.switch_on()
 
     @Driver.check_active
     def off(self) -> None:
-        """Take it away."""
+        """Switch the supply off."""
         self.device.switch_off()
 
     @Driver.check_active
     def cycle(self) -> None:
-        """Take it away, and give it again after `delay`."""
+        """Switch the supply off, and on again after `delay`."""
         self.off()
         self.bench.run_for(round(self.delay * 1_000_000))
         self.on()

@@ -153,16 +153,16 @@ class BenchLibrary:
         return passed[-1]
 
     def order_fault(self, fault: str, duration: str | None = None) -> None:
-        """Let a fault come: ``cut``, ``cut@2s-3s``, ``axis2/sdo_slow=2s``.
+        """Order a fault: ``cut``, ``cut@2s-3s``, ``axis2/sdo_slow=2s``.
 
         Args:
             fault: the fault, with its arguments.
-            duration: how long it stays; for ever unless given.
+            duration: how long it stays; until it is cleared unless given.
         """
         self.bench.fault(fault, for_=duration)
 
     def clear_fault(self, name: str) -> None:
-        """Let a fault go.
+        """Clear a fault.
 
         Args:
             name: of the fault.
@@ -208,7 +208,7 @@ class BenchLibrary:
             raise AssertionError(f"{name} is {bench.get(name)!r}, not {wanted!r} within {within}")
 
     def switch_off(self, device: str = "") -> None:
-        """Take the supply away.
+        """Switch the supply off.
 
         Args:
             device: of which device; of all unless given.
@@ -216,7 +216,7 @@ class BenchLibrary:
         self._of(device).switch_off()
 
     def switch_on(self, device: str = "") -> None:
-        """Give the supply again.
+        """Switch the supply on.
 
         Args:
             device: to which device; to all unless given.
