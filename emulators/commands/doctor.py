@@ -25,9 +25,10 @@ from typing import Final
 
 import click
 
-from tickrig import compiled, kernel
+from tickrig._compiled import compiled
 from tickrig._version import __version__
 from tickrig.emulators.bench.running_emulator import keeping_time
+from tickrig.emulators.rig.kernel import kernel
 from tickrig.host.cli.messages import Refused
 from tickrig.host.text.names import near
 from tickrig.host.text.page_text import json_text, one_line
