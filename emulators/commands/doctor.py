@@ -1,7 +1,7 @@
 """What of this machine tickrig can use: `tickrig doctor`.
 
-Each check is a probe: it reads files, opens what any user may open, and gives everything back.
-None needs root, and none is waited for longer than its time. What a probe raises is its result.
+Each check is a probe: it reads files, opens what any user may open, and closes it again. No probe
+needs root. A probe that takes too long is given up; an exception of a probe is its result.
 """
 
 from __future__ import annotations
@@ -108,7 +108,7 @@ def _packages() -> _Rows:
     try:
         lines = requires("tickrig") or []
     except PackageNotFoundError:
-        do = "pip install tickrig, else nobody knows which packages it needs"
+        do = "pip install tickrig: its packages are checked then"
         yield _CheckRow("packages", _NOTE, "runs from a folder, not installed", do)
         return
     extras: dict[str, list[str]] = {"": []}
@@ -448,7 +448,7 @@ def run_doctor(*, as_json: bool, needs: Sequence[str]) -> int:
 
 
 def _lacks(rows: Sequence[_CheckRow], name: str, is_wanted: bool) -> bool:
-    """Say whether a needed check found nothing; of several ports one is enough."""
+    """Return whether a needed check found nothing; of several ports one is enough."""
     states = [row.state for row in rows if row.name == name and row.needed]
     if is_wanted and name in ("serial port", "can adapter"):
         return _OK not in states

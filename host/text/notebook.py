@@ -1,7 +1,7 @@
 """Tables and listings as HTML for Jupyter, in which foreign text is text only.
 
 A notebook shows what `_repr_html_` returns inside its own page: there is no style sheet and no
-content security policy of ours. So every text is escaped, what cannot be seen is spelt out, and
+content security policy of ours. So every text is escaped, invisible characters are spelt out, and
 nothing has a link, a script or an address.
 
 >>> listing(["<b>"])[-15:]
@@ -51,7 +51,7 @@ def table(
         rows: the cells.
         title: makes a table that folds.
         opened: a table that folds is unfolded at first.
-        most: so many rows are shown; how many more there are stands below.
+        most: number of rows that are shown; a line below counts the others.
     """
     every = iter(rows)
     shown = list(islice(every, most))

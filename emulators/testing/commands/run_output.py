@@ -149,7 +149,7 @@ def _diagram_of(text: str, signals: _Signals) -> _Diagram:
 
 
 def _is_path(word: str) -> bool:
-    """Say whether a word is meant as `X:Y`, not as an object of a node with a sub-index."""
+    """Return whether a word is meant as `X:Y`, not as an object of a node with a sub-index."""
     left, colon, _ = word.partition(":")
     return bool(colon) and not left.rpartition(_SLASH)[2].startswith("0x")
 
@@ -209,7 +209,7 @@ class RunPlots:
         self._paths: dict[_Diagram, _PathSampler] = {}
 
     def watch(self, rig: BenchRig) -> None:
-        """Look at the signals from now on; Refused if there is none of a name."""
+        """Look at the signals from now on; Refused if a name is unknown."""
         self._signals = signals = _Signals(rig)
         with refused_at("--plot"):
             self._diagrams = [_diagram_of(word, signals) for word in self._words]
