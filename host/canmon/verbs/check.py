@@ -433,6 +433,7 @@ class _Usual:
         self._words, self._bus, self._reopen = words, bus, reopen
         self._make = partial(diagnosis.Diagnoser, bit_rate, eds, rules=known)
         self._diagnoser = self._make()
+        self._watch, self._end_us = listening.Stopwatch(), 0
         self.source: AnySource[Columns] | Source
 
     def listen(self, span_us: int | None) -> None:
@@ -450,8 +451,11 @@ class _Usual:
         self.source = source
         with closing(source), listening.until_interrupted():
             listening.listen(source, self._take, span_us)
+        if source.live and list(self._words) != [_STDIN] and self._diagnoser.kept.frames:
+            self._end_us = self._watch.now_us
 
     def _take(self, records: Sequence[Record]) -> None:
+        self._watch.take(records)
         if self._diagnoser.kept.frames < _MOST_FRAMES:
             self._diagnoser.take(records)
 
@@ -460,7 +464,7 @@ class _Usual:
         source = self.source
         lost = [f"{source.lost} frames were lost"] if source.lost else []
         self._diagnoser.without_errors = source.without_errors
-        self._found = found = self._diagnoser.diagnosis(lost, source.errors())
+        self._found = found = self._diagnoser.diagnosis(lost, source.errors(), self._end_us)
         lines = DumpLines(stamp) if stamp else None
         if lines and found.frames:
             lines.stamp(min(bus.at_us[0] for bus in self._diagnoser.kept))

@@ -203,19 +203,22 @@ class Diagnoser:
         """Take frames in the order of the log: a block of columns, or records."""
         self.kept.take(frames)
 
-    def diagnosis(self, lost: Iterable[str] = (), errors: Iterable[str] = ()) -> Diagnosis:
+    def diagnosis(
+        self, lost: Iterable[str] = (), errors: Iterable[str] = (), end_us: int = 0
+    ) -> Diagnosis:
         """Judge what has come until now.
 
         Args:
             lost: what the source says was lost.
             errors: what the source says of errors beside its error frames.
+            end_us: until when a bus was heard, by the time of its frames; 0 for the last frame.
         """
         faults: list[BusFault] = []
         judged: set[str] = set()
         why: dict[str, str] = {}
         for bus in self.kept:
             known = learnt.bus_of(self._rules or {}, bus.name, len(self.kept.buses))
-            one = _BusJudge(bus, self._bit_rate, self._eds, known)
+            one = _BusJudge(bus, self._bit_rate, self._eds, known, end_us)
             faults += one.faults()
             judged |= one.judged
             why |= one.unjudged
@@ -276,6 +279,7 @@ class _BusJudge:
         bit_rate: int | None,
         eds: Mapping[int, node_memory.EdsObjects],
         rules: learnt.LearntBus | None = None,
+        end_us: int = 0,
     ) -> None:
         self._bus, self._bit_rate, self._eds, self._rules = bus, bit_rate, eds, rules
         self.judged = {"no-error-frames", "time-back"}
@@ -286,7 +290,8 @@ class _BusJudge:
         self._backward = bus.backward()
         self._times, self._set_back = steady_times(bus, self._backward)
         # A clock that was set back leaves the end of the log before other times in it.
-        self._end_us = max(self._times[self._set_back[-1] if self._set_back else 0 :])
+        last_us = max(self._times[self._set_back[-1] if self._set_back else 0 :])
+        self._end_us = max(last_us, end_us)
 
     def faults(self) -> list[BusFault]:
         """Return what is wrong."""
@@ -357,7 +362,7 @@ class _BusJudge:
             most_us = max(at_us[row - 1] - at_us[row] for row in rows)
             text = f"the time goes back by {'up to ' * (len(rows) > 1)}{ms_text(most_us)} ms"
             self._hit("time-back", None, text, rows, len(rows))
-        if len(self._bus) > 1 and not rows and at_us[0] == self._end_us:
+        if len(self._bus) > 1 and not rows and at_us[0] == max(at_us):
             self.unjudged |= dict.fromkeys(_TIMED, ONE_TIME)
             self.judged.discard("time-back")
 

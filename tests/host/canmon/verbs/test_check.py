@@ -507,6 +507,14 @@ def test_written_rules_are_held_against_a_large_log(
     assert check(write(tmp_path / "run.log", WRITTEN), "--rule", "emcy never").stdout == FOUND
 
 
+def test_a_bus_is_heard_for_a_time_and_judged_without_a_rule() -> None:
+    with new_wire() as wire, wire.calling("703#7F"):
+        result = check(wire.word, "--for", "500ms")
+    assert (result.exit_code, result.stdout) == (0, "")
+    assert "no-reboot" in result.stderr.partition("\n")[0]
+    assert result.stderr.endswith("\n0 findings\n")
+
+
 def test_written_rules_are_held_against_a_bus() -> None:
     with new_wire() as wire, wire.calling("083#3081110000000000"):
         result = check(wire.word, "--for", "500ms", "--rule", "emcy at most 2", "--around", "0")

@@ -272,3 +272,13 @@ def test_what_is_wrong_in_learnt_rules_is_said(text: str, reason: str) -> None:
         learnt.parse_learnt(text)
     assert reason in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_a_bus_that_falls_silent_is_judged_until_now() -> None:
+    one = Diagnoser()
+    one.take([Record(at * 100_000, "can0", CanFrame.parse("705#05")) for at in range(20)])
+    assert one.diagnosis().faults == ()
+    (fault,) = one.diagnosis(end_us=5_000_000).faults
+    assert str(fault) == (
+        "no-lost-heartbeat: can0 node 5: no heartbeat for 3100.0 ms, one each 100.000 before"
+    )
