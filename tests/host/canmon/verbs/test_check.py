@@ -508,11 +508,12 @@ def test_written_rules_are_held_against_a_large_log(
 
 
 def test_a_bus_is_heard_for_a_time_and_judged_without_a_rule() -> None:
-    with new_wire() as wire, wire.calling("703#7F"):
+    with new_wire() as wire, wire.calling("000#0205"):
         result = check(wire.word, "--for", "500ms")
-    assert (result.exit_code, result.stdout) == (0, "")
-    assert "no-reboot" in result.stderr.partition("\n")[0]
-    assert result.stderr.endswith("\n0 findings\n")
+    assert result.exit_code == 1
+    assert " nmt-stop: " in result.stdout
+    assert "NMT stops node 5 [" in result.stdout
+    assert result.stderr.endswith("\n1 finding: nmt-stop: 1\n")
 
 
 def test_written_rules_are_held_against_a_bus() -> None:
