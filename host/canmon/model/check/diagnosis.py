@@ -241,7 +241,6 @@ class Diagnoser:
         }
         return Diagnosis(tuple(faults), names, unjudged, self.kept.frames)
 
-
     def summaries(self) -> list[learnt.BusSummary]:
         """Return what is usual on each bus."""
         found = []
@@ -769,9 +768,7 @@ class _BusJudge:
             ends = int(rows[0]), int(rows[-1])
             frame = learnt.FrameSummary(ident, _name(ident), ends, lengths)
             rhythm = self._rhythm_of(ident) if _has_rhythm(ident) else None
-            frame = frame._replace(
-                irregular=rhythm is None, service=node_events.is_event(ident)
-            )
+            frame = frame._replace(irregular=rhythm is None, service=node_events.is_event(ident))
             if rhythm is not None and rhythm.share >= _SURE_SHARE:
                 period = rhythm.period_us
                 times = sync.period_us if sync and ident != node_events.SYNC_ID else 0

@@ -259,7 +259,9 @@ def parse_learnt(text: str) -> Learnt | None:
     if others:
         raise ValueError(f"{others[0]!r} beside [learnt]: give other rules in a check of their own")
     table = _table(words["learnt"], "learnt")
-    return {name: _bus(_table(one, f"learnt.{name}"), f"learnt.{name}") for name, one in table.items()}
+    return {
+        name: _bus(_table(one, f"learnt.{name}"), f"learnt.{name}") for name, one in table.items()
+    }
 
 
 def _bus(words: Mapping[str, Any], place: str) -> LearntBus:
@@ -279,7 +281,9 @@ def _bus(words: Mapping[str, Any], place: str) -> LearntBus:
             raise ValueError(f"{place}.frame: {error}") from None
         frames[ident] = _frame(one, f"{place}.frame.{name}")
     order = tuple(
-        tuple(_whole(node, f"{place}.boot_order", 127) for node in _list(group, f"{place}.boot_order"))
+        tuple(
+            _whole(node, f"{place}.boot_order", 127) for node in _list(group, f"{place}.boot_order")
+        )
         for group in _list(words.get("boot_order", []), f"{place}.boot_order")
     )
     usual = frozenset(_texts(words.get("usual", []), f"{place}.usual"))
@@ -300,7 +304,8 @@ def _frame(value: object, place: str) -> LearntFrame:
     words = _table(value, place)
     _known(words, ("lengths", "kind", "period", "jitter", "required"), place)
     lengths = tuple(
-        _whole(one, f"{place}.lengths", 64) for one in _list(words.get("lengths", []), f"{place}.lengths")
+        _whole(one, f"{place}.lengths", 64)
+        for one in _list(words.get("lengths", []), f"{place}.lengths")
     )
     kind, required = words.get("kind", EVENT), words.get("required", False)
     if kind not in _KINDS:
