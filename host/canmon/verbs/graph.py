@@ -215,7 +215,7 @@ def _refuse_missing(source: str, collector: Collector) -> None:
     for text in collector.missing:
         node, dot, base = text.lower().rpartition(".") if text[:1].isdecimal() else ("", "", text)
         of_node = [f"{node}{dot}{kind}" for kind in BUS_SIGNALS if not dot or kind in OF_NODES]
-        names = [*collector.heard, *of_node]
+        names = [*collector.object_names, *of_node]
         meant = closest(text, names) or [name for name in names if base in name.lower()]
         hint = f"did you mean {meant[0]!r}?" if meant else f"canmon graph {source} lists what is"
         raise Refused(f"{text!r}: no such signal in {source}; {hint}")

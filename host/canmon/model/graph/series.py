@@ -453,7 +453,7 @@ class Collector:
 
     Attributes:
         series: one for each word.
-        heard: names of the objects that were heard while one was looked for.
+        object_names: names of the objects that were heard while one was looked for.
     """
 
     def __init__(
@@ -466,7 +466,7 @@ class Collector:
         each_node: bool = False,
     ) -> None:
         self.series = [Series(word.label or word.text, word.axis, most=most) for word in words]
-        self.heard: dict[str, None] = {}
+        self.object_names: dict[str, None] = {}
         self._decoder, self._each_node, self._rates = decoder, each_node, rates
         self._slices: defaultdict[int, list[tuple[FrameSlice, Series]]] = defaultdict(list)
         self._objects: list[_Object] = []
@@ -478,7 +478,7 @@ class Collector:
                 case BusSignal():
                     self._samplers.append(_Sampler(word, word.source, series, rates))
                 case _:
-                    self._objects.append(_Object(word, word.source, series, self.heard))
+                    self._objects.append(_Object(word, word.source, series, self.object_names))
 
     @property
     def missing(self) -> list[str]:
@@ -656,10 +656,10 @@ class _Object:
     """An object that is waited for."""
 
     def __init__(
-        self, word: CurveSpec, wanted: ObjectName, series: Series, heard: dict[str, None]
+        self, word: CurveSpec, wanted: ObjectName, series: Series, known: dict[str, None]
     ) -> None:
         self._word, self._wanted, self.series = word, wanted, series
-        self._heard = heard
+        self._known = known
         self._found: tuple[int | None, str] | None = None
         self._is_state = False
 
@@ -675,8 +675,8 @@ class _Object:
 
     def take(self, at_us: int, decoded: Decoded) -> None:
         """Take its value, if it is among the signals."""
-        if self._found is None and len(self._heard) < _MOST_HEARD:
-            self._heard |= dict.fromkeys(_named(decoded.node, one.name) for one in decoded.signals)
+        if self._found is None and len(self._known) < _MOST_HEARD:
+            self._known |= dict.fromkeys(_named(decoded.node, one.name) for one in decoded.signals)
         if self._wanted.node not in (None, decoded.node):
             return
         for signal in decoded.signals:
