@@ -10,51 +10,51 @@ from tickrig.device.twin import Part, restore, state_of
 from tickrig.wire.instant import NEVER
 
 _Action = Callable[[int], None]
-"""Something to do; it is told the time in microseconds."""
+"""An action, called with the time in microseconds."""
 
 _SPARE: Final = 64
-"""So many forgotten actions may stay, and as many as there are others."""
+"""Number of cancelled actions that may stay in the heap, besides as many as there are others."""
 
 _Entry = tuple[int, int, Hashable, _Action]
-"""When, the number of its entering, its key, and what."""
+"""Time, entry number, key and action."""
 
 
 class EventQueue(Part):
-    """Actions by time; those of the same time in the order they were entered."""
+    """Actions in order of time; those of the same time in order of entry."""
 
     def __init__(self) -> None:
         self._number = 0
         self._heap: list[_Entry] = []
         self._entered: dict[Hashable, int] = {}
-        """The number of what holds for each key; others in the heap were forgotten."""
+        """Number of the valid entry by key; others in the heap are cancelled."""
         self.due_us = NEVER
 
     def put(self, key: Hashable, t_us: int, action: _Action) -> None:
-        """Enter an action; one entered before under the same key is forgotten."""
+        """Add an action; it replaces an earlier one with the same key."""
         self._number += 1
         self._entered[key] = self._number
         heappush(self._heap, (t_us, self._number, key, action))
         self._note_due()
 
     def wake(self, key: Hashable, t_us: int) -> None:
-        """Let the rig stop at a time, for its watchers to look; as `put` of doing nothing."""
+        """Make the rig stop at a time for its watchers; the same as `put` of an empty action."""
         self.put(key, t_us, _nothing)
 
     def __getstate__(self) -> object:
-        """Return the state without what was forgotten: it need not be copied."""
+        """Return the state without cancelled actions."""
         return state_of(self, {"_heap": sorted(filter(self._holds, self._heap))})
 
     def __setstate__(self, state: object) -> None:
-        """Go on with what was copied."""
+        """Restore the copied state."""
         restore(self, state)
 
     def drop(self, key: Hashable) -> None:
-        """Forget an action; one that is not there is no error."""
+        """Cancel an action; does nothing if there is none."""
         if self._entered.pop(key, None) is not None:
             self._note_due()
 
     def run(self, now_us: int) -> None:
-        """Do what is due at `now_us`."""
+        """Run the actions due at `now_us`."""
         while self.due_us <= now_us:
             _, _, key, action = self._heap[0]
             self.drop(key)

@@ -92,7 +92,7 @@ def _number(bus: NodeBus, node_id: int, sub: int) -> int | None:
 
 
 def chosen_eds(eds: Path | eds_folder.EdsFolder | None, bus: NodeBus, node_id: int) -> Path | None:
-    """Return the EDS of a node: the file that is named, or that of a folder which fits the node.
+    """Return the EDS of a node: the given file, or the file of a folder that fits the node.
 
     A line on standard error names the file of a folder, or says that none fits.
 
@@ -175,7 +175,7 @@ def read_eds_paths(
 
     Args:
         paths: the files.
-        folders: in which those of other nodes are looked for.
+        folders: searched for those of other nodes.
         notify: takes a line about each choice.
     """
     found = {node: _read(node, path) for node, path in paths.items()}

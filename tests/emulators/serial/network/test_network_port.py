@@ -293,7 +293,7 @@ def test_a_port_open_to_others_is_warned_of_and_says_where_this_machine_finds_it
         host, _, number = port.url.removeprefix("socket://").rpartition(":")
         assert (host, int(number)) in [("127.0.0.1", port.port), ("[::1]", port.port)]
         warned = [record.getMessage() for record in caplog.records]
-    open_to_others = f"Anyone who reaches port {port.port} of {port.address} can drive this device: "
+    open_to_others = f"Anyone who reaches port {port.port} of {port.address} can drive this device"
     assert [text.startswith(open_to_others) for text in warned] == [True] * ("1" not in place)
 
 

@@ -131,7 +131,7 @@ def test_what_was_stored_stays_and_what_was_restored_goes(
     assert call("read", "5", "1017h").stdout == "1017h:00 heartbeat_time = 100 (0x0064)\n"
     result = call("restore", "5", "--reset")
     assert result.exit_code == 0, result.output
-    assert "what hangs on it may fall" in result.stderr
+    assert "a hanging load may fall" in result.stderr
     assert call("read", "5", "1017h").stdout == "1017h:00 heartbeat_time = 0 (0x0000)\n"
 
 

@@ -91,7 +91,7 @@ def test_an_end_in_the_middle_says_so_and_the_same_command_goes_on(
     assert result.exit_code == 130
     assert result.stderr.splitlines()[-1] == (
         "interrupted; done: stop, clear; not done: download, identification, start; the node has"
-        " no whole program; a transfer cannot go on in its middle: the same command begins it anew"
+        " no whole program; a transfer cannot go on in its middle: the same command starts it again"
     )
     assert module.net().stdout == (
         "node 17: stopped; identification 00000000h; flash: no valid program\n"
