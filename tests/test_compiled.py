@@ -5,7 +5,9 @@ from __future__ import annotations
 import ast
 import copy
 import hashlib
+import importlib
 import importlib.util
+import inspect
 import os
 import pickle
 import subprocess
@@ -25,6 +27,7 @@ import tickrig.host
 import tickrig.rtc
 import tickrig.testing
 from tests.device.canopen.profile_objects import DRIVE, make_dictionary
+from tests.import_graph import modules
 from tickrig.device.canopen.ds402 import Ds402
 from tickrig.device.canopen.models.epos import make_epos
 from tickrig.device.canopen.stack import make_slave
@@ -147,6 +150,26 @@ def test_of_the_public_classes_users_derive_from_all_but_those_of_the_page() -> 
     )
     page = (ROOT / "docs" / "howto/compiled.md").read_text("utf-8")
     assert not [name for name in KEPT if f"`{name}`" not in page]
+
+
+def refuses(base: type, made: type) -> bool:
+    """Return whether no instance of `made`, in Python, can be created if `base` is compiled."""
+    if issubclass(made, Enum | tuple | BaseException) or getattr(base, "_is_protocol", False):
+        return False
+    return "allow_interpreted_subclasses=True" not in inspect.getsource(base).partition("class ")[0]
+
+
+def test_no_class_of_python_derives_from_a_compiled_one_that_refuses_it() -> None:
+    compiled = set(compiled_modules())
+    found = [
+        f"{name}.{made.__name__}({base.__name__})"
+        for name in modules().keys() - compiled
+        for made in vars(importlib.import_module(name)).values()
+        if isinstance(made, type) and made.__module__ == name
+        for base in made.__mro__[1:]
+        if base.__module__ in compiled and refuses(base, made)
+    ]
+    assert found == []
 
 
 def test_a_compiled_caller_does_not_see_what_is_replaced(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -18,6 +18,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Final
 
+from tickrig._compiled import mypyc_attr
 from tickrig.wire.canopen.nmt import CAN_ID_MASK, INVALID
 from tickrig.wire.errors import FieldError, FramingError
 
@@ -71,6 +72,7 @@ def fields(mapping: Iterable[int]) -> Iterator[tuple[MappedObject, int]]:
         shift += mapped.bits
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 @dataclass(frozen=True, slots=True)
 class PdoDescription:
     """A PDO: its communication parameter and its mapping.
