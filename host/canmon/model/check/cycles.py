@@ -60,7 +60,7 @@ _LEAST_NOISY: Final = 2
 _LEAST_QUIET: Final = 0.3
 
 
-class Level(NamedTuple):
+class _Level(NamedTuple):
     """Gaps with one period.
 
     Attributes:
@@ -86,7 +86,7 @@ class Rhythm(NamedTuple):
         share: of the gaps that have the period.
     """
 
-    levels: tuple[Level, ...]
+    levels: tuple[_Level, ...]
     missing: tuple[tuple[int, int], ...] = ()
     extra: tuple[int, ...] = ()
     noisy: tuple[tuple[int, int, int, int], ...] = ()
@@ -107,7 +107,7 @@ def rhythm_of(times: Sequence[int]) -> Rhythm | None:
     """
     if len(times) <= LEAST_GAPS:
         return None
-    gaps = gaps_of(times)
+    gaps = _gaps_of(times)
     windows = _windows(gaps)
     middles = sorted(middle for middle, _ in windows)
     period_us = middles[len(middles) // 2]
@@ -141,7 +141,7 @@ def rhythm_of(times: Sequence[int]) -> Rhythm | None:
     return Rhythm(tuple(levels), tuple(missing), tuple(extra), tuple(noisy), quiet, share)
 
 
-def gaps_of(times: Sequence[int]) -> Sequence[int]:
+def _gaps_of(times: Sequence[int]) -> Sequence[int]:
     """Return the gaps between times; of an array of numpy an array."""
     if isinstance(times, list):
         return [b - a for a, b in pairwise(times)]
@@ -172,7 +172,7 @@ def _is_steady(middle: int, spread: int) -> bool:
     return middle >= _SHORTEST_US and spread <= limit
 
 
-def _levels(windows: Sequence[tuple[int, int]], gaps: int, usual: int) -> list[Level]:
+def _levels(windows: Sequence[tuple[int, int]], gaps: int, usual: int) -> list[_Level]:
     """Return runs of steady windows with the same middle; noisy ones of that middle join them."""
     runs: list[list[int]] = []  # first window, one behind the last, its middle
     for at, (middle, spread) in enumerate(windows):
@@ -193,14 +193,14 @@ def _levels(windows: Sequence[tuple[int, int]], gaps: int, usual: int) -> list[L
     levels = []
     for begin, end, _ in joined:
         middles = sorted(middle for middle, _ in windows[begin:end])
-        levels.append(Level(begin * size, end * size, middles[len(middles) // 2]))
+        levels.append(_Level(begin * size, end * size, middles[len(middles) // 2]))
     if levels and levels[-1].end + size > gaps:
         levels[-1] = levels[-1]._replace(end=gaps)
     return levels
 
 
 def _odd(
-    gaps: Sequence[int], level: Level, quiet: int
+    gaps: Sequence[int], level: _Level, quiet: int
 ) -> tuple[list[tuple[int, int]], list[int], int]:
     """Judge the odd gaps of a level.
 

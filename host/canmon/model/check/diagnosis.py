@@ -64,7 +64,7 @@ else:  # an extra
     np = LazyModule("numpy")
     column_traffic = LazyModule("tickrig.host.canmon.model.columns.column_traffic")
 
-NO_LOSS: Final = "no-loss"
+_NO_LOSS: Final = "no-loss"
 
 RULES: Final[Mapping[str, str]] = MappingProxyType(
     {
@@ -83,14 +83,14 @@ RULES: Final[Mapping[str, str]] = MappingProxyType(
         "seen-once": "a CAN-ID that comes once",
         "silence": "a bus that is silent",
         "time-back": "a time that goes back",
-        NO_LOSS: "frames that were lost",
+        _NO_LOSS: "frames that were lost",
         **learnt.RULES,
         "max-load": "half a second with a load above 80 %",
     }
 )
 """All rules, and what each finds."""
 
-MOST_LOAD: Final = 80.0
+_MOST_LOAD: Final = 80.0
 _ANY_BUS: Final = frozenset(["no-error-frames", "time-back", "max-load"])
 _TIMED: Final = (
     *("time-back", "max-load", "silence", "no-lost-heartbeat", "seen-once"),
@@ -222,12 +222,12 @@ class Diagnoser:
             faults += one.faults()
             judged |= one.judged
             why |= one.unjudged
-        for rule, texts in ((NO_LOSS, lost), ("no-error-frames", errors)):
+        for rule, texts in ((_NO_LOSS, lost), ("no-error-frames", errors)):
             begin_us = min((bus.at_us[0] for bus in self.kept), default=0)
             faults += [
                 BusFault(rule, "", None, None, text, begin_us, begin_us, 1, ()) for text in texts
             ]
-        judged |= {NO_LOSS} if self.kept.frames else set()
+        judged |= {_NO_LOSS} if self.kept.frames else set()
         if self.without_errors and "no-error-frames" not in {fault.rule for fault in faults}:
             judged.discard("no-error-frames")
             why["no-error-frames"] = self.without_errors
@@ -372,7 +372,7 @@ class _BusJudge:
             self.unjudged["max-load"] = "no bit rate is known: give -b, as -b 500000"
             return
         self.judged.add("max-load")
-        first_us, most = self._times[0], MOST_LOAD / 100 * self._bit_rate * _LOAD_US / 1_000_000
+        first_us, most = self._times[0], _MOST_LOAD / 100 * self._bit_rate * _LOAD_US / 1_000_000
         steps = self._bits_by_step(first_us)
         width, total, over_us = _LOAD_US // _LOAD_STEP_US, 0, first_us
         window: deque[int] = deque()
@@ -389,7 +389,7 @@ class _BusJudge:
                     for at in (begin_us, over_us)
                 )
                 percent = total * 100_000_000 / (self._bit_rate * _LOAD_US)
-                text = f"load {percent:.1f} % in {_LOAD_US // 1_000} ms, at most {MOST_LOAD:g} %"
+                text = f"load {percent:.1f} % in {_LOAD_US // 1_000} ms, at most {_MOST_LOAD:g} %"
                 self._hit("max-load", None, f"{text} is right", [begin, max(begin, end - 1)])
 
     def _bits_by_step(self, first_us: int) -> dict[int, int]:

@@ -34,8 +34,8 @@ RULES: Final = {
 IDENTITY: Final = ("vendor", "product", "revision", "serial")
 """Sub-indices 1 to 4 of 1018h."""
 
-CYCLIC, ON_SYNC, EVENT = "cyclic", "sync", "event"
-_KINDS: Final = (CYCLIC, ON_SYNC, EVENT)
+CYCLIC, ON_SYNC, _EVENT = "cyclic", "sync", "event"
+_KINDS: Final = (CYCLIC, ON_SYNC, _EVENT)
 _MORE_LOAD: Final = 1.25
 _MORE_BITS: Final = 5_000
 _TOLERANCE: Final = 20
@@ -65,7 +65,7 @@ class FrameSummary(NamedTuple):
     name: str
     rows: tuple[int, int]
     lengths: tuple[int, ...]
-    kind: str = EVENT
+    kind: str = _EVENT
     period_us: int | None = None
     jitter_us: int = 0
     few: bool = False
@@ -110,7 +110,7 @@ class BusSummary:
     found: tuple[str, ...] = ()
 
 
-class LearntFrame(NamedTuple):
+class _LearntFrame(NamedTuple):
     """What the frames of an identifier must keep.
 
     Attributes:
@@ -122,13 +122,13 @@ class LearntFrame(NamedTuple):
     """
 
     lengths: tuple[int, ...] = ()
-    kind: str = EVENT
+    kind: str = _EVENT
     period: tuple[int, int] | None = None
     jitter_us: int | None = None
     required: bool = False
 
 
-class LearntNode(NamedTuple):
+class _LearntNode(NamedTuple):
     """What a node must keep.
 
     Attributes:
@@ -152,8 +152,8 @@ class LearntBus:
         usual: findings that are none.
     """
 
-    frames: Mapping[int, LearntFrame]
-    nodes: Mapping[int, LearntNode]
+    frames: Mapping[int, _LearntFrame]
+    nodes: Mapping[int, _LearntNode]
     boot_order: tuple[tuple[int, ...], ...] = ()
     bits_per_second: int | None = None
     usual: frozenset[str] = frozenset()
@@ -161,7 +161,7 @@ class LearntBus:
     def is_usual(self, hit: Hit) -> bool:
         """Say whether a finding is usual."""
         if hit.rule == "no-emcy" and hit.node is not None:
-            codes = self.nodes.get(hit.node, LearntNode()).emcy
+            codes = self.nodes.get(hit.node, _LearntNode()).emcy
             if any(hit.text.startswith(f"EMCY {code} ") for code in codes):
                 return True
         return usual_text(hit) in self.usual
@@ -290,31 +290,31 @@ def _bus(words: Mapping[str, Any], place: str) -> LearntBus:
     return LearntBus(frames, nodes, order, most, usual)
 
 
-def _node(value: object, place: str) -> LearntNode:
+def _node(value: object, place: str) -> _LearntNode:
     words = _table(value, place)
     _known(words, (*IDENTITY, "emcy"), place)
     identity = tuple(
         _whole(words[name], f"{place}.{name}", 1 << 32) if name in words else None
         for name in IDENTITY
     )
-    return LearntNode(identity, _texts(words.get("emcy", []), f"{place}.emcy"))
+    return _LearntNode(identity, _texts(words.get("emcy", []), f"{place}.emcy"))
 
 
-def _frame(value: object, place: str) -> LearntFrame:
+def _frame(value: object, place: str) -> _LearntFrame:
     words = _table(value, place)
     _known(words, ("lengths", "kind", "period", "jitter", "required"), place)
     lengths = tuple(
         _whole(one, f"{place}.lengths", 64)
         for one in _list(words.get("lengths", []), f"{place}.lengths")
     )
-    kind, required = words.get("kind", EVENT), words.get("required", False)
+    kind, required = words.get("kind", _EVENT), words.get("required", False)
     if kind not in _KINDS:
         raise ValueError(f"{place}.kind = {kind!r} is none of {', '.join(_KINDS)}")
     if not isinstance(required, bool):
         raise ValueError(f"{place}.required = {required!r} is not true or false")
     period = _period(words["period"], f"{place}.period") if "period" in words else None
     jitter = _us(words["jitter"], f"{place}.jitter") if "jitter" in words else None
-    return LearntFrame(lengths, kind, period, jitter, required)
+    return _LearntFrame(lengths, kind, period, jitter, required)
 
 
 def _period(value: object, place: str) -> tuple[int, int]:
@@ -415,7 +415,7 @@ def broken(learnt: LearntBus, bus: BusSummary, last_row: int) -> Iterator[Hit]:
     yield from _order_broken(learnt.boot_order, bus.boots)
 
 
-def _frame_broken(right: LearntFrame, frame: FrameSummary) -> Iterator[Hit]:
+def _frame_broken(right: _LearntFrame, frame: FrameSummary) -> Iterator[Hit]:
     ident = frame.ident
     node, name = node_of(ident), frame.name
     odd = [str(one) for one in frame.lengths if right.lengths and one not in right.lengths]
