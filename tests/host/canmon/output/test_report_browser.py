@@ -150,6 +150,15 @@ def test_the_page_is_no_wider_than_the_screen(
     context.close()
 
 
+def test_nothing_is_cut_off_on_paper(page: Page) -> None:
+    page.set_viewport_size({"width": 720, "height": 1000})
+    page.locator(".finding").nth(abort(page)).click()
+    page.emulate_media(media="print")
+    assert page.evaluate("document.documentElement.scrollWidth") <= 720
+    assert not page.locator("#search").is_visible()
+    assert not page.locator(".frames button").is_visible()
+
+
 def test_chromium_prints_it(path: Path) -> None:
     log, pdf, png = (path.with_name(name) for name in ("run.log", "run.pdf", "run.png"))
     words = ["report", str(log), "--pdf", str(pdf), "--png", str(png)]
