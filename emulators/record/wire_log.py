@@ -76,7 +76,7 @@ class WireLog:
         """End frames as soon as a silence ends them, not when the next traffic comes.
 
         Args:
-            rig: whose time passes.
+            rig: the rig with the time.
             name: of the line.
         """
         logs = self._splitters.values()
