@@ -10,7 +10,7 @@ from tickrig.host.cli.messages import Refused
 
 def test_others_are_listed_and_a_pipe_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     consent = Consent(yes=False, virtual=False)
-    with pytest.raises(Refused, match=r"may move, other nodes may trip\. There is no terminal.*--yes"):
+    with pytest.raises(Refused, match=r"other nodes may trip\. There is no terminal.*--yes"):
         consent.begin(5, Level.COMMUNICATION, {3: 1, 16: 4})
     assert capsys.readouterr().err == "also on this bus: node 3, node 16\n"
     assert not consent.confirm("SYNC?")

@@ -267,5 +267,5 @@ def test_what_is_more_than_one_act_is_told_in_words(bench_of: BenchOf) -> None:
 
 def test_no_terminal_is_nobody_there(bench_of: BenchOf, tmp_path: Path) -> None:
     bench = bench_of(Terminal(str(tmp_path)))
-    with pytest.raises(OperatorRefused, match=r"nobody is at the terminal \(Is a directory\)"):
+    with pytest.raises(OperatorRefused, match=r"there is no terminal \(Is a directory\)"):
         bench.press("power_button")
