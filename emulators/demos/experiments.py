@@ -3,21 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack
 from dataclasses import dataclass, field
 from itertools import accumulate, pairwise
-from pathlib import Path
 from typing import Final, NamedTuple
 
 from tickrig.emulators.demos.tracks import LOOK_US, Mark, RobotSample, RobotTrack, advanced
-from tickrig.emulators.rh3.commands.served_cart import CartClock, ServedCart
 from tickrig.emulators.rh3.convoy import Convoy, MovingControl
-from tickrig.host.cli.control import serving_control, stopped_by_signals
-from tickrig.host.cli.engine_options import EngineOptions
-from tickrig.host.cli.messages import say
+from tickrig.host.control.clock import RealClock
 from tickrig.host.links.game_pad import StickPosition
-from tickrig.host.rtc.commands.system_control import SystemControl
-from tickrig.host.rtc.engines.engines_joined import engines_joined
 from tickrig.host.rtc.motion.drive import PERIOD_US
 from tickrig.host.rtc.motion.geometry import Pose
 from tickrig.host.rtc.motion.iis_interfaces import Velocity2To1, Velocity3To2
@@ -37,9 +30,9 @@ from tickrig.host.rtc.motion.options.game_pad import GamePad
 # robot (Fig. 91), and any pose to any follower (Fig. 98).
 #
 # In virtual time the acts change the connectors as `tickrig rtc con` and `dis` do. In real time
-# (`serve`) nobody changes them but who works with the system from outside: `tickrig rtc --at`, or
-# a tool of OpenRTM. The planned path is that of the present connectors in both cases: the path of
-# the robot that is followed, or where the command of the stick leads.
+# (`terminal_cli`) the experiment changes none: `tickrig rtc --at` does, or a tool of OpenRTM. The
+# planned path is that of the present connectors in both cases: the path of the robot that is
+# followed, or where the command of the stick leads.
 
 _SECOND_US: Final = 1_000_000
 _ROW_US: Final = 2 * _SECOND_US
@@ -249,7 +242,7 @@ class ConvoyRun:
         marks: when connectors changed.
     """
 
-    def __init__(self, experiment: Experiment, echo: _Echo, clock: CartClock | None = None) -> None:
+    def __init__(self, experiment: Experiment, echo: _Echo, clock: RealClock | None = None) -> None:
         self._experiment, self._echo = experiment, echo
         self.convoy = convoy = Convoy(
             [*experiment.robots.values()], [*experiment.omni.values()], clock
@@ -380,38 +373,3 @@ class ConvoyRun:
             manager.connect(source, f"{name}.in")
             source = f"{name}.out"
         manager.activate(*names)
-
-
-def serve(
-    experiment: Experiment, echo: _Echo, control: Path | None, engines: EngineOptions
-) -> ConvoyRun:
-    """Run an experiment in real time until Ctrl-C; its connectors are changed from outside.
-
-    Args:
-        experiment: its first connectors hold until somebody changes them.
-        echo: receives a line of the table each 2 s.
-        control: path of a control socket for `tickrig rtc`, None without one.
-        engines: for tools of OpenRTM.
-
-    Raises:
-        Refused: an engine or the control socket cannot be.
-    """
-    clock = CartClock()
-    run = ConvoyRun(experiment, echo, clock)
-    loop = run.convoy.loop
-    cart = ServedCart(loop, clock)
-    cart.after_tick.append(run.look)
-    with stopped_by_signals(cart.stop), ExitStack() as stack:
-        requests = SystemControl(loop.manager, cart)
-        if control is not None:
-            cart.server = stack.enter_context(serving_control(control, requests, clock))
-        if engines:
-            stack.enter_context(
-                engines_joined(engines, loop.manager, cart.attach, cart.stop, fixed=True)
-            )
-        hint = "" if control is None else f"\n  tickrig rtc ls -l --at {control}"
-        say(f"{', '.join(experiment.names)}. Ctrl-C ends.{hint}")
-        run.begin()
-        cart.run()
-    clock.serve = None
-    return run

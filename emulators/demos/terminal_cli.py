@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -10,19 +11,26 @@ import click
 
 from tickrig._lazy import LazyModule
 from tickrig.host.cli.can_options import BusOptions, open_raw
-from tickrig.host.cli.engine_options import take_engines
-from tickrig.host.cli.messages import Refused, failing, refuse_path, warnings_shown
+from tickrig.host.cli.control import serving_control, stopped_by_signals
+from tickrig.host.cli.engine_options import EngineOptions, take_engines
+from tickrig.host.cli.messages import Refused, failing, refuse_path, say, warnings_shown
 
 if TYPE_CHECKING:
     import canopen
 
     from tickrig.emulators.commands import picture
     from tickrig.emulators.demos import experiments, fig120, robots, rrc, rtc_lite, tkernel, tracks
+    from tickrig.emulators.rh3.commands import served_cart
     from tickrig.host.links import link
     from tickrig.host.rtc import states
+    from tickrig.host.rtc.commands import system_control
+    from tickrig.host.rtc.engines import engines_joined
 else:
     canopen, link = LazyModule("canopen"), LazyModule("tickrig.host.links.link")
+    served_cart = LazyModule("tickrig.emulators.rh3.commands.served_cart")
     states = LazyModule("tickrig.host.rtc.states")
+    system_control = LazyModule("tickrig.host.rtc.commands.system_control")
+    engines_joined = LazyModule("tickrig.host.rtc.engines.engines_joined")
     picture = LazyModule("tickrig.emulators.commands.picture")
     experiments = LazyModule("tickrig.emulators.demos.experiments")
     fig120 = LazyModule("tickrig.emulators.demos.fig120")
@@ -88,8 +96,38 @@ def _run_experiment(
         run.play()
     else:
         with warnings_shown():
-            run = experiments.serve(experiment, click.echo, control, engines)
+            run = _serve(experiment, control, engines)
     _draw(plot, run.tracks, run.marks, experiment.title)
+
+
+def _serve(
+    experiment: experiments.Experiment, control: Path | None, engines: EngineOptions
+) -> experiments.ConvoyRun:
+    """Run an experiment in real time until Ctrl-C; others change its connectors.
+
+    Raises:
+        Refused: an engine or the control socket cannot be.
+    """
+    clock = served_cart.CartClock()
+    run = experiments.ConvoyRun(experiment, click.echo, clock)
+    loop = run.convoy.loop
+    cart = served_cart.ServedCart(loop, clock)
+    cart.after_tick.append(run.look)
+    with stopped_by_signals(cart.stop), ExitStack() as stack:
+        requests = system_control.SystemControl(loop.manager, cart)
+        if control is not None:
+            cart.server = stack.enter_context(serving_control(control, requests, clock))
+        if engines:
+            joined = engines_joined.engines_joined(
+                engines, loop.manager, cart.attach, cart.stop, fixed=True
+            )
+            stack.enter_context(joined)
+        hint = "" if control is None else f"\n  tickrig rtc ls -l --at {control}"
+        say(f"{', '.join(experiment.names)}. Ctrl-C ends.{hint}")
+        run.begin()
+        cart.run()
+    clock.serve = None
+    return run
 
 
 def show_rh3(plot: Path | None) -> None:
