@@ -16,7 +16,7 @@ _VERBS: Final = {
     "info": (f"{_HERE}.info:command", "Say what log files are."),
     "top": (f"{_HERE}.top:command", "Show all identifiers: counts, rates, gaps, jitter."),
     "stats": (f"{_HERE}.stats:command", "Count a log: rates, gaps, jitter, missed cycles."),
-    "check": (f"{_HERE}.check:command", "Hold traffic against rules."),
+    "check": (f"{_HERE}.check:command", "Say what is wrong on a bus or in a log."),
     "report": (f"{_HERE}.report:command", "Write what was on a bus as one HTML page."),
     "conform": (f"{_HERE}.conform:command", "Judge one CANopen node, clause by clause."),
     "eds": ("tickrig.host.canmon.cli:eds", "Check, mend, compare and show EDS files."),

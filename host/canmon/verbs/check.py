@@ -47,7 +47,6 @@ from tickrig.host.text.whole_file import write_whole
 if TYPE_CHECKING:
     from tickrig.host.canmon.model.check import column_check, diagnosis, learnt
     from tickrig.host.canmon.model.columns.columns import Columns
-    from tickrig.host.canmon.model.decode.node_memory import EdsObjects
 else:  # numpy; decoders
     column_check = LazyModule("tickrig.host.canmon.model.check.column_check")
     diagnosis = LazyModule("tickrig.host.canmon.model.check.diagnosis")
@@ -357,7 +356,8 @@ def command(  # noqa: PLR0913 - options
     bit_rate = _bit_rate(rules, words, bus)
     objects = decode_options.read_eds_files(eds)
     if _is_empty(rules):
-        held_frames = _Usual(words, bus, bit_rate or rules.bit_rate, objects, known, reopen=reopen)
+        make = partial(diagnosis.Diagnoser, bit_rate, objects, rules=known)
+        held_frames = _Usual(words, bus, make, reopen=reopen)
         held_frames.listen(span_us)
         if init:
             held_frames.learn(output)
@@ -411,9 +411,7 @@ class _Usual:
     Args:
         words: SOURCE words.
         bus: options of buses.
-        bit_rate: bits a second, None if it is not known.
-        eds: what EDS files say, by node-ID.
-        known: what was learnt from a good log, None for nothing.
+        make: makes what judges the frames.
         reopen: wait for a bus that goes away.
 
     Attributes:
@@ -424,15 +422,12 @@ class _Usual:
         self,
         words: Sequence[str],
         bus: BusOptions,
-        bit_rate: int | None,
-        eds: Mapping[int, EdsObjects],
-        known: learnt.Learnt | None,
+        make: Callable[[], diagnosis.Diagnoser],
         *,
         reopen: bool,
     ) -> None:
         self._words, self._bus, self._reopen = words, bus, reopen
-        self._make = partial(diagnosis.Diagnoser, bit_rate, eds, rules=known)
-        self._diagnoser = self._make()
+        self._make, self._diagnoser = make, make()
         self._watch, self._end_us = listening.Stopwatch(), 0
         self.source: AnySource[Columns] | Source
 

@@ -1,6 +1,6 @@
-"""Rules that are learnt from a good log, as TOML, and what breaks them in another log.
+r"""Rules that are learnt from a good log, as TOML, and what breaks them in another log.
 
->>> rules = parse_learnt('[learnt.can0.frame.185]\\nlengths = [6]\\nperiod = "10ms±20%"\\n')
+>>> rules = parse_learnt('[learnt.can0.frame.185]\nlengths = [6]\nperiod = "10ms±20%"\n')
 >>> rules["can0"].frames[0x185].period
 (10000, 2000)
 """

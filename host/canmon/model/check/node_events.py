@@ -55,9 +55,9 @@ _TOGGLE_ABORT: Final = 0x0503_0000
 RULES: Final = {
     "no-error-frames": "error frames",
     "no-emcy": "EMCY but error reset",
-    "no-reboot": "a boot-up without an NMT reset of a node that was heard",
+    "no-reboot": "a boot-up without an NMT reset of a node that sent frames before",
     "nmt-stop": "an NMT stop",
-    "nmt-state": "an NMT state that nobody commanded",
+    "nmt-state": "an NMT state without a command",
     "guard-toggle": "the toggle bit of guarding",
     "remote-heartbeat": "a remote frame to a node that sends heartbeats",
     "doubled-node": "two nodes with one node-ID",
@@ -421,7 +421,7 @@ class BusEvents:
                 absent.setdefault(node, row)
         if absent:
             nodes = ", ".join(map(str, sorted(absent)))
-            text = f"SDO requests to nodes that were never heard: {nodes}"
+            text = f"SDO requests to nodes that send nothing: {nodes}"
             self.hits.append(Hit("sdo-unanswered", None, None, text, tuple(absent.values())))
 
 
