@@ -39,6 +39,7 @@ from tickrig.emulators.testing.signals.formula import parse_formula
 from tickrig.emulators.testing.signals.table import read_points
 from tickrig.emulators.tkernel.ucode_table import parse_table as parse_ucodes
 from tickrig.host.canmon.eds_document import read_document
+from tickrig.host.canmon.model.check.learnt import parse_learnt
 from tickrig.host.canmon.model.check.rule_parser import parse_rule
 from tickrig.host.canmon.model.check.rules import parse_rule_file
 from tickrig.host.canmon.model.decode.dbc_file import DbcFile
@@ -200,6 +201,9 @@ READERS: Final = {
     "host.rtc.engines.ros2.table_reader": Reader(
         lambda text: parse_topics(text, "t.toml"), ('[[topic]]\nname = "',)
     ),
+    "host.canmon.model.check.learnt": Reader(
+        parse_learnt, ('[learnt.can0.frame.185]\nperiod = "', "[learnt.can0]\na = ")
+    ),
     "host.canmon.model.check.rules": Reader(
         lambda text: parse_rule_file(text, no_rule), ('rules = ["', "x = ", "a.")
     ),
@@ -258,6 +262,8 @@ PARSES: Final = re.compile(
     r"csv\.reader\(|ast\.parse\(|tomlkit\.parse|load_file\(|\.splitlines\(|content_lines\("
 )
 ELSEWHERE: Final = {
+    "emulators.commands.doctor": "what our own child process says",
+    "emulators.testing.bench.bench": "our own transcript",
     "emulators.testing.campaign.parquet_file": "a message of pyarrow",
     "emulators.testing.campaign.worker": "what pytest says",
     "emulators.testing.commands.replay": "whether a line begins with +",
@@ -265,12 +271,15 @@ ELSEWHERE: Final = {
     "emulators.testing.plugin.report_plugin": "of a worker of pytest",
     "emulators.testing.plugin.settings": "lines of pytest.ini",
     "host.canmon.conform.stimulus": "of a program that the user names, its first line",
+    "host.canmon.tui.app": "rules that `settings` has read",
+    "host.canmon.tui.settings": "`parse_rules`, as of a file",
     "host.canmon.tui.panels.alarms_panel": "`parse_rules`, as of a file",
     "host.canmon.tui.panels.sequence_panel": "`TomlSequence`",
     "host.canmon.model.decode.node_memory": "our own table",
     "host.canmon.model.logs.log_file": "our own table",
     "host.canopen.conform.binding.wanted": "our own table",
     "host.rtc.engines.ros2.message_types": "our own table",
+    "host.canmon.verbs.check": "whether a file is TOML; the rules read it",
     "host.control.client": "of our own emulator",
     "host.links.serial_link": "of the kernel",
     "host.canmon.model.check.report": "our own findings",

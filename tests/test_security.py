@@ -25,9 +25,11 @@ RUNNING = re.compile(
 
 RUNS = {
     "emulators/bench/child.py": "our own emulators, for demos",
+    "emulators/commands/doctor.py": "the search of python-can for adapters, which may not end",
     "emulators/testing/bench/modes/operators.py": "`power` of a rig file",
     "emulators/testing/campaign/crew.py": "a worker of a campaign: pytest",
     "host/canmon/conform/stimulus.py": "`--stimulus CMD`",
+    "host/canmon/output/report_page.py": "Chromium, which prints the page",
     "host/rtc/engines/openrtm/stubs.py": "omniidl, and the stubs that it makes",
     "host/text/user_file.py": "`FILE.py:Class`",
     "wire/rtc_types/idl.py": "methods of value types, made of our own IDL",

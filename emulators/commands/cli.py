@@ -122,10 +122,10 @@ _COMMANDS: Final = {
         f"{_HERE}.cli:doctor",
         "See what of this machine tickrig can use, and what to do.",
     ),
-    "emu": (f"{_HERE}.emu_cli:emu", "Emulate a device, ours or that of an installed package."),
+    "emu": (f"{_HERE}.emu_cli:emu", "Emulate a built-in device or one of an installed package."),
     "init": (
         f"{_TESTING}.init_cli:init",
-        "Write an initial rig file with devices and all their options.",
+        "Write an initial rig file: devices with all their options.",
     ),
     "new": (f"{_HERE}.new_cli:new", "Create a package that extends tickrig."),
     "record": (

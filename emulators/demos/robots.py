@@ -22,6 +22,7 @@ from tickrig.host.rtc.motion.components.omni_to_2wd import plan
 from tickrig.host.rtc.motion.drive import drive, limits_of, start, stop, table
 from tickrig.host.rtc.motion.geometry import Pose
 from tickrig.host.rtc.motion.motion_run import TrackSample
+from tickrig.host.text.whole_file import write_whole
 from tickrig.wire.canopen.eds.eds_writer import write_eds
 
 _HERE: Final = Path(__file__).parent
@@ -127,6 +128,6 @@ def _device_files(definition: SystemDefinition) -> dict[str, DeviceFile]:
         for name in {node.eds for node in definition.nodes}:
             path = Path(folder, Path(name).name)
             device = MODELS[path.stem].describe()
-            path.write_text(write_eds(device.template.description, device.info), "utf-8")
+            write_whole(path, write_eds(device.template.description, device.info))
             files[name] = read_device_file(path)
     return files

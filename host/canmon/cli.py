@@ -20,7 +20,7 @@ _VERBS: Final = {
     "report": (f"{_HERE}.report:command", "Write what was on a bus as one HTML page."),
     "conform": (f"{_HERE}.conform:command", "Judge one CANopen node, clause by clause."),
     "eds": ("tickrig.host.canmon.cli:eds", "Check, mend, compare and show EDS files."),
-    "net": ("tickrig.host.canmon.net.group:command", "Set a CANopen network to work."),
+    "net": ("tickrig.host.canmon.net.group:command", "Set up a CANopen network."),
     "gateway": (
         "tickrig.host.canmon.gateway:command",
         "Give other programs SOURCE in lines of text: CiA 309-3, ASCII mapping.",

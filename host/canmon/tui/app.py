@@ -39,6 +39,7 @@ from tickrig.host.canmon.tui.session import DecodedFrame, Model, Session, Task, 
 from tickrig.host.cli.messages import Refused, SourceFailed
 from tickrig.host.text.toml_reader import load_toml
 from tickrig.host.text.values import counted
+from tickrig.host.text.whole_file import replacing, write_whole
 from tickrig.host.tui import FramedApp, KeyFooter, Line
 from tickrig.wire.can import Frames
 from tickrig.wire.instant import NEVER
@@ -278,7 +279,7 @@ class _ExportScreen(ModalScreen[str]):
 
 # The screen as a picture.
 
-_FONTS: Final = re.compile(r"\s*@font-face \{.*?\}", re.DOTALL)
+_FONTS: Final = re.compile(r"@font-face \{[^}]*\}")
 """Textual names fonts of another site; without them a reader's own are taken."""
 _CELL: Final = (8, 17)
 _GROUND, _INK = "#121212", "#e0e0e0"
@@ -317,7 +318,8 @@ def _write_png(path: Path, strips: Sequence[Strip]) -> None:
                 draw.text((column * wide, row * high), letter, ink, fonts[bool(style.bold)])
                 column += 1
             column = end
-    image.save(path)
+    with replacing(path) as beside:
+        image.save(beside, "PNG")
 
 
 # What is replaced as a whole when buses or files change.
@@ -697,7 +699,7 @@ class MonitorApp(FramedApp):
                 said += f"{path} is written"
             else:
                 return said
-        path.write_text(_FONTS.sub("", self.export_screenshot(title="canmon tui")), "utf-8")
+        write_whole(path, _FONTS.sub("", self.export_screenshot(title="canmon tui")))
         return said
 
     def action_times(self) -> None:
