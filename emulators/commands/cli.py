@@ -135,7 +135,7 @@ _COMMANDS: Final = {
     "replay": (f"{_TESTING}.replay_cli:replay_command", "Replay the trace FILE on fresh devices."),
     "report": (
         f"{_TESTING}.report_cli:report_command",
-        "Make one HTML page from JSON reports of test runs.",
+        "Make one HTML page of test runs that were kept as JSON.",
     ),
     "run": (
         f"{_TESTING}.run_cli:run",
@@ -143,7 +143,7 @@ _COMMANDS: Final = {
     ),
     "rtc": (
         "tickrig.host.rtc.commands.cli:rtc",
-        "Run RT components, and operate them while they run.",
+        "Run RT components, and work with them while they run.",
     ),
 }
 

@@ -23,7 +23,7 @@ _NAME: Final = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
 
 @click.group()
 def new() -> None:
-    """Begin a package that adds something to tickrig."""
+    """Create a package that extends tickrig."""
 
 
 @new.command()
