@@ -309,6 +309,12 @@ class HoldingFault(ABC, Generic[W]):
     def pair(self, other: HoldingFault[W]) -> None:
         """Share common state with the fault of the other direction."""
 
+    def end(self) -> None:
+        """Act no more; what is held is still released at its time. Only late faults are asked."""
+
+    def take_over(self, other: HoldingFault[W]) -> None:
+        """Hold what a fault of the same name holds that this one replaces."""
+
 
 @dataclass(frozen=True, slots=True)
 class FaultType(FaultForm, Generic[W]):
@@ -350,12 +356,13 @@ class FaultyPort(Copyable, Generic[W]):
         self._to_device: dict[str, Fault[W]] = {}
         self._from_device: dict[str, Fault[W]] = {}
         self._tallies: dict[str, FaultTally] = {}
+        self._ending: list[str] = []  # late faults that were cleared and still hold traffic
         self.listeners: Listeners[Callable[[int, Mark, W, W], None]] = Listeners()
 
     @property
     def armed(self) -> tuple[str, ...]:
         """Names of the armed faults."""
-        return tuple(self._to_device)
+        return tuple(name for name in self._to_device if name not in self._ending)
 
     def check(self, name: str, *arguments: str) -> None:
         """Raise ValueError unless the fault can be armed with these arguments."""
@@ -385,16 +392,41 @@ class FaultyPort(Copyable, Generic[W]):
         )
         if isinstance(there, HoldingFault) and isinstance(back, HoldingFault):
             there.pair(back)
-        self._to_device[name], self._from_device[name] = there, back
+        for faults, fault in ((self._to_device, there), (self._from_device, back)):
+            before = faults.get(name)
+            if isinstance(fault, HoldingFault) and isinstance(before, type(fault)):
+                fault.take_over(before)
+            faults[name] = fault
+        if name in self._ending:
+            self._ending.remove(name)
 
     def acted(self, name: str) -> int:
         """Return how often a fault has acted since it was last armed."""
         return self._tallies[name].acted if name in self._tallies else 0
 
     def clear(self, name: str) -> None:
-        """Clear a fault; held traffic is lost. Does nothing if it is not armed."""
-        self._to_device.pop(name, None)
-        self._from_device.pop(name, None)
+        """Clear a fault; does nothing if it is not armed.
+
+        What a late fault holds still comes at its time, and nothing overtakes it. What another
+        fault holds is lost.
+        """
+        for faults in (self._to_device, self._from_device):
+            fault = faults.get(name)
+            if isinstance(fault, HoldingFault) and fault.is_late and _holds(fault):
+                fault.end()
+                if name not in self._ending:
+                    self._ending.append(name)
+        self._forget(name)
+
+    def _forget(self, name: str) -> None:
+        """Remove a fault that is cleared, once neither direction holds traffic."""
+        both = (self._to_device, self._from_device)
+        if name in self._ending:
+            if any(_holds(faults[name]) for faults in both):
+                return
+            self._ending.remove(name)
+        for faults in both:
+            faults.pop(name, None)
 
     @property
     def due_us(self) -> int:
@@ -415,6 +447,8 @@ class FaultyPort(Copyable, Generic[W]):
             self.use_uart(now_us, self._setting)
         left = self._suffer(Mark.TO_DEVICE, self._to_device, now_us, self._port.poll(now_us))
         late = self._release(Mark.TO_DEVICE, self._to_device, now_us)
+        for name in tuple(self._ending):
+            self._forget(name)
         return left if late is None else late + left  # type: ignore[operator] # bytes or frames
 
     def send(self, now_us: int, traffic: W, /) -> None:
@@ -438,10 +472,7 @@ class FaultyPort(Copyable, Generic[W]):
             now_us: the present time.
             setting: the new setting.
         """
-        held = any(
-            isinstance(fault, HoldingFault) and fault.due_us < NEVER
-            for fault in self._from_device.values()
-        )
+        held = any(map(_holds, self._from_device.values()))
         self._setting = setting if held else None
         if not held:
             self._port.use_uart(now_us, setting)  # type: ignore[attr-defined] # of a ByteEnd
@@ -491,6 +522,10 @@ class FaultyPort(Copyable, Generic[W]):
 def _unchanged(now_us: int, traffic: W) -> W:
     """Pass all traffic: for the direction in which a fault does not act."""
     return traffic
+
+
+def _holds(fault: object) -> bool:
+    return isinstance(fault, HoldingFault) and fault.due_us < NEVER
 
 
 def _is_late(fault: object) -> bool:

@@ -210,6 +210,15 @@ class _Late(ByteFault, HoldingFault[bytes]):
             self._free_us = now_us
         return out or None
 
+    def end(self) -> None:
+        """Act no more."""
+        self.trigger.tally.count = self.trigger.tally.acted
+
+    def take_over(self, other: HoldingFault[bytes]) -> None:
+        """Hold what the fault holds that this one replaces."""
+        assert isinstance(other, _Late)
+        self._queue, self._free_us = other._queue, other._free_us
+
     def sent(self, until_us: int) -> None:
         """Start pauses when the line has sent the latest bytes."""
         self._free_us = max(self._free_us, until_us)
@@ -327,7 +336,7 @@ BYTE_FAULTS: Final[Mapping[str, FaultType[bytes]]] = {
         uart_error="framing",
     ),
     "parity": FaultType(
-        "a data bit of a byte is turned over, its parity bit is not",
+        "a data bit of a byte is inverted, its parity bit is not",
         _Parity,
         arguments=(WAY,),
         uart_error="parity",

@@ -166,7 +166,7 @@ class BenchMachine:
         inputs: names of the inputs and buttons that may change; all of the bench unless given.
         traffic: what somebody else may send: frames in candump's notation, or bytes in hex to a
             device; where there are several wires with a device before them: `drive/705#00`.
-        fault_for: how long faults stay, as `"300ms"`.
+        fault_for: how long faults stay, as `("100ms", "300ms")`.
         patience: how much time of the bench one call may take: a host that waits for ever is a
             finding. A search is the faster the less it is, as each such call is waited for so long.
         longest: how much time of the bench a whole run may take.

@@ -90,6 +90,9 @@ def traffic(words: Sequence[str]) -> st.SearchStrategy[HostStep]:
 
 
 def _faults(world: World, for_: Sequence[str]) -> st.SearchStrategy[HostStep]:
+    if isinstance(for_, str):
+        raise ValueError(f"fault_for is a tuple of times: ({for_!r},), not {for_!r}")
+
     @st.composite
     def fault(draw: st.DrawFn) -> HostStep:
         wait_us = draw(timing())

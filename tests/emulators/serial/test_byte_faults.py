@@ -191,6 +191,30 @@ def test_what_is_late_is_not_told_as_lost(bench: Bench) -> None:
     assert r"the host hears ab where the device sent abc\n" in bench.transcript()
 
 
+@pytest.mark.parametrize("fault", ["delay=200ms", "split=100ms", "break=200ms"])
+def test_a_late_answer_comes_also_if_its_fault_is_cleared(bench: Bench, fault: str) -> None:
+    bench.fault(fault, for_="20ms")
+    port = bench.serial(timeout=1)
+    port.write(b"abc\n")
+    bench.run_for("50ms")
+    assert "abc" not in str(port.read(port.in_waiting))
+    port.write(b"de\n")  # its answer does not overtake the other
+    assert (port.readline() + port.readline()).endswith(b"c\nde\n")
+    port.write(b"fg\n")
+    bench.run_for("3ms")
+    assert port.read(9) == b"fg\n"
+
+
+def test_a_late_answer_comes_also_if_its_fault_is_armed_again(bench: Bench) -> None:
+    bench.fault("delay=200ms")
+    port = bench.serial(timeout=1)
+    port.write(b"abc\n")
+    bench.run_for("50ms")
+    bench.fault("delay=10ms")
+    port.write(b"de\n")
+    assert (port.readline(), port.readline()) == (b"abc\n", b"de\n")
+
+
 def test_jitter_delays_by_chance_and_keeps_the_order(bench: Bench) -> None:
     bench.fault("jitter=30ms")
     port = bench.serial(timeout=1)

@@ -596,6 +596,9 @@ def test_mistakes_in_a_machine_are_told_in_a_line() -> None:
     class Bare(Chair):
         faults = "cut"
 
+    class Short(Chair):
+        fault_for = "300ms"
+
     class Forgot(Chair):
         def make_bench(self) -> Bench:
             return None  # type: ignore[return-value]  # the mistake
@@ -604,6 +607,8 @@ def test_mistakes_in_a_machine_are_told_in_a_line() -> None:
         check_host(Rated)
     with pytest.raises(ValueError, match="faults is a tuple of names"):
         check_host(Bare)
+    with pytest.raises(ValueError, match="fault_for is a tuple of times: ..300ms.,., not"):
+        check_host(Short)
     with pytest.raises(TypeError, match="make_bench returned None, no Bench"):
         check_host(Forgot)
     with pytest.raises(TypeError, match="give the class Chair, not an object of it"):
