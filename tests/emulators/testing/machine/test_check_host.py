@@ -607,7 +607,7 @@ def test_mistakes_in_a_machine_are_told_in_a_line() -> None:
         check_host(Rated)
     with pytest.raises(ValueError, match="faults is a tuple of names"):
         check_host(Bare)
-    with pytest.raises(ValueError, match="fault_for is a tuple of times: ..300ms.,., not"):
+    with pytest.raises(ValueError, match="fault_for is a tuple of times"):
         check_host(Short)
     with pytest.raises(TypeError, match="make_bench returned None, no Bench"):
         check_host(Forgot)
