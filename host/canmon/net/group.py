@@ -79,7 +79,7 @@ def command(
     canmon net can0 lss --fastscan --node-id 5 --store
     canmon net can0 dcf 5 drive.dcf --dry-run     what differs; without it, it is written
     canmon net can0 program 5 firmware.bin
-    canmon net can0 boot 5 --bus bus.yml --explain
+    canmon net can0 boot 5 --bus bus.yml --explain        what it would write
 
     \b
     Exit status  0 all is done            2 usage

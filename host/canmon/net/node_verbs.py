@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
@@ -18,9 +19,11 @@ from tickrig.host.canmon.risks import nmt_risk, write_risk
 from tickrig.host.canopen.bus_file.bus_file import read_bus_file
 from tickrig.host.canopen.commissioning.configuration import dcf_values, writes
 from tickrig.host.canopen.commissioning.node_bus import NetworkScan, NodeFound
+from tickrig.host.canopen.dialogue import Script
 from tickrig.host.canopen.errors import SdoAborted, SdoFailed
 from tickrig.host.canopen.master import boot_slave
 from tickrig.host.canopen.master.assignment import ObjectWrite, SlaveAssignment
+from tickrig.host.canopen.master.boot_slave import BootStatus
 from tickrig.host.canopen.master.from_bus_file import plan_of
 from tickrig.host.cli.messages import Refused, refuse_path, refusing, say, until_unread
 from tickrig.host.cli.options import NODE_ID, PATH, time_option
@@ -301,6 +304,8 @@ def _nothing_expected(node_id: int) -> SlaveAssignment:
     return SlaveAssignment(node_id)
 
 
+_OnStep = Callable[[boot_slave.BootStep], None]
+
 _HALF: Final = "the node is as the steps before left it"
 
 
@@ -308,7 +313,14 @@ _HALF: Final = "the node is as the steps before left it"
 @click.argument("node", type=NODE_ID)
 @click.option("--bus", "bus_file", type=PATH, metavar="FILE", help="bus.yml that has the node.")
 @node_eds_option("EDS or DCF of the node.")
-@click.option("--explain", is_flag=True, help="Show each step: asked, answered, what follows.")
+@click.option(
+    "--explain",
+    "--dry-run",
+    "explain",
+    is_flag=True,
+    help="Read only: show each step, and what would be written.",
+)
+@click.option("--steps", is_flag=True, help="Boot it, and show each step.")
 @click.option("--keep-alive", "leaves_alone", is_flag=True, help="Leave it if it is Operational.")
 @click.option("--start", is_flag=True, help="Start it when it has booted.")
 @click.option("--yes", is_flag=True, help="Ask nothing.")
@@ -319,6 +331,7 @@ def boot(  # noqa: PLR0913, PLR0917 - options
     bus_file: Path | None,
     eds: Path | EdsFolder | None,
     explain: bool,
+    steps: bool,
     leaves_alone: bool,
     start: bool,
     yes: bool,
@@ -329,9 +342,13 @@ def boot(  # noqa: PLR0913, PLR0917 - options
     master; the error status is a letter A to O. The expectations come from --bus, for the master of
     that bus.yml, or from --eds: its device, and for a DCF its values.
 
+    --explain sends only reads: it shows what the boot-up would write, in order, beside the value
+    that the node has now, and exits with 1 if the node would not boot.
+
     \b
     canmon net can0 boot 5 --explain
     canmon net can0 boot 5 --bus bus.yml --explain --start
+    canmon net can0 boot 5 --bus bus.yml --steps --start
     """  # noqa: D301 - click wants the backspace
     if bus_file is not None and eds is not None:
         raise Refused("--bus or --eds: which? give one")
@@ -339,18 +356,22 @@ def boot(  # noqa: PLR0913, PLR0917 - options
     with net_session(call, node) as session:
         slave = slave or _expected(node, None, chosen_eds(eds, session.bus, node))
         slave = replace(slave, reset_communication=False) if leaves_alone else slave
+        if explain:
+            _explain(session, slave, start=start)
+            return
         if doing := _changes(slave):
             what = f"boot-up of node {node}: {', '.join(doing)}"
             session.confirm(what, yes=yes, risk=_risk(slave))
         session.work.ending = _HALF
-        outcome = _boot(session, slave, explain=explain)
+        outcome = session.bus.run(
+            node, boot_slave.SlaveBoot(slave, _step_printer(session, shown=steps)).script()
+        )
         session.work.ending = ""
         status = outcome.status
-        if not status.good:
-            raise NodeFailed(f"node {node}: error status {status.value}: {status.text}")
+        _check_status(node, status)
         letter = f"error status {status.value}: " if status.value else ""
         say(f"node {node}: {letter}{status.text}")
-        if start and status is boot_slave.BootStatus.BOOTED:
+        if start and status is BootStatus.BOOTED:
             may = nmt_risk(NmtCommand.START, slave.device_type or None)
             session.confirm(f"NMT start to node {node}", yes=yes, risk=may)
             session.bus.command(NmtCommand.START, node)
@@ -363,11 +384,122 @@ def _expected(node: int, bus_file: Path | None, eds: Path | None) -> SlaveAssign
     return _nothing_expected(node) if eds is None else _of_eds(eds, node)
 
 
-def _boot(session: NetSession, slave: SlaveAssignment, *, explain: bool) -> boot_slave.BootOutcome:
+def _step_printer(session: NetSession, *, shown: bool) -> _OnStep:
+    """Return what prints each step with its time, if they are to be shown."""
     began_us = session.bus.now_us
 
     def show(step: boot_slave.BootStep) -> None:
-        if explain:
+        if shown:
             click.echo(one_line(f"{format_time(session.bus.now_us - began_us)} {step}"))
 
-    return session.bus.run(slave.node_id, boot_slave.SlaveBoot(slave, show).script())
+    return show
+
+
+def _check_status(node: int, status: BootStatus) -> None:
+    if not status.good:
+        raise NodeFailed(f"node {node}: error status {status.value}: {status.text}")
+
+
+# What `--explain` shows. It sends SDO uploads and nothing else: `SlaveBoot` runs for the identity
+# alone, and what it would do afterwards is read back and listed here, in its order. Node guarding
+# is not asked either: its first request starts the life guarding of a node (CiA 301).
+
+_NOT_SENT: Final = "not sent"
+_NOT_AWAITED: Final = "not waited for"
+_COMMUNICATION: Final = 2
+"""Sub-index of 1011h for communication parameters alone."""
+_MOST_HEX: Final = 8
+"""Largest number of bytes that are shown as a number."""
+
+
+def _explain(session: NetSession, slave: SlaveAssignment, *, start: bool) -> None:
+    """Show the boot-up of a node, and change nothing; NodeFailed if it would not boot."""
+    node, on_step = slave.node_id, _step_printer(session, shown=True)
+    talk = boot_slave.BootTalk(on_step)
+    status = session.bus.run(node, _explained(slave, talk, on_step))
+    _check_status(node, status)
+    if start and status is BootStatus.BOOTED:
+        talk.record("NMT start", _NOT_SENT, "would be sent")
+    say(f"node {node}: nothing was written")
+
+
+def _explained(
+    slave: SlaveAssignment, talk: boot_slave.BootTalk, on_step: _OnStep
+) -> Script[BootStatus]:
+    """Read what the boot-up reads, and show what it would write; return how it would end."""
+    identity = replace(
+        SlaveAssignment(slave.node_id, boots=slave.boots, device_type=slave.device_type),
+        vendor_id=slave.vendor_id,
+        product_code=slave.product_code,
+        revision=slave.revision,
+        serial=slave.serial,
+    )
+    status = (yield from boot_slave.SlaveBoot(identity, on_step).script()).status
+    if not status.good:
+        return status
+    try:
+        if slave.boots:
+            if not slave.reset_communication and (yield from _explain_state(slave, talk)):
+                return BootStatus.WAS_OPERATIONAL
+            if slave.software_version and (yield from _explain_software(slave, talk)):
+                return BootStatus.BOOTED
+            yield from _explain_writes(slave, talk)
+    except boot_slave.BootEnded as end:
+        return end.status
+    if slave.heartbeat_us:
+        talk.record("heartbeat", _NOT_AWAITED, f"must come within {slave.heartbeat_us // 1_000} ms")
+    elif slave.guard_us:
+        talk.record("node guarding", _NOT_SENT, "would start")
+    return BootStatus.BOOTED
+
+
+def _explain_state(slave: SlaveAssignment, talk: boot_slave.BootTalk) -> Script[bool]:
+    """Return whether the node is Operational and would be left alone."""
+    if slave.heartbeat_us:
+        wait_us, status = slave.heartbeat_us, BootStatus.NO_HEARTBEAT
+        state = yield from talk.report("state by heartbeat", wait_us, status)
+        if state is NmtState.OPERATIONAL:
+            return True
+        meaning = "would be sent"
+    else:
+        talk.record("state by guarding", _NOT_SENT, "not known")
+        meaning = "would be sent unless it is Operational"
+    talk.record("reset communication", _NOT_SENT, meaning)
+    return False
+
+
+def _explain_software(slave: SlaveAssignment, talk: boot_slave.BootTalk) -> Script[bool]:
+    """Return whether its software would be updated, after which the boot-up begins again."""
+    at, name, wanted = boot_slave.IDENTIFICATION, "software identification", slave.software_version
+    data = yield from talk.read(at, 1, name, BootStatus.NO_PROGRAM_OBJECTS)
+    what = f"{at:04X}h:01 {name}"
+    same = int.from_bytes(data, "little") == wanted
+    if same or not slave.program or not slave.reset_communication:
+        talk.compare(what, data, wanted, BootStatus.UPDATE_NOT_ALLOWED)
+        return False
+    talk.record(what, f"{int.from_bytes(data, 'little'):08X}h", f"not {wanted:08X}h: to be updated")
+    for step in (
+        "1F51h:01 := stop",
+        "1F51h:01 := clear",
+        f"1F50h:01 := {len(slave.program)} bytes",
+    ):
+        talk.record(step, _NOT_SENT, "would be written")
+    talk.record("1F51h:01 := start", _NOT_SENT, "would be written, then booted from the beginning")
+    return True
+
+
+def _explain_writes(slave: SlaveAssignment, talk: boot_slave.BootTalk) -> Script[None]:
+    """Show the writes of the configuration, each beside the value that the node has."""
+    if slave.restore_sub:
+        talk.record(f"1011h:{slave.restore_sub:02X} := load", _NOT_SENT, "would be written")
+        kind = "communication" if slave.restore_sub == _COMMUNICATION else "node"
+        talk.record(f"reset {kind}", _NOT_SENT, "would be sent")
+    for write in slave.writes:
+        what = f"{write.index:04X}h:{write.sub:02X}"
+        data = yield from talk.attempt(write.index, write.sub, what, 1)
+        now = f"{data}" if isinstance(data, SdoFailed) else f"{_value_text(data)} now"
+        talk.record(f"{what} := {_value_text(write.data)}", now, "would be written")
+
+
+def _value_text(data: bytes) -> str:
+    return f"{data[::-1].hex().upper()}h" if 0 < len(data) <= _MOST_HEX else f"{len(data)} bytes"

@@ -3,13 +3,23 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import cast
 
 import pytest
 
 from tests.environment import ROOT
 from tests.host.canmon.net.test_net_configuration import drive_dcf
 from tests.host.canmon.net.test_net_verbs import net
+from tickrig.device import make_epos
+from tickrig.host.canmon.conform.conform_source import ConformSource, open_conform_source
+from tickrig.host.canmon.net import session
+from tickrig.host.links.link import StampedLink
+from tickrig.wire.can import CanFrame
+from tickrig.wire.canopen.eds.eds_writer import write_eds
+from tickrig.wire.canopen.sdo_frame import ClientCommand
 
 RIG = """\
 [device.drive]
@@ -35,7 +45,7 @@ def test_each_step_is_told(rig: str, tmp_path: Path) -> None:
         r"(?s)\[(?!1017\])(\w+)\](.*?)(?=\n\[|$)", _without_value, path.read_text("utf-8")
     )
     path.write_text(text, "utf-8")
-    result = net(rig, "boot", "5", "--eds", file, "--explain", "--start")
+    result = net(rig, "boot", "5", "--eds", file, "--steps", "--start")
     assert result.exit_code == 0, result.output
     assert steps(result.stdout) == [
         "1000h:00 device type: 00020192h; as expected",
@@ -55,7 +65,7 @@ def _without_value(match: re.Match[str]) -> str:
 
 
 def test_nothing_but_an_answer_is_expected_unless_told(rig: str) -> None:
-    result = net(rig, "boot", "5", "--explain")
+    result = net(rig, "boot", "5", "--steps")
     assert result.exit_code == 0, result.output
     assert steps(result.stdout) == ["1000h:00 device type: 00020192h; not looked at"]
     assert "nothing is expected of the node but that it answers" in result.stderr
@@ -65,7 +75,7 @@ def test_nothing_but_an_answer_is_expected_unless_told(rig: str) -> None:
 def test_what_a_bus_yml_expects_is_done(rig: str) -> None:
     path = Path(rig)
     path.write_text(RIG.replace("node_id = 5", "node_id = 2"))
-    result = net(rig, "boot", "2", "--bus", str(BUS), "--explain")
+    result = net(rig, "boot", "2", "--bus", str(BUS), "--steps")
     assert result.exit_code == 0, result.output
     told = steps(result.stdout)
     assert told[0] == "1000h:00 device type: 00020192h; as expected"
@@ -74,16 +84,115 @@ def test_what_a_bus_yml_expects_is_done(rig: str) -> None:
     assert "This may turn a motor: homing method" in result.stderr
 
 
-def test_another_device_ends_with_its_letter(rig: str) -> None:
+class _Watched:
+    """A link, and the frames that were sent by it."""
+
+    def __init__(self, link: StampedLink) -> None:
+        self._link, self.sent = link, list[CanFrame]()
+
+    def __getattr__(self, name: str) -> object:
+        return getattr(self._link, name)
+
+    def send(self, frames: tuple[CanFrame, ...]) -> None:
+        self.sent += frames
+        self._link.send(frames)
+
+
+@pytest.fixture
+def sent(monkeypatch: pytest.MonkeyPatch) -> list[CanFrame]:
+    """Return the frames that a verb sends."""
+    frames: list[CanFrame] = []
+
+    def watched(*words: object) -> ConformSource:
+        source = open_conform_source(*words)  # type: ignore[arg-type] # passed through
+        link = _Watched(source.link)
+        link.sent = frames
+        return replace(source, link=cast("StampedLink", link))
+
+    monkeypatch.setattr(session, "open_conform_source", watched)
+    return frames
+
+
+def written(frames: Sequence[CanFrame]) -> list[CanFrame]:
+    """Return the frames that are no SDO upload: NMT, guarding, downloads."""
+    uploads = (ClientCommand.UPLOAD, ClientCommand.UPLOAD_SEGMENT)
+    return [
+        frame
+        for frame in frames
+        if frame.remote
+        or frame.can_id not in range(0x601, 0x680)
+        or frame.data[0] & 0xE0 not in uploads
+    ]
+
+
+@pytest.mark.parametrize("words", [(), ("--start",)])
+@pytest.mark.parametrize("option", ["--explain", "--dry-run"])
+def test_what_is_explained_is_only_read(
+    rig: str, sent: list[CanFrame], option: str, words: tuple[str, ...]
+) -> None:
+    Path(rig).write_text(RIG.replace("node_id = 5", "node_id = 2"))
+    call = ("boot", "2", "--bus", str(BUS), *words)
+    booted = net(rig, *call, "--steps")
+    assert written(sent)
+    sent.clear()
+    result = net(rig, *call, option)
+    assert result.exit_code == 0, result.output
+    assert sent
+    assert not written(sent)
+    wanted = [step.split(": ")[0] for step in steps(booted.stdout) if " := " in step]
+    told = steps(result.stdout)
+    assert [step.split(": ")[0] for step in told if " := " in step] == wanted, "in this order"
+    assert "1017h:00 := 0064h: 0000h now; would be written" in told
+    assert result.stderr == "node 2: nothing was written\n"
+    assert ("NMT start: not sent; would be sent" in told) is ("--start" in words)
+
+
+def test_who_is_kept_alive_is_not_guarded_to_explain(rig: str, sent: list[CanFrame]) -> None:
+    assert net(rig, "boot", "5", "--keep-alive").exit_code == 0
+    assert {frame.can_id for frame in written(sent)} == {0x705, 0x000}
+    sent.clear()
+    result = net(rig, "boot", "5", "--keep-alive", "--explain")
+    assert (result.exit_code, written(sent)) == (0, [])
+    assert steps(result.stdout)[1:] == [
+        "state by guarding: not sent; not known",
+        "reset communication: not sent; would be sent unless it is Operational",
+    ]
+
+
+def test_an_update_and_a_restore_are_explained(
+    rig: str, tmp_path: Path, sent: list[CanFrame]
+) -> None:
+    bus = tmp_path / "bus.yml"
+    node = "{node_id: 5, dcf: r1.eds, restore_configuration: 2, guard_time: 100}"
+    bus.write_text(f"master: {{node_id: 1}}\nnodes:\n  drive: {node}\n")
+    eds = tmp_path / "r1.eds"
+    eds.write_text(write_eds(make_epos(5).dictionary.description), "utf-8")
+    result = net(rig, "boot", "5", "--bus", str(bus), "--explain")
+    assert result.exit_code == 0, result.output
+    assert not written(sent)
+    told = steps(result.stdout)
+    assert "1011h:02 := load: not sent; would be written" in told
+    assert "reset communication: not sent; would be sent" in told
+
+
+def test_an_explained_boot_of_another_device_fails(rig: str, sent: list[CanFrame]) -> None:
     other = ROOT / "tests" / "golden" / "canopen" / "r1.eds"
     result = net(rig, "boot", "5", "--eds", str(other), "--explain")
+    assert result.exit_code == 1
+    assert "Error: node 5: error status C: 1000h device" in result.stderr
+    assert not written(sent)
+
+
+def test_another_device_ends_with_its_letter(rig: str) -> None:
+    other = ROOT / "tests" / "golden" / "canopen" / "r1.eds"
+    result = net(rig, "boot", "5", "--eds", str(other), "--steps")
     assert result.exit_code == 1
     assert steps(result.stdout)[-1].endswith("1000h device type is another than expected")
     assert result.stderr.splitlines()[-1].startswith("Error: node 5: error status C: 1000h device")
 
 
 def test_who_is_kept_alive_is_looked_at_and_not_reset(rig: str) -> None:
-    result = net(rig, "boot", "5", "--explain", "--keep-alive")
+    result = net(rig, "boot", "5", "--steps", "--keep-alive")
     assert result.exit_code == 0, result.output
     assert steps(result.stdout)[1:] == [
         "state by guarding: Pre-operational; goes on",
@@ -94,7 +203,7 @@ def test_who_is_kept_alive_is_looked_at_and_not_reset(rig: str) -> None:
 def test_a_silent_node_has_status_b(tmp_path: Path) -> None:
     path = tmp_path / "bench.toml"
     path.write_text(RIG + '[fault]\ndrive = "power_off@50ms"\n')
-    result = net(str(path), "boot", "5", "--explain")
+    result = net(str(path), "boot", "5", "--steps")
     assert result.exit_code == 1
     assert steps(result.stdout)[0] == "1000h:00 device type: no answer; asked again"
     assert "error status B: 1000h device type cannot be read" in result.stderr
