@@ -77,7 +77,7 @@ def command(
     canmon net can0 write 5 heartbeat_time=100
     canmon net can0 nmt start 5
     canmon net can0 lss --fastscan --node-id 5 --store
-    canmon net can0 dcf 5 drive.dcf --dry-run     what differs; without it, it is written
+    canmon net can0 dcf 5 drive.dcf --dry-run     what would be written; writes nothing
     canmon net can0 program 5 firmware.bin
     canmon net can0 boot 5 --bus bus.yml --explain        what it would write
 

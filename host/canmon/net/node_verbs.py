@@ -14,7 +14,13 @@ from tickrig.host.canmon.model.decode.eds_folder import EdsFolder
 from tickrig.host.canmon.model.decode.node_board import profile_text
 from tickrig.host.canmon.net.group import NetCall
 from tickrig.host.canmon.net.node_objects import DEVICE_TYPE, NamedObjects
-from tickrig.host.canmon.net.session import NetSession, NodeFailed, net_session
+from tickrig.host.canmon.net.session import (
+    NetSession,
+    NodeFailed,
+    dry_run_option,
+    net_session,
+    print_plan,
+)
 from tickrig.host.canmon.risks import nmt_risk, write_risk
 from tickrig.host.canopen.bus_file.bus_file import read_bus_file
 from tickrig.host.canopen.commissioning.configuration import dcf_values, writes
@@ -125,9 +131,10 @@ _PERIODS: Final = 3
 @click.command()
 @click.argument("word", type=click.Choice(list(_COMMANDS)), metavar="COMMAND")
 @click.argument("node", metavar="NODE|all")
+@dry_run_option
 @click.option("--yes", is_flag=True, help="Do not ask.")
 @click.pass_obj
-def nmt(call: NetCall, word: str, node: str, yes: bool) -> None:
+def nmt(call: NetCall, word: str, node: str, dry_run: bool, yes: bool) -> None:
     """Send an NMT command to NODE, or to all: start, stop, pre-op, reset-node, reset-comm.
 
     Then the command waits for the state, or after a reset for the boot-up; only a node with a
@@ -136,11 +143,15 @@ def nmt(call: NetCall, word: str, node: str, yes: bool) -> None:
 
     \b
     canmon net can0 nmt start 5
+    canmon net can0 nmt reset-node 5 --dry-run
     canmon net can0 nmt reset-node all --yes
     """  # noqa: D301 - click wants the backspace
     command, node_id = _COMMANDS[word], _node_id(node)
     with net_session(call, node_id or None) as session:
-        if node_id == ALL_NODES:
+        if dry_run:
+            to = f"node {node_id}" if node_id else "all nodes"
+            print_plan(f"NMT {word} to {to} (000#{command:02X}{node_id:02X})")
+        elif node_id == ALL_NODES:
             _command_all(session, command, word, yes=yes)
         else:
             _command_one(session, command, word, node_id, yes=yes)

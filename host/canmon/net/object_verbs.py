@@ -9,6 +9,7 @@ from typing import Final
 import click
 
 from tickrig.host.canmon.eds_document import node_eds_option
+from tickrig.host.canmon.model.decode.decoded import write_entry
 from tickrig.host.canmon.model.decode.eds_folder import EdsFolder
 from tickrig.host.canmon.net import node_objects
 from tickrig.host.canmon.net.group import NetCall
@@ -23,9 +24,11 @@ from tickrig.host.canmon.net.node_objects import (
 from tickrig.host.canmon.net.session import (
     NetSession,
     NodeFailed,
+    dry_run_option,
     failure_text,
     net_session,
     of_node,
+    print_plan,
 )
 from tickrig.host.canmon.risks import write_risk
 from tickrig.host.canopen.commissioning.configuration import (
@@ -117,10 +120,16 @@ _PDO_MAPPINGS: Final = (*range(0x1600, 0x1800), *range(0x1A00, 0x1C00))
 @click.argument("node", type=NODE_ID)
 @click.argument("values", nargs=-1, required=True, metavar="OBJECT=VALUE...")
 @node_eds_option()
+@dry_run_option
 @click.option("--yes", is_flag=True, help="Ask nothing.")
 @click.pass_obj
-def write(
-    call: NetCall, node: int, values: Sequence[str], eds: Path | EdsFolder | None, yes: bool
+def write(  # noqa: PLR0913, PLR0917 - options
+    call: NetCall,
+    node: int,
+    values: Sequence[str],
+    eds: Path | EdsFolder | None,
+    dry_run: bool,
+    yes: bool,
 ) -> None:
     """Write objects of NODE, by name or index, in this order.
 
@@ -130,6 +139,7 @@ def write(
 
     \b
     canmon net can0 write 5 heartbeat_time=100 --yes
+    canmon net can0 write 5 heartbeat_time=100 controlword=6 --dry-run
     canmon net can0 write 5 2000h:1=u16:0x1F 1008h=text:left
     canmon net can0 write 5 controlword=15 target_velocity=100 --eds drive.eds
     """  # noqa: D301 - click wants the backspace
@@ -140,6 +150,9 @@ def write(
         writes = [(objects.find(name), text) for name, text in pairs]
         made = [(entry, text, encoded(objects, entry, text)) for entry, text in writes]
         titles = [f"{objects.title(entry)} = {text}" for entry, text, _ in made]
+        if dry_run:
+            print_plan(*titles)
+            return
         risk = write_risk(objects.is_drive, [entry for entry, _, _ in made])
         session.confirm(f"writes to node {node}: {', '.join(titles)}", yes=yes, risk=risk)
         session.work.plan(*titles)
@@ -274,6 +287,14 @@ def save(session: NetSession, node_id: int, sub: int) -> None:
         sub: 1 for all, 2 for 1000h to 1FFFh, 3 for 6000h to 9FFFh, others are
             manufacturer-specific.
     """
+    _check_saves(session, node_id, sub)
+    with of_node(node_id):
+        session.bus.write(node_id, _STORE, sub, b"save", _PATIENCE_US)
+    say(f"node {node_id}: stored")
+
+
+def _check_saves(session: NetSession, node_id: int, sub: int) -> None:
+    """Read whether a node stores on command; NodeFailed if not."""
     with of_node(node_id):
         data = session.bus.read(node_id, _STORE, sub)
         if not data[:1] or not data[0] & _ON_COMMAND:
@@ -281,8 +302,10 @@ def save(session: NetSession, node_id: int, sub: int) -> None:
                 f"node {node_id}: {_STORE:04X}h:{sub:02X} is {data[::-1].hex().upper()}h:"
                 " it does not store on command"
             )
-        session.bus.write(node_id, _STORE, sub, b"save", _PATIENCE_US)
-    say(f"node {node_id}: stored")
+
+
+def _save_text(sub: int) -> str:
+    return f"{write_entry((_STORE, sub))} = 'save'"
 
 
 def _load_defaults(session: NetSession, node_id: int, sub: int) -> None:
@@ -315,17 +338,23 @@ def _sub(word: str) -> int:
 @click.command()
 @click.argument("node", type=NODE_ID)
 @click.argument("area", default="all")
+@dry_run_option
 @click.option("--yes", is_flag=True, help="Do not ask.")
 @click.pass_obj
-def store(call: NetCall, node: int, area: str, yes: bool) -> None:
+def store(call: NetCall, node: int, area: str, dry_run: bool, yes: bool) -> None:
     """Store parameters of NODE (1010h): all, communication, application or a sub-index.
 
     \b
     canmon net can0 store 5
+    canmon net can0 store 5 --dry-run
     canmon net can0 store 5 communication --yes
     """  # noqa: D301 - click wants the backspace
     sub = _sub(area)
     with net_session(call, node) as session:
+        if dry_run:
+            _check_saves(session, node, sub)
+            print_plan(_save_text(sub))
+            return
         session.confirm(f"node {node} stores its parameters: {area}", yes=yes)
         session.work.plan("store")
         save(session, node, sub)
@@ -336,15 +365,19 @@ def store(call: NetCall, node: int, area: str, yes: bool) -> None:
 @click.argument("node", type=NODE_ID)
 @click.argument("area", default="all")
 @click.option("--reset", "then_reset", is_flag=True, help="Reset it, so that they apply at once.")
+@dry_run_option
 @click.option("--yes", is_flag=True, help="Do not ask.")
 @click.pass_obj
-def restore(call: NetCall, node: int, area: str, then_reset: bool, yes: bool) -> None:
+def restore(  # noqa: PLR0913, PLR0917 - options
+    call: NetCall, node: int, area: str, then_reset: bool, dry_run: bool, yes: bool
+) -> None:
     """Restore the defaults of NODE (1011h): all, communication, application or a sub-index.
 
     They take effect at its next reset.
 
     \b
     canmon net can0 restore 5 --reset
+    canmon net can0 restore 5 --reset --dry-run
     canmon net can0 restore 5 communication
     """  # noqa: D301 - click wants the backspace
     sub = _sub(area)
@@ -352,6 +385,13 @@ def restore(call: NetCall, node: int, area: str, then_reset: bool, yes: bool) ->
     if then_reset:
         risk += "; its motor is released: a hanging load may fall"
     with net_session(call, node) as session:
+        if dry_run:
+            with of_node(node):
+                session.bus.read(node, _RESTORE, sub)
+            kind = "reset-comm" if sub == _COMMUNICATION else "reset-node"
+            reset_text = [f"NMT {kind} to node {node}"] if then_reset else []
+            print_plan(f"{write_entry((_RESTORE, sub))} = 'load'", *reset_text)
+            return
         session.confirm(f"node {node} forgets its parameters: {area}", yes=yes, risk=risk)
         session.work.plan("restore", *(["reset"] if then_reset else []))
         _load_defaults(session, node, sub)
@@ -371,7 +411,7 @@ def restore(call: NetCall, node: int, area: str, then_reset: bool, yes: bool) ->
 @click.option("--skip", multiple=True, metavar="OBJECT", help="Object to omit; may be repeated.")
 @click.option("--store", is_flag=True, help="Then store all parameters (1010h:01).")
 @click.option("--other-device", is_flag=True, help="Accept a FILE of another device.")
-@click.option("--dry-run", is_flag=True, help="Show the differences; write nothing.")
+@dry_run_option
 @click.option("--yes", is_flag=True, help="Do not ask.")
 @click.pass_obj
 def dcf(  # noqa: PLR0913, PLR0917 - options
@@ -404,6 +444,8 @@ def dcf(  # noqa: PLR0913, PLR0917 - options
         with of_node(node, objects.title):
             changed = values if whole else _changed(session, objects, values)
             steps = _steps(session, objects, changed, file)
+        if dry_run:
+            print_plan(*_titles(objects, steps), *([_save_text(1)] if steps and store else []))
         if dry_run or not steps:
             return
         what = f"{counted(len(changed), 'object')} of {file.name} to node {node}"
@@ -451,13 +493,14 @@ def _steps(
         return writes(changed, number, writable)
 
 
+def _titles(objects: node_objects.NamedObjects, steps: Sequence[Write]) -> list[str]:
+    return [f"{objects.title(at)} = {node_objects.shown(objects, at, data)}" for at, data in steps]
+
+
 def _write_all(
     session: NetSession, objects: node_objects.NamedObjects, steps: Sequence[Write], *, store: bool
 ) -> None:
-    titles = [
-        f"{objects.title(at)} = {node_objects.shown(objects, at, data)}" for at, data in steps
-    ]
-    session.work.plan(*titles, *(["store"] if store else []))
+    session.work.plan(*_titles(objects, steps), *(["store"] if store else []))
     for number, (at, data) in enumerate(steps):
         session.work.ending = disabled(steps[:number], steps[number:])
         with of_node(objects.node_id, objects.title):

@@ -13,8 +13,20 @@ import click
 from tickrig.host.canmon.model.decode.decoded import write_entry
 from tickrig.host.canmon.net.group import NetCall
 from tickrig.host.canmon.net.node_objects import Entry
-from tickrig.host.canmon.net.session import NetSession, NodeFailed, net_session, of_node
-from tickrig.host.canopen.commissioning.program import COMMANDS, Program, ProgramFailed
+from tickrig.host.canmon.net.session import (
+    NetSession,
+    NodeFailed,
+    dry_run_option,
+    net_session,
+    of_node,
+    print_plan,
+)
+from tickrig.host.canopen.commissioning.program import (
+    COMMANDS,
+    Program,
+    ProgramFailed,
+    ProgramStatus,
+)
 from tickrig.host.cli.messages import Refused, refusing, say
 from tickrig.host.cli.options import NODE_ID, PATH
 from tickrig.host.cli.start import paint
@@ -88,6 +100,7 @@ _HALF: Final = (
 @click.option("--expect", metavar="ID", help="1F56h of FILE, in hex; skip if the node has it.")
 @click.option("--no-start", is_flag=True, help="Leave the program stopped.")
 @click.option("--tries", type=click.IntRange(1, 99), default=3, metavar="N", help="Transfers.  [3]")
+@dry_run_option
 @click.option("--yes", is_flag=True, help="Do not ask.")
 @click.pass_obj
 def command(  # noqa: PLR0913, PLR0917 - options
@@ -99,6 +112,7 @@ def command(  # noqa: PLR0913, PLR0917 - options
     expect: str | None,
     no_start: bool,
     tries: int,
+    dry_run: bool,
     yes: bool,
 ) -> None:
     """Download FILE to NODE by block transfer (CiA 302-3); without FILE show its program.
@@ -109,11 +123,14 @@ def command(  # noqa: PLR0913, PLR0917 - options
 
     \b
     canmon net can0 program 5
+    canmon net can0 program 5 firmware.bin --dry-run
     canmon net can0 program 5 firmware.bin --expect 1A2B3C4D
     canmon net can0 program 5 --control start
     """  # noqa: D301 - click wants the backspace
     if file is not None and control is not None:
         raise Refused("FILE or --control: which? give one")
+    if dry_run and file is None and control is None:
+        raise Refused("--dry-run of what? give FILE or --control; without them nothing is written")
     data = b"" if file is None else _read(file)
     wanted = None if expect is None else _identification(expect)
     with net_session(call, node) as session:
@@ -130,10 +147,16 @@ def command(  # noqa: PLR0913, PLR0917 - options
                     ):
                         say(f"node {node}: it runs what is expected; nothing is to be done")
                         return
+                    if dry_run:
+                        print_plan(*_plan(status, number, len(data), start=not no_start))
+                        return
                     what = f"{len(data)} bytes of {file.name} into program {number} of node {node}"
                     session.confirm(what, yes=yes, risk=_RISK)
                     _download(session, program, data, wanted, tries=tries, start=not no_start)
                 elif control is not None:
+                    if dry_run:
+                        print_plan(_command_text(number, control))
+                        return
                     risk = (
                         _RISK if control != "start" else "This may turn a motor: the program runs"
                     )
@@ -144,6 +167,18 @@ def command(  # noqa: PLR0913, PLR0917 - options
             click.echo(f"node {node}: {program.status()}")
         except ProgramFailed as error:
             raise NodeFailed(f"node {node}: {error}") from None
+
+
+def _plan(status: ProgramStatus, number: int, size: int, *, start: bool) -> list[str]:
+    """Return the writes of a download, in order."""
+    words = ["clear"] if status.control == COMMANDS["stop"] else ["stop", "clear"]
+    steps = [_command_text(number, word) for word in words]
+    steps.append(f"{_title((0x1F50, number))} = {size} bytes")
+    return [*steps, _command_text(number, "start")] if start else steps
+
+
+def _command_text(number: int, word: str) -> str:
+    return f"{_title((0x1F51, number))} = {COMMANDS[word]} ({word})"
 
 
 def _title(entry: Entry) -> str:

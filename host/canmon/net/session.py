@@ -26,6 +26,10 @@ _Title = Callable[[tuple[int, int]], str]
 
 _MOST_LISTED: Final = 5
 
+dry_run_option: Final = click.option(
+    "--dry-run", is_flag=True, help="Print what would be written, in order; write nothing."
+)
+
 _LOCAL: Final = (AbortCode.COMMAND_SPECIFIER, AbortCode.TOGGLE_BIT)
 
 
@@ -110,6 +114,13 @@ class NetSession:
         say(text)
         if not click.confirm("Go on?", default=False, err=True):
             raise Refused("not started")
+
+
+def print_plan(*steps: str) -> None:
+    """Print the steps of `--dry-run`, one a line, and that none was made."""
+    for step in steps:
+        click.echo(one_line(f"not done: {step}"))
+    say("dry run: nothing was written")
 
 
 @contextmanager

@@ -3,23 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
-from typing import cast
 
 import pytest
 
 from tests.environment import ROOT
 from tests.host.canmon.net.test_net_configuration import drive_dcf
-from tests.host.canmon.net.test_net_verbs import net
+from tests.host.canmon.net.test_net_verbs import net, written
 from tickrig.device import make_epos
-from tickrig.host.canmon.conform.conform_source import ConformSource, open_conform_source
-from tickrig.host.canmon.net import session
-from tickrig.host.links.link import StampedLink
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.eds.eds_writer import write_eds
-from tickrig.wire.canopen.sdo_frame import ClientCommand
 
 RIG = """\
 [device.drive]
@@ -82,47 +75,6 @@ def test_what_a_bus_yml_expects_is_done(rig: str) -> None:
     assert "6098h:00 := 23h: taken; goes on" in told
     assert told[-1] == "heartbeat: Pre-operational; goes on"
     assert "This may turn a motor: homing method" in result.stderr
-
-
-class _Watched:
-    """A link, and the frames that were sent by it."""
-
-    def __init__(self, link: StampedLink) -> None:
-        self._link, self.sent = link, list[CanFrame]()
-
-    def __getattr__(self, name: str) -> object:
-        return getattr(self._link, name)
-
-    def send(self, frames: tuple[CanFrame, ...]) -> None:
-        self.sent += frames
-        self._link.send(frames)
-
-
-@pytest.fixture
-def sent(monkeypatch: pytest.MonkeyPatch) -> list[CanFrame]:
-    """Return the frames that a verb sends."""
-    frames: list[CanFrame] = []
-
-    def watched(*words: object) -> ConformSource:
-        source = open_conform_source(*words)  # type: ignore[arg-type] # passed through
-        link = _Watched(source.link)
-        link.sent = frames
-        return replace(source, link=cast("StampedLink", link))
-
-    monkeypatch.setattr(session, "open_conform_source", watched)
-    return frames
-
-
-def written(frames: Sequence[CanFrame]) -> list[CanFrame]:
-    """Return the frames that are no SDO upload: NMT, guarding, downloads."""
-    uploads = (ClientCommand.UPLOAD, ClientCommand.UPLOAD_SEGMENT)
-    return [
-        frame
-        for frame in frames
-        if frame.remote
-        or frame.can_id not in range(0x601, 0x680)
-        or frame.data[0] & 0xE0 not in uploads
-    ]
 
 
 @pytest.mark.parametrize("words", [(), ("--start",)])

@@ -98,7 +98,14 @@ def test_what_a_dcf_says_is_in_the_node_then(
     dry = call("dcf", f"{NODE_ID}", file, "--dry-run")
     assert dry.exit_code == 0
     unread = "2004h:00 u8_write_only: it cannot be read, 0 (0x00) in the file\n"
-    assert dry.stdout == before.stdout + unread
+    assert dry.stdout.startswith(before.stdout + unread)
+    plan = dry.stdout.removeprefix(before.stdout + unread).splitlines()
+    assert all(line.startswith("not done: ") for line in plan)
+    entries = [line.split()[2] for line in plan]
+    empties = entries.index("1A00h:00")
+    assert entries.index("1800h:01") < empties < entries.index("1A00h:01"), "disabled, emptied"
+    assert entries.index("1A00h:01") < entries.index("1A00h:00", empties + 1), "and filled"
+    assert call("compare", f"{NODE_ID}", file).stdout == before.stdout, "nothing is written"
     written = call("dcf", f"{NODE_ID}", file)
     assert written.exit_code == 0, written.output
     after = call("compare", f"{NODE_ID}", file)

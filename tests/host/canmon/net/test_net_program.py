@@ -8,11 +8,12 @@ from pathlib import Path
 import pytest
 from click.testing import Result
 
-from tests.host.canmon.net.test_net_verbs import net
+from tests.host.canmon.net.test_net_verbs import net, written
 from tickrig.device.canopen.models.f_palette_boot import make_f_palette_boot
 from tickrig.emulators.testing.conformance.conformance import SlaveBench
 from tickrig.host.canmon.net import session
 from tickrig.host.canmon.net.program_verb import ProgressBar
+from tickrig.wire.can import CanFrame
 
 RIG = """\
 [device.module]
@@ -44,6 +45,22 @@ def test_firmware_is_downloaded_and_runs(rig: str, file: str) -> None:
         "10240 bytes written",
         "node 17: started",
     ]
+
+
+def test_a_dry_run_downloads_nothing(rig: str, file: str, sent: list[CanFrame]) -> None:
+    result = net(rig, "program", "17", file, "--dry-run")
+    assert result.exit_code == 0, result.output
+    assert result.stdout.splitlines()[1:] == [
+        "not done: 1F51h:01 program control = 0 (stop)",
+        "not done: 1F51h:01 program control = 3 (clear)",
+        "not done: 1F50h:01 program data = 10240 bytes",
+        "not done: 1F51h:01 program control = 1 (start)",
+    ]
+    command = net(rig, "program", "17", "--control", "stop", "--dry-run")
+    assert command.stdout == "not done: 1F51h:01 program control = 0 (stop)\n"
+    assert not written(sent)
+    shown = net(rig, "program", "17", "--dry-run")
+    assert (shown.exit_code, "give FILE or --control" in shown.stderr) == (2, True)
 
 
 def test_over_a_line_with_1_percent_corrupted_frames_too(rig: str, file: str) -> None:

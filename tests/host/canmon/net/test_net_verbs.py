@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,8 +16,12 @@ from tickrig.device import make_epos
 from tickrig.emulators.testing.conformance.conformance import SlaveBench
 from tickrig.host.canmon.cli import main
 from tickrig.host.canmon.net import node_objects, session
+from tickrig.host.canmon.net.group import VERBS
 from tickrig.host.canmon.net.node_objects import NamedObjects
+from tickrig.host.cli.start import load
+from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.eds.eds_writer import write_eds
+from tickrig.wire.canopen.sdo_frame import ClientCommand
 
 CANMON = "from tickrig.commands import canmon; canmon()"
 RIG = """\
@@ -32,6 +37,18 @@ node_id = 16
 
 def net(*words: str) -> Result:
     return CliRunner().invoke(main, ["net", *words], catch_exceptions=False)
+
+
+def written(frames: Sequence[CanFrame]) -> list[CanFrame]:
+    """Return the frames that are no SDO upload: NMT, guarding, downloads."""
+    uploads = (ClientCommand.UPLOAD, ClientCommand.UPLOAD_SEGMENT)
+    return [
+        frame
+        for frame in frames
+        if frame.remote
+        or frame.can_id not in range(0x601, 0x680)
+        or frame.data[0] & 0xE0 not in uploads
+    ]
 
 
 def test_a_scan_lists_nodes_with_profile_identity_and_name(rig: str) -> None:
@@ -124,6 +141,52 @@ def test_nmt_commands_and_what_comes_of_them(rig: str) -> None:
     assert result.stderr.endswith("node 5: sent; it has no heartbeat that tells its state\n")
     result = net(rig, "nmt", "reset-comm", "ALL")
     assert result.stderr.splitlines()[1:] == ["node 5: boot-up", "node 16: boot-up"]
+
+
+_READS = {"scan", "read", "compare"}
+
+
+def test_each_verb_that_writes_has_a_dry_run() -> None:
+    assert {
+        name
+        for name, (path, _) in VERBS.items()
+        if not any("--dry-run" in option.opts for option in load(path).params)
+    } == _READS
+
+
+@pytest.mark.parametrize(
+    ("words", "steps"),
+    [
+        ("nmt start 5", ["NMT start to node 5 (000#0105)"]),
+        ("nmt reset-node all", ["NMT reset-node to all nodes (000#8100)"]),
+        (
+            "write 5 controlword=6 heartbeat_time=0x64",
+            ["6040h:00 controlword = 6", "1017h:00 producer_heartbeat_time = 0x64"],
+        ),
+        ("store 5 all", ["1010h:01 = 'save'"]),
+        ("restore 5 --reset", ["1011h:01 = 'load'", "NMT reset-node to node 5"]),
+    ],
+)
+def test_a_dry_run_prints_the_steps_in_order_and_writes_nothing(
+    rig: str, sent: list[CanFrame], words: str, steps: list[str]
+) -> None:
+    result = net(rig, *words.split(), "--dry-run")
+    assert result.exit_code == 0, result.output
+    assert result.stdout.splitlines() == [f"not done: {step}" for step in steps]
+    assert result.stderr.splitlines()[-1] == "dry run: nothing was written"
+    assert not written(sent)
+    assert net(rig, *words.split()).exit_code == 0
+    assert written(sent)
+
+
+def test_a_dry_run_refuses_what_cannot_be_written(rig: str, sent: list[CanFrame]) -> None:
+    result = net(rig, "write", "5", "heartbeat_time=5", "controlword=x", "--dry-run")
+    assert result.exit_code == 2
+    assert "'x' is no number; controlword is UNSIGNED16" in result.stderr
+    result = net(rig, "restore", "5", "communication", "--dry-run")
+    assert result.exit_code == 1
+    assert "1011h:02: refused: sub-index does not exist" in result.stderr
+    assert not written(sent)
 
 
 @pytest.fixture
