@@ -73,6 +73,7 @@ def command(
 
     \b
     canmon net can0 scan                          which nodes are there?
+    canmon net can0 scan --write bus.yml --eds-dir eds
     canmon net can0 read 5 device_name 1018h:1    objects by name or index
     canmon net can0 write 5 heartbeat_time=100
     canmon net can0 nmt start 5

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+import os
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -9,9 +12,16 @@ from typing import Final
 
 import click
 
-from tickrig.host.canmon.eds_document import chosen_eds, node_eds_option, read_device_document
-from tickrig.host.canmon.model.decode.eds_folder import EdsFolder
+from tickrig.host.canmon.eds_document import (
+    chosen_eds,
+    eds_folder_option,
+    node_eds_option,
+    read_device_document,
+    read_eds_folders,
+)
+from tickrig.host.canmon.model.decode.eds_folder import EdsFolder, node_identity
 from tickrig.host.canmon.model.decode.node_board import profile_text
+from tickrig.host.canmon.model.decode.node_memory import slug
 from tickrig.host.canmon.net.group import NetCall
 from tickrig.host.canmon.net.node_objects import DEVICE_TYPE, NamedObjects
 from tickrig.host.canmon.net.session import (
@@ -22,7 +32,7 @@ from tickrig.host.canmon.net.session import (
     print_plan,
 )
 from tickrig.host.canmon.risks import nmt_risk, write_risk
-from tickrig.host.canopen.bus_file.bus_file import read_bus_file
+from tickrig.host.canopen.bus_file.bus_file import decode_bus_file, read_bus_file
 from tickrig.host.canopen.commissioning.configuration import dcf_values, writes
 from tickrig.host.canopen.commissioning.node_bus import NetworkScan, NodeFound
 from tickrig.host.canopen.dialogue import Script
@@ -35,6 +45,7 @@ from tickrig.host.cli.messages import Refused, refuse_path, refusing, say, until
 from tickrig.host.cli.options import NODE_ID, PATH, time_option
 from tickrig.host.text.page_text import json_text, one_line
 from tickrig.host.text.values import counted, format_time
+from tickrig.host.text.whole_file import write_whole
 from tickrig.wire.canopen.nmt import ALL_NODES, NmtCommand, NmtState
 
 _NOBODY: Final = 1
@@ -44,8 +55,18 @@ _WAIT_US: Final = 500_000
 @click.command()
 @time_option("--wait", "wait_us", help="Wait for the last answers and heartbeats. [500ms]")
 @click.option("--json", "as_json", is_flag=True, help="Print nodes as JSON, one per line.")
+@click.option("--write", "bus_file", type=PATH, metavar="FILE", help="Write a bus.yml of them.")
+@eds_folder_option
+@click.option("--force", is_flag=True, help="Let --write replace FILE.")
 @click.pass_obj
-def scan(call: NetCall, wait_us: int | None, as_json: bool) -> None:
+def scan(  # noqa: PLR0913, PLR0917 - options
+    call: NetCall,
+    wait_us: int | None,
+    as_json: bool,
+    bus_file: Path | None,
+    eds_folders: tuple[Path, ...],
+    force: bool,
+) -> None:
     """List the nodes on the bus; exit status 1 if there are none.
 
     The device type (1000h) of each node-ID is read by SDO; nothing is changed. Nodes that only send
@@ -54,7 +75,12 @@ def scan(call: NetCall, wait_us: int | None, as_json: bool) -> None:
     \b
     canmon net can0 scan
     canmon net can0 scan --wait 2s --json
+    canmon net can0 scan --write bus.yml --eds-dir eds
+
+    --write makes a bus.yml for `boot --bus` and `tickrig check`. It takes the EDS of each node, and
+    its name, from --eds-dir; a node without an EDS stands in it as a comment.
     """  # noqa: D301 - click wants the backspace
+    folder = _writing(bus_file, eds_folders, force=force)
     found: list[NodeFound] = []
     with net_session(call) as session:
         scan = NetworkScan(session.bus, wait_us or _WAIT_US)
@@ -68,6 +94,8 @@ def scan(call: NetCall, wait_us: int | None, as_json: bool) -> None:
         say("no node answered or sent anything")
         raise click.exceptions.Exit(_NOBODY)
     say(counted(len(found), "node"))
+    if bus_file is not None and folder is not None:
+        _write_bus_file(bus_file, found, folder)
 
 
 def _line(node: NodeFound) -> str:
@@ -100,6 +128,100 @@ def _json(node: NodeFound) -> str:
             "answers": node.answers,
         }
     )
+
+
+# What `scan --write` writes. A bus.yml needs an EDS for each node, so a node without one is a
+# comment. Vendor and product are those of the EDS, which fits by them; the serial number is not
+# checked, because a spare part has another one.
+
+_FIRST_LETTER: Final = re.compile(r"[a-z]")
+_MOST_LETTERS: Final = 40
+_REVISION: Final = (0x1018, 3)
+
+
+def _writing(path: Path | None, folders: tuple[Path, ...], *, force: bool) -> EdsFolder | None:
+    """Return the folder of EDS files for `--write`; Refused if it cannot be written."""
+    if path is None:
+        if folders or force:
+            raise Refused(f"{'--eds-dir' if folders else '--force'} is for --write FILE")
+        return None
+    if not folders:
+        raise Refused("--write: a bus.yml needs the EDS of each node: give --eds-dir DIR")
+    if path.exists() and not force:
+        raise Refused(f"--write {path} is there already: choose another name, or give --force")
+    return read_eds_folders(folders)
+
+
+def _write_bus_file(path: Path, found: list[NodeFound], folder: EdsFolder) -> None:
+    """Write the nodes that have an EDS; Refused, and nothing written, if it would have errors."""
+    taken = {node.node_id for node in found}
+    master = next((one for one in (1, *range(127, 1, -1)) if one not in taken), None)
+    if master is None:
+        raise Refused("--write: all node-IDs are taken: none is left for the master")
+    files = {node.node_id: _eds_of(node, folder) for node in found}
+    if not any(files.values()):
+        raise Refused(f"--write {path}: no node has an EDS in {folder}: nothing written")
+    lines = [
+        "# Written by canmon net scan. To check it: tickrig check FILE",
+        "master:",
+        f"  node_id: {master}",
+        "nodes:",
+    ]
+    for node in found:
+        eds = files[node.node_id]
+        lines += _no_eds_lines(node) if eds is None else _node_lines(node, eds, path.parent)
+    text = "\n".join(lines) + "\n"
+    try:
+        errors = decode_bus_file(text.encode("utf-8", "backslashreplace"), path).errors
+    except ImportError:  # without PyYAML it cannot be checked
+        errors = ()
+    if errors:
+        raise Refused(one_line(f"--write {path}: nothing written: {errors[0]}"))
+    with refusing("--write"):
+        write_whole(path, text)
+    count = sum(eds is not None for eds in files.values())
+    say(one_line(f"{path}: {counted(count, 'node')} written"))
+
+
+def _eds_of(node: NodeFound, folder: EdsFolder) -> Path | None:
+    """Return the EDS of a node; a line says which, or why there is none."""
+    identity = node_identity(node.identity[:3]) if node.answers else None
+    if identity is None:
+        say(f"node {node.node_id}: not written: it does not tell vendor and product (1018h)")
+        return None
+    choice = folder.choose(node.node_id, identity)
+    if choice is None:
+        say(one_line(f"node {node.node_id}: not written: no EDS in {folder} for {identity}"))
+        return None
+    say(choice.said(node.node_id))
+    return choice.path
+
+
+def _node_lines(node: NodeFound, eds: Path, folder: Path) -> list[str]:
+    """Return the section of a node."""
+    document = read_device_document(eds, "--eds-dir")
+    name = slug(document.device.info.product_name or node.name)[:_MOST_LETTERS] or "node"
+    if not _FIRST_LETTER.match(name):  # YAML takes 1_5 for a number
+        name = f"node_{name}"
+    try:
+        there = os.path.relpath(eds.resolve(), folder.resolve())
+    except ValueError:  # another drive of Windows
+        there = str(eds.resolve())
+    lines = [f"  {name}_{node.node_id}:", f"    node_id: {node.node_id}"]
+    lines.append(f"    dcf: {json.dumps(there, ensure_ascii=False)}")
+    revision, serial = node.identity[2:]
+    if revision and _REVISION in document.rows:
+        lines.append(f"    revision_number: 0x{revision:08X}")
+    if serial:
+        lines.append(f"    serial_number: 0 # not checked; it has 0x{serial:08X}")
+    if node.answers > 1:
+        lines.append(f"    # {node.answers} nodes answered with this node-ID")
+    return lines
+
+
+def _no_eds_lines(node: NodeFound) -> list[str]:
+    said = f"{_identity(node)} {json.dumps(node.name)}" if node.answers else "does not answer"
+    return [f"  # node {node.node_id}, without an EDS: {said}"]
 
 
 # The verb `net nmt`: NMT commands and their effect.

@@ -12,12 +12,14 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
+from tests.environment import ROOT
 from tickrig.device import make_epos
 from tickrig.emulators.testing.conformance.conformance import SlaveBench
 from tickrig.host.canmon.cli import main
 from tickrig.host.canmon.net import node_objects, session
 from tickrig.host.canmon.net.group import VERBS
 from tickrig.host.canmon.net.node_objects import NamedObjects
+from tickrig.host.canopen.bus_file.bus_file import read_bus_file
 from tickrig.host.cli.start import load
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.eds.eds_writer import write_eds
@@ -60,6 +62,69 @@ def test_a_scan_lists_nodes_with_profile_identity_and_name(rig: str) -> None:
     ]
     said = [json.loads(line) for line in net(rig, "scan", "--json").stdout.splitlines()]
     assert [node["node"] for node in said] == [5, 16]
+
+
+def _eds_folder(tmp_path: Path, name: str = "EPOS") -> Path:
+    """Return a folder with the EDS of the drive alone."""
+    folder = tmp_path / "eds"
+    folder.mkdir(exist_ok=True)
+    text = (ROOT / "examples" / "eds" / "epos.eds").read_text("utf-8")
+    assert "\nProductName=EPOS\n" in text
+    text = text.replace("\nProductName=EPOS\n", f"\nProductName={name}\n")
+    (folder / "drive.eds").write_text(text, "utf-8")
+    return folder
+
+
+def test_a_scan_is_written_as_a_bus_file_that_boots(
+    rig: str, tmp_path: Path, sent: list[CanFrame]
+) -> None:
+    bus, folder = tmp_path / "bus.yml", _eds_folder(tmp_path)
+    result = net(rig, "scan", "--write", str(bus), "--eds-dir", str(folder))
+    assert result.exit_code == 0, result.output
+    assert result.stdout == net(rig, "scan").stdout
+    assert not [frame for frame in written(sent) if frame.can_id != 0x7E5], "LSS: who has no ID"
+    assert bus.read_text("utf-8").splitlines()[1:] == [
+        "master:",
+        "  node_id: 1",
+        "nodes:",
+        "  epos_5:",
+        "    node_id: 5",
+        '    dcf: "eds/drive.eds"',
+        "    revision_number: 0x00010000",
+        "    serial_number: 0 # not checked; it has 0x00000001",
+        '  # node 16, without an EDS: 00000000:00000001:00010000:00000001 "f-palette"',
+    ]
+    assert "node 16: not written: no EDS in " in result.stderr
+    read = read_bus_file(bus)
+    assert (list(read.slaves), read.findings) == (["epos_5"], ())
+    assert net(rig, "boot", "5", "--bus", str(bus)).exit_code == 0
+
+
+@pytest.mark.parametrize(
+    "name", ["1_0", "yes", "a: {b} # c", "\u00e4\u0085-", "'\"", "x" * 200, ""]
+)
+def test_a_bus_file_takes_any_name_of_an_eds(rig: str, tmp_path: Path, name: str) -> None:
+    bus, folder = tmp_path / "bus.yml", _eds_folder(tmp_path, name)
+    result = net(rig, "scan", "--write", str(bus), "--eds-dir", str(folder))
+    assert result.exit_code == 0, result.output
+    assert [slave.node_id for slave in read_bus_file(bus).slaves.values()] == [5]
+
+
+def test_a_bus_file_that_is_there_stays_unless_forced(rig: str, tmp_path: Path) -> None:
+    bus, folder = tmp_path / "bus.yml", _eds_folder(tmp_path)
+    bus.write_text("mine")
+    words = ("scan", "--write", str(bus), "--eds-dir", str(folder))
+    result = net(rig, *words)
+    assert (result.exit_code, result.stdout, bus.read_text()) == (2, "", "mine")
+    assert "bus.yml is there already: choose another name, or give --force" in result.stderr
+    (folder / "drive.eds").rename(folder / "drive.txt")
+    result = net(rig, *words, "--force")
+    assert (result.exit_code, bus.read_text()) == (2, "mine"), "no EDS: nothing to write"
+    assert result.stderr.splitlines()[-1].endswith(": nothing written")
+    (folder / "drive.txt").rename(folder / "drive.eds")
+    assert net(rig, *words, "--force").exit_code == 0
+    assert "epos_5:" in bus.read_text()
+    assert {path.name for path in tmp_path.iterdir()} == {"bus.yml", "eds", "bench.toml"}
 
 
 def test_objects_are_read_by_name_and_by_index(rig: str) -> None:
@@ -260,6 +325,10 @@ def test_an_eds_of_another_device_is_told(rig: str, tmp_path: Path) -> None:
         (("nmt", "start", "0"), 2, "'0' is no node-ID 1..127, and not all"),
         (("nmt", "sart", "5"), 2, "'sart' is not one of 'start'"),
         (("red", "5"), 2, "No such command 'red'"),
+        (("scan", "--write", "b.yml"), 2, "--write: a bus.yml needs the EDS of each node: give"),
+        (("scan", "--write", "b.yml", "--eds-dir", "nosuch"), 2, "--eds-dir nosuch: No such file"),
+        (("scan", "--eds-dir", "."), 2, "--eds-dir is for --write FILE"),
+        (("scan", "--force"), 2, "--force is for --write FILE"),
         (("scan", "--wait", "x"), 2, "--wait 'x' is not a time"),
         (("scan", "--wait", "5"), 2, "--wait '5' has no unit: write 5s, 5ms or 5us"),
     ],
