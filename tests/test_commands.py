@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+import shlex
 import shutil
 import signal
 import subprocess
@@ -22,6 +24,8 @@ from tickrig.emulators.commands.cli import DEMOS
 from tickrig.emulators.commands.cli import main as tickrig
 from tickrig.emulators.rh3.commands.motion_cli import main as rh3
 from tickrig.host.canmon.cli import main as canmon
+from tickrig.host.cli.options import LazyCommand
+from tickrig.host.cli.start import load
 from tickrig.host.rrc.cli import main as rrc
 
 ROOT = Path(__file__).parents[1]
@@ -259,6 +263,70 @@ def run_onto_full_disk(words: str, folder: Path, stream: str) -> tuple[int, str]
             cwd=folder,
         )
     return process.returncode, process.stderr or ""
+
+
+# All commands of all console scripts: the names of their options and the examples of their help.
+
+MODULES = dict(
+    re.findall(r'_start\("(.+?)", "(.+?)"\)', (ROOT / "src/tickrig/commands.py").read_text("utf-8"))
+)
+
+
+def commands_below(command: click.Command, *words: str) -> Iterator[tuple[str, click.Command]]:
+    """Yield each command with the words that lead to it."""
+    if isinstance(command, LazyCommand):
+        command = load(command.path)
+    yield " ".join(words), command
+    if isinstance(command, click.Group):
+        context = click.Context(command)
+        for name in command.list_commands(context):
+            found = command.get_command(context, name)
+            assert found is not None
+            yield from commands_below(found, *words, name)
+
+
+COMMANDS = {
+    words: command
+    for script, module in MODULES.items()
+    for words, command in commands_below(load(f"{module}:main"), script)
+}
+
+
+def examples(command: click.Command) -> list[str]:
+    """Return the command lines in the help, without what a comment or a pipe adds."""
+    blocks = re.findall(r"(?s)\x08\n(.*?)(?:\n\n|\Z)", command.help or "")
+    lines = "\n".join(blocks).replace("\\\n", " ").splitlines()
+    started = [line.strip() for line in lines if line.split()[:1] and line.split()[0] in SCRIPTS]
+    return [re.split(r" {2,}(?![ -])| [|<>]", line)[0] for line in started]
+
+
+def test_every_console_script_is_walked() -> None:
+    assert MODULES.keys() == SCRIPTS.keys()
+    assert {"tickrig rtc conf set", "tickrig ctl press", "canmon net scan"} <= COMMANDS.keys()
+
+
+@pytest.mark.parametrize("words", COMMANDS)
+def test_the_help_of_every_command_has_an_example(words: str) -> None:
+    assert examples(COMMANDS[words])
+
+
+EXAMPLES = {line for command in COMMANDS.values() for line in examples(command)}
+OF_NEW = "tickrig emu lamp --link /tmp/lamp"
+"""This device exists after the lines before it, in the help of `tickrig new device`."""
+
+
+@pytest.mark.parametrize("line", sorted(EXAMPLES - {OF_NEW}))
+def test_every_example_is_a_line_that_its_command_takes(line: str) -> None:
+    script, *rest = shlex.split(line)
+    command, context = COMMANDS[script], None
+    while True:
+        context = command.make_context(script, rest, parent=context)
+        rest = [*context._protected_args, *context.args]
+        if not isinstance(command, click.Group) or not rest:
+            return
+        _, found, rest = command.resolve_command(context, rest)
+        assert found is not None
+        command = found
 
 
 def test_the_package_is_the_command() -> None:

@@ -65,7 +65,11 @@ def demo(context: click.Context) -> None:
     """Show an emulated device and a host at work; each ends by itself.
 
     Without a name, list the demonstrations.
-    """
+
+    \b
+    tickrig demo
+    tickrig demo rtc-lite --virtual
+    """  # noqa: D301 - click wants the backspace
     if context.invoked_subcommand is None:
         for name, (_, what) in DEMOS.items():
             click.echo(f"tickrig demo {name:8}  {what}")

@@ -173,14 +173,23 @@ def verb(
 
 @verb(_describe)
 def describe() -> Object:
-    """List inputs, groups, outputs and faults."""
+    """List inputs, groups, outputs and faults.
+
+    \b
+    tickrig ctl /tmp/rrc.ctl describe
+    tickrig ctl /tmp/rrc.ctl describe --json
+    """  # noqa: D301 - click wants the backspace
     return {}
 
 
 @verb(_values)
 @click.argument("names", nargs=-1, shell_complete=_complete(_seen))
 def get(names: tuple[str, ...]) -> Object:
-    """Show inputs and outputs by NAME; without names, show all."""
+    """Show inputs and outputs by NAME; without names, show all.
+
+    \b
+    tickrig ctl /tmp/rrc.ctl get state out_v_pct
+    """  # noqa: D301 - click wants the backspace
     return {"names": list(names)} if names else {}
 
 
@@ -188,7 +197,11 @@ def get(names: tuple[str, ...]) -> Object:
 @click.argument("name", shell_complete=_complete(_settable))
 @click.argument("values", nargs=-1, required=True)
 def set_(name: str, values: tuple[str, ...]) -> Object:
-    """Set the input or group NAME to VALUES, such as 'set stick 100 -20'."""
+    """Set the input or group NAME to VALUES, such as 'set stick 100 -20'.
+
+    \b
+    tickrig ctl /tmp/rrc.ctl set stick 100 -20
+    """  # noqa: D301 - click wants the backspace
     return {"name": name, "value": [parse_setting(value) for value in values]}
 
 
@@ -196,47 +209,75 @@ def set_(name: str, values: tuple[str, ...]) -> Object:
 @click.argument("name", shell_complete=_complete(_buttons))
 @click.option("--for", "duration", default="100ms", help="How long, as 500ms.  [100ms]")
 def press(name: str, duration: str) -> Object:
-    """Press the button NAME; it is released automatically. To hold it: set NAME 1."""
+    """Press the button NAME; it is released automatically. To hold it: set NAME 1.
+
+    \b
+    tickrig ctl /tmp/rrc.ctl press power_button --for 500ms
+    """  # noqa: D301 - click wants the backspace
     return {"name": name, "duration_us": time_us("--for", duration)}
 
 
 @verb()
 @click.argument("spec", shell_complete=_complete(faults))
 def fault(spec: str) -> Object:
-    """Start a fault: NAME[=ARGUMENT[,ARGUMENT]][@FROM[-TO]], times since the start."""
+    """Start a fault: NAME[=ARGUMENT[,ARGUMENT]][@FROM[-TO]], times since the start.
+
+    \b
+    tickrig ctl /tmp/rrc.ctl fault flip=0.001
+    """  # noqa: D301 - click wants the backspace
     return {"spec": spec}
 
 
 @verb()
 @click.argument("name", shell_complete=_complete(faults))
 def clear(name: str) -> Object:
-    """Clear the fault NAME."""
+    """Clear the fault NAME.
+
+    \b
+    tickrig ctl /tmp/rrc.ctl clear flip
+    """  # noqa: D301 - click wants the backspace
     return {"name": name}
 
 
 @verb(_faults)
 def faults_() -> Object:
-    """List the faults: on or off, since when, how often each acted, its arguments."""
+    """List the faults: on or off, since when, how often each acted, its arguments.
+
+    \b
+    tickrig ctl /tmp/rrc.ctl faults
+    """  # noqa: D301 - click wants the backspace
     return {}
 
 
 @verb(_lines)
 @click.option("--since", type=int, default=0, help="Only those after the line of this number.")
 def lines(since: int) -> Object:
-    """Show the latest lines on the wire, at most 100."""
+    """Show the latest lines on the wire, at most 100.
+
+    \b
+    tickrig ctl /tmp/rrc.ctl lines --json
+    """  # noqa: D301 - click wants the backspace
     return {"since": since}
 
 
 @verb(_status)
 def status() -> Object:
-    """Show the status of the run: time, late ticks, lost bytes, faults."""
+    """Show the status of the run: time, late ticks, lost bytes, faults.
+
+    \b
+    tickrig ctl /tmp/rrc.ctl status
+    """  # noqa: D301 - click wants the backspace
     return {}
 
 
 @verb(whom=_SERVER)
 @click.argument("node", type=click.IntRange(1, 127))
 def restart(node: int) -> Object:
-    """Reset the NODE of an rtc-canopen-server, by its node-ID, and set it up again."""
+    """Reset the NODE of an rtc-canopen-server, by its node-ID, and set it up again.
+
+    \b
+    tickrig ctl /tmp/robot.ctl restart 5
+    """  # noqa: D301 - click wants the backspace
     return {"node": node}
 
 
@@ -248,14 +289,22 @@ _NUMBERS: Final = {"ignore_unknown_options": True}
 @click.argument("y", type=float)
 @click.argument("deg", type=float)
 def goal(x: float, y: float, deg: float) -> Object:
-    """Drive the cart of 'rh3 serve' to X and Y in metres, and turn it to DEG degrees."""
+    """Drive the cart of 'rh3 serve' to X and Y in metres, and turn it to DEG degrees.
+
+    \b
+    tickrig ctl /tmp/cart goal 1 0.5 90
+    """  # noqa: D301 - click wants the backspace
     return {"pose": [x, y, deg]}
 
 
 @verb(whom=_CART)
 @click.argument("file", type=PATH, required=False)
 def path(file: Path | None) -> Object:
-    """Drive it along the points of FILE, as 'rh3 path', or along its defined path."""
+    """Drive it along the points of FILE, as 'rh3 path', or along its defined path.
+
+    \b
+    tickrig ctl /tmp/cart path corners.txt
+    """  # noqa: D301 - click wants the backspace
     if file is None:
         return {}
     try:
@@ -267,11 +316,19 @@ def path(file: Path | None) -> Object:
 
 @verb(whom=_CART)
 def end() -> Object:
-    """Put PositionInput into Error after the last command has finished."""
+    """Put PositionInput into Error after the last command has finished.
+
+    \b
+    tickrig ctl /tmp/cart end
+    """  # noqa: D301 - click wants the backspace
     return {}
 
 
 @verb()
 def stop() -> Object:
-    """End the emulator."""
+    """End the emulator.
+
+    \b
+    tickrig ctl /tmp/rrc.ctl stop
+    """  # noqa: D301 - click wants the backspace
     return {}

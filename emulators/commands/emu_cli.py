@@ -80,7 +80,8 @@ def device_command(device_type: DeviceType) -> click.Command:
         context.exit(run_named(device_type.name, options))
 
     first = device_type.text or f"Emulate {device_type.title}."
-    command = click.command(device_type.name, help=f"{first}\n\n{_HELP}")(run)
+    example = f"\b\ntickrig emu {device_type.name} --link /tmp/{device_type.name}"
+    command = click.command(device_type.name, help=f"{first}\n\n{_HELP}\n\n{example}")(run)
     command.params[:0] = declared.values()
     if device_type.panel:
         panel_option(command)
@@ -93,4 +94,9 @@ def _inputs(device_type: DeviceType) -> Iterable[InputSignal]:
 
 @click.group(cls=_DeviceGroup, commands=_OURS)
 def emu() -> None:
-    """Emulate a built-in device or one of an installed package."""
+    """Emulate a built-in device or one of an installed package.
+
+    \b
+    tickrig emu rrc --link /tmp/rrc
+    tickrig emu canopen-slave --model f-palette --node-id 5 -i socketcan -c vcan0
+    """  # noqa: D301 - click wants the backspace

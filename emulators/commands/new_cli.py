@@ -23,7 +23,11 @@ _NAME: Final = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
 
 @click.group()
 def new() -> None:
-    """Create a package that extends tickrig."""
+    """Create a package that extends tickrig.
+
+    \b
+    tickrig new device lamp
+    """  # noqa: D301 - click wants the backspace
 
 
 @new.command()

@@ -28,7 +28,11 @@ _LIVE: Final[Decorator] = add_options(
 @click.command()
 @works_in("tickrig.emulators.demos.terminal_cli:show_rrc")
 def rrc() -> None:
-    """Drive an RRC on a pty through power-on, all samples, output mode and a watchdog trip."""
+    """Drive an RRC on a pty through power-on, all samples, output mode and a watchdog trip.
+
+    \b
+    tickrig demo rrc
+    """  # noqa: D301 - click wants the backspace
 
 
 @click.command("rtc-lite")
@@ -39,7 +43,11 @@ def rtc_lite(virtual: bool) -> None:
 
     ConsoleIn, LiteA, LiteB, ConsoleOut: the experiments of the paper on
     RTComponent-Lite. The devices are processes on two ptys, in real time.
-    """
+
+    \b
+    tickrig demo rtc-lite
+    tickrig demo rtc-lite --virtual
+    """  # noqa: D301 - click wants the backspace
 
 
 @click.command()
@@ -52,7 +60,11 @@ def tkernel(no_caches: bool) -> None:
     with infra-red markers; a node on T-Kernel reads their ucodes. On the way
     back the resolution service is unreachable, and the caches of the node go
     on. In virtual time: the same lines each time.
-    """
+
+    \b
+    tickrig demo tkernel
+    tickrig demo tkernel --no-caches
+    """  # noqa: D301 - click wants the backspace
 
 
 @click.command(cls=BusCommand)

@@ -140,7 +140,11 @@ def conf() -> None:
 @click.option("-l", "--long", is_flag=True, help="Show the values of each set.")
 @at
 def list_(at: Path, name: str, long: bool) -> None:
-    """List the parameters of the component NAME with the values that hold, and its sets."""
+    """List the parameters of the component NAME with the values that hold, and its sets.
+
+    \b
+    tickrig rtc conf list ConfigSample0 -l
+    """  # noqa: D301 - click wants the backspace
     for line in _configuration_lines(_configuration(at, name), long=long):
         click.echo(line.removeprefix("  "))
 
@@ -150,7 +154,11 @@ def list_(at: Path, name: str, long: bool) -> None:
 @click.argument("parameter")
 @at
 def get(at: Path, name: str, parameter: str) -> None:
-    """Print the value of PARAMETER that holds."""
+    """Print the value of PARAMETER that holds.
+
+    \b
+    tickrig rtc conf get ConfigSample0 int_param0
+    """  # noqa: D301 - click wants the backspace
     values = {one["name"]: one["value"] for one in _configuration(at, name)["parameters"]}
     if parameter not in values:
         raise Refused(f"no parameter {parameter!r}; known: {', '.join(values) or 'none'}")
@@ -164,7 +172,11 @@ def get(at: Path, name: str, parameter: str) -> None:
 @click.option("--set", "set_id", default="", help="The set to change.  [the active one]")
 @at
 def set_(at: Path, name: str, parameter: str, value: str, set_id: str) -> None:
-    """Change PARAMETER to VALUE; elements of a list have commas between."""
+    """Change PARAMETER to VALUE; elements of a list have commas between.
+
+    \b
+    tickrig rtc conf set ConfigSample0 int_param0 5
+    """  # noqa: D301 - click wants the backspace
     request_system(at, "set_parameter", name=name, parameter=parameter, value=value, set=set_id)
 
 
@@ -173,7 +185,11 @@ def set_(at: Path, name: str, parameter: str, value: str, set_id: str) -> None:
 @click.argument("set_id", metavar="SET")
 @at
 def act(at: Path, name: str, set_id: str) -> None:
-    """Let the values of SET hold."""
+    """Let the values of SET hold.
+
+    \b
+    tickrig rtc conf act ConfigSample0 fast
+    """  # noqa: D301 - click wants the backspace
     request_system(at, "activate_set", name=name, set=set_id)
 
 
@@ -200,7 +216,10 @@ def ls(at: Path, names: tuple[str, ...], long: bool, recursive: bool, as_json: b
     """List the components NAMES, all if none is named.
 
     With -l a line is: state, ports/those connected, rate, type, name.
-    """
+
+    \b
+    tickrig rtc ls -l
+    """  # noqa: D301 - click wants the backspace
     described = components(at, *names)
     if as_json:
         click.echo(json_text(described))
@@ -217,7 +236,11 @@ def ls(at: Path, names: tuple[str, ...], long: bool, recursive: bool, as_json: b
 @as_json
 @at
 def cat(at: Path, names: tuple[str, ...], long: bool, as_json: bool) -> None:
-    """Show the components NAMES: type, state, ports, connectors, configuration."""
+    """Show the components NAMES: type, state, ports, connectors, configuration.
+
+    \b
+    tickrig rtc cat ConsoleIn0 -l
+    """  # noqa: D301 - click wants the backspace
     described = components(at, *names)
     if as_json:
         click.echo(json_text(described))
@@ -233,7 +256,12 @@ def cat(at: Path, names: tuple[str, ...], long: bool, as_json: bool) -> None:
 @click.option("--rate", "rate_hz", type=NumberRange(1e-6, 1e6), help="In Hz.  [1000]")
 @at
 def create(at: Path, type_name: str, name: str, rate_hz: float | None) -> None:
-    """Create a component of TYPE, and print its name, such as ConsoleIn0."""
+    """Create a component of TYPE, and print its name, such as ConsoleIn0.
+
+    \b
+    tickrig rtc create ConsoleIn
+    tickrig rtc create SeqOut Source0 --rate 100
+    """  # noqa: D301 - click wants the backspace
     rate = {} if rate_hz is None else {"rate_hz": rate_hz}
     click.echo(request_system(at, "create", type=type_name, name=name, **rate)["name"])
 
@@ -261,7 +289,12 @@ def con(at: Path, first: str, second: str, properties: tuple[str, ...], name: st
 @click.argument("ports", nargs=-1, required=True, shell_complete=complete_port)
 @at
 def dis(at: Path, ports: tuple[str, ...]) -> None:
-    """End the connector between two PORTS, all of one port, or all of a component."""
+    """End the connector between two PORTS, all of one port, or all of a component.
+
+    \b
+    tickrig rtc dis ConsoleIn0.out ConsoleOut0.in
+    tickrig rtc dis ConsoleIn0
+    """  # noqa: D301 - click wants the backspace
     request_system(at, "disconnect", ports=list(ports))
 
 
@@ -269,7 +302,11 @@ def dis(at: Path, ports: tuple[str, ...]) -> None:
 @_names_needed
 @at
 def exit_(at: Path, names: tuple[str, ...]) -> None:
-    """End the components NAMES, and their connectors."""
+    """End the components NAMES, and their connectors.
+
+    \b
+    tickrig rtc exit ConsoleIn0
+    """  # noqa: D301 - click wants the backspace
     for name in names:
         request_system(at, "delete", name=name)
 
@@ -322,8 +359,10 @@ def print_(at: Path, port: str, count: int | None, duration: str | None, as_json
 
 def _moving(name: str, verb: str, wanted: str, text: str) -> click.Command:
     """Return a command that asks components for a state, and waits until they are there."""
+    told = f"{text}, and wait until they are {wanted.capitalize()}."
+    example = f"tickrig rtc {name} ConsoleIn0 ConsoleOut0"
 
-    @click.command(name, help=f"{text}, and wait until they are {wanted.capitalize()}.")
+    @click.command(name, help=f"{told}\n\n\b\n{example}")
     @_names_needed
     @click.option("--wait", default="2s", help="How long to wait for it; 0 asks only.  [2s]")
     @at
@@ -386,7 +425,11 @@ _FILES: Final = "tickrig.host.rtc.system.system_file"
 @click.argument("file", type=PATH, required=False)
 @at
 def save(at: Path, file: Path | None) -> None:
-    """Write the system as it is to FILE, .toml or .xml; without FILE print it as TOML."""
+    """Write the system as it is to FILE, .toml or .xml; without FILE print it as TOML.
+
+    \b
+    tickrig rtc save system.toml
+    """  # noqa: D301 - click wants the backspace
     file_format = "toml" if file is None else load(f"{_FILES}:file_format")(file)
     text = request_system(at, "save", format=file_format)["text"]
     if file is None:
@@ -399,7 +442,11 @@ def save(at: Path, file: Path | None) -> None:
 @as_json
 @at
 def status(at: Path, as_json: bool) -> None:
-    """Show how the run is going: time, late ticks."""
+    """Show how the run is going: time, late ticks.
+
+    \b
+    tickrig rtc status --json
+    """  # noqa: D301 - click wants the backspace
     answer = {key: value for key, value in request_system(at, "status").items() if key != "ok"}
     if as_json:
         click.echo(json_text(answer))
@@ -411,7 +458,11 @@ def status(at: Path, as_json: bool) -> None:
 @click.command()
 @at
 def stop(at: Path) -> None:
-    """End the system."""
+    """End the system.
+
+    \b
+    tickrig rtc stop
+    """  # noqa: D301 - click wants the backspace
     request_system(at, "stop")
 
 
@@ -423,7 +474,10 @@ def check(at: Path, file: Path) -> None:
 
     States are compared with a .toml file; RTSProfile has none. What is there
     beside it does not matter.
-    """
+
+    \b
+    tickrig rtc check system.toml
+    """  # noqa: D301 - click wants the backspace
     text = request_system(at, "save", format=load(f"{_FILES}:file_format")(file))["text"]
     lines = load(f"{_FILES}:lacking")(file, text)
     for line in lines:
