@@ -13,6 +13,7 @@ import tomllib
 from collections.abc import Iterator
 from importlib.metadata import packages_distributions, requires
 from pathlib import Path
+from typing import Any
 
 import click
 import pytest
@@ -327,6 +328,93 @@ def test_every_example_is_a_line_that_its_command_takes(line: str) -> None:
         _, found, rest = command.resolve_command(context, rest)
         assert found is not None
         command = found
+
+
+OPTION_NAMES = {
+    "--json": r"flag: (?!.*(one a line|object a)).*JSON",
+    "--jsonl": r"flag: .*(JSON, one a line|JSON object a)|flag: .*JSON.*\b(each|per)\b",
+    "-o": r"(?i)(path|\S*file\S*|dir|out): (.*\b(write|record)\b|the (page|rules|trace)\b|"
+    r"of --plot|output|file for|into a log|junit|svg|markdown|one page|\.svg)",
+    "--plot": r".*: Draw|.*: .*\bas picture",
+    "--control": r"(?i)path: .*(control socket|unix socket)",
+    "--max": r"integer.*: .*\bshown\b",
+    "--for": r".*: (How long|End after)\b",
+}
+"""The name of an option, and how `KIND: HELP` of all that do this begins."""
+
+SECOND = "a second file beside the output, named by its kind"
+CANDUMP = "the letter of candump"
+OTHER_NAMES = {
+    **dict.fromkeys(("--junit", "--sarif", "--html", "--badge", "--issue", "--report"), SECOND),
+    **dict.fromkeys(("--write-baseline", "--save", "--trace", "--log", "--store"), SECOND),
+    "-l": CANDUMP,
+    "-n": CANDUMP,
+    "-T": CANDUMP,
+    "--pdf": "the page of -o once more",
+    "--png": "the page of -o once more",
+    "--write-eds": "it ends an emulator that writes nothing else",
+    "--dot": "text for another program; no picture",
+    "--map": "draws on the terminal",
+    "--at": "the socket of a program that runs already",
+    "--board": "tkernel-emu has two sockets; --control is that of its system",
+    "--socket": "carries CiA 309-3, not the control protocol",
+    "--wait": "ends as soon as the answer is there",
+    "rrc test --json": "has a file since it was there; `--json -` prints",
+    "canmon net scan --json": "a stream; the name is in scripts",
+    "canmon net read --json": "a stream; the name is in scripts",
+    "canmon net program --control": "the object 1F51h, program control",
+}
+"""Options of another name for the same, or of a name for something else, with the reason."""
+
+
+def misnamed(words: str, option: click.Option) -> Iterator[str]:
+    """Yield what is wrong with the names of an option."""
+    kind = "flag" if option.is_flag else option.metavar or option.type.name
+    told = f"{kind}: {option.help}"
+    for name, pattern in OPTION_NAMES.items():
+        if bool(re.match(pattern, told)) != (name in option.opts) and not (
+            name == "--json" and "--jsonl" in option.opts  # the old name of a stream
+        ):
+            yield f"{words} {option.opts[-1]}"
+
+
+MISNAMED = {
+    wrong
+    for words, command in COMMANDS.items()
+    for option in command.params
+    if isinstance(option, click.Option)
+    for wrong in misnamed(words, option)
+}
+
+
+def test_options_that_do_the_same_have_the_same_name() -> None:
+    assert [one for one in MISNAMED if not {one, one.split()[-1]} & OTHER_NAMES.keys()] == []
+
+
+@pytest.mark.parametrize(
+    ("name", "settings"),
+    [
+        ("--json", {"is_flag": True, "help": "Findings as JSON, one a line."}),
+        ("--jsonl", {"is_flag": True, "help": "Print the answer as JSON."}),
+        ("--file", {"metavar": "FILE", "help": "Write the table."}),
+        ("--curve", {"type": click.Path(), "help": "Draw the curves."}),
+        ("--serve", {"type": click.Path(), "help": "Control socket."}),
+        ("--most", {"type": click.IntRange(1), "help": "Findings that are shown."}),
+        ("--during", {"metavar": "TIME", "help": "End after this time."}),
+    ],
+)
+def test_an_option_of_another_name_is_found(name: str, settings: dict[str, Any]) -> None:
+    assert {*misnamed("canmon x", click.Option([name], **settings))} == {f"canmon x {name}"}
+
+
+def test_no_exception_of_the_names_is_left_over() -> None:
+    assert OTHER_NAMES.keys() - MISNAMED - {one.split()[-1] for one in MISNAMED} == set()
+
+
+def test_the_table_of_option_names_is_what_is_held() -> None:
+    page = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
+    table = page.partition("| option | meaning |")[2].partition("\n\n")[0]
+    assert re.findall(r"(?m)^\| `(-+\w+)", table) == [*OPTION_NAMES]
 
 
 def test_the_package_is_the_command() -> None:

@@ -19,7 +19,7 @@ _LIVE: Final[Decorator] = add_options(
     click.option(
         "--control",
         type=PATH,
-        help="In real time until Ctrl-C: tickrig rtc con and dis --at PATH change the connections.",
+        help="Control socket for tickrig rtc con and dis --at PATH; in real time until Ctrl-C.",
     ),
     openrtm_options,
 )

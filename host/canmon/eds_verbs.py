@@ -50,7 +50,7 @@ class _Case(NamedTuple):
 @click.command()
 @click.argument("file", nargs=-1, required=True, type=PATH)
 @click.option("--strict", is_flag=True, help="Count warnings as errors.")
-@click.option("--json", "as_json", is_flag=True, help="Print findings as JSON, one per line.")
+@click.option("--jsonl", "--json", "as_json", is_flag=True, help="Findings as JSON, one a line.")
 @click.option("--junit", "report", type=PATH, metavar="FILE", help="Write a JUnit report.")
 def check_all(file: Sequence[Path], strict: bool, as_json: bool, report: Path | None) -> None:
     """Check EDS files and print all findings; exit status 1 if there is an error.
@@ -62,7 +62,7 @@ def check_all(file: Sequence[Path], strict: bool, as_json: bool, report: Path | 
     \b
     canmon eds check drive.eds
     canmon eds check *.eds *.xdd --strict --junit eds.xml
-    canmon eds check drive.eds --json | jq .rule
+    canmon eds check drive.eds --jsonl | jq .rule
     """  # noqa: D301 - click wants the backspace
     _check_report(report, file)
     documents, unread = _read(file)
@@ -322,7 +322,7 @@ _DIFFERENT: Final = 1
 @click.command()
 @click.argument("old", type=PATH)
 @click.argument("new", type=PATH)
-@click.option("--json", "as_json", is_flag=True, help="Print differences as JSON, one per line.")
+@click.option("--jsonl", "--json", "as_json", is_flag=True, help="Differences as JSON, one a line.")
 def compare(old: Path, new: Path, as_json: bool) -> None:
     """Compare the devices of two EDS files; exit status 1 if they differ.
 
@@ -331,7 +331,7 @@ def compare(old: Path, new: Path, as_json: bool) -> None:
 
     \b
     canmon eds diff old.eds new.eds
-    canmon eds diff drive.eds drive.xdd --json
+    canmon eds diff drive.eds drive.xdd --jsonl
     """  # noqa: D301 - click wants the backspace
     changes = diff(read_device_document(old), read_device_document(new))
     with until_unread():

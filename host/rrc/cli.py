@@ -160,7 +160,9 @@ def _watchdog(time_us: int | None, *, off: bool) -> int:
 
 
 _for_option: Final = time_option("--for", "for_us", help="End after this time.")
-_json_option: Final = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+_json_option: Final = click.option(
+    "--json", "as_json", is_flag=True, help="Print the answer as JSON."
+)
 _speed_option: Final = click.option(
     "--speed", type=_SPEED, default=1, show_default=True, help="Speed mode, 1 is the slowest."
 )
@@ -336,14 +338,14 @@ def _poweroff(**options: Any) -> None:
 @main.command("watch")
 @_for_option
 @click.option("--all", "every", is_flag=True, help="Print each status line, not only changes.")
-@_json_option
+@click.option("--jsonl", "--json", "as_json", is_flag=True, help="One JSON object a line.")
 @works_in(f"{_VERBS}:watch")
 def _watch(**options: Any) -> None:
     """Print events and changes of the status line until Ctrl-C.
 
     \b
     rrc /dev/ttyACM0 watch
-    rrc /dev/ttyACM0 watch --json --for 10s > run.jsonl
+    rrc /dev/ttyACM0 watch --jsonl --for 10s > run.jsonl
     """  # noqa: D301 - click wants the backspace
 
 

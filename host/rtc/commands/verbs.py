@@ -338,7 +338,7 @@ def inject(at: Path, port: str, value: str) -> None:
 @click.argument("port", shell_complete=complete_port)
 @click.option("-n", "count", type=click.IntRange(1), help="End after so many values.")
 @click.option("--for", "duration", metavar="TIME", help="End after this time, as 2s.")
-@click.option("--json", "as_json", is_flag=True, help="Print each value as a JSON object.")
+@click.option("--jsonl", "--json", "as_json", is_flag=True, help="One JSON object a value.")
 @at
 def print_(at: Path, port: str, count: int | None, duration: str | None, as_json: bool) -> None:
     """Print what the OutPort PORT writes from now on, a line a value; Ctrl-C ends.
@@ -347,7 +347,7 @@ def print_(at: Path, port: str, count: int | None, duration: str | None, as_json
 
     \b
     tickrig rtc print ConsoleIn0.out
-    tickrig rtc print SeqOut0.Long -n 10 --json
+    tickrig rtc print SeqOut0.Long -n 10 --jsonl
     """  # noqa: D301 - click wants the backspace
     until_s = time.monotonic() + time_us("--for", duration) / 1e6 if duration else None
     try:

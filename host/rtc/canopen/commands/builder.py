@@ -15,7 +15,7 @@ from tickrig.host.rtc.canopen.builder.profile_file import EXAMPLE
 
 @click.command(cls=HarmlessCommand)
 @click.argument("profile", type=PATH, required=False)
-@click.option("--out", type=PATH, metavar="DIR", help="Write the files there; DIR is made.")
+@click.option("-o", "--out", type=PATH, metavar="DIR", help="Write the files there; DIR is made.")
 @click.option("--force", is_flag=True, help="Overwrite the skeleton, which is yours to fill.")
 @click.option("--all", "every", is_flag=True, help="Show every object, not only those of ports.")
 @click.option("--example", is_flag=True, help="Print a profile to begin with, and end.")
