@@ -193,6 +193,8 @@ class BusEvents:
         self._first = first_rows(rows)
         self._requests: dict[tuple[int, int], int] = {}
         self._silent: list[tuple[int, str, int]] = []
+        self._wrong_toggles: dict[int, int] = {}  # first row in the transfer of a node
+        self._latest_sdo: dict[int, int] = {}
         self._row = 0
         self._untimed = times[0] == times[-1]
 
@@ -222,13 +224,18 @@ class BusEvents:
             self._requests[node, at_us] = row
         elif can_id in RESPONSE_IDS and not frame.remote:
             self._answer(at_us, node, data)
-        for transfer in said.transfers:
-            self._transfer(at_us, transfer)
+        if said.kind == "sdo":
+            # A new request ends a transfer whose wrong frame came before it.
+            if said.flaw == WRONG_TOGGLE:
+                self._wrong_toggles.setdefault(node, row)
+            for transfer in said.transfers:
+                self._transfer(at_us, transfer)
+            self._latest_sdo[node] = row
 
     def end(self, end_us: int) -> None:
         """Judge what is known once all frames were taken."""
         for transfer in self._decoder.pending(end_us):
-            if transfer.duration_us > _PATIENCE_US:
+            if transfer.duration_us > _PATIENCE_US or WRONG_TOGGLE in transfer.flaws:
                 self._transfer(end_us, transfer)
         self._judge_silent()
         for node, one in sorted(self.nodes.items()):
@@ -383,6 +390,7 @@ class BusEvents:
             and not transfer.partial
             and WRONG_TOGGLE not in transfer.flaws
         ):
+            row = self._latest_sdo.get(node, row)
             self._silent.append((node, f"{what} is broken off", row))
         elif transfer.retries and transfer.mode is decoded.TransferMode.EXPEDITED:
             again = f"asked again {counted(transfer.retries, 'time')}"
@@ -390,7 +398,9 @@ class BusEvents:
         if entry == STATUSWORD and transfer.direction is decoded.TransferDirection.UPLOAD:
             self._statusword(node, ident, transfer.data or b"")
         if WRONG_TOGGLE in transfer.flaws:
-            self._hit("sdo-toggle", node, ident, f"{what}: {WRONG_TOGGLE}")
+            row = self._wrong_toggles.get(node, self._row)
+            self.hits.append(Hit("sdo-toggle", node, ident, f"{what}: {WRONG_TOGGLE}", (row,)))
+        self._wrong_toggles.pop(node, None)
         if (
             entry is not None
             and transfer.direction is decoded.TransferDirection.DOWNLOAD

@@ -176,6 +176,7 @@ class Decoded(NamedTuple):
         transfers: the SDO transfers that ended with this frame.
         asks: who sent it waits for an answer: SDO client, NMT master that guards.
         size: bytes that a PDO must have by its mapping, None where nobody told it.
+        flaw: what does not fit with an SDO frame, where that is new in its transfer.
     """
 
     kind: str
@@ -187,6 +188,7 @@ class Decoded(NamedTuple):
     transfers: tuple[Transfer, ...] = ()
     asks: bool = False
     size: int | None = None
+    flaw: str = ""
 
     @property
     def text(self) -> str:

@@ -253,13 +253,16 @@ class BusDecoder:
             return Decoded("sdo", node, "remote frame")
         step = take(at_us, frame.data)
         if not step.ended:
-            return Decoded("sdo", node, step.text, (), "", step.entry, asks=step.asks)
+            return Decoded(
+                *("sdo", node, step.text, (), "", step.entry), asks=step.asks, flaw=step.flaw
+            )
         for transfer in step.ended:
             self._learn(transfer)
         ended = tuple(self._named(transfer) for transfer in step.ended)
         last = ended[-1]
         signals, source = _signals(last), last.source
-        return Decoded("sdo", node, None, signals, source, step.entry, ended, step.asks)
+        said = Decoded("sdo", node, None, signals, source, step.entry, ended, step.asks)
+        return said._replace(flaw=step.flaw) if step.flaw else said
 
     def _named(self, transfer: Transfer) -> Transfer:
         """Return it with name and value of its object."""

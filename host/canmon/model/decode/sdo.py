@@ -84,6 +84,7 @@ class OpenTransfer:
         block_last: place of the last segment in its block, once it was heard.
         block_size: segments of a block, as its receiver wants it; 0 while it has not said so.
         done: nothing more is expected.
+        new_flaw: what the latest frame added to `flaws`; empty if nothing.
     """
 
     at_us: int
@@ -107,6 +108,7 @@ class OpenTransfer:
     block_last: int | None = None
     block_size: int = 0
     done: bool = False
+    new_flaw: str = ""
     _block: dict[int, bytes] = field(default_factory=dict)
 
     @property
@@ -155,6 +157,7 @@ class OpenTransfer:
         """Note what does not fit, once."""
         if text not in self.flaws:
             self.flaws.append(text)
+            self.new_flaw = text
 
     def close(
         self, now_us: int, outcome: TransferOutcome, *, code: int = 0, by_client: bool = False
@@ -385,12 +388,14 @@ class SdoStep(NamedTuple):
         entry: index and sub-index it is about, as far as known.
         ended: the transfers that ended with it.
         asks: the client waits for an answer to it.
+        flaw: what does not fit with it, where that is new in its transfer.
     """
 
     text: str
     entry: tuple[int, int] | None = None
     ended: tuple[Transfer, ...] = ()
     asks: bool = False
+    flaw: str = ""
 
 
 class SdoChannel:
@@ -441,7 +446,9 @@ class SdoChannel:
 
     def _step(self, at_us: int, text: str, message: sdo.Request | sdo.Response) -> SdoStep:
         """Close what is done, and tell what ended."""
-        running = self._running
+        running, flaw = self._running, ""
+        if running:
+            flaw, running.new_flaw = running.new_flaw, ""
         if running and running.done:
             self._end(running.close(at_us, TransferOutcome.DONE))
         ended, self._ended = tuple(self._ended), []
@@ -450,7 +457,7 @@ class SdoChannel:
             entry = ended[-1].entry
         elif entry is None and running:
             entry = running.entry
-        return SdoStep(text, entry, ended)
+        return SdoStep(text, entry, ended, flaw=flaw)
 
     def _end(self, transfer: Transfer) -> None:
         self._latest, self._running = transfer, None

@@ -282,3 +282,26 @@ def test_a_bus_that_falls_silent_is_judged_until_now() -> None:
     assert str(fault) == (
         "no-lost-heartbeat: can0 node 5: no heartbeat for 3100.0 ms, one each 100.000 before"
     )
+
+
+def test_a_finding_of_an_sdo_transfer_has_the_frame_that_shows_it() -> None:
+    ask = "590#4108100009000000"
+    cases = {
+        "sdo-toggle": (
+            "610#4008100000000000",
+            ask,
+            "610#6000000000000000",
+            "*590#1B66000000000000",
+        ),
+        "no-sdo-abort": ("610#4008100000000000", ask, "*590#8008100000000206"),
+        "sdo-unanswered": ("*610#4008100000000000",),
+    }
+    broken = ("610#4008100000000000", ask, "*610#6000000000000000")
+    for rule, texts in (*cases.items(), ("sdo-unanswered", broken)):
+        for behind in ("", "610#4000100000000000 590#4300100091010700"):
+            frames = " ".join(("710#05 590#4300100091010700", *texts)).replace("*", "")
+            found = diagnose([lines(f"{frames} {behind} {'710#05 ' * 30}", 100_000)]).faults
+            (fault,) = (one for one in found if one.rule == rule)
+            number = 3 + next(at for at, text in enumerate(texts) if text.startswith("*"))
+            assert [place.number for place in fault.frames] == [number]
+            assert fault.first_us == fault.frames[0].at_us
