@@ -15,7 +15,8 @@ from typing import Final, NamedTuple
 
 from tickrig.host.canmon.model.check.diagnosis import BusFault, Diagnosis
 from tickrig.host.canmon.model.decode.decoded import Decoded
-from tickrig.host.canmon.model.decode.node_board import NodeStatus, identity_words, pdo_contents
+from tickrig.host.canmon.model.decode.node_board import NodeStatus, pdo_contents, told_identity
+from tickrig.host.canmon.model.decode.node_memory import HEARTBEAT_TIME
 from tickrig.host.canmon.model.frames import (
     REMOTE,
     Record,
@@ -28,6 +29,7 @@ from tickrig.host.canmon.model.frames import (
 from tickrig.host.canmon.model.survey import Mark, Survey, Thinned
 from tickrig.host.text.page_text import content_policy, duration, harmless, json_text, one_line
 from tickrig.host.text.values import counted
+from tickrig.wire.canopen import nmt
 
 Around = Sequence[tuple[Record, Decoded]]
 
@@ -181,7 +183,7 @@ def _page_data(survey: Survey, verdict: Verdict, head: ReportHead) -> dict[str, 
             }
             for channel in sorted(survey.frames)
         ],
-        "nodes": [_node(survey, row, several=several) for row in rows],
+        "nodes": [_node(survey, row, verdict.diagnosis, several=several) for row in rows],
         "nodeHeads": _HEADS,
         "signals": _signals(survey, several=several),
         "ids": _idents(survey, rows, max(span_us, 1)),
@@ -246,27 +248,30 @@ _HEADS: Final = (
 )
 
 
-def _node(survey: Survey, row: NodeStatus, *, several: bool) -> dict[str, object]:
-    lane = survey.lane(row.channel, row.node)
+def _node(
+    survey: Survey, row: NodeStatus, diagnosis: Diagnosis, *, several: bool
+) -> dict[str, object]:
+    lane, memory = survey.lane(row.channel, row.node), row.memory
     label = f"{row.channel} node {row.node}" if several else f"Node {row.node}"
-    period = "" if row.period_us is None else f"{row.period_us / 1e3:g} ms"
-    late = f", late {counted(lane.gaps.count, 'time')}" if lane.gaps.count else ""
+    gaps = _gaps(survey, row, lane.gaps, diagnosis)
     boots = f"{row.boots}" + f" ({row.unrequested_boots} unasked)" * bool(row.unrequested_boots)
+    filed = bool(row.name) and not memory.was_received(_DEVICE_NAME)
     cells = (
-        *(label, row.name, identity_words(row), row.state_text, period + late),
-        *(boots, row.drive_state, _emcys(lane.emcys), _failures(lane.failures)),
+        *(label, row.name + _FROM_EDS * filed, told_identity(row) or "not read", row.state_text),
+        *(_heartbeat(row, gaps, diagnosis), boots, row.drive_state),
+        *(_emcys(lane.emcys), _failures(lane.failures)),
     )
     return {
         "key": _key(row.channel, row.node),
         "label": one_line(label),
-        "short": one_line(row.name or row.drive_state),
+        "short": one_line(row.name + _FROM_EDS * filed or row.drive_state),
         "cells": [one_line(cell) for cell in cells],
         "states": [part for at_us, state in lane.states.changes for part in (at_us, state)],
         "pdos": _bins(_pdo_counts(survey, row), survey.counts.width_us),
         **{
             name: [[one.at_us, one.span_us, one_line(one.text)] for one in marks.items]
             for name, marks in (
-                ("gaps", lane.gaps),
+                ("gaps", gaps),
                 ("boots", lane.boots),
                 ("commands", lane.commands),
                 ("emcys", lane.emcys),
@@ -275,6 +280,67 @@ def _node(survey: Survey, row: NodeStatus, *, several: bool) -> dict[str, object
             )
         },
     }
+
+
+_FROM_EDS: Final = " (EDS)"
+_DEVICE_NAME: Final = (0x1008, 0)
+
+
+def _of_node(diagnosis: Diagnosis, row: NodeStatus, rule: str) -> list[BusFault]:
+    return [
+        one
+        for one in diagnosis.faults
+        if one.rule == rule and (one.channel, one.node) == (row.channel, row.node)
+    ]
+
+
+def _heartbeat(row: NodeStatus, gaps: Thinned[Mark], diagnosis: Diagnosis) -> str:
+    if _of_node(diagnosis, row, "doubled-node"):  # their gaps give the period of neither
+        return "from two nodes" if row.reported_us is not None else ""
+    if row.period_us is None:
+        return ""
+    filed = not row.learnt and not row.memory.was_received(HEARTBEAT_TIME)
+    late = f", late {counted(gaps.count, 'time')}" if gaps.count else ""
+    return f"{row.period_us / 1e3:g} ms{_FROM_EDS * filed}{late}"
+
+
+def _gaps(
+    survey: Survey, row: NodeStatus, gaps: Thinned[Mark], diagnosis: Diagnosis
+) -> Thinned[Mark]:
+    """Return the gaps that a finding confirms.
+
+    A survey sees a gap at once, by the heartbeats before it; the rules see the whole log, and
+    know two nodes with one node-ID. A node that is guarded has no heartbeats to judge.
+    """
+    guarded = (row.channel, nmt.ERROR_CONTROL_COB_ID + row.node | REMOTE) in survey.counts.sums
+    if guarded or "no-lost-heartbeat" not in diagnosis.judged:
+        return gaps
+    silences = [
+        one for one in diagnosis.faults if one.rule == "silence" and one.channel == row.channel
+    ]
+    spans = [
+        (survey.since(from_us), survey.since(to_us))
+        for one in [*_of_node(diagnosis, row, "no-lost-heartbeat"), *silences]
+        for from_us, to_us in _seen(one)
+    ]
+    kept = [
+        gap
+        for gap in gaps.items
+        if any(begin <= gap.at_us + gap.span_us and gap.at_us <= end for begin, end in spans)
+    ]
+    if len(kept) == len(gaps.items):
+        return gaps
+    found = Thinned[Mark]()
+    for gap in kept:
+        found.append(gap)
+    return found
+
+
+def _seen(fault: BusFault) -> Iterable[tuple[int, int]]:
+    """Return the times of a finding; what has too many frames is one span at its end."""
+    yield from ((place.at_us, place.at_us) for place in fault.frames)
+    if fault.amount > len(fault.frames):
+        yield fault.frames[-1].at_us if fault.frames else fault.first_us, fault.last_us
 
 
 def _emcys(marks: Thinned[Mark]) -> str:

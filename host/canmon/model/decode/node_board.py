@@ -16,7 +16,7 @@ Who a node is, and what its PDOs carry, as far as anybody said it.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
@@ -482,17 +482,40 @@ def maker_text(row: NodeStatus) -> str:
 
 def identity_words(row: NodeStatus) -> str:
     """Return profile, vendor, product, revision and serial number, as far as they are known."""
+    words = _identity(row.memory.number, row.memory.eds.vendor)
+    return words or "not known: no EDS, and nobody has read 1000h or 1018h"
+
+
+def told_identity(row: NodeStatus) -> str:
+    """Return what was read from the node, and behind it what else its EDS says of its kind.
+
+    A serial number of an EDS is that of no device, so it is left out.
+    """
     memory = row.memory
-    vendor, product, revision, serial = (memory.number(_IDENTITY, sub) for sub in range(1, 5))
-    maker = " ".join(filter(None, [memory.eds.vendor, _hex(vendor)]))
-    device_type = memory.number(*DEVICE_TYPE)
+
+    def read(index: int, sub: int) -> int | None:
+        return memory.number(index, sub) if memory.was_received((index, sub)) else None
+
+    def other(index: int, sub: int) -> int | None:
+        serial = (index, sub) == (_IDENTITY, 4)
+        known = serial or memory.was_received((index, sub))
+        return None if known else memory.number(index, sub)
+
+    filed = _identity(other, memory.eds.vendor)
+    return "; ".join(filter(None, [_identity(read, ""), f"EDS: {filed}" * bool(filed)]))
+
+
+def _identity(number: Callable[[int, int], int | None], vendor_name: str) -> str:
+    vendor, product, revision, serial = (number(_IDENTITY, sub) for sub in range(1, 5))
+    maker = " ".join(filter(None, [vendor_name, _hex(vendor)]))
+    device_type = number(*DEVICE_TYPE)
     words = ["" if device_type is None else profile_text(device_type)]
     words += [f"vendor {maker}"] * bool(maker)
     words += [f"product {_hex(product)}"] * (product is not None)
     if revision is not None:
         words.append(f"revision {revision >> 16}.{revision & 0xFFFF}")
     words += [f"serial {serial}"] * bool(serial)
-    return ", ".join(filter(None, words)) or "not known: no EDS, and nobody has read 1000h or 1018h"
+    return ", ".join(filter(None, words))
 
 
 def _hex(number: int | None) -> str:

@@ -108,6 +108,53 @@ def test_a_finding_has_its_node_and_the_frames_around(data: dict[str, Any]) -> N
     assert times[0] < 602_000 < times[-1]
 
 
+def page_of(log: Path, frames: list[tuple[int, str]], *words: object) -> dict[str, Any]:
+    """Return the data of the page of some frames."""
+    lines = (f"({1_600_000_000 + at_us / 1e6:.6f}) can0 {frame}" for at_us, frame in sorted(frames))
+    log.write_text("\n".join(lines) + "\n")
+    result = report(log, "-o", log.with_suffix(".html"), *words)
+    assert result.exit_code == 0, result.output
+    return data_of(log.with_suffix(".html"))
+
+
+@pytest.mark.parametrize("joins", [0, 31])
+def test_two_nodes_with_one_id_miss_no_heartbeat(joins: int, tmp_path: Path) -> None:
+    first = [(n * 100_000, "711#05") for n in range(1, 60)]
+    second = [(n * 100_000 + 37_000, "711#05") for n in range(joins, 60)]
+    boots = [(20_000, "711#00"), (joins * 100_000 + 5_000, "711#00")]
+    data = page_of(tmp_path / "run.log", [*first, *second, *boots])
+    (node,) = data["nodes"]
+    rules = [one["rule"] for one in data["findings"]]
+    assert "doubled-node" in rules
+    assert "no-lost-heartbeat" not in rules
+    assert node["gaps"] == []
+    assert node["cells"][4] == "from two nodes"
+
+
+def test_a_node_that_is_guarded_keeps_its_gaps(tmp_path: Path) -> None:
+    asked = [(n * 100_000, "711#R") for n in range(60)]
+    told = [
+        (n * 100_000 + 1_000, f"711#{5 | n % 2 << 7:02X}") for n in range(60) if not 20 <= n < 30
+    ]
+    (node,) = page_of(tmp_path / "run.log", [*asked, *told])["nodes"]
+    assert len(node["gaps"]) == 1
+
+
+def test_an_identity_says_what_was_read_and_what_an_eds_says(tmp_path: Path) -> None:
+    eds = Path(__file__).parents[4] / "examples" / "eds" / "epos.eds"
+    read = [
+        (n * 100_000, frame)
+        for n, frame in enumerate(("605#4018100100000000", "585#43181001FB000000", "705#05"))
+    ]
+    (node,) = page_of(tmp_path / "run.log", read, "--eds", f"5={eds}")["nodes"]
+    heard, _, from_eds = node["cells"][2].partition("; EDS: ")
+    assert heard == "vendor 000000FBh"
+    assert from_eds.startswith("CiA 402 drive, ")
+    assert "product" in from_eds
+    assert "serial" not in node["cells"][2]
+    assert node["cells"][1].endswith(" (EDS)")
+
+
 def test_the_page_says_what_is_no_frame(log: str, tmp_path: Path) -> None:
     with Path(log).open("a", encoding="ascii") as file:
         file.write("what?\n")
