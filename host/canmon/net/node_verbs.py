@@ -7,6 +7,7 @@ import os
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from errno import EISDIR, ENOENT
 from pathlib import Path
 from typing import Final
 
@@ -147,6 +148,9 @@ def _writing(path: Path | None, folders: tuple[Path, ...], *, force: bool) -> Ed
         return None
     if not folders:
         raise Refused("--write: a bus.yml needs the EDS of each node: give --eds-dir DIR")
+    if path.is_dir() or not path.parent.is_dir():
+        wrong, why = (path, EISDIR) if path.is_dir() else (path.parent, ENOENT)
+        refuse_path("--write", OSError(why, os.strerror(why), str(wrong)))
     if path.exists() and not force:
         raise Refused(f"--write {path} is there already: choose another name, or give --force")
     return read_eds_folders(folders)

@@ -127,6 +127,56 @@ def test_an_update_and_a_restore_are_explained(
     assert "reset communication: not sent; would be sent" in told
 
 
+@pytest.mark.parametrize("with_file", [True, False])
+def test_an_update_of_software_is_explained(
+    tmp_path: Path, sent: list[CanFrame], with_file: bool
+) -> None:
+    rig, bus = tmp_path / "boot.toml", tmp_path / "bus.yml"
+    rig.write_text('[device.module]\ntype = "f-palette-boot"\nnode_id = 17\n')
+    (tmp_path / "new.bin").write_bytes(bytes(100))
+    file = "software_file: new.bin, " if with_file else ""
+    eds = ROOT / "examples" / "eds" / "f-palette-boot.eds"
+    node = f"{{node_id: 17, dcf: {eds}, {file}software_version: 0x1234}}"
+    bus.write_text(f"master: {{node_id: 1}}\nnodes:\n  module: {node}\n")
+    result = net(str(rig), "boot", "17", "--bus", str(bus), "--explain")
+    assert not written(sent)
+    if not with_file:
+        assert result.exit_code == 1
+        assert "error status H: other software than expected" in result.stderr
+        return
+    assert result.exit_code == 0, result.output
+    assert steps(result.stdout)[-5:] == [
+        "1F56h:01 software identification: F18AE307h; not 00001234h: to be updated",
+        "1F51h:01 := stop: not sent; would be written",
+        "1F51h:01 := clear: not sent; would be written",
+        "1F50h:01 := 100 bytes: not sent; would be written",
+        "1F51h:01 := start: not sent; would be written, then booted from the beginning",
+    ]
+
+
+def test_a_slave_that_the_master_does_not_boot_is_explained(
+    rig: str, tmp_path: Path, sent: list[CanFrame]
+) -> None:
+    bus, eds = tmp_path / "bus.yml", ROOT / "examples" / "eds" / "epos.eds"
+    node = f"{{node_id: 5, dcf: {eds}, boot: false, heartbeat_producer: 100}}"
+    bus.write_text(f"master: {{node_id: 1}}\nnodes:\n  drive: {node}\n")
+    result = net(rig, "boot", "5", "--bus", str(bus), "--explain")
+    assert (result.exit_code, written(sent)) == (0, []), result.output
+    assert steps(result.stdout) == [
+        "1F81h: bit 2 is 0; not booted by this master",
+        "heartbeat: not waited for; must come within 300 ms",
+    ]
+
+
+def test_who_is_kept_alive_by_a_heartbeat_is_listened_to(
+    rig: str, tmp_path: Path, sent: list[CanFrame]
+) -> None:
+    file = drive_dcf(tmp_path / "x.dcf", at_101700=100)
+    result = net(rig, "boot", "5", "--eds", file, "--keep-alive", "--explain")
+    assert (result.exit_code, written(sent)) == (1, []), "no heartbeat yet"
+    assert "error status E: to be kept alive, but no heartbeat came" in result.stderr
+
+
 def test_an_explained_boot_of_another_device_fails(rig: str, sent: list[CanFrame]) -> None:
     other = ROOT / "tests" / "golden" / "canopen" / "r1.eds"
     result = net(rig, "boot", "5", "--eds", str(other), "--explain")

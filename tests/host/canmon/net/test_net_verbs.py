@@ -127,6 +127,21 @@ def test_a_bus_file_that_is_there_stays_unless_forced(rig: str, tmp_path: Path) 
     assert {path.name for path in tmp_path.iterdir()} == {"bus.yml", "eds", "bench.toml"}
 
 
+@pytest.mark.parametrize("there", ["nosuch/bus.yml", "eds"])
+def test_a_bus_file_that_cannot_be_written_is_one_line(
+    rig: str, tmp_path: Path, there: str
+) -> None:
+    bus, folder = tmp_path / there, _eds_folder(tmp_path)
+    result = net(rig, "scan", "--write", str(bus), "--eds-dir", str(folder), "--force")
+    assert result.exit_code == 2, result.output
+    why = "No such file or directory" if "/" in there else "Is a directory"
+    assert (
+        result.stderr.splitlines()[-1]
+        == f"Error: --write {bus if '/' not in there else bus.parent}: {why}"
+    )
+    assert result.stdout == "", "before the bus is opened"
+
+
 def test_objects_are_read_by_name_and_by_index(rig: str) -> None:
     result = net(rig, "read", "5", "statusword", "1018h:2", "manufacturer_device_name", "0x6060")
     assert result.exit_code == 0, result.output
