@@ -615,11 +615,8 @@ def _explain_software(slave: SlaveAssignment, talk: boot_slave.BootTalk) -> Scri
         talk.compare(what, data, wanted, BootStatus.UPDATE_NOT_ALLOWED)
         return False
     talk.record(what, f"{int.from_bytes(data, 'little'):08X}h", f"not {wanted:08X}h: to be updated")
-    for step in (
-        "1F51h:01 := stop",
-        "1F51h:01 := clear",
-        f"1F50h:01 := {len(slave.program)} bytes",
-    ):
+    talk.record("1F51h:01 := stop", _NOT_SENT, "would be written unless it is stopped")
+    for step in ("1F51h:01 := clear", f"1F50h:01 := {len(slave.program)} bytes"):
         talk.record(step, _NOT_SENT, "would be written")
     talk.record("1F51h:01 := start", _NOT_SENT, "would be written, then booted from the beginning")
     return True

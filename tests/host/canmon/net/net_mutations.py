@@ -43,6 +43,8 @@ LINES = (
     "program 5 --control stop",
     "boot 5 --eds {file} --explain",
     "boot 5 --bus {file} --keep-alive",
+    "boot 5 --eds {file} --steps",
+    "write 5 heartbeat_time=100 6040h=6 --dry-run",
     "scan --wait 10ms --json",
 )
 WORDS = (

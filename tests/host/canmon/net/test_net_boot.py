@@ -147,7 +147,7 @@ def test_an_update_of_software_is_explained(
     assert result.exit_code == 0, result.output
     assert steps(result.stdout)[-5:] == [
         "1F56h:01 software identification: F18AE307h; not 00001234h: to be updated",
-        "1F51h:01 := stop: not sent; would be written",
+        "1F51h:01 := stop: not sent; would be written unless it is stopped",
         "1F51h:01 := clear: not sent; would be written",
         "1F50h:01 := 100 bytes: not sent; would be written",
         "1F51h:01 := start: not sent; would be written, then booted from the beginning",
