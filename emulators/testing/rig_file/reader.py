@@ -509,7 +509,8 @@ class _Reader:
                 continue
             node_id = plan.node_id if plan and plan.node_id is not None else each.node_id
             if node_id is None:
-                section.wrong("no key 'node_id': its file gives none; 1..127, or lss")
+                if "node_id" not in section.values:  # else its value was wrong
+                    section.wrong("no key 'node_id': its file gives none; 1..127, or lss")
             elif node_id != UNCONFIGURED:
                 first = seen.setdefault((plan.wire if plan else name, node_id), name)
                 if first != name:

@@ -288,7 +288,7 @@ def _pass_on(
 
 
 @click.command()
-@click.argument("source", nargs=-1, required=True)
+@click.argument("source", nargs=-1, metavar="SOURCE...")
 @click.argument("log", type=PATH)
 @decode_options.filter_option
 @decode_options.decode_options
@@ -315,6 +315,8 @@ def conv(  # noqa: PLR0913 - options
 
     {source}
     """  # noqa: D301 - click wants the backspace
+    if not source:  # click takes the last word as LOG
+        raise click.UsageError("Missing argument 'LOG'.")
     chosen = decode_options.read_filter(wanted)
     decoder = None if chosen is None else decode_options.make_decoder(eds, dbc)
     meaning, pieces = (

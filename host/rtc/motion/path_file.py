@@ -31,8 +31,8 @@ def read_path(path: Path) -> list[Pose]:
         raise ValueError(f"path {path}: {error.strerror or error}") from None
     points = []
     for number, line in enumerate(text.splitlines(), 1):
-        if words := line.partition("#")[0].replace(",", " ").split():
-            points.append(_point(f"{path}:{number}", words))
+        if words := (said := line.partition("#")[0].strip()).replace(",", " ").split():
+            points.append(_point(f"{path}:{number}", said, words))
     if not points:
         raise ValueError(f"{path} has no point; a line has x and y in metres")
     return points
@@ -74,13 +74,12 @@ def describe_pose(pose: Pose) -> str:
     return f"{pose.x:.3f} {pose.y:.3f} m, {degrees(pose.heading):.1f} deg"
 
 
-def _point(place: str, words: list[str]) -> Pose:
+def _point(place: str, text: str, words: list[str]) -> Pose:
     numbers = _numbers(words)
     if len(numbers) not in (2, 3) or not plausible(*numbers):
-        text = " ".join(words)
         raise ValueError(f"{place}: {text!r} is not x y in metres, and a heading in radians")
     if not within_reach(point := Pose(*numbers)):
-        raise ValueError(f"{place}: {' '.join(words)!r} is beyond {FARTHEST_M} m")
+        raise ValueError(f"{place}: {text!r} is beyond {FARTHEST_M} m")
     return point
 
 

@@ -176,6 +176,8 @@ def test_a_mistake_is_one_line(words: list[str], told: str) -> None:
         ("1 2 3 4", ":1: '1 2 3 4' is not x y in metres"),
         ("1 2\n1 nan", ":2: '1 nan' is not x y in metres"),
         ("1 two", ":1: '1 two' is not x y in metres"),
+        ("0, 0\n 1, x  # corner", ":2: '1, x' is not x y in metres"),
+        ("0,1001", ":1: '0,1001' is beyond 1000 m"),
         ("0 1000\n0 1001", ":2: '0 1001' is beyond 1000 m"),
         ("# nothing", " has no point; a line has x and y in metres"),
     ],

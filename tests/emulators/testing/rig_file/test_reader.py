@@ -233,6 +233,16 @@ def test_files_are_looked_for_beside_the_rig_file(tmp_path: Path) -> None:
     )
 
 
+def test_a_wrong_node_id_is_not_a_missing_one() -> None:
+    text = '[device.a]\ntype = "io_module.eds"\nprofile = "401"\n'
+    rig = ROOT / "examples" / "rig.toml"
+    for given, expected in (("node_id = 300", "it takes 1..127"), ("", "no key 'node_id'")):
+        with pytest.raises(RigFileError) as caught:
+            parse_rig_file(text + given, rig)
+        (mistake,) = caught.value.mistakes
+        assert expected in mistake.reason
+
+
 RRC = '[device.rrc]\ntype = "rrc"\n'
 NODE = '[device.node]\ntype = "epos"\nnode_id = 5\n'
 

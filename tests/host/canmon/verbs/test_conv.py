@@ -40,6 +40,13 @@ def test_a_log_goes_through_blf_and_back(tmp_path: Path) -> None:
     assert again.read_text("ascii") == LOG.replace("bench", "can1")
 
 
+@pytest.mark.parametrize("words", [(), ("run.log",)])
+def test_a_missing_log_is_called_log(words: tuple[str, ...]) -> None:
+    result = canmon("conv", *words)
+    assert result.exit_code == 2
+    assert "Missing argument 'LOG'" in result.stderr
+
+
 def test_what_a_format_cannot_hold_is_said(tmp_path: Path) -> None:
     result = canmon("conv", log(tmp_path), tmp_path / "run.trc")
     assert result.stderr.splitlines() == [
