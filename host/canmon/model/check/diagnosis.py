@@ -100,9 +100,7 @@ _TIMED: Final = (
 """Rules that a log without times cannot break."""
 _SURE_SHARE: Final = 0.9
 """Frames have a period to be learnt if so many gaps have it."""
-_IDENTITY: Final = 0x1018
 _NEAR_US: Final = 100_000
-_KEPT_FRAMES: Final = 1_000
 _KEPT_TEXTS: Final = 3
 _LOST_AFTER: Final = 1.5
 """A heartbeat is lost after so many of its periods, as on the node board."""
@@ -452,7 +450,7 @@ class _BusJudge:
         layout = getattr(decoder.bus(self._bus.name).lasting(ident), "__self__", None)
         if isinstance(layout, PdoDecoder) and usual < layout.size:
             text = f"{_name(ident)} has {usual} B, {layout.size} are right by its mapping"
-            self._hit("pdo-length", ident, text, rows[:_KEPT_FRAMES], sizes[usual])
+            self._hit("pdo-length", ident, text, rows[: learnt.KEPT_FRAMES], sizes[usual])
         if len(sizes) == 1:
             return
         lengths = _plain(self._bus.picked(self._bus.dlc, rows))
@@ -475,7 +473,9 @@ class _BusJudge:
             odd = unknown
             text = f"the length of {_name(ident)} changes from {lengths[odd[0] - 1]} to"
             text += f" {lengths[odd[0]]} B"
-        self._hit("pdo-length", ident, text, [rows[at] for at in odd[:_KEPT_FRAMES]], len(odd))
+        self._hit(
+            "pdo-length", ident, text, [rows[at] for at in odd[: learnt.KEPT_FRAMES]], len(odd)
+        )
 
     # Rhythms
 
@@ -566,7 +566,7 @@ class _BusJudge:
                 text += f" its period is {ms_text(period)}"
                 shown = piece[begin : min(end, len(piece) - 1) + 1]
                 rule = "pdo-jitter" if kind == "pdo" else "sync-period"
-                self._hit(rule, ident, text, shown[:_KEPT_FRAMES])
+                self._hit(rule, ident, text, shown[: learnt.KEPT_FRAMES])
             last_us = int(times[-1])
             if piece is pieces[-1] and self._end_us - last_us > max(
                 _STOPPED * rhythm.levels[-1].period_us, _STOPPED_US
@@ -659,7 +659,7 @@ class _BusJudge:
 
     def _double(self, ident: int, rows: Sequence[int]) -> None:
         text = "a second heartbeat comes beside the first: two nodes have this node-ID"
-        self._hit("doubled-node", ident, text, rows[:_KEPT_FRAMES], len(rows))
+        self._hit("doubled-node", ident, text, rows[: learnt.KEPT_FRAMES], len(rows))
 
     # Drives, and what comes once
 
@@ -716,7 +716,7 @@ class _BusJudge:
 
     def _is_statusword(self, ident: int, rows: Sequence[int], values: Sequence[int]) -> bool:
         """Say whether TPDO1 begins with a statusword: all of its states are, and one is enabled."""
-        if any(self._bus.dlc[row] < 2 for row in rows[:_KEPT_FRAMES]):
+        if any(self._bus.dlc[row] < 2 for row in rows[: learnt.KEPT_FRAMES]):
             return False
         if len(set(values)) > 64:
             return False
@@ -765,8 +765,10 @@ class _BusJudge:
             if ident & ERROR and ident < FD:
                 continue
             lengths = tuple(sorted(set(_plain(bus.picked(bus.dlc, rows)))))
-            ends = int(rows[0]), int(rows[-1])
-            frame = learnt.FrameSummary(ident, _name(ident), ends, lengths)
+            long = [
+                piece for piece in self._pieces(ident, rows) if len(piece) > 2 * cycles.LEAST_GAPS
+            ]
+            frame = learnt.FrameSummary(ident, _name(ident), rows, long, lengths)
             rhythm = self._rhythm_of(ident) if _has_rhythm(ident) else None
             frame = frame._replace(irregular=rhythm is None, service=node_events.is_event(ident))
             if rhythm is not None and rhythm.share >= _SURE_SHARE:
@@ -775,11 +777,11 @@ class _BusJudge:
                 on_sync = bool(times) and abs(period / times - round(period / times)) < 0.02
                 kind = learnt.ON_SYNC if on_sync and ident in node_events.PDO_IDS else learnt.CYCLIC
                 frame = frame._replace(kind=kind, period_us=period, jitter_us=rhythm.spread_us)
-            frames[ident] = frame._replace(few=len(self._longest(ident)) <= 2 * cycles.LEAST_GAPS)
+            frames[ident] = frame._replace(few=not long)
         boots = {node: one.boots[0] for node, one in self._events.nodes.items() if one.boots}
         return learnt.BusSummary(
             *(bus.name, frames, self._node_summaries(), self._boot_order(boots), boots),
-            self._peak_bits(),
+            *self._peak(),
             tuple(dict.fromkeys(map(learnt.usual_text, self._hits))),
         )
 
@@ -796,11 +798,12 @@ class _BusJudge:
         heard = node_events.first_rows(self._rows) if self._canopen else {}
         for node, row in sorted(heard.items()):
             words = tuple(
-                memory(self._bus.name, node).number(_IDENTITY, sub)
+                memory(self._bus.name, node).number(node_events.IDENTITY, sub)
                 for sub in range(1, len(learnt.IDENTITY) + 1)
             )
             codes = tuple(sorted(self._events.nodes[node].emcy))
-            nodes[node] = learnt.NodeSummary(row, words, codes)
+            told = {sub: row for sub, (_, row) in self._events.nodes[node].identity.items()}
+            nodes[node] = learnt.NodeSummary(row, words, codes, told)
         return nodes
 
     def _boot_order(self, boots: Mapping[int, int]) -> list[list[int]]:
@@ -813,18 +816,29 @@ class _BusJudge:
             latest_us = self._times[row]
         return [sorted(group) for group in groups]
 
-    def _peak_bits(self) -> int:
-        steps = self._bits_by_step(self._times[0])
-        width = _LOAD_US // _LOAD_STEP_US
-        sums = (sum(steps.get(at + off, 0) for off in range(width)) for at in steps)
-        return max(sums, default=0) * 1_000_000 // _LOAD_US
+    def _peak(self) -> tuple[int, tuple[int, int]]:
+        """Return the bits a second of the busiest half second, and the ends of one that has many.
+
+        That is the first with more than is right, else the busiest.
+        """
+        first_us, width = self._times[0], _LOAD_US // _LOAD_STEP_US
+        steps = self._bits_by_step(first_us)
+        sums = {at: sum(steps.get(at + off, 0) for off in range(width)) for at in steps}
+        busiest = max(sums, key=lambda at: (sums[at], -at), default=0)
+        most = self._rules.bits_per_second if self._rules else None
+        limit = (most or 0) * _LOAD_US / 1_000_000
+        shown = min((at for at in sums if most and sums[at] > limit), default=busiest)
+        begin_us = first_us + shown * _LOAD_STEP_US
+        begin, end = (bisect_left(self._times, at) for at in (begin_us, begin_us + _LOAD_US))
+        begin = min(begin, len(self._times) - 1)
+        return sums.get(busiest, 0) * 1_000_000 // _LOAD_US, (begin, max(begin, end - 1))
 
     def _grouped(self, hits: Iterable[Hit]) -> list[BusFault]:
         """Put hits of one rule and node, or CAN-ID, together."""
         self._hits += hits
         if self._rules is not None:
             self.judged |= learnt.RULES.keys()
-            self._hits += learnt.broken(self._rules, self.summary(), len(self._bus) - 1)
+            self._hits += learnt.broken(self._rules, self.summary(), self._bus, self._times)
             self._hits = [hit for hit in self._hits if not self._rules.is_usual(hit)]
         groups: dict[tuple[str, int | None], list[Hit]] = {}
         for hit in self._hits:
@@ -844,7 +858,7 @@ class _BusJudge:
         return BusFault(
             *(first.rule, self._bus.name, first.node, first.ident, text, min(times), max(times)),
             sum(hit.amount for hit in hits),
-            tuple(self._bus.place(row) for row in rows[:_KEPT_FRAMES]),
+            tuple(self._bus.place(row) for row in rows[: learnt.KEPT_FRAMES]),
         )
 
 

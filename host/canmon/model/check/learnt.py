@@ -11,9 +11,10 @@ import json
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import islice, pairwise
 from typing import Any, Final, NamedTuple
 
-from tickrig.host.canmon.model.check.bus_frames import Hit
+from tickrig.host.canmon.model.check.bus_frames import BusFrames, Hit
 from tickrig.host.canmon.model.frames import ident_text, ms_text, node_of, parse_ident
 from tickrig.host.text.names import closest
 from tickrig.host.text.toml_reader import load_toml
@@ -43,6 +44,8 @@ _JITTERS: Final = 4
 _LEAST_JITTER_US: Final = 500
 _PERIOD: Final = re.compile(r"([^±+]+)(?:±|\+-)([0-9]{1,3})%")
 _MOST_USUAL: Final = 50
+KEPT_FRAMES: Final = 1_000
+"""So many frames of a finding are kept."""
 
 
 class FrameSummary(NamedTuple):
@@ -51,7 +54,8 @@ class FrameSummary(NamedTuple):
     Attributes:
         ident: CAN-ID with flags.
         name: for people.
-        rows: of the first and of the last frame.
+        rows: of all of them.
+        pieces: rows between what changes how they come, where they are enough for a rhythm.
         lengths: bytes of data.
         kind: cyclic, sync or event.
         period_us: None if they have no rhythm.
@@ -63,7 +67,8 @@ class FrameSummary(NamedTuple):
 
     ident: int
     name: str
-    rows: tuple[int, int]
+    rows: Sequence[int]
+    pieces: Sequence[Sequence[int]]
     lengths: tuple[int, ...]
     kind: str = _EVENT
     period_us: int | None = None
@@ -80,11 +85,13 @@ class NodeSummary(NamedTuple):
         row: of its first frame.
         identity: what SDO traffic tells of 1018h, None for what it does not.
         emcy: error codes, as 8130h.
+        told: rows of the SDO answers that tell it, by sub-index.
     """
 
     row: int
-    identity: tuple[int | None, ...] = (None,) * len(IDENTITY)
-    emcy: tuple[str, ...] = ()
+    identity: tuple[int | None, ...]
+    emcy: tuple[str, ...]
+    told: Mapping[int, int]
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,6 +105,7 @@ class BusSummary:
         boot_order: node-IDs in the order of their first boot-ups; those within 100 ms together.
         boots: rows of these boot-ups.
         bits_per_second: of the busiest half second.
+        busy: rows of the first and last frame in one of too many bits, else in this one.
         found: findings of rules that need no parameter, as texts.
     """
 
@@ -107,6 +115,7 @@ class BusSummary:
     boot_order: Sequence[Sequence[int]] = ()
     boots: Mapping[int, int] = field(default_factory=dict)
     bits_per_second: int = 0
+    busy: tuple[int, ...] = ()
     found: tuple[str, ...] = ()
 
 
@@ -376,26 +385,29 @@ def _number(text: str, low: int, high: int, place: str) -> int:
 # Holding
 
 
-def broken(learnt: LearntBus, bus: BusSummary, last_row: int) -> Iterator[Hit]:
+def broken(
+    learnt: LearntBus, bus: BusSummary, frames: BusFrames, times: Sequence[int]
+) -> Iterator[Hit]:
     """Give what a bus does not keep.
 
     Args:
         learnt: what it must keep.
         bus: what it does.
-        last_row: of its last frame, which shows what is missing.
+        frames: all of its frames; the last shows what is missing.
+        times: of them.
     """
+    last_row = len(frames) - 1
     for node in sorted(learnt.nodes.keys() - bus.nodes.keys()):
         yield Hit("learnt-nodes", node, None, "is missing", (last_row,))
     for node, one in sorted(bus.nodes.items()):
         if node not in learnt.nodes:
             yield Hit("learnt-nodes", node, None, "is new", (one.row,))
             continue
-        for name, right, value in zip(
-            IDENTITY, learnt.nodes[node].identity, one.identity, strict=True
-        ):
+        identity = zip(IDENTITY, learnt.nodes[node].identity, one.identity, strict=True)
+        for sub, (name, right, value) in enumerate(identity, 1):
             if right is not None and value is not None and value != right:
                 text = f"its {name} is {value:08X}h, {right:08X}h is right"
-                yield Hit("learnt-identity", node, None, text, (one.row,))
+                yield Hit("learnt-identity", node, None, text, (one.told.get(sub, one.row),))
     for ident, wanted in sorted(learnt.frames.items()):
         if wanted.required and ident not in bus.frames:
             text = f"{ident_text(ident)} is missing"
@@ -405,24 +417,27 @@ def broken(learnt: LearntBus, bus: BusSummary, last_row: int) -> Iterator[Hit]:
             continue  # an EMCY, or SDO: rules of their own
         if ident not in learnt.frames:
             text = f"{ident_text(ident)} is new"
-            yield Hit("learnt-frames", node_of(ident), ident, text, (frame.rows[0],))
+            yield Hit("learnt-frames", node_of(ident), ident, text, (int(frame.rows[0]),))
         else:
-            yield from _frame_broken(learnt.frames[ident], frame)
+            yield from _frame_broken(learnt.frames[ident], frame, frames, times)
     most = learnt.bits_per_second
     if most is not None and bus.bits_per_second > most:
         text = f"{bus.bits_per_second} bits a second, at most {most} is right"
-        yield Hit("learnt-load", None, None, text, (last_row,))
+        yield Hit("learnt-load", None, None, text, bus.busy)
     yield from _order_broken(learnt.boot_order, bus.boots)
 
 
-def _frame_broken(right: _LearntFrame, frame: FrameSummary) -> Iterator[Hit]:
+def _frame_broken(
+    right: _LearntFrame, frame: FrameSummary, frames: BusFrames, times: Sequence[int]
+) -> Iterator[Hit]:
     ident = frame.ident
     node, name = node_of(ident), frame.name
-    odd = [str(one) for one in frame.lengths if right.lengths and one not in right.lengths]
+    odd = [one for one in frame.lengths if right.lengths and one not in right.lengths]
     if odd:
         wanted = " or ".join(map(str, right.lengths))
-        text = f"{name} has {' or '.join(odd)} B, {wanted} is right"
-        yield Hit("learnt-length", node, ident, text, frame.rows)
+        text = f"{name} has {' or '.join(map(str, odd))} B, {wanted} is right"
+        wrong = (int(row) for row in frame.rows if frames.dlc[row] in odd)
+        yield Hit("learnt-length", node, ident, text, tuple(islice(wrong, KEPT_FRAMES)))
     if right.period is None or frame.few:
         return
     period, off = right.period
@@ -430,16 +445,33 @@ def _frame_broken(right: _LearntFrame, frame: FrameSummary) -> Iterator[Hit]:
         return
     if frame.period_us is None:
         text = f"{name} has no period, {ms_text(period)} ms is right"
-        yield Hit("learnt-period", node, ident, text, frame.rows)
+        rows = _odd_rows(frame.pieces, times, period, off)
+        yield Hit("learnt-period", node, ident, text, rows)
     elif abs(frame.period_us - period) > off:
         text = f"{name} has a period of {ms_text(frame.period_us)} ms, {ms_text(period)} is right"
-        yield Hit("learnt-period", node, ident, text, frame.rows)
+        rows = _odd_rows(frame.pieces, times, period, off)
+        yield Hit("learnt-period", node, ident, text, rows)
     elif right.jitter_us is not None and frame.jitter_us > max(
         _JITTERS * right.jitter_us, _LEAST_JITTER_US, period // 10
     ):
         text = f"{name} has a jitter of {ms_text(frame.jitter_us)} ms,"
         text += f" {ms_text(right.jitter_us)} is right"
-        yield Hit("learnt-jitter", node, ident, text, frame.rows)
+        rows = _odd_rows(frame.pieces, times, frame.period_us, frame.jitter_us // 2)
+        yield Hit("learnt-jitter", node, ident, text, rows)
+
+
+def _odd_rows(
+    pieces: Sequence[Sequence[int]], times: Sequence[int], period: int, off: int
+) -> tuple[int, ...]:
+    """Return the rows behind gaps that a period does not allow, from two such gaps on.
+
+    A single odd gap before is a frame that was late or lost, and not where the period is another.
+    """
+    ends = (pair for piece in pieces for pair in pairwise(piece))
+    gaps = [(abs(times[row] - times[before] - period) > off, int(row)) for before, row in ends]
+    begin = next((at for at, (a, b) in enumerate(pairwise(gaps)) if a[0] and b[0]), 0)
+    odd = (row for is_odd, row in gaps[begin:] if is_odd)
+    return tuple(islice(odd, KEPT_FRAMES)) or (gaps[-1][1],)
 
 
 def _order_broken(order: Sequence[Sequence[int]], boots: Mapping[int, int]) -> Iterator[Hit]:

@@ -50,6 +50,7 @@ _PAIR_US: Final = 100_000
 _PDO_PARAMETERS: Final = range(0x1400, 0x1C00)
 _SYNC_PARAMETERS: Final = range(0x1005, 0x1008)
 _HEARTBEAT_TIME: Final = 0x1017
+IDENTITY: Final = 0x1018
 _TOGGLE_ABORT: Final = 0x0503_0000
 
 RULES: Final = {
@@ -91,6 +92,7 @@ class NodeEvents:
         boots: rows of boot-ups.
         toggled: a frame had the toggle bit.
         state: the NMT state that it told last; None before.
+        identity: what was read of 1018h and the row that told it first, by sub-index.
     """
 
     heartbeats: list[int] = field(default_factory=list)
@@ -104,6 +106,7 @@ class NodeEvents:
     reset: bool = False
     fault: bool = False
     emcy: set[str] = field(default_factory=set)
+    identity: dict[int, tuple[bytes | None, int]] = field(default_factory=dict)
     requests: int = 0
     latest_request: bytes = b""
     latest_answer: tuple[int, bytes, int] | None = None
@@ -397,6 +400,10 @@ class BusEvents:
             self._silent.append((node, f"{what} is not answered, {again}", row))
         if entry == STATUSWORD and transfer.direction is decoded.TransferDirection.UPLOAD:
             self._statusword(node, ident, transfer.data or b"")
+        if entry is not None and entry[0] == IDENTITY and transfer.data is not None:
+            known = self.nodes[node].identity
+            if known.get(entry[1], (None, 0))[0] != transfer.data:
+                known[entry[1]] = transfer.data, self._row
         if WRONG_TOGGLE in transfer.flaws:
             row = self._wrong_toggles.get(node, self._row)
             self.hits.append(Hit("sdo-toggle", node, ident, f"{what}: {WRONG_TOGGLE}", (row,)))

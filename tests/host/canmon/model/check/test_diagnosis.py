@@ -238,7 +238,9 @@ def test_another_identity_and_order_of_boot_ups_is_found() -> None:
     other.take(
         lines("702#00 702#7F 701#00 601#4018100100000000 581#4318100179563412 701#7F", 200_000)
     )
-    assert {fault.rule for fault in other.diagnosis().faults} == {"learnt-identity", "learnt-order"}
+    faults = {fault.rule: fault for fault in other.diagnosis().faults}
+    assert faults.keys() == {"learnt-identity", "learnt-order"}
+    assert [place.number for place in faults["learnt-identity"].frames] == [5]
 
 
 def test_what_a_good_log_has_is_usual() -> None:
@@ -305,3 +307,38 @@ def test_a_finding_of_an_sdo_transfer_has_the_frame_that_shows_it() -> None:
             number = 3 + next(at for at, text in enumerate(texts) if text.startswith("*"))
             assert [place.number for place in fault.frames] == [number]
             assert fault.first_us == fault.frames[0].at_us
+
+
+def test_what_is_not_as_learnt_shows_where() -> None:
+    plan = Plan()
+    records = list(sound(plan))
+    shorter, second = faulty("PDO length", plan), faulty("doubled node-ID", plan)
+    busy = faulty("load", plan)
+    at = next(at for at, one in enumerate(second) if one not in records)
+    third = [*records[:at], *second[at:]]
+    chance = Random(1)
+    jitter = [
+        one._replace(at_us=one.at_us + chance.randrange(2_200) * (frame_of(one).can_id == 0x185))
+        for one in records
+    ]
+    jitter.sort(key=lambda one: one.at_us)
+    moved = next(at for at, (a, b) in enumerate(zip(jitter, records, strict=True)) if a != b)
+    cases = {
+        "learnt-length": (shorter, shorter.index(next(o for o in shorter if o not in records))),
+        "learnt-period": (third, at),
+        "learnt-jitter": (jitter, moved),
+        "learnt-load": (busy, next(at for at, one in enumerate(busy) if one not in records)),
+    }
+    for rule, (log, culprit) in cases.items():
+        one = Diagnoser(rules=rules_of(plan))
+        one.take(log)
+        faults = one.diagnosis().faults
+        (fault,) = (fault for fault in faults if fault.rule == rule)
+        near_us = log[culprit].at_us
+        if rule == "learnt-load":
+            assert fault.first_us <= near_us <= fault.last_us < near_us + 100_000
+        else:
+            assert near_us - 60_000 <= fault.first_us <= near_us + 60_000, rule
+        assert [fault.first_us for fault in faults] == sorted(fault.first_us for fault in faults)
+        if rule == "learnt-length":
+            assert [place.number for place in fault.frames] == [culprit + 1]
