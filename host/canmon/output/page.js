@@ -4,7 +4,7 @@ const data = JSON.parse(document.getElementById("data").textContent);
 const at = id => document.getElementById(id);
 const SVG = "http://www.w3.org/2000/svg";
 const NMT = ["operational", "pre-operational", "stopped"];
-const state = {from: 0, to: Math.max(data.span, 1), node: "", words: "", chosen: -1, cross: null};
+const state = {from: 0, to: Math.max(data.span, 1), node: "", words: "", chosen: -1, cross: null, paper: false};
 const shownSignals = new Set(data.signals.map((_, number) => number).filter(number => number < 10));
 let drawn = {lanes: [], left: 0, width: 0, height: 0};
 
@@ -30,6 +30,7 @@ const short = number => {
   return String(Number(number.toFixed(3)));
 };
 const fits = text => !state.words || text.toLowerCase().includes(state.words);
+const wordsOf = finding => `${finding.title} ${finding.rule} ${finding.text}`;
 const ofNode = one => !state.node || one.key === state.node;
 
 // Findings.
@@ -38,16 +39,20 @@ function listFindings() {
   const list = at("finding-list");
   list.textContent = "";
   const seen = data.findings.map((one, number) => [one, number])
-    .filter(([one]) => ofNode(one) && fits(`${one.rule} ${one.text}`));
+    .filter(([one]) => ofNode(one) && fits(wordsOf(one)));
   for (const [one, number] of seen) {
-    const item = make("li"), button = make("button", undefined, "finding");
+    const item = make("li"), button = make("button", undefined, "finding"), open = number === state.chosen;
     button.dataset.finding = number;
-    button.setAttribute("aria-expanded", String(number === state.chosen));
-    button.append(make("time", (one.t / 1e6).toFixed(6) + " s"), make("span", one.rule, "rule"),
-      make("span", one.count > 1 ? `${one.text} (${one.count} times)` : one.text, "words"));
+    button.setAttribute("aria-expanded", String(open));
+    const head = make("span", undefined, "head"), texts = make("span", undefined, "texts");
+    head.append(make("span", one.title, "title"), " ", make("span", one.rule, "rule"));
+    texts.append(head, make("span", one.count > 1 ? `${one.text} (${one.count} times)` : one.text, "words"));
+    button.append(make("time", (one.t / 1e6).toFixed(6) + " s"), texts,
+      make("span", `${open ? "hide" : "show"} ${one.frames.length ? "frames" : "more"}`, "open"));
     button.addEventListener("click", () => choose(number === state.chosen ? -1 : number, false));
     item.append(button);
-    if (number === state.chosen) item.append(framesOf(one));
+    if (state.paper) item.append(...fewFrames(one));
+    else if (open) item.append(framesOf(one));
     list.append(item);
   }
   if (!seen.length) list.append(make("li", data.findings.length ? "No finding fits." : "No finding.", "empty"));
@@ -63,15 +68,28 @@ function framesOf(finding) {
     box.append(make("p", data.around ? "Frames around it are shown for the first findings only." : "", "quiet"));
     return box;
   }
+  box.append(frameTable(finding.frames));
+  return box;
+}
+
+// On paper, where nobody clicks: the first frame of the finding among ten.
+function fewFrames(finding) {
+  if (!finding.frames.length) return [];
+  const first = Math.max(0, finding.frames.findIndex(one => one[4]) - 4);
+  const box = make("div", undefined, "frames");
+  box.append(frameTable(finding.frames.slice(first, first + 10)));
+  return [box];
+}
+
+function frameTable(frames) {
   const table = make("table");
   table.setAttribute("aria-label", "Frames around the finding");
-  for (const [t, channel, frame, text, here] of finding.frames) {
+  for (const [t, channel, frame, text, here] of frames) {
     const row = make("tr", undefined, here ? "here" : "");
     row.append(make("td", (t / 1e6).toFixed(6)), make("td", channel), make("td", frame), make("td", text));
     table.append(row);
   }
-  box.append(table);
-  return box;
+  return table;
 }
 
 function choose(number, scroll) {
@@ -114,9 +132,26 @@ const near = t => view(t - data.span / 100, t + data.span / 100);
 
 // The chart.
 
+// A finding of many times is a bar from its first to its last, below the marks of the others.
+const MANY = 3, MOST_BARS = 6;
+const isMany = one => one.count > MANY && one.at.length > MANY;
+function barsOf() {
+  const rows = [];
+  data.findings.forEach((one, number) => {
+    if (!ofNode(one) || !isMany(one)) return;
+    const row = rows.find(bars => bars.at(-1).to < one.t);
+    const bar = {number, one, from: one.t, to: Math.max(one.last, one.at.at(-1))};
+    if (row) row.push(bar); else rows.push([bar]);
+  });
+  return rows;
+}
+
 function lanesOf() {
   const lanes = [];
-  if (data.findings.length) lanes.push({kind: "findings", name: "Findings", height: 22});
+  if (data.findings.length) {
+    const bars = barsOf();
+    lanes.push({kind: "findings", name: "Findings", bars, height: 22 + 7 * Math.min(bars.length, MOST_BARS)});
+  }
   for (const bus of data.buses) {
     const several = data.buses.length > 1 ? ` ${bus.name}` : "";
     lanes.push({kind: "load", name: `Load${several}`, soft: "", bus, height: 48});
@@ -247,8 +282,19 @@ function marks(group, kind, list, x, shape) {
 const nmtClass = name => NMT.includes(name) ? name : "other";
 const painters = {
   findings(group, lane, x, y) {
+    const mark = (one, number, kind, d) => {
+      const found = draw(group, "path", {class: fits(wordsOf(one)) ? kind : `${kind} dim`, d});
+      found.dataset.mark = number;
+    };
+    lane.bars.forEach((bars, row) => {
+      const top = y + 18 + 7 * (row % MOST_BARS);
+      for (const {number, one, from, to} of bars) {
+        const begin = Math.max(x(from), drawn.left - 2), end = Math.min(Math.max(x(to), x(from) + 3), drawn.left + drawn.width + 2);
+        if (end > begin) mark(one, number, "found many", `M${begin} ${top}H${end}v5H${begin}z`);
+      }
+    });
     data.findings.forEach((one, number) => {
-      if (!ofNode(one)) return;
+      if (!ofNode(one) || isMany(one)) return;
       let path = "", before = -10;
       for (const t of one.at.length ? one.at : [one.t]) {
         const place = x(t);
@@ -256,9 +302,7 @@ const painters = {
         before = place;
         path += `M${place - 5} ${y + 3}h10l-5 12z`;
       }
-      if (!path) return;
-      const mark = draw(group, "path", {class: fits(`${one.rule} ${one.text}`) ? "found" : "found dim", d: path});
-      mark.dataset.mark = number;
+      if (path) mark(one, number, "found", path);
     });
   },
   load(group, lane, x, y) {
@@ -347,7 +391,7 @@ function under(lane, t, reach) {
     if (found.length > 5) lines.push(`and ${found.length - 5} more`);
   };
   if (lane.kind === "findings") {
-    add(data.findings.filter(ofNode).flatMap(one => (one.at.length ? one.at : [one.t]).map(t => [t, 0, `${one.rule}: ${one.text}`])));
+    add(data.findings.filter(ofNode).flatMap(one => (one.at.length ? one.at : [one.t]).map(t => [t, 0, `${one.title} (${one.rule}): ${one.text}`])));
   }
   if (lane.kind === "load") {
     const found = valueAt(lane.bus.load, t, 2), rate = (found ? found[0] : 0) * perSecond(lane.bus.load);
@@ -514,8 +558,13 @@ function begin() {
     event.preventDefault();
     act();
   });
+  const paper = matchMedia("print"), print = on => { if (state.paper !== on) { state.paper = on; listFindings(); } };
+  paper.addEventListener("change", () => print(paper.matches));
+  addEventListener("beforeprint", () => print(true));
+  addEventListener("afterprint", () => print(false));
   pointers();
   refresh();
+  print(paper.matches);
   new ResizeObserver(() => redraw()).observe(at("chart"));
 }
 begin();

@@ -13,7 +13,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Final, NamedTuple
 
-from tickrig.host.canmon.model.check.diagnosis import BusFault, Diagnosis
+from tickrig.host.canmon.model.check.diagnosis import RULES, BusFault, Diagnosis
 from tickrig.host.canmon.model.decode.decoded import Decoded
 from tickrig.host.canmon.model.decode.node_board import NodeStatus, pdo_contents, told_identity
 from tickrig.host.canmon.model.decode.node_memory import HEARTBEAT_TIME
@@ -225,7 +225,9 @@ def _finding(survey: Survey, fault: BusFault, verdict: Verdict) -> dict[str, obj
     return {
         "t": survey.since(fault.first_us) if places else 0,
         "at": [survey.since(place.at_us) for place in places],
+        "last": survey.since(fault.last_us),
         "rule": one_line(fault.rule),
+        "title": _title(fault.rule),
         "text": one_line(_fault_text(fault)),
         "key": _key(fault.channel, fault.node),
         "count": fault.amount,
@@ -240,6 +242,12 @@ def _finding(survey: Survey, fault: BusFault, verdict: Verdict) -> dict[str, obj
             for number, (one, decoded) in enumerate(around, first)
         ],
     }
+
+
+def _title(rule: str) -> str:
+    """Return what a rule finds, since the name of a rule may say what it wants instead."""
+    text = RULES.get(rule, "")
+    return text[:1].upper() + text[1:]
 
 
 _HEADS: Final = (

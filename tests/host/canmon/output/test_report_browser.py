@@ -135,6 +135,67 @@ def test_names_of_an_eds_are_text(page: Page) -> None:
     assert page.locator("img").count() == 0
 
 
+@pytest.fixture(scope="module")
+def doubled(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Write the page of two nodes with one node-ID, one EMCY, and a drive that stands still."""
+    log = tmp_path_factory.mktemp("doubled") / "run.log"
+    beats = [(n * 100_000 + more, "711#05") for n in range(1, 60) for more in (0, 37_000)]
+    words = [
+        (n * 100_000 + 50_000, f"183#{'3702' if n < 30 else '4002'}00000000") for n in range(60)
+    ]
+    lines = sorted([*beats, *words, (2_500_000, "091#1023810000000000")])
+    log.write_text("".join(f"({1e9 + at_us / 1e6:.6f}) can0 {frame}\n" for at_us, frame in lines))
+    page = log.with_suffix(".html")
+    command = ["report", str(log), "-o", str(page), "--eds", f"3={EPOS}", "-b", "500k"]
+    assert CliRunner().invoke(main, command).exit_code == 0
+    return page
+
+
+def test_a_finding_of_many_times_is_one_bar(browser: Browser, doubled: Path) -> None:
+    page = browser.new_page(viewport={"width": 1280, "height": 900})
+    page.goto(doubled.as_uri())
+    rules = page.locator(".finding .rule").all_text_contents()
+    assert {"doubled-node", "no-emcy"} <= set(rules)
+    assert page.locator("#chart path.found.many").count() == 1
+    bar, mark = (
+        page.locator(f"#chart path[data-mark='{rules.index(rule)}']").bounding_box()
+        for rule in ("doubled-node", "no-emcy")
+    )
+    assert bar
+    assert mark
+    assert bar["width"] > 20 * mark["width"]
+    assert mark["y"] + mark["height"] <= bar["y"]
+    page.locator("#chart path.found.many").dispatch_event("click")
+    assert page.locator(".finding[aria-expanded=true] .rule").inner_text() == "doubled-node"
+    page.close()
+
+
+def test_a_finding_has_a_plain_title_and_says_that_it_opens(page: Page) -> None:
+    one = page.locator(".finding").nth(abort(page))
+    assert one.locator(".title").inner_text() == "Aborted SDO transfers"
+    assert one.locator(".open").inner_text() == "show frames"
+    one.focus()
+    page.keyboard.press("Enter")
+    assert page.locator(".finding").nth(abort(page)).get_attribute("aria-expanded") == "true"
+    assert page.locator(".finding").nth(abort(page)).locator(".open").inner_text() == "hide frames"
+    assert page.locator(".frames tr.here").count() >= 1
+    page.keyboard.press("Enter")
+    assert page.locator(".frames").count() == 0
+
+
+def test_paper_shows_ten_frames_of_each_finding(page: Page) -> None:
+    page.emulate_media(media="print")
+    page.wait_for_selector(".frames table")
+    boxes = page.locator("#finding-list > li")
+    assert boxes.count() > 2
+    for n in range(boxes.count()):
+        assert 1 <= boxes.nth(n).locator("tr").count() <= 10
+        assert boxes.nth(n).locator("tr.here").count() >= 1
+    assert not page.locator(".finding .open").first.is_visible()
+    page.emulate_media(media="screen")
+    page.wait_for_selector(".frames", state="detached")
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [360, 768, 1280])
 def test_the_page_is_no_wider_than_the_screen(
