@@ -146,6 +146,9 @@ function barsOf() {
   return rows;
 }
 
+const SIGNAL_HEIGHTS = {states: 26, constant: 16, curve: 56};
+const isConstant = signal => signal.at.length > 0 && signal.at.every((value, n) => n % 3 === 0 || value === signal.at[1]);
+
 function lanesOf() {
   const lanes = [];
   if (data.findings.length) {
@@ -162,7 +165,8 @@ function lanesOf() {
   }
   data.signals.forEach((signal, number) => {
     if (!ofNode(signal) || !shownSignals.has(number)) return;
-    lanes.push({kind: signal.states ? "states" : "curve", name: signal.name, soft: "", signal, height: signal.states ? 26 : 56});
+    const kind = signal.states ? "states" : isConstant(signal) ? "constant" : "curve";
+    lanes.push({kind, name: signal.name, soft: "", signal, height: SIGNAL_HEIGHTS[kind]});
   });
   return lanes;
 }
@@ -252,8 +256,10 @@ const highest = bins => {
 };
 const perSecond = bins => 1e6 / bins.width;
 
+// Draws states, and returns what writes their names: above what is drawn meanwhile.
 function bands(group, changes, x, top, height, end, classOf) {
   let before = -10;
+  const words = [];
   for (let n = 0; n < changes.length; n += 2) {
     const from = x(changes[n]), to = x(n + 2 < changes.length ? changes[n + 2] : end);
     if (to < drawn.left || from > drawn.left + drawn.width) continue;
@@ -262,9 +268,10 @@ function bands(group, changes, x, top, height, end, classOf) {
     const begin = Math.max(from, drawn.left), stop = Math.min(to, drawn.left + drawn.width);
     draw(group, "rect", {class: classOf(changes[n + 1]), x: begin, y: top, width: Math.max(stop - begin, 0.6), height});
     if (stop - begin > changes[n + 1].length * 6 + 6) {
-      draw(group, "text", {x: begin + 3, y: top + height - 3}, changes[n + 1]);
+      words.push([begin + 3, changes[n + 1]]);
     }
   }
+  return () => { for (const [left, text] of words) draw(group, "text", {class: "in", x: left, y: top + height - 3}, text); };
 }
 
 function marks(group, kind, list, x, shape) {
@@ -279,6 +286,11 @@ function marks(group, kind, list, x, shape) {
   if (dim) draw(group, "path", {class: `${kind} dim`, d: dim});
 }
 
+// A state has one colour in all signals, so that the legend can say which.
+const stateNames = [...new Set(data.signals.flatMap(one => (one.states || []).filter((_, n) => n % 2)))];
+const STATE_COLOURS = 6, MOST_STATES = 12;
+const plainNames = stateNames.filter(name => name !== "operation enabled" && !name.startsWith("fault"));
+const stateClass = name => name === "operation enabled" ? "operational" : name.startsWith("fault") ? "stopped" : `s${plainNames.indexOf(name) % STATE_COLOURS}`;
 const nmtClass = name => NMT.includes(name) ? name : "other";
 const painters = {
   findings(group, lane, x, y) {
@@ -310,17 +322,19 @@ const painters = {
     area(group, "area", bins, x, y + 2, lane.height - 2, most);
     const text = lane.bus.rate ? `max ${(most * scale / lane.bus.rate * 100).toFixed(1)} %` : `max ${(most * scale / 1e3).toFixed(1)} kbit/s`;
     draw(drawn.svg, "text", {class: "soft", x: 0, y: y + 25}, text);
+    draw(drawn.svg, "text", {class: "soft", x: 0, y: y + 38}, `in ${short(bins.width / 1e3)} ms`);
   },
   errors(group, lane, x, y) {
     area(group, "errors", lane.bus.errors, x, y + 2, lane.height - 2, highest(lane.bus.errors));
   },
   node(group, lane, x, y) {
     const node = lane.node;
-    bands(group, node.states, x, y + 1, 14, data.span, nmtClass);
+    const write = bands(group, node.states, x, y + 1, 14, data.span, nmtClass);
     for (const [t, span] of node.gaps) {
       const from = Math.max(x(t), drawn.left - 2), to = Math.min(x(t + span), drawn.left + drawn.width + 2);
       if (to > from) draw(group, "rect", {class: "gap", x: from, y: y + 1, width: Math.max(to - from, 2), height: 14});
     }
+    write();
     marks(group, "command", node.commands, x, place => `M${place} ${y + 17}v10`);
     marks(group, "boot", node.boots, x, place => `M${place - 4} ${y + 27}h8l-4 -9z`);
     marks(group, "emcy", node.emcys, x, place => `M${place} ${y + 16}l5 6l-5 6l-5 -6z`);
@@ -336,9 +350,11 @@ const painters = {
     area(group, "area", node.pdos, x, y + 38, lane.height - 38, highest(node.pdos));
   },
   states(group, lane, x, y) {
-    const names = [...new Set(lane.signal.states.filter((_, n) => n % 2))];
-    bands(group, lane.signal.states, x, y + 2, lane.height - 6, data.span, name =>
-      name === "operation enabled" ? "operational" : name.startsWith("fault") ? "stopped" : `s${names.indexOf(name) % 4}`);
+    bands(group, lane.signal.states, x, y + 2, lane.height - 6, data.span, stateClass)();
+  },
+  constant(group, lane, x, y) {
+    const text = `always ${short(lane.signal.at[1])} ${lane.signal.unit}`;
+    draw(group, "text", {class: "soft", x: drawn.left + 3, y: y + 12}, text);
   },
   curve(group, lane, x, y) {
     const bins = lane.signal, [from, to] = seenBins(bins, 3);
@@ -408,7 +424,7 @@ function under(lane, t, reach) {
     lines.push(`${((rate ? rate[0] : 0) * perSecond(node.pdos)).toFixed(1)} PDOs/s`);
   }
   if (lane.kind === "states") lines.push(stateAt(lane.signal.states, t));
-  if (lane.kind === "curve") {
+  if (lane.kind === "curve" || lane.kind === "constant") {
     const found = valueAt(lane.signal, t, 3);
     if (found) lines.push(`${found[0] === found[1] ? short(found[0]) : `${short(found[0])} … ${short(found[1])}`} ${lane.signal.unit}`);
   }
@@ -482,7 +498,12 @@ function table(id, heads, rows, kinds) {
   top.append(head);
   for (const cells of rows) {
     const row = make("tr");
-    cells.forEach((text, n) => { if (used[n]) row.append(make("td", text, kinds[n] || "")); });
+    cells.forEach((text, n) => {
+      if (!used[n]) return;
+      const cell = make("td", text, kinds[n] || "");
+      cell.dataset.head = heads[n];
+      row.append(cell);
+    });
     body.append(row);
   }
   found.append(top, body);
@@ -530,7 +551,8 @@ function begin() {
   at("later").addEventListener("click", () => move((state.to - state.from) / 4));
   for (const [kind, sign, text] of [["operational", "", "operational"], ["pre-operational", "", "pre-operational"],
     ["stopped", "", "stopped"], ["gap", "", "no heartbeat"], ["boot", "▲", "boot-up"], ["", "|", "NMT command"],
-    ["emcy", "◆", "EMCY"], ["failed", "✕", "SDO failed"], ["", "▬", "SDO transfer"], ["found", "▼", "finding"]]) {
+    ["emcy", "◆", "EMCY"], ["failed", "✕", "SDO failed"], ["", "▬", "SDO transfer"], ["found", "▼", "finding"],
+    ...stateNames.slice(0, MOST_STATES).map(name => [stateClass(name), "", name])]) {
     const one = make("span");
     one.append(make("i", sign, kind), text);
     at("legend").append(one);

@@ -120,7 +120,7 @@ def _what(survey: Survey, head: ReportHead) -> str:
     begun = f", from {_date(survey.first_us)}" if survey.first_us >= _DATED_US else ""
     bits = sum(sum(spans.values()) for spans in survey.bits.sums.values())
     load = load_text(bits * 1_000_000 // span_us, head.bit_rate) if span_us else ""
-    busy = f", at a mean load of {load}" if load and len(survey.frames) == 1 else ""
+    busy = f", at a mean load of {load} over that time" if load and len(survey.frames) == 1 else ""
     return f"{head.source} holds {frames:,} frames of {buses} in {duration(span_us)}{begun}{busy}."
 
 

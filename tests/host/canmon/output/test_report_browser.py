@@ -170,6 +170,43 @@ def test_a_finding_of_many_times_is_one_bar(browser: Browser, doubled: Path) -> 
     page.close()
 
 
+def test_the_timeline_explains_itself(browser: Browser, doubled: Path) -> None:
+    page = browser.new_page(viewport={"width": 1280, "height": 900})
+    page.goto(doubled.as_uri())
+    legend = page.locator("#legend")
+    assert {"operation enabled", "switch on disabled"} <= set(
+        legend.locator("span").all_inner_texts()
+    )
+    colours = {
+        name: legend.locator("span", has_text=name)
+        .locator("i")
+        .evaluate("one => getComputedStyle(one).backgroundColor")
+        for name in ("operation enabled", "switch on disabled")
+    }
+    drawn = page.locator("#chart g rect.s0").evaluate("one => getComputedStyle(one).fill")
+    assert drawn == colours["switch on disabled"]
+    assert len(set(colours.values())) == 2
+    assert "always 0" in page.locator("#chart").inner_text()
+    assert page.locator("#chart path.line").count() == 0
+    assert re.search(r"max [0-9.]+ %\s*in [0-9.]+ ms", page.locator("#chart").text_content() or "")
+    page.close()
+
+
+@pytest.mark.parametrize("width", [360, 500, 768])
+def test_all_of_a_node_is_seen_on_a_small_screen(
+    browser: Browser, doubled: Path, width: int
+) -> None:
+    page = browser.new_page(viewport={"width": width, "height": 900})
+    page.goto(doubled.as_uri())
+    cell = page.locator("#node-table td", has_text="from two nodes")
+    box = cell.bounding_box()
+    assert box
+    assert box["x"] + box["width"] <= width
+    head = cell.evaluate("one => getComputedStyle(one, '::before').content")
+    assert head == '"Heartbeat"'
+    page.close()
+
+
 def test_a_finding_has_a_plain_title_and_says_that_it_opens(page: Page) -> None:
     one = page.locator(".finding").nth(abort(page))
     assert one.locator(".title").inner_text() == "Aborted SDO transfers"
