@@ -29,10 +29,12 @@ from tickrig.host.text.values import counted
 
 if TYPE_CHECKING:
     from tickrig.host.canmon.model.columns import column_traffic
+    from tickrig.host.canmon.model.columns import columns as column_frames
     from tickrig.host.canmon.model.columns.columns import Columns
     from tickrig.host.canmon.model.frames import AnyRecord, LineRecord
     from tickrig.host.canmon.model.traffic import TrafficSnapshot
 else:  # numpy
+    column_frames = LazyModule("tickrig.host.canmon.model.columns.columns")
     column_traffic = LazyModule("tickrig.host.canmon.model.columns.column_traffic")
 
 
@@ -288,7 +290,9 @@ _PATIENCE_US: Final = 5_000_000
 """How long a bus is heard where nothing else ends it."""
 
 
-span_option: Final = time_option("--for", "span_us", help="End after 10s, 500ms.")
+span_option: Final = time_option(
+    "--for", "span_us", help="End after 10s, 500ms; in a log by its times."
+)
 """Add the option `--for`, in microseconds."""
 
 
@@ -336,10 +340,18 @@ def follow(  # noqa: PLR0913 - how, on a screen and without
 def listen(
     source: AnySource[Item], take: Callable[[Sequence[Item]], None], span_us: int | None
 ) -> None:
-    """Take what comes until the source ends or the time is over."""
-    begin_s = time.monotonic()
-    while not (source.ended or _is_over(begin_s, span_us)):
-        take(source.poll(_POLL_US))
+    """Take what comes until the source ends or the time is over: in a log by its own times."""
+    begin_s, last_us = time.monotonic(), None
+    while not (source.ended or (source.live and _is_over(begin_s, span_us))):
+        records = source.poll(_POLL_US)
+        if span_us is not None and not source.live and records:
+            last_us = records[0].at_us + span_us if last_us is None else last_us
+            late = [at for at, one in enumerate(records) if one.at_us > last_us]
+            take(records[: late[0]] if late else records)
+            if late:
+                return
+        else:
+            take(records)
         say_marks(source)
 
 
@@ -349,25 +361,38 @@ def say_marks(source: AnySource[object]) -> None:
         click.echo(mark.text, err=True)
 
 
-def take_blocks(log: BlockLog, take: Callable[[Columns], None]) -> bool:
+def take_blocks(log: BlockLog, take: Callable[[Columns], None], span_us: int | None = None) -> bool:
     """Take all blocks of a log, or until somebody interrupts it.
+
+    Args:
+        log: the log.
+        take: takes a block.
+        span_us: for how long by the times of the log; None for all of it.
 
     Returns:
         False where it holds CAN FD: then all of it is to be read frame by frame.
     """
+    last_us: int | None = None
     with until_interrupted():
         while not log.ended:
             for block in log.poll(0):
+                if span_us is not None and len(block):
+                    last_us = int(block.at_us[0]) + span_us if last_us is None else last_us
+                    inside = block.at_us <= last_us
+                    late, rows = (~inside).nonzero()[0], inside.nonzero()[0]
+                    if len(late):
+                        take(column_frames.select(block, rows[rows < late[0]]))
+                        return True
                 take(block)
     return not log.no_columns
 
 
-def count_blocks(log: BlockLog | None) -> TrafficSnapshot | None:
+def count_blocks(log: BlockLog | None, span_us: int | None) -> TrafficSnapshot | None:
     """Return the statistics of a log; None where it is to be read frame by frame."""
     if log is None:
         return None
     traffic = column_traffic.ColumnTraffic()
-    return traffic.snapshot() if take_blocks(log, traffic.take) else None
+    return traffic.snapshot() if take_blocks(log, traffic.take, span_us) else None
 
 
 def patience_us(source: AnySource[object], words: Sequence[str]) -> int | None:

@@ -375,7 +375,7 @@ def command(  # noqa: PLR0913 - options
     log = None if decoder else block_log(words)
     if log is not None:
         checker = column_check.ColumnChecker(rules, bit_rate, heartbeats)
-        log = _in_blocks(log, checker, verdict)
+        log = _in_blocks(log, checker, verdict, span_us)
     frames = log or open_source(words, bus)
     if reopen:
         frames.reopen()
@@ -436,7 +436,7 @@ class _Usual:
         log = block_log(self._words)
         if log is not None:
             with closing(log):
-                if listening.take_blocks(log, self._diagnoser.take):
+                if listening.take_blocks(log, self._diagnoser.take, span_us):
                     self.source = log
                     return
             self._diagnoser = self._make()  # CAN FD: read it again, frame by frame
@@ -583,7 +583,10 @@ def _bit_rate(rules: Rules, words: Sequence[str], bus: BusOptions) -> int | None
 
 
 def _in_blocks(
-    log: BlockLog, checker: column_check.ColumnChecker, verdict: _FindingPrinter
+    log: BlockLog,
+    checker: column_check.ColumnChecker,
+    verdict: _FindingPrinter,
+    span_us: int | None,
 ) -> BlockLog | None:
     """Judge a log; return None where it is to be read again, frame by frame."""
 
@@ -592,7 +595,7 @@ def _in_blocks(
             verdict.count(len(block), int(block.at_us[0]))
         verdict.take(checker.take(block))
 
-    if listening.take_blocks(log, take):
+    if listening.take_blocks(log, take, span_us):
         verdict.take(checker.end(log.losses(), log.errors()))
         verdict.unjudged = checker.unjudged(log.without_errors)
         return log

@@ -196,7 +196,7 @@ def command(source: str, signals: Sequence[str], **options: Any) -> None:
     decoder = None if slices and not eds and not dbc else make_decoder(eds, dbc)
     log = block_log([source]) if slices else None
     collector = Collector(words)
-    whole = log is not None and take_blocks(log, collector.take_columns)
+    whole = log is not None and take_blocks(log, collector.take_columns, request.span_us)
     frames = (log if whole else None) or open_source([source], bus)
     with closing(frames):
         if not isinstance(frames, BlockLog):
@@ -229,7 +229,7 @@ def _list(
     whole = (
         log is not None
         and decoder.standard
-        and take_blocks(log, column_survey.ColumnSurvey(decoder, survey).take)
+        and take_blocks(log, column_survey.ColumnSurvey(decoder, survey).take, request.span_us)
     )
     frames = (log if whole else None) or open_source([source], bus)
     with closing(frames):

@@ -66,7 +66,7 @@ def command(
     """  # noqa: D301 - click wants the backspace
     found = read_eds_files(eds)
     view, log = _NodesView(found), block_log(source)
-    whole = log is not None and view.decoder.standard and take_blocks(log, view.take_block)
+    whole = log is not None and view.decoder.standard and take_blocks(log, view.take_block, span_us)
     frames = (log if whole else None) or open_source(source, BusOptions(**options))
     with closing(frames):
         if not isinstance(frames, BlockLog):

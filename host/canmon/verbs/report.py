@@ -27,7 +27,7 @@ from tickrig.host.canmon.output import listening, report_page
 from tickrig.host.canmon.sources.source import AnySource, BlockLog, Source, block_log, open_source
 from tickrig.host.canmon.verbs import decode_options
 from tickrig.host.cli.can_options import BusOptions
-from tickrig.host.cli.messages import SourceFailed, refusing
+from tickrig.host.cli.messages import Refused, SourceFailed, refusing
 from tickrig.host.cli.options import PATH
 from tickrig.host.text.whole_file import check_file, write_whole
 
@@ -230,6 +230,8 @@ class _Reading:
         self._words, self._bus = list(words), bus
         self.source: AnySource[Any] = open_source(words, bus)
         self._recorded = self.source.live
+        if span_us is not None and not self._recorded:
+            raise Refused("--for is how long a bus is recorded: leave it out for a log")
         if self._recorded:
             self._words = [str(folder / "bus.log")]
             self._record(self.source, Path(self._words[0]), words, span_us)

@@ -235,7 +235,7 @@ def command(
     bus = BusOptions(**options)
     rates = listening.bit_rates_of(source, bus)
     log = block_log(source)
-    snapshot = listening.count_blocks(log)
+    snapshot = listening.count_blocks(log, span_us)
     frames = (log if snapshot else None) or open_source(source, bus)
     with closing(frames):
         if not isinstance(frames, BlockLog):

@@ -71,7 +71,7 @@ def command(  # noqa: PLR0913 - options
     if not plain:
         take = lambda records: model.take_decoded(meaning.take(records))  # noqa: E731
     log = block_log(source) if plain else None
-    snapshot = listening.count_blocks(log)
+    snapshot = listening.count_blocks(log, span_us)
     model.press("d" if decode else "")
     frames = (log if snapshot else None) or open_any(source, bus)
     if reopen:

@@ -157,6 +157,31 @@ def test_learnt_rules_stand_alone(
     assert reason in result.stderr
 
 
+@pytest.mark.parametrize("small_bytes", [0, 1 << 20])
+def test_a_time_ends_a_log_by_its_own_times(
+    small_bytes: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(block_log, "SMALL_BYTES", small_bytes)
+    log = write(tmp_path / "run.log", LOST)
+    assert (check(log).exit_code, check(log, "--for", "1400ms").exit_code) == (1, 0)
+    learnt = check("--init", log, "--for", "1s").stdout
+    assert f"Learnt from {log}, 11 frames" in learnt
+    late = ("--max-gap", "703=150ms")
+    assert (check(log, *late).exit_code, check(log, *late, "--for", "1s").exit_code) == (1, 0)
+    for verb in ("stats", "nodes", "top"):
+        short = CliRunner().invoke(main, [verb, log, "--for", "1s"])
+        whole = CliRunner().invoke(main, [verb, log])
+        first = write(tmp_path / f"{verb}.log", "".join(LOST.splitlines(keepends=True)[:11]))
+        alone = CliRunner().invoke(main, [verb, first])
+        assert short.exit_code == 0
+        assert short.stdout == alone.stdout != whole.stdout
+    page = tmp_path / "a.html"
+    result = CliRunner().invoke(main, ["report", log, "--for", "1s", "-o", str(page)])
+    assert (result.exit_code, result.stderr) == (
+        *(2, "Error: --for is how long a bus is recorded: leave it out for a log\n"),
+    )
+
+
 def test_nothing_is_learnt_of_no_frame(tmp_path: Path) -> None:
     result = check("--init", write(tmp_path / "run.log", ""))
     assert (result.exit_code, result.stdout) == (5, "")
