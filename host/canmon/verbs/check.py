@@ -126,8 +126,10 @@ class _FindingPrinter:
         return {name: why for name, why in self.unjudged.rules.items() if name not in self.counts}
 
     def doubts(self) -> list[str]:
-        """Say what was not judged, one line each."""
-        none = [f"{name} judged nothing: {why}" for name, why in self.none_judged.items()]
+        """Say what was judged and what was not, one line each."""
+        held = [name for name in self._rules if name not in self.none_judged]
+        none = [f"judged: {', '.join(held)}"] * bool(held)
+        none += [f"{name} judged nothing: {why}" for name, why in self.none_judged.items()]
         return none + [f"not judged: {text}" for text in self.unjudged.notes]
 
     def summary(self) -> str:
@@ -226,7 +228,12 @@ def _read_learnt(
     Raises:
         Refused: it is wrong, or not alone.
     """
-    others = [f"--{name.replace('_', '-')}" for name in (*SWITCHES, *VALUES) if options.get(name)]
+    others = [
+        f"--{name.replace('_', '-')}"
+        for name in (*SWITCHES, *VALUES)
+        if name != "bitrate" and options.get(name)  # no rule by itself
+    ]
+    others += ["--max-load"] * (options.get("max_load") == 0)  # a limit, too
     if init and (files or others):
         raise Refused(f"--init learns all rules: leave {(*map(str, files), *others)[0]} out")
     found = None
@@ -242,7 +249,8 @@ def _read_learnt(
             raise Refused(f"rules {path}: {error}") from None
     if found is not None and (others or len(files) > 1):
         rest = others[0] if others else "another file"
-        raise Refused(f"learnt rules are held alone: leave {rest} out, or check twice")
+        beside = "learnt rules stand beside those that need no parameter, and no others"
+        raise Refused(f"{beside}: leave {rest} out, or check twice")
     return found
 
 
@@ -288,9 +296,7 @@ _MOST_AROUND: Final = 1_000
         "--max",
         "most",
         type=click.IntRange(1),
-        default=20,
-        show_default=True,
-        help="Findings without a RULE, and frames of each, that are shown.",
+        help="Findings without a RULE, and frames of each, that are shown (default: 20 and 3).",
     ),
     click.option("--junit", "report_path", type=PATH, metavar="FILE", help="Write a JUnit report."),
     click.option("--sarif", "sarif_path", type=PATH, metavar="FILE", help="Write a SARIF report."),
@@ -312,7 +318,7 @@ def command(  # noqa: PLR0913 - options
     around: int,
     init: bool,
     output: Path | None,
-    most: int,
+    most: int | None,
     report_path: Path | None,
     sarif_path: Path | None,
     jsonl: bool,
@@ -330,7 +336,8 @@ def command(  # noqa: PLR0913 - options
 
     --init learns what is usual in a good log: nodes, identities, CAN-IDs,
     lengths, periods, load, order of boot-ups, EMCYs. Given to the next check,
-    its file is held beside the rules that need no parameter.
+    its file is held beside the rules that need no parameter, with -b, --eds and
+    no other rule.
 
     With other rules, only these are held. They are options, or a TOML file with the
     same names: no_emcy = true, heartbeat = ["3=100ms±20%"].
@@ -403,6 +410,9 @@ def command(  # noqa: PLR0913 - options
 
 _MOST_FRAMES: Final = 20_000_000
 """Frames of a bus that are kept: 700 MB."""
+_SHOWN: Final = 20
+_SHOWN_FRAMES: Final = 3
+"""Findings, and frames of each, that are shown where nobody says how many."""
 
 
 class _Usual:
@@ -454,7 +464,7 @@ class _Usual:
         if self._diagnoser.kept.frames < _MOST_FRAMES:
             self._diagnoser.take(records)
 
-    def show(self, *, jsonl: bool, stamp: Stamp | None, most: int) -> None:
+    def show(self, *, jsonl: bool, stamp: Stamp | None, most: int | None) -> None:
         """Show what was found."""
         source = self.source
         lost = [f"{source.lost} frames were lost"] if source.lost else []
@@ -463,8 +473,10 @@ class _Usual:
         lines = DumpLines(stamp) if stamp else None
         if lines and found.frames:
             lines.stamp(min(bus.at_us[0] for bus in self._diagnoser.kept))
-        text_of = _fault_json if jsonl else partial(_fault_text, lines=lines, most=most)
-        shown = found.faults if jsonl else found.faults[:most]
+        text_of = (
+            _fault_json if jsonl else partial(_fault_text, lines=lines, most=most or _SHOWN_FRAMES)
+        )
+        shown = found.faults if jsonl else found.faults[: most or _SHOWN]
         if shown:
             with until_unread():
                 click.echo("\n".join(map(text_of, shown)))

@@ -49,9 +49,11 @@ def test_statistics_of_a_bus(heartbeats: None) -> None:
 def test_a_bus_is_checked_for_a_time(heartbeats: None) -> None:
     words = ("check", *BUS, "--for", "1s", "--no-loss", "--nodes")
     ran = canmon(*words, "3")
-    assert (ran.returncode, ran.stdout, ran.stderr) == (0, "", "all rules hold\n")
+    assert (ran.returncode, ran.stdout, ran.stderr) == (
+        *(0, "", "judged: no-loss, nodes\nall rules hold\n"),
+    )
     ran = canmon(*words, "3-4")
-    assert (ran.returncode, ran.stderr) == (1, "1 finding: nodes: 1\n")
+    assert (ran.returncode, ran.stderr) == (1, "judged: no-loss, nodes\n1 finding: nodes: 1\n")
     assert ran.stdout.endswith(" nodes: node 4 was never heard\n")
 
 

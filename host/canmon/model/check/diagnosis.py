@@ -231,7 +231,7 @@ class Diagnoser:
             why["no-error-frames"] = self.without_errors
         if not self.kept.frames:
             why = dict.fromkeys(RULES, "no frame came")
-        faults.sort(key=lambda fault: (fault.first_us, fault.channel, fault.rule))
+        faults.sort(key=lambda fault: (fault.first_us, fault.frames[:1], fault.channel, fault.rule))
         names = tuple(name for name in RULES if name in judged)
         held = RULES if self._rules is not None else RULES.keys() - learnt.RULES.keys()
         unjudged = {
@@ -802,8 +802,8 @@ class _BusJudge:
                 for sub in range(1, len(learnt.IDENTITY) + 1)
             )
             codes = tuple(sorted(self._events.nodes[node].emcy))
-            told = {sub: row for sub, (_, row) in self._events.nodes[node].identity.items()}
-            nodes[node] = learnt.NodeSummary(row, words, codes, told)
+            answers = {sub: row for sub, (_, row) in self._events.nodes[node].identity.items()}
+            nodes[node] = learnt.NodeSummary(row, words, codes, answers)
         return nodes
 
     def _boot_order(self, boots: Mapping[int, int]) -> list[list[int]]:

@@ -85,13 +85,13 @@ class NodeSummary(NamedTuple):
         row: of its first frame.
         identity: what SDO traffic tells of 1018h, None for what it does not.
         emcy: error codes, as 8130h.
-        told: rows of the SDO answers that tell it, by sub-index.
+        answers: rows of the SDO answers with it, by sub-index.
     """
 
     row: int
     identity: tuple[int | None, ...]
     emcy: tuple[str, ...]
-    told: Mapping[int, int]
+    answers: Mapping[int, int]
 
 
 @dataclass(frozen=True, slots=True)
@@ -407,7 +407,7 @@ def broken(
         for sub, (name, right, value) in enumerate(identity, 1):
             if right is not None and value is not None and value != right:
                 text = f"its {name} is {value:08X}h, {right:08X}h is right"
-                yield Hit("learnt-identity", node, None, text, (one.told.get(sub, one.row),))
+                yield Hit("learnt-identity", node, None, text, (one.answers.get(sub, one.row),))
     for ident, wanted in sorted(learnt.frames.items()):
         if wanted.required and ident not in bus.frames:
             text = f"{ident_text(ident)} is missing"

@@ -139,8 +139,8 @@ def test_what_a_good_log_has_is_told_to_be_usual(tmp_path: Path) -> None:
     ("words", "reason"),
     [
         (("--init", "--no-emcy"), "--init learns all rules: leave --no-emcy out"),
-        (("learnt.toml", "--no-emcy"), "learnt rules are held alone: leave --no-emcy out"),
-        (("learnt.toml", "other.toml"), "learnt rules are held alone: leave another file out"),
+        (("learnt.toml", "--no-emcy"), "and no others: leave --no-emcy out"),
+        (("learnt.toml", "other.toml"), "and no others: leave another file out"),
         (("bad.toml",), "rules bad.toml: learnt.can0: 'nodes' is none of"),
     ],
 )
@@ -180,6 +180,27 @@ def test_a_time_ends_a_log_by_its_own_times(
     assert (result.exit_code, result.stderr) == (
         *(2, "Error: --for is how long a bus is recorded: leave it out for a log\n"),
     )
+
+
+def test_learnt_rules_take_a_bit_rate(tmp_path: Path) -> None:
+    good, rules = write(tmp_path / "good.log", SOUND), str(tmp_path / "good.toml")
+    assert check("--init", good, "-b", "500000", "-o", rules).exit_code == 0
+    result = check(good, rules, "-b", "500000")
+    assert result.exit_code == 0
+    judged = result.stderr.partition("\n")[0].removeprefix("judged: ").split(", ")
+    assert {"max-load", "learnt-load", "no-emcy"} <= set(judged)
+    assert "bit rate" not in result.stderr
+
+
+def test_a_finding_shows_its_first_frames_and_stands_in_their_order(tmp_path: Path) -> None:
+    log = SOUND + "".join(f"({5 + at / 10:.6f}) can0 083#3081110000000000\n" for at in range(5))
+    again = log + "(9.000000) can0 703#00\n(9.000000) can0 084#3081110000000000\n"
+    first, *_ = (found := check(write(tmp_path / "run.log", again)).stdout).splitlines()[1::2]
+    assert first == "    frames: 30 (3.900000)"
+    assert "    frames: 31 (5.000000), 32 (5.100000), 33 (5.200000), and 2 more" in found
+    assert found.index("no-reboot") < found.index("can0 node 4")
+    asked = check(str(tmp_path / "run.log"), "--max", "4").stdout
+    assert "34 (5.300000), and 1 more" in asked
 
 
 def test_nothing_is_learnt_of_no_frame(tmp_path: Path) -> None:
@@ -225,13 +246,16 @@ def check(*words: str) -> Result:
 
 def test_rules_that_hold_end_with_0(log: str) -> None:
     result = check(log, "--no-sdo-abort", "--nodes", "3", "--no-loss")
-    assert (result.exit_code, result.stdout, result.stderr) == (0, "", "all rules hold\n")
+    assert (result.exit_code, result.stdout, result.stderr) == (
+        *(0, "", "judged: no-loss, no-sdo-abort, nodes\nall rules hold\n"),
+    )
 
 
 def test_findings_are_lines_and_end_with_1(log: str) -> None:
     result = check(log, "--no-emcy", *HEARTBEAT)
     assert (result.exit_code, result.stdout) == (1, f"{EMCY}\n{LATE}\n")
-    assert result.stderr == "2 findings: heartbeat 3: 1, no-emcy: 1\n"
+    said = "judged: no-emcy, heartbeat 3\n2 findings: heartbeat 3: 1, no-emcy: 1\n"
+    assert result.stderr == said
 
 
 def test_a_file_holds_the_same_rules(log: str, tmp_path: Path) -> None:
@@ -423,7 +447,7 @@ def test_what_is_no_toml_is_said_with_its_line(log: str, tmp_path: Path) -> None
 
 def test_lines_that_are_no_frames_are_said_before_the_verdict(tmp_path: Path) -> None:
     log = write(tmp_path / "run.log", LOG + "what?\n")
-    first, last = check(log, "--no-sdo-abort").stderr.splitlines()
+    first, *_, last = check(log, "--no-sdo-abort").stderr.splitlines()
     assert "line 5 is no frame" in first
     assert last == "all rules hold"
 
@@ -493,7 +517,7 @@ def test_written_rules_are_held_by_a_file_and_reported(tmp_path: Path) -> None:
     rules = write(tmp_path / "rules.toml", '[rule]\nquiet = "emcy never"\nform = "dlc"\n')
     report = tmp_path / "out.xml"
     result = check(log, rules, "--junit", str(report))
-    assert result.stderr == "1 finding: quiet: 1\n"
+    assert result.stderr == "judged: quiet, form\n1 finding: quiet: 1\n"
     cases = ET.fromstring(report.read_bytes()).iter("testcase")
     failed = {case.get("name"): case.findtext("failure") for case in cases}
     quiet = FOUND.replace("emcy never", "quiet").removesuffix("\n")
@@ -612,6 +636,7 @@ def test_a_rule_that_judged_nothing_is_said_and_none_at_all_ends_with_5(
     result = check(log, "--no-sdo-abort", *words)
     assert (result.exit_code, result.stdout) == (0, "")
     assert result.stderr.splitlines() == [
+        "judged: no-sdo-abort",
         "max-gap 083 judged nothing: 083 came once",
         "1 rule held, 1 judged nothing",
     ]
@@ -637,6 +662,7 @@ def test_a_finding_goes_before_what_was_not_judged(log: str) -> None:
     result = check(log, "--no-emcy", "--max-gap", "083=1s")
     assert (result.exit_code, result.stdout) == (1, f"{EMCY}\n")
     assert result.stderr.splitlines() == [
+        "judged: no-emcy",
         "max-gap 083 judged nothing: 083 came once",
         "1 finding: no-emcy: 1",
     ]

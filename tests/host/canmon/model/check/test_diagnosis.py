@@ -342,3 +342,11 @@ def test_what_is_not_as_learnt_shows_where() -> None:
         assert [fault.first_us for fault in faults] == sorted(fault.first_us for fault in faults)
         if rule == "learnt-length":
             assert [place.number for place in fault.frames] == [culprit + 1]
+
+
+def test_a_pdo_that_comes_once_at_the_start_is_no_finding() -> None:
+    records = list(sound())
+    start_us = next(one.at_us for one in records if str(one.frame) == "000#0100")
+    for off_us, found in ((1_400_000, []), (1_600_000, ["seen-once"])):
+        faults = diagnose([put(list(records), start_us + off_us, "391#01")]).faults
+        assert [fault.rule for fault in faults] == found
