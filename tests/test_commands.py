@@ -359,7 +359,6 @@ OTHER_NAMES = {
     "--board": "tkernel-emu has two sockets; --control is that of its system",
     "--socket": "carries CiA 309-3, not the control protocol",
     "--wait": "ends as soon as the answer is there",
-    "canmon net scan --write": SECOND,
     "rrc test --json": "has a file since it was there; `--json -` prints",
     "canmon net scan --json": "a stream; the name is in scripts",
     "canmon net scan --write": SECOND,

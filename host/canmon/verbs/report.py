@@ -15,7 +15,7 @@ import click
 
 from tickrig._lazy import LazyModule
 from tickrig._version import __version__
-from tickrig.host.canmon.model.check import diagnosis
+from tickrig.host.canmon.model.check import diagnosis, learnt
 from tickrig.host.canmon.model.decode.dbc_file import DbcFile
 from tickrig.host.canmon.model.decode.decoder import Decoder
 from tickrig.host.canmon.model.decode.node_memory import EdsObjects
@@ -27,7 +27,7 @@ from tickrig.host.canmon.output import listening, report_page
 from tickrig.host.canmon.sources.source import AnySource, BlockLog, Source, block_log, open_source
 from tickrig.host.canmon.verbs import decode_options
 from tickrig.host.cli.can_options import BusOptions
-from tickrig.host.cli.messages import Refused, SourceFailed, refusing
+from tickrig.host.cli.messages import Refused, SourceFailed, refuse_path, refusing
 from tickrig.host.cli.options import PATH
 from tickrig.host.text.whole_file import check_file, write_whole
 
@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 else:  # numpy
     column_survey = LazyModule("tickrig.host.canmon.model.columns.column_survey")
 
+_RULE_FILE: Final = ".toml"
 _MOST_AROUND: Final = 200
 """Findings that are shown with their frames."""
 
@@ -80,21 +81,25 @@ def command(  # noqa: PLR0913 - options
     \b
     canmon report run.log -o run.html
     canmon report run.blf -o run.html --eds 3=drive.eds -b 500000
+    canmon report next.log good.toml -o next.html
     canmon report can0 --for 60s -o bus.html --pdf bus.pdf
 
-    A bus is recorded first, until Ctrl-C or for --for.
+    A bus is recorded first, until Ctrl-C or for --for. A file that canmon check
+    --init wrote is held against the log, as good.toml.
 
     {source}
     """  # noqa: D301 - click wants the backspace
     outputs = {"-o": page, "--pdf": pdf, "--png": png}
     with refusing():
         _check_outputs(outputs)
+    rules = _learnt([word for word in source if word.endswith(_RULE_FILE)])
+    source = [word for word in source if not word.endswith(_RULE_FILE)]
     bus, objects = BusOptions(**options), decode_options.read_eds_files(eds)
     rates, words = listening.bit_rates_of(source, bus), _named(source)
     with TemporaryDirectory(prefix="canmon-") as folder:
         read = _Reading(source, bus, Path(folder), span_us)
         try:
-            seen = read.whole(lambda: _Seen(objects, dbc, rates))
+            seen = read.whole(lambda: _Seen(objects, dbc, rates, rules))
             verdict = _verdict(seen, read, around)
         finally:
             read.close()
@@ -113,6 +118,26 @@ def command(  # noqa: PLR0913 - options
 def _named(words: Sequence[str]) -> str:
     """Return what a page calls a source: a log by its name, wherever it lies."""
     return ", ".join(Path(word).name if Path(word).is_file() else word for word in words) or "bus"
+
+
+def _learnt(files: Sequence[str]) -> learnt.Learnt | None:
+    """Return what was learnt from a good log; None without a file."""
+    if len(files) > 1:
+        raise Refused(f"learnt rules are held alone: leave {files[1]} out")
+    for path in files:
+        try:
+            found = learnt.parse_learnt(Path(path).read_text("utf-8"))
+        except OSError as error:
+            refuse_path("rules", error)
+        except ValueError as error:
+            raise Refused(f"rules {path}: {error}") from None
+        if found is None:
+            raise Refused(
+                f"rules {path}: no [learnt]: a report takes what canmon check --init writes;"
+                " hold other rules with canmon check"
+            )
+        return found
+    return None
 
 
 def _check_outputs(outputs: Mapping[str, Path | None]) -> None:
@@ -160,17 +185,21 @@ class _Seen:
     Attributes:
         survey: of it.
         decoder: of the survey.
-        diagnosis: what is wrong by all rules that need no parameter.
+        diagnosis: what is wrong by all rules that need no parameter, and those that were learnt.
     """
 
     def __init__(
-        self, objects: Mapping[int, EdsObjects], dbc: Sequence[Path], rates: BitRates
+        self,
+        objects: Mapping[int, EdsObjects],
+        dbc: Sequence[Path],
+        rates: BitRates,
+        rules: learnt.Learnt | None,
     ) -> None:
         self.decoder = decode_options.decoder_of(objects, dbc)
         names = {node: found.name for node, found in objects.items()}
         self.survey = Survey(self.decoder, names, rates)
         self.diagnosis = diagnosis.Diagnosis((), (), {}, 0)
-        self._diagnoser = diagnosis.Diagnoser(rates.nominal, objects)
+        self._diagnoser = diagnosis.Diagnoser(rates.nominal, objects, rules=rules)
 
     def by_columns(self, log: BlockLog) -> bool:
         """Take a log in blocks; False if it is to be read frame by frame."""

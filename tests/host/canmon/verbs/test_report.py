@@ -155,6 +155,38 @@ def test_an_identity_says_what_was_read_and_what_an_eds_says(tmp_path: Path) -> 
     assert node["cells"][1].endswith(" (EDS)")
 
 
+def test_learnt_rules_are_held(log: str, tmp_path: Path) -> None:
+    good = tmp_path / "good.toml"
+    learn = ["check", "--init", log, "-o", str(good)]
+    assert CliRunner().invoke(main, learn).exit_code == 0
+    with Path(log).open("a", encoding="ascii") as file:
+        file.write("(1600000006.0) can0 1AA#01\n")
+    page = tmp_path / "run.html"
+    assert report(log, good, "-o", page).exit_code == 0
+    found = [one["rule"] for one in data_of(page)["findings"]]
+    assert "learnt-frames" in found
+    assert report(log, "-o", page).exit_code == 0
+    assert "learnt-frames" not in [one["rule"] for one in data_of(page)["findings"]]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (None, "No such file"),
+        ("no_emcy = true\n", "no [learnt]: a report takes what canmon check --init writes"),
+        ("[learnt.can0]\nspeed = 1\n", "speed"),
+    ],
+)
+def test_other_rules_are_refused(log: str, tmp_path: Path, text: str | None, said: str) -> None:
+    rules = tmp_path / "rules.toml"
+    if text is not None:
+        rules.write_text(text)
+    result = report(log, rules, "-o", tmp_path / "run.html")
+    assert result.exit_code == 2
+    assert said in result.stderr
+    assert len(result.stderr.splitlines()) == 1
+
+
 def test_the_page_says_what_is_no_frame(log: str, tmp_path: Path) -> None:
     with Path(log).open("a", encoding="ascii") as file:
         file.write("what?\n")
