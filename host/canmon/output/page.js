@@ -134,7 +134,7 @@ const near = t => view(t - data.span / 100, t + data.span / 100);
 
 // A finding of many times is a bar from its first to its last, below the marks of the others.
 const MANY = 3, MOST_BARS = 6;
-const isMany = one => one.count > MANY && one.at.length > MANY;
+const isMany = one => one.at.length > MANY;
 function barsOf() {
   const rows = [];
   data.findings.forEach((one, number) => {
