@@ -216,7 +216,7 @@ def test_what_eds_check_finds_in_the_eds_is_counted(rig: str, tmp_path: Path) ->
             ("--node", "5", "--read-only", "--intrusive", "--yes"),
             "--read-only and --intrusive: which level? give one",
         ),
-        (("--json",), "--node is missing: without it nothing is judged"),
+        (("--json",), "--node is missing: it is needed for checks and reports"),
     ],
 )
 def test_what_cannot_be_is_told_before_the_run(rig: str, words: tuple[str, ...], why: str) -> None:
