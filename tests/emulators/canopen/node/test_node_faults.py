@@ -34,7 +34,9 @@ def bench_of(folder: Path, mode: str = "virtual") -> Bench:
     """Return a bench with two drives, the name of one in segments."""
     eds = (ROOT / "examples/eds/epos.eds").read_text("utf-8")
     file = folder / "drive.eds"
-    file.write_text(eds.replace("DefaultValue=EPOS\n", f"DefaultValue={LONG_NAME}\n"), "utf-8")
+    if not file.is_file():  # another process may be reading it
+        name = f"DefaultValue={LONG_NAME}\n"
+        file.write_text(eds.replace("DefaultValue=EPOS\n", name), "utf-8")
     return Bench(axis2=f"2={file}", axis3="3=epos", seed=3, mode=mode)
 
 

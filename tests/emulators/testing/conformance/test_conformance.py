@@ -345,4 +345,4 @@ def test_several_groups_may_be_one_word() -> None:
 
 def test_the_level_is_intrusive_unless_given() -> None:
     assert conformance(make_epos(5), only="NMT-03").level is Level.INTRUSIVE
-    assert "Unless given it is `intrusive`" in (conformance.__doc__ or "")
+    assert "The default is `intrusive`" in (conformance.__doc__ or "")

@@ -105,7 +105,7 @@ def test_what_will_never_come_is_told() -> None:
 
     with (
         patched_time(RrcBench().passing),
-        pytest.raises(RuntimeError, match="an event loop waits for ever"),
+        pytest.raises(RuntimeError, match="an event loop waits endlessly"),
         asyncio.Runner() as runner,
     ):
         runner.run(host())

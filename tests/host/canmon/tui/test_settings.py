@@ -261,7 +261,7 @@ WRONG = [
     ("source", "can0 'x", "No closing quotation"),
     ("source", "-", "standard input can be named at the start only"),
     ("source", "none.log", "none.log: No such file or directory"),
-    ("interface", "sockcan", "'sockcan' is none of python-can: "),
+    ("interface", "sockcan", "'sockcan' is not an interface of python-can: "),
     ("bitrate", "fast", "'fast' is not a bit rate like 500000, 500k or 1M"),
     ("data_bitrate", "0", "'0' is not a bit rate like 500000, 500k or 1M"),
     ("bus_kwargs", "port", "'port' is not KEY=VALUE, as port=43113"),

@@ -292,7 +292,7 @@ def test_a_node_is_saved_as_dcf_and_the_dcf_is_loaded_again(two: Path, tmp_path:
         await desk.press("ctrl+s")
         await desk.answer(str(file))
         await passed(desk)
-        assert told(desk) == f"{file}: 126 values saved"
+        assert told(desk).replace(" ", "") == f"{file}:126valuessaved"  # a long path is wrapped
         text = file.read_text("utf-8")
         assert "NodeID=16" in text
         section = text[text.index("[1A00sub2]") :]
