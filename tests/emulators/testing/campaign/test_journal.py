@@ -62,7 +62,7 @@ def test_a_line_whose_bits_are_wrong_is_no_line(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("head", "said"),
     [
-        ({**HEAD, "seeds": "0-99"}, "is of a campaign with seeds 0-9; now 0-99: --fresh starts again"),
+        ({**HEAD, "seeds": "0-99"}, "is of a campaign with seeds 0-9; now 0-99: --fresh starts"),
         ({**HEAD, "tests": ["t.py::test_c"]}, "with tests t.py::test_a, t.py::test_b; now t.py"),
         ({**HEAD, "rig file": "rig.toml"}, "with rig file None; now rig.toml"),
     ],

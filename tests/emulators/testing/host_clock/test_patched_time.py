@@ -162,8 +162,8 @@ def test_events_are_waited_for_in_virtual_time(in_virtual_time: RrcBench) -> Non
     with pytest.raises(RuntimeError) as caught:
         user_host.wait_for_event(event, None)
     assert re.fullmatch(
-        r"tests/.*/user_host\.py:\d+: Event\.wait waits endlessly: nothing that happens on the bench"
-        r" ends it, and another thread cannot",
+        r"tests/.*/user_host\.py:\d+: Event\.wait waits endlessly: nothing that happens on the"
+        r" bench ends it, and another thread cannot",
         str(caught.value),
     )
 

@@ -25,8 +25,8 @@ async def open_pdos(desk: Desk, node: str = "16 Palette0") -> None:
 
 
 def told(desk: Desk) -> str:
-    """Return what the lines at the bottom say, without their line break."""
-    return " ".join(desk.shown("pdo-status").split())
+    """Return what the lines at the bottom say, without line breaks, also those behind a hyphen."""
+    return " ".join(desk.shown("pdo-status").split()).replace("- ", "-")
 
 
 async def choose(desk: Desk, text: str) -> None:
@@ -292,7 +292,7 @@ def test_a_node_is_saved_as_dcf_and_the_dcf_is_loaded_again(two: Path, tmp_path:
         await desk.press("ctrl+s")
         await desk.answer(str(file))
         await passed(desk)
-        assert told(desk).replace(" ", "") == f"{file}:126valuessaved"  # a long path is wrapped
+        assert told(desk) == f"{file}: 126 values saved"
         text = file.read_text("utf-8")
         assert "NodeID=16" in text
         section = text[text.index("[1A00sub2]") :]
