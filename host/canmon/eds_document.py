@@ -179,7 +179,8 @@ def read_eds_paths(
         notify: takes a line about each choice.
     """
     found = {node: _read(node, path) for node, path in paths.items()}
-    show_findings(odd for objects in found.values() for odd in objects.findings)
+    if found:
+        show_findings(odd for objects in found.values() for odd in objects.findings)
     return eds_folder.EdsFiles(found, read_eds_folders(folders), notify)
 
 

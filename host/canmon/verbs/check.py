@@ -361,7 +361,7 @@ def command(  # noqa: PLR0913 - options
     rules = Rules() if known or init else _read_rules(files, options)
     bus = BusOptions(**{name: options[name] for name in _NAMES})
     bit_rate = _bit_rate(rules, words, bus)
-    objects = decode_options.read_eds_files(eds)
+    objects = decode_options.read_eds_files(eds) if any(eds) else {}
     if _is_empty(rules):
         make = partial(diagnosis.Diagnoser, bit_rate, objects, rules=known)
         held_frames = _Usual(words, bus, make, reopen=reopen)
