@@ -50,14 +50,14 @@ def test_the_guard_is_set_before_anything_moves() -> None:
 class LateLink(SpyLink):
     """An RRC whose answers come after half a second, to commands of some numbers."""
 
-    def __init__(self, late: range) -> None:
+    def __init__(self, late: range, delay: str = "500ms") -> None:
         line = SerialLine()
-        self._port, self._late = FaultyPort(line.a, BYTE_FAULTS), late
+        self._port, self._late, self._delay = FaultyPort(line.a, BYTE_FAULTS), late, delay
         super().__init__(SimLink(Rig(Station(Rrc(), self._port)), line.b))
 
     def send(self, traffic: bytes, /) -> None:
         if len(self.lines) in self._late:
-            self._port.arm("delay", "500ms")
+            self._port.arm("delay", self._delay)
         else:
             self._port.clear("delay")
         super().send(traffic)
@@ -70,7 +70,7 @@ def test_an_rrc_that_answers_late_is_asked_again() -> None:
 
 def test_an_rrc_that_always_answers_late_is_not_taken_for_another_device() -> None:
     with pytest.raises(LinkTimeout, match="an RRC answered once, then not in time: "):
-        Chair(LateLink(range(1, 99)), Guard())
+        Chair(LateLink(range(1, 99), "9s"), Guard())
 
 
 def listen(bench: Bench, duration_us: int) -> None:

@@ -105,7 +105,7 @@ def lines(text: str, step_us: int = 1_000) -> list[Record]:
 
 def test_without_times_nothing_is_judged_by_them() -> None:
     found = diagnose([lines("701#00 704#00 701#7F 701#7F 704#00 180#R 081#0050010000000000", 0)])
-    assert [fault.rule for fault in found.faults] == ["no-emcy", "no-reboot"]
+    assert [fault.rule for fault in found.faults] == ["no-reboot", "no-emcy"]
     assert found.unjudged["pdo-missing"] == found.unjudged["time-back"]
     assert "no-lost-heartbeat" in found.unjudged
 
