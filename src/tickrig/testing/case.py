@@ -25,13 +25,14 @@ class BenchTestCase(unittest.TestCase):
         bench: the bench, from `setUp` on.
         patched: whether hosts that call `time.sleep` and `time.monotonic` use the bench's time.
 
+    >>> import io
     >>> class ChairTest(BenchTestCase):
     ...     def make_bench(self):
     ...         return Bench("rrc")
     ...     def test_it_is_off(self):
     ...         self.bench.run_for("1s")
     ...         self.assertEqual(self.bench.get("state"), "WaitPowerOn")
-    >>> unittest.TextTestRunner(open("/dev/null", "w")).run(ChairTest("test_it_is_off"))
+    >>> unittest.TextTestRunner(io.StringIO()).run(ChairTest("test_it_is_off"))
     <unittest.runner.TextTestResult run=1 errors=0 failures=0>
     """
 
