@@ -176,7 +176,7 @@ def svg(lines: list[Line], columns: int) -> str:
     rules.append(f"#s{{transform:translateY(-{scroll}px);animation-name:s}}")
     body = "\n".join(_row(row, line) for row, line in enumerate(lines))
     return (
-        '<svg xmlns="http://www.w3.org/2000/svg" '
+        '<svg xmlns="http://www.w3.org/2000/svg" xml:space="preserve" '  # for viewers without CSS
         f'viewBox="0 0 {width + 16} {height}" fill="{INK}">\n'
         f"<style>\n{chr(10).join(rules)}\n</style>\n"
         f'<rect width="100%" height="100%" rx="6" fill="{GROUND}"/>\n'
