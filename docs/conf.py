@@ -1,10 +1,17 @@
-"""How Sphinx makes the site: of these pages, and of the docstrings (`make docs`)."""
+"""How Sphinx makes the site: of these pages, and of the docstrings (`make docs`).
+
+`make docs SITE=https://docs.example.org/tickrig/` makes it for that address: it adds
+sitemap.xml, and the links of 404.html work below that path. Without an address these links begin at
+the root of a host.
+"""
 
 from __future__ import annotations
 
+import os
 import re
 from logging import getLogger
 from typing import TYPE_CHECKING, Any
+from urllib.parse import urlsplit
 
 from tickrig import __version__
 
@@ -18,7 +25,19 @@ extensions = [
     "sphinx.ext.napoleon",
     "sphinx.ext.intersphinx",
     "myst_parser",
+    "notfound.extension",
 ]
+html_baseurl = os.environ.get("SITE", "")
+if html_baseurl:
+    extensions.append("sphinx_sitemap")
+    sitemap_url_scheme = "{link}"
+    sitemap_excludes = ["404.html", "search.html"]
+notfound_urls_prefix = f"{urlsplit(html_baseurl).path.rstrip('/')}/"
+notfound_context = {
+    "title": "Page not found",
+    "body": "<h1>Page not found</h1>\n\n<p>This page has another name now, or the address has a "
+    "mistake. The menu has all pages, and the field above it searches them.</p>",
+}
 html_theme = "furo"
 html_title = f"tickrig {version}"
 html_show_sourcelink = False

@@ -21,8 +21,11 @@ from tests.environment import ROOT, made_once
 PLACES = ("tickrig", "tickrig.device", "tickrig.host", "tickrig.rtc", "tickrig.testing")
 pytestmark = pytest.mark.timeout(600)  # it takes half a minute of a processor, beside other tests
 
-INDEXES = {"genindex.html", "py-modindex.html", "search.html"}
-"""Sphinx makes them; whether they are linked is the theme's business."""
+INDEXES = {"genindex.html", "py-modindex.html", "search.html", "404.html"}
+"""Sphinx and its extensions make them; whether they are linked is the theme's business."""
+
+
+SITE = "https://docs.example.org/rig/"
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +40,7 @@ def make_site(folder: Path) -> None:
             *(sys.executable, "-m", "sphinx", "-W", "-q", "-d", str(folder / "doctrees")),
             *(str(ROOT / "docs"), str(folder / "html")),
         ),
-        env={**os.environ, "PYTHONPATH": str(ROOT / "src")},
+        env={**os.environ, "PYTHONPATH": str(ROOT / "src"), "SITE": SITE},
         capture_output=True,
         text=True,
         check=False,
@@ -55,6 +58,9 @@ def links(page: Path) -> Iterator[tuple[Path, str]]:
     for target in re.findall(r'<a [^>]*href="([^"]+)"', text_of(page)):
         if not re.match(r"\w+:", target):
             path, _, name = unquote(target).partition("#")
+            if page.name == "404.html" and path:
+                assert path.startswith("/rig/"), path  # it is shown for an address in any folder
+                path = str(page.parent / path.removeprefix("/rig/"))
             yield ((page.parent / path).resolve() if path else page), name
 
 
@@ -81,7 +87,9 @@ def test_every_link_of_the_site_leads_to_something(site: Path) -> None:
 
 
 def test_the_site_wants_nothing_of_the_network(site: Path) -> None:
-    loading = re.compile(r'<(?:script|img|iframe|link)\b[^>]*(?:src|href)="(?:https?:)?//[^"]*"')
+    loading = re.compile(
+        r'<(?:script|img|iframe|link(?! rel="canonical"))\b[^>]*(?:src|href)="(?:https?:)?//[^"]*"'
+    )
     for page in site.rglob("*.html"):
         assert loading.findall(text_of(page)) == []
     fetching = re.compile(r"""(?:@import\s|url\()\s*["']?(?:https?:)?//[^"')]*""")
@@ -97,6 +105,21 @@ def test_each_page_is_in_the_menu_of_each_page(site: Path) -> None:
         found = {(site / page).parent.joinpath(path).resolve() for path in there if path}
         missed = {path for path in pages if (site / path).resolve() not in found}
         assert missed <= {page, Path("index.html")}, page.name
+
+
+def test_the_page_for_an_unknown_address_has_the_menu_and_its_styles_in_any_folder(
+    site: Path,
+) -> None:
+    text = text_of(site / "404.html")
+    assert "Page not found" in text
+    assert 'href="/rig/tutorials/index.html"' in text
+    assert re.findall(r'(?:src|href)="(?!https:|/rig/|#)[^"]*"', text) == []
+
+
+def test_the_site_map_has_each_page(site: Path) -> None:
+    there = set(re.findall(r"<loc>(.*?)</loc>", (site / "sitemap.xml").read_text("utf-8")))
+    pages = {f"{SITE}{page.relative_to(site)}" for page in site.rglob("*.html")}
+    assert pages - there == {f"{SITE}404.html", f"{SITE}search.html"}
 
 
 def test_no_table_is_torn(site: Path) -> None:
