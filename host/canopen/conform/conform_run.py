@@ -266,7 +266,7 @@ class ConformRun:
         if self._stray.stamps:
             self._stray.compare(self._client.number(*HEARTBEAT))
         subject = self._subject
-        self._care.prepare(subject.restorable(self._plan.level), subject.binding.held)
+        self._care.prepare(subject.restorable(self._plan.level), subject.binding.reader.held)
 
     def _object_checks(self) -> list[Check]:
         """Make the chosen checks of the objects of the EDS; without one there are none."""

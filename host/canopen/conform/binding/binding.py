@@ -140,16 +140,16 @@ class Binding:
         findings: where EDS and node contradict each other, one a line.
         known: the objects are those of an EDS.
         entries: the objects by index and sub-index.
-        held: what was read of them.
+        reader: has read them.
     """
 
     device: EdsDevice
     bound: Mapping[str, Bound]
     reasons: Mapping[str, str]
-    findings: tuple[str, ...] = ()
-    known: bool = True
-    entries: Mapping[_Place, EntryDescription] = field(default_factory=dict)
-    held: Mapping[_Place, bytes] = field(default_factory=dict)
+    findings: tuple[str, ...]
+    known: bool
+    entries: Mapping[_Place, EntryDescription]
+    reader: ObjectReader
 
 
 @dataclass(slots=True)
@@ -206,7 +206,7 @@ def bind(
     search.reasons.update(missing)
     findings = (*reader.findings, *search.findings)
     bound, reasons = search.bound, search.reasons
-    return Binding(found, bound, reasons, findings, search.known, entries, reader.held)
+    return Binding(found, bound, reasons, findings, search.known, entries, reader)
 
 
 def _bind_object(search: _Search, wanted: WantedObject) -> None:

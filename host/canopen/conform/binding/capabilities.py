@@ -165,17 +165,18 @@ def find_features(
 
     Args:
         binding: its objects.
-        client: reads it.
+        client: tries a block upload.
         claims: what its EDS says, None without one.
     """
     reasons = dict(_missing(binding))
     for word, key in _DUMMIES.items():
         if claims is None or word not in claims.dummies:
             reasons[word] = _unsaid(claims, key.title(), "this dummy may be mapped")
-    if (client.number(_STORE, 1) or 0) & _AUTONOMOUSLY:
+    number = binding.reader.number
+    if (number(_STORE, 1) or 0) & _AUTONOMOUSLY:
         reasons["unsaved"] = f"{_STORE:04X}h:01 says that the node saves by itself (bit 1)"
     for word, index in _ON_COMMAND.items():
-        said = client.number(index, 1)
+        said = number(index, 1)
         if said is not None and not said & 1:
             reasons[word] = f"{index:04X}h:01 says that the node does not do it on command (bit 0)"
     if _has_constant_heartbeat(binding):

@@ -16,7 +16,7 @@ from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.host.canopen.conform.check import ConformancePlan, Level
 from tickrig.host.canopen.conform.conform_run import ConformRun
-from tickrig.host.canopen.conform.verdict import CheckVerdict, Report
+from tickrig.host.canopen.conform.verdict import CheckVerdict, Report, Result
 from tickrig.host.canopen.eds import read_sound
 from tickrig.host.links.link import StampedFrames
 from tickrig.wire.can import CanFrame, Frames
@@ -150,6 +150,27 @@ def test_all_is_as_it_was(level: Level) -> None:
     assert report.unrestored == ()
     assert told(r1) == before
     assert r1.slave.state is NmtState.OPERATIONAL
+
+
+def test_what_was_read_since_the_last_check_is_not_read_again() -> None:
+    r1, asked = configured(), list[str]()
+    r1.wire.observers.append(lambda at_us, frame: asked.append(str(frame)))
+    assert judge(r1, Level.INTRUSIVE, "NMT-06").exit_status == 0
+    for name, times in {"181001": 1, "002000": 2, "012000": 2}.items():
+        assert asked.count(f"605#40{name}00000000") == times, name
+
+
+def test_all_is_as_it_was_though_the_node_boots_behind_the_last_check() -> None:
+    r1 = configured()
+    before = told(r1)
+
+    def boot(result: Result) -> None:
+        r1.slave.reset()
+        r1.rig.run_for(100_000)
+
+    report = r1.judge(ConformancePlan(Level.INTRUSIVE, ("NMT-06",), confirm=yes), on_result=boot)
+    assert report.unrestored == ()
+    assert told(r1) == before
 
 
 @pytest.mark.parametrize("call", SAMPLE)
