@@ -95,7 +95,7 @@ _MAX_NUMBER: Final = 0xFFFF_FFFF
 _MOST_NUMBERS: Final = 2
 
 
-class GatewayRequest(NamedTuple):
+class _GatewayRequest(NamedTuple):
     """A command.
 
     Attributes:
@@ -117,7 +117,7 @@ def _sequence_of(line: str) -> int:
     return int(found[1]) if found and int(found[1]) <= _MAX_NUMBER else 0
 
 
-def parse_request(line: str) -> GatewayRequest | None:
+def parse_request(line: str) -> _GatewayRequest | None:
     """Read a line; None for an empty one and for a comment.
 
     Raises:
@@ -137,7 +137,7 @@ def parse_request(line: str) -> GatewayRequest | None:
         numbers.append(number(words.pop(0), _MAX_NUMBER, "number"))
     if not words:
         raise GatewayError(_GatewayErrorCode.SYNTAX, "there is no command")
-    return GatewayRequest(int(head[1]), tuple(numbers), words[0].lower(), tuple(words[1:]))
+    return _GatewayRequest(int(head[1]), tuple(numbers), words[0].lower(), tuple(words[1:]))
 
 
 def number(word: str, most: int, what: str, least: int = 0) -> int:
@@ -158,7 +158,7 @@ def _one_of(word: str, words: Collection[str], what: str) -> str:
     return lower
 
 
-def _check_count(request: GatewayRequest, least: int, most: int | None) -> None:
+def _check_count(request: _GatewayRequest, least: int, most: int | None) -> None:
     """Refuse a command with fewer words behind it than `least`, or more than `most`."""
     count = len(request.words)
     if count < least or (most is not None and count > most):
@@ -303,7 +303,7 @@ _LSS_HELP: Final = """\
 [SEQUENCE] [NET] lss_allnodes [TIMEOUT_MS [FIRST_NODE STORE]]"""
 
 
-def carry_out(bus: NodeBus, request: GatewayRequest) -> str:
+def carry_out(bus: NodeBus, request: _GatewayRequest) -> str:
     """Carry out a command of `LSS_VERBS`, and return what is answered.
 
     Raises:
@@ -324,19 +324,19 @@ def carry_out(bus: NodeBus, request: GatewayRequest) -> str:
         raise GatewayError(code, str(error)) from None
 
 
-def _switch_all(lss: LssMaster, request: GatewayRequest) -> str:
+def _switch_all(lss: LssMaster, request: _GatewayRequest) -> str:
     (mode,) = _numbers(request, 1)
     lss.switch_all(LssMode(_within(mode, 0, 1)))
     return _LSS_OK
 
 
-def _select(lss: LssMaster, request: GatewayRequest) -> str:
+def _select(lss: LssMaster, request: _GatewayRequest) -> str:
     if not lss.select(LssAddress(*_numbers(request, 4))):
         raise GatewayError(_GatewayErrorCode.TIME_OUT, "no slave has this address")
     return _LSS_OK
 
 
-def _set_node(lss: LssMaster, request: GatewayRequest) -> str:
+def _set_node(lss: LssMaster, request: _GatewayRequest) -> str:
     (node_id,) = _numbers(request, 1)
     lss.configure_node_id(
         node_id if node_id == _UNCONFIGURED else _within(node_id, 1, _MOST_NODE_ID)
@@ -344,7 +344,7 @@ def _set_node(lss: LssMaster, request: GatewayRequest) -> str:
     return _LSS_OK
 
 
-def _configure_bit_rate(lss: LssMaster, request: GatewayRequest) -> str:
+def _configure_bit_rate(lss: LssMaster, request: _GatewayRequest) -> str:
     table, index = _numbers(request, 2)
     if table != STANDARD_TABLE or index not in BIT_RATES:
         raise GatewayError(_GatewayErrorCode.LSS_BIT_RATE, f"table {table} has no bit rate {index}")
@@ -352,37 +352,37 @@ def _configure_bit_rate(lss: LssMaster, request: GatewayRequest) -> str:
     return _LSS_OK
 
 
-def _activate(lss: LssMaster, request: GatewayRequest) -> str:
+def _activate(lss: LssMaster, request: _GatewayRequest) -> str:
     (delay_ms,) = _numbers(request, 1)
     lss.activate_bit_rate(_within(delay_ms, 0, _MOST_DELAY_MS))
     return _LSS_OK
 
 
-def _store(lss: LssMaster, request: GatewayRequest) -> str:
+def _store(lss: LssMaster, request: _GatewayRequest) -> str:
     _numbers(request, 0)
     lss.store()
     return _LSS_OK
 
 
-def _address(lss: LssMaster, request: GatewayRequest) -> str:
+def _address(lss: LssMaster, request: _GatewayRequest) -> str:
     wanted = _numbers(request, 0, 1)
     address = lss.address()
     return f"0x{address[_within(wanted[0], 0, 3)]:08X}" if wanted else _text(address)
 
 
-def _node(lss: LssMaster, request: GatewayRequest) -> str:
+def _node(lss: LssMaster, request: _GatewayRequest) -> str:
     _numbers(request, 0)
     return f"0x{lss.node_id():02X}"
 
 
-def _scan(lss: LssMaster, request: GatewayRequest) -> str:
+def _scan(lss: LssMaster, request: _GatewayRequest) -> str:
     _numbers(request, 0, 1)
     if (address := lss.fastscan()) is None:
         raise GatewayError(_GatewayErrorCode.TIME_OUT, "no slave is without a node-ID")
     return _text(address)
 
 
-def _all_nodes(lss: LssMaster, request: GatewayRequest) -> str:
+def _all_nodes(lss: LssMaster, request: _GatewayRequest) -> str:
     """Return each slave without a node-ID one; what a slave was given stands in front of OK."""
     words = _numbers(request, 0, 3)
     if len(words) == 2:
@@ -401,7 +401,7 @@ def _all_nodes(lss: LssMaster, request: GatewayRequest) -> str:
     return "\n".join([*said, _LSS_OK])
 
 
-_CARRIED_OUT: Final[dict[str, Callable[[LssMaster, GatewayRequest], str]]] = {
+_CARRIED_OUT: Final[dict[str, Callable[[LssMaster, _GatewayRequest], str]]] = {
     "lss_switch_glob": _switch_all,
     "lss_switch_sel": _select,
     "lss_set_node": _set_node,
@@ -416,7 +416,7 @@ _CARRIED_OUT: Final[dict[str, Callable[[LssMaster, GatewayRequest], str]]] = {
 LSS_VERBS: Final = tuple(_CARRIED_OUT)
 
 
-def _numbers(request: GatewayRequest, least: int, most: int | None = None) -> tuple[int, ...]:
+def _numbers(request: _GatewayRequest, least: int, most: int | None = None) -> tuple[int, ...]:
     _check_count(request, least, least if most is None else most)
     return tuple(number(word, _MOST, "number") for word in request.words)
 
@@ -478,7 +478,7 @@ class Gateway:
         self._bus, self._net, self._version = bus, net, version
         self._node: int | None = None
         self._timeout_us = 500_000
-        self._verbs: Mapping[str, Callable[[GatewayRequest], str]] = {
+        self._verbs: Mapping[str, Callable[[_GatewayRequest], str]] = {
             **dict.fromkeys(LSS_VERBS, self._lss),
             **dict.fromkeys(("r", "read"), self._read),
             **dict.fromkeys(("w", "write"), self._write),
@@ -503,7 +503,7 @@ class Gateway:
             reason = f"{_GatewayErrorCode.LOST_CONNECTION} #{error}"
         return f"[{_sequence_of(line)}] ERROR:{' '.join(reason.split())}"
 
-    def _carry_out(self, request: GatewayRequest) -> str:
+    def _carry_out(self, request: _GatewayRequest) -> str:
         verb = self._verbs.get(request.verb)
         if verb is None:
             raise GatewayError(
@@ -511,7 +511,7 @@ class Gateway:
             )
         return verb(request)
 
-    def _node_of(self, request: GatewayRequest, least: int) -> int:
+    def _node_of(self, request: _GatewayRequest, least: int) -> int:
         """Return the node that a command is for; 0 is all of them."""
         *net, node = request.numbers or (-1,)
         self._check_net(net)
@@ -529,14 +529,14 @@ class Gateway:
             text = f"there is no net {net[0]}, this one is {self._net}"
             raise GatewayError(_GatewayErrorCode.UNSUPPORTED_NET, text)
 
-    def _read(self, request: GatewayRequest) -> str:
+    def _read(self, request: _GatewayRequest) -> str:
         node = self._node_of(request, 1)
         _check_count(request, 2, 3)
         index, sub = _object(request)
         name = _data_type(request.words[2]) if len(request.words) > 2 else ""
         return decode(name, self._bus.run(node, upload(index, sub), self._timeout_us))
 
-    def _write(self, request: GatewayRequest) -> str:
+    def _write(self, request: _GatewayRequest) -> str:
         node = self._node_of(request, 1)
         _check_count(request, 4, None)
         index, sub = _object(request)
@@ -544,7 +544,7 @@ class Gateway:
         self._bus.run(node, download(index, sub, data), self._timeout_us)
         return OK
 
-    def _command(self, request: GatewayRequest) -> str:
+    def _command(self, request: _GatewayRequest) -> str:
         node = self._node_of(request, 0)
         if request.verb == "reset":
             _check_count(request, 1, 1)
@@ -555,11 +555,11 @@ class Gateway:
         self._bus.command(command, node)
         return OK
 
-    def _lss(self, request: GatewayRequest) -> str:
+    def _lss(self, request: _GatewayRequest) -> str:
         self._check_net(list(request.numbers))
         return carry_out(self._bus, request)
 
-    def _set(self, request: GatewayRequest) -> str:
+    def _set(self, request: _GatewayRequest) -> str:
         self._check_net(list(request.numbers))
         _check_count(request, 1, None)
         if (name := request.words[0].lower()) not in _SETTINGS:
@@ -575,25 +575,25 @@ class Gateway:
                 self._timeout_us = 1_000 * number(value, _MOST_TIMEOUT_MS, "time-out", 1)
         return OK
 
-    def _info(self, request: GatewayRequest) -> str:
+    def _info(self, request: _GatewayRequest) -> str:
         """Say vendor-ID, product code, revision, serial number, class, protocol, version."""
         _check_count(request, 1, 1)
         _one_of(request.words[0], ("version",), "info")
         return f"0x00000000 0x00000000 0.0 0 0 3.0 {self._version}"
 
-    def _help(self, request: GatewayRequest) -> str:
+    def _help(self, request: _GatewayRequest) -> str:
         _check_count(request, 0, 1)
         what = _one_of(request.words[0], ("datatype", "lss"), "help") if request.words else ""
         text = {"": _HELP, "datatype": _TYPES_HELP, "lss": _LSS_HELP}[what]
         return "\n" + text
 
 
-def _numbered(request: GatewayRequest, text: str) -> str:
+def _numbered(request: _GatewayRequest, text: str) -> str:
     """Return an answer with its number; remarks stand in lines of their own before it."""
     remarks, end, value = text.rpartition("\n") if text.startswith("#") else ("", "", text)
     return f"{remarks}{end}[{request.sequence}] {value}"
 
 
-def _object(request: GatewayRequest) -> tuple[int, int]:
+def _object(request: _GatewayRequest) -> tuple[int, int]:
     index, sub, *_ = request.words
     return number(index, 0xFFFF, "index"), number(sub, 0xFF, "sub-index")

@@ -54,7 +54,7 @@ def refused_by(socket: Path | str, whom: str) -> Iterator[None]:
 # A command that runs until it is stopped, by a signal or over its control socket.
 
 
-class Waiting(Protocol):
+class _Waiting(Protocol):
     """An object that serves requests while it waits: a `ServingClock`, the loop of a server.
 
     Attributes:
@@ -78,7 +78,7 @@ def stopped_by_signals(stop: Callable[[], None]) -> Iterator[None]:
 
 @contextmanager
 def serving_control(
-    path: Path, dispatcher: RequestDispatcher, clock: Waiting
+    path: Path, dispatcher: RequestDispatcher, clock: _Waiting
 ) -> Iterator[ControlServer]:
     """Serve a control socket whenever the clock waits, and yield the server.
 

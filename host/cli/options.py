@@ -26,7 +26,7 @@ class HarmlessCommand(click.Command):
             return super().main(*args, **extra)
 
 
-class PathType(click.Path):
+class _PathType(click.Path):
     """A path, like `click.Path(path_type=Path)`, which imports pathlib only if a path is given."""
 
     def convert(
@@ -41,7 +41,7 @@ class PathType(click.Path):
         return Path(str(super().convert(value, param, ctx)))
 
 
-PATH: Final = PathType()
+PATH: Final = _PathType()
 VERSION: Final = __version__
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]

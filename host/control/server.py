@@ -56,7 +56,7 @@ Answer = Callable[[bytes], bytes]
 """Answers a line, given without its end; the answer has one."""
 
 
-class Readable(Protocol):
+class _Readable(Protocol):
     """An object with a descriptor, such as a socket, for `select`."""
 
     def fileno(self) -> int:
@@ -89,9 +89,9 @@ class LineServer:
         self._listener, self._begin, self._refuse = listener, begin, refuse
         self._max_line, self._clock = max_line, clock
         self._clients: dict[socket.socket, _Client] = {}
-        self._attached: dict[Readable, Callable[[], None]] = {}
+        self._attached: dict[_Readable, Callable[[], None]] = {}
 
-    def attach(self, source: Readable, ready: Callable[[], None]) -> None:
+    def attach(self, source: _Readable, ready: Callable[[], None]) -> None:
         """Serve another source, too.
 
         Args:

@@ -36,7 +36,7 @@ _FOREIGN: Final = (
 """Foreign modules that wait with `select`."""
 
 
-class HasDescriptor(Protocol):
+class _HasDescriptor(Protocol):
     """An object with a descriptor, such as a socket."""
 
     def fileno(self) -> int:
@@ -44,8 +44,8 @@ class HasDescriptor(Protocol):
         ...
 
 
-Read = TypeVar("Read", bound="int | HasDescriptor")
-Written = TypeVar("Written", bound="int | HasDescriptor")
+Read = TypeVar("Read", bound="int | _HasDescriptor")
+Written = TypeVar("Written", bound="int | _HasDescriptor")
 
 
 def ready(
@@ -103,11 +103,11 @@ if sys.platform != "win32":
         )
 
 
-def _number(source: int | HasDescriptor) -> int:
+def _number(source: int | _HasDescriptor) -> int:
     return source if isinstance(source, int) else source.fileno()
 
 
-def let_wait(opened: HasDescriptor) -> None:
+def let_wait(opened: _HasDescriptor) -> None:
     """Let pyserial and python-can wait for descriptors with high numbers."""
     try:
         number = opened.fileno()

@@ -38,7 +38,7 @@ _PUSHED_PCT: Final = 60
 _TAKEN_US: Final = 100_000
 
 
-class Operator(Protocol):
+class _Operator(Protocol):
     """The person at the chair. Time passes on the chair while the program waits for an answer."""
 
     def instruct(self, text: str) -> None:
@@ -93,7 +93,7 @@ class Procedure:
     """
 
     chair: Chair
-    operator: Operator
+    operator: _Operator
     report: Callable[[StepResult], None]
     results: list[StepResult] = field(default_factory=list, init=False)
 

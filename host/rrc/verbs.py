@@ -185,7 +185,7 @@ class _Keys:
         return self._drive if self._dead_man.holds(now_us) else (0, 0)
 
 
-class PadHand:
+class _PadHand:
     """Drives by the left stick of a game pad while one of its buttons is held.
 
     Args:
@@ -213,10 +213,10 @@ class PadHand:
         return round(forward * self._most[0]), round(right * self._most[1])
 
 
-def open_pad(path: str, v_pct: int = 100, w_pct: int = 100) -> PadHand:
+def open_pad(path: str, v_pct: int = 100, w_pct: int = 100) -> _PadHand:
     """Open a game pad; Refused if it cannot be."""
     try:
-        return PadHand(path, v_pct, w_pct)
+        return _PadHand(path, v_pct, w_pct)
     except LinkClosed as error:
         raise Refused(str(error)) from error
 

@@ -316,7 +316,7 @@ class RtComponent(ComponentAction):
 _Callback = Callable[["ExecutionContext"], ReturnCode]
 
 
-class Participant:
+class _Participant:
     """A component as its execution context sees it.
 
     Attributes:
@@ -423,12 +423,12 @@ class Participant:
             return failed(self.component.instance_name, callback)
 
 
-_MOVES: Final[dict[tuple[LifeCycleState, LifeCycleState], Callable[[Participant], ReturnCode]]] = {
-    (_INACTIVE, _ACTIVE): Participant._activate,
-    (_INACTIVE, _ERROR): Participant._enter_error,
-    (_ACTIVE, _INACTIVE): Participant._deactivate,
-    (_ACTIVE, _ERROR): Participant._abort_active,
-    (_ERROR, _INACTIVE): Participant._reset,
+_MOVES: Final[dict[tuple[LifeCycleState, LifeCycleState], Callable[[_Participant], ReturnCode]]] = {
+    (_INACTIVE, _ACTIVE): _Participant._activate,
+    (_INACTIVE, _ERROR): _Participant._enter_error,
+    (_ACTIVE, _INACTIVE): _Participant._deactivate,
+    (_ACTIVE, _ERROR): _Participant._abort_active,
+    (_ERROR, _INACTIVE): _Participant._reset,
 }
 
 
@@ -528,8 +528,8 @@ class ExecutionContext:
         self._ticked_us, self.due_us, self.running = 0, NEVER, False
         self._others = ExecutionContexts()
         self.rate_hz, self.period_us = rate_hz, _period_us(rate_hz)
-        self._participants: tuple[Participant, ...] = ()
-        self._by_id: dict[int, Participant] = {}
+        self._participants: tuple[_Participant, ...] = ()
+        self._by_id: dict[int, _Participant] = {}
         self.allows_period: Callable[[int], bool] | None = None
         self.on_move: list[MoveListener] = []
 
@@ -632,7 +632,7 @@ class ExecutionContext:
         """
         if self._find(component) is not None:
             return ReturnCode.PRECONDITION_NOT_MET
-        participant = self._by_id[id(component)] = Participant(component, self)
+        participant = self._by_id[id(component)] = _Participant(component, self)
         self._participants += (participant,)
         component.contexts.append(self)
         return ReturnCode.RTC_OK
@@ -740,13 +740,13 @@ class ExecutionContext:
             return ReturnCode.BAD_PARAMETER
         return participant.request(source, wanted)
 
-    def _release(self, participant: Participant) -> None:
+    def _release(self, participant: _Participant) -> None:
         participant.leave()
         self._participants = tuple(p for p in self._participants if p is not participant)
         del self._by_id[id(participant.component)]
         participant.component.contexts.remove(self)
 
-    def _find(self, component: RtComponent) -> Participant | None:
+    def _find(self, component: RtComponent) -> _Participant | None:
         return self._by_id.get(id(component))
 
     def _plan(self) -> None:
@@ -760,7 +760,7 @@ class ExecutionContext:
             participant.notify(callback(participant.component))
 
 
-_PASSES: Final = (Participant.pre, Participant.do, Participant.post)
+_PASSES: Final = (_Participant.pre, _Participant.do, _Participant.post)
 
 
 def _possible(rate_hz: float) -> bool:

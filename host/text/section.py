@@ -48,7 +48,7 @@ from tickrig.host.text.names import closest, near
 from tickrig.host.text.toml_reader import BROKEN, Mistake, TomlDocument, TomlPath, read_toml
 from tickrig.host.text.values import counted, parse_size, us_of
 
-Taker = Callable[[Any], Any]
+_Taker = Callable[[Any], Any]
 """Converts a TOML value; ValueError with the allowed values."""
 
 _LONGEST: Final = 60
@@ -92,7 +92,7 @@ def string(value: object) -> str:
     raise ValueError(f"it takes a text, not {shown(value)}")
 
 
-def matching(accepts: Callable[[str], object], what: str) -> Taker:
+def matching(accepts: Callable[[str], object], what: str) -> _Taker:
     """Return a taker for texts that a function accepts; `what` describes them in messages."""
 
     def take(value: object) -> str:
@@ -152,7 +152,7 @@ def lines(value: object) -> dict[str, str]:
     raise ValueError(f'it takes lines like name = "value", not {shown(value)}')
 
 
-def whole(low: int, high: int) -> Taker:
+def whole(low: int, high: int) -> _Taker:
     """Return a taker for whole numbers of a range."""
 
     def take(value: object) -> int:
@@ -163,7 +163,7 @@ def whole(low: int, high: int) -> Taker:
     return take
 
 
-def number(low: float, high: float, *, above: bool = False) -> Taker:
+def number(low: float, high: float, *, above: bool = False) -> _Taker:
     """Return a taker for numbers of a range; `above` excludes its lower end."""
     allowed = f"above {low:g} and up to {high:g}" if above else f"{low:g}..{high:g}"
 
@@ -177,7 +177,7 @@ def number(low: float, high: float, *, above: bool = False) -> Taker:
     return take
 
 
-def one_of(*names: str) -> Taker:
+def one_of(*names: str) -> _Taker:
     """Return a taker for one of several words."""
 
     def take(value: object) -> str:
@@ -221,7 +221,7 @@ class Field:
         default: default value, for people; empty if the key is required.
     """
 
-    field: Taker
+    field: _Taker
     values: str
     text: str
     default: str = ""

@@ -16,7 +16,7 @@ Place = str | tuple[str | int, ...]
 """Place of a step in its file: `FILE:LINE`, keys and indices, or a line number."""
 
 What = TypeVar("What")
-Came = TypeVar("Came")
+_Came = TypeVar("_Came")
 
 FOREVER: Final = 0
 """Value of `times` for endless repetition."""
@@ -29,15 +29,15 @@ class StepError(ValueError):
 
 
 @dataclass(frozen=True)  # with slots, Python 3.11 cannot make a `Condition[str]`
-class Condition(Generic[Came]):
+class Condition(Generic[_Came]):
     """An expectation: its text, and its condition."""
 
     text: str
-    matches: Callable[[Came], bool]
+    matches: Callable[[_Came], bool]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Step(Generic[What, Came]):
+class Step(Generic[What, _Came]):
     """One step; its parts run in this order, and most steps have only one.
 
     Attributes:
@@ -55,12 +55,12 @@ class Step(Generic[What, Came]):
     place: Place
     at_us: int | None = None
     what: What | None = None
-    wanted: tuple[Condition[Came], ...] = ()
+    wanted: tuple[Condition[_Came], ...] = ()
     within_us: int = 0
     goes_on: bool = False
-    on_fail: tuple[Step[What, Came], ...] = ()
+    on_fail: tuple[Step[What, _Came], ...] = ()
     times: int | None = None
-    steps: tuple[Step[What, Came], ...] = ()
+    steps: tuple[Step[What, _Came], ...] = ()
 
     @property
     def takes_time(self) -> bool:

@@ -93,7 +93,7 @@ class _Array:
 
 
 @dataclass(slots=True, eq=False)
-class Table:
+class _Table:
     """A table; `closed` to a second header and to dotted keys, `frozen` to all."""
 
     line: int
@@ -101,54 +101,54 @@ class Table:
     closed: bool = False
     frozen: bool = False
 
-    def below(self, line: int, key: str) -> Table:
+    def below(self, line: int, key: str) -> _Table:
         """Return the table on the way to that of a header, the last one of an array.
 
         Raises:
-            TakenError: there is another value.
+            _TakenError: there is another value.
         """
-        node = self.entries.setdefault(key, Table(line))
+        node = self.entries.setdefault(key, _Table(line))
         if isinstance(node, _Array) and not node.frozen:
             node = node.items[-1]
-        if not isinstance(node, Table) or node.frozen:
-            raise TakenError(key, node.line)
+        if not isinstance(node, _Table) or node.frozen:
+            raise _TakenError(key, node.line)
         return node
 
-    def open(self, line: int, key: str) -> Table:
-        """Return the table of a header `[key]`; TakenError if it cannot have one."""
-        node = self.entries.setdefault(key, Table(line))
-        if not isinstance(node, Table) or node.closed or node.frozen:
-            raise TakenError(key, node.line)
+    def open(self, line: int, key: str) -> _Table:
+        """Return the table of a header `[key]`; _TakenError if it cannot have one."""
+        node = self.entries.setdefault(key, _Table(line))
+        if not isinstance(node, _Table) or node.closed or node.frozen:
+            raise _TakenError(key, node.line)
         node.line, node.closed = line, True
         return node
 
-    def add(self, line: int, key: str) -> Table:
-        """Return a new table of a header `[[key]]`; TakenError if it cannot have one."""
+    def add(self, line: int, key: str) -> _Table:
+        """Return a new table of a header `[[key]]`; _TakenError if it cannot have one."""
         node = self.entries.setdefault(key, _Array(line, frozen=False))
         if not isinstance(node, _Array) or node.frozen:
-            raise TakenError(key, node.line)
-        node.items.append(table := Table(line, closed=True))
+            raise _TakenError(key, node.line)
+        node.items.append(table := _Table(line, closed=True))
         return table
 
-    def dotted(self, line: int, key: str) -> Table:
-        """Return the table of the first part of a dotted key; TakenError if there is none."""
-        node = self.entries.setdefault(key, Table(line))
-        if not isinstance(node, Table) or node.closed or node.frozen:
-            raise TakenError(key, node.line)
+    def dotted(self, line: int, key: str) -> _Table:
+        """Return the table of the first part of a dotted key; _TakenError if there is none."""
+        node = self.entries.setdefault(key, _Table(line))
+        if not isinstance(node, _Table) or node.closed or node.frozen:
+            raise _TakenError(key, node.line)
         return node
 
 
-_Node = Table | _Array | _Leaf
+_Node = _Table | _Array | _Leaf
 
 
-class TakenError(Exception):
+class _TakenError(Exception):
     """A key that is there already, in another way."""
 
     def __init__(self, key: str, line: int) -> None:
         super().__init__(f"{key!r} stands in line {line} already")
 
 
-def _document_of(top: Table, mistakes: Iterable[Mistake], *, whole: bool) -> TomlDocument:
+def _document_of(top: _Table, mistakes: Iterable[Mistake], *, whole: bool) -> TomlDocument:
     """Return the document of its top table."""
     lines: dict[TomlPath, int] = {}
     values = {key: _plain(each, (key,), lines) for key, each in top.entries.items()}
@@ -159,7 +159,7 @@ def _plain(node: _Node, path: TomlPath, lines: dict[TomlPath, int]) -> Any:
     """Return the value of a node, and record the lines of it and its content."""
     lines[path] = node.line
     match node:
-        case Table():
+        case _Table():
             return {key: _plain(each, (*path, key), lines) for key, each in node.entries.items()}
         case _Array():
             return [_plain(each, (*path, at), lines) for at, each in enumerate(node.items)]
@@ -247,8 +247,8 @@ class _Reader:
     def __init__(self, text: str) -> None:
         self._text, self._at, self._whole = text, 0, True
         self._starts = [0, *(match.end() for match in re.finditer("\n", text))]
-        self._top = self._section = Table(1)
-        self._dotted: list[Table] = []  # by keys of this section
+        self._top = self._section = _Table(1)
+        self._dotted: list[_Table] = []  # by keys of this section
         self._mistakes: list[Mistake] = []
 
     def read(self) -> TomlDocument:
@@ -318,7 +318,7 @@ class _Reader:
             try:
                 self._section = self._header()
             except _WrongError:
-                self._section, self._whole = Table(0), False
+                self._section, self._whole = _Table(0), False
                 raise
         else:
             self._key_value(self._section, self._dotted, 0)
@@ -326,7 +326,7 @@ class _Reader:
         if self._at < len(self._text) and not self._is("\n"):
             raise _WrongError(self._at, f"{self._rest()} is too much here")
 
-    def _header(self) -> Table:
+    def _header(self) -> _Table:
         line, many = self._line(self._at), self._is("[[")
         start, self._at = self._at, self._at + 1 + many
         self._skip(_BLANK)
@@ -337,19 +337,19 @@ class _Reader:
             for key in above:
                 table = table.below(line, key)
             return table.add(line, last) if many else table.open(line, last)
-        except TakenError as error:
+        except _TakenError as error:
             raise _WrongError(start, str(error)) from None
 
-    def _key_value(self, table: Table, dotted: list[Table], depth: int) -> None:
+    def _key_value(self, table: _Table, dotted: list[_Table], depth: int) -> None:
         start, line = self._at, self._line(self._at)
         *above, last = keys = self._key()
         try:
             for key in above:
                 table = table.dotted(line, key)
                 dotted.append(table)
-            taken = TakenError(last, table.entries[last].line) if last in table.entries else None
-        except TakenError as error:
-            table, taken = Table(0), error
+            taken = _TakenError(last, table.entries[last].line) if last in table.entries else None
+        except _TakenError as error:
+            table, taken = _Table(0), error
         if not taken:
             table.entries[last] = _Leaf(line, BROKEN)  # until it is read
         self._take("=", ".".join(keys))
@@ -447,8 +447,8 @@ class _Reader:
         if is_first and line > self._line(start) and _STATEMENT.match(self._text, first):
             self._close(start, "]", "array")
 
-    def _inline(self, start: int, depth: int) -> Table:
-        table, dotted = Table(self._line(start), frozen=True), list[Table]()
+    def _inline(self, start: int, depth: int) -> _Table:
+        table, dotted = _Table(self._line(start), frozen=True), list[_Table]()
         broken = self._skip_in_inline(known=False)
         while not self._is("}"):
             self._key_value(table, dotted, depth)

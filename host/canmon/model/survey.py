@@ -32,7 +32,7 @@ from tickrig.wire.canopen.nmt import NmtState
 # the frames: what is counted goes into bins of equal width, and when there are too many bins,
 # two become one (`TimeBins`). What is a mark (an EMCY, a transfer) is kept one by one up to a
 # number, then every second one, every fourth (`Thinned`); how many there were stays exact.
-# States are changes, and of the changes in one span of time the last one counts (`Bands`).
+# States are changes, and of the changes in one span of time the last one counts (`_Bands`).
 #
 # There are two ways in, as everywhere in canmon: `Survey.take` frame by frame, and
 # `ColumnSurvey` in blocks of numpy. Both let `NodeBoard` follow the nodes; a survey is a board
@@ -41,7 +41,7 @@ from tickrig.wire.canopen.nmt import NmtState
 T = TypeVar("T")
 Key = TypeVar("Key")
 
-MOST_BINS: Final = 2_000
+_MOST_BINS: Final = 2_000
 _FIRST_WIDTH_US: Final = 1_000
 _MOST_MARKS: Final = 1_000
 _MOST_SIGNALS: Final = 400
@@ -60,7 +60,7 @@ class TimeBins(Generic[Key]):
         ranges: by key, the least and the greatest value of each span that has one.
     """
 
-    def __init__(self, most: int = MOST_BINS, width_us: int = _FIRST_WIDTH_US) -> None:
+    def __init__(self, most: int = _MOST_BINS, width_us: int = _FIRST_WIDTH_US) -> None:
         self._most, self.width_us = most, width_us
         self.sums: dict[Key, dict[int, int]] = {}
         self.ranges: dict[Key, dict[int, tuple[float, float]]] = {}
@@ -123,7 +123,7 @@ class Thinned(Generic[T]):
         self.count += 1
 
 
-class Bands:
+class _Bands:
     """States as the times at which they begin; of many in one span of time the last is kept.
 
     Attributes:
@@ -177,7 +177,7 @@ class SignalTrack:
     count: int = 0
     low: float = 0.0
     high: float = 0.0
-    states: Bands | None = None
+    states: _Bands | None = None
 
     def take(self, count: int, low: float, high: float) -> None:
         """Count values."""
@@ -201,7 +201,7 @@ class Mark(NamedTuple):
 
 
 @dataclass(slots=True)
-class NodeLane:
+class _NodeLane:
     """What one node did, and when.
 
     Attributes:
@@ -214,7 +214,7 @@ class NodeLane:
         gaps: without a heartbeat that was due: from the last one on.
     """
 
-    states: Bands = field(default_factory=Bands)
+    states: _Bands = field(default_factory=_Bands)
     boots: Thinned[Mark] = field(default_factory=Thinned)
     commands: Thinned[Mark] = field(default_factory=Thinned)
     emcys: Thinned[Mark] = field(default_factory=Thinned)
@@ -259,7 +259,7 @@ class Survey(NodeBoard):
         self.bits = TimeBins[str]()
         self.errors = TimeBins[str]()
         self.values = TimeBins[SignalName]()
-        self.lanes: dict[tuple[str, int], NodeLane] = {}
+        self.lanes: dict[tuple[str, int], _NodeLane] = {}
         self.signals: dict[SignalName, SignalTrack] = {}
         self.signals_left: set[SignalName] = set()
 
@@ -337,7 +337,7 @@ class Survey(NodeBoard):
             if len(self.signals) >= _MOST_SIGNALS:
                 self.signals_left.add(name)
                 return None
-            states = Bands() if name.name == "statusword" else None
+            states = _Bands() if name.name == "statusword" else None
             track = self.signals[name] = SignalTrack(unit, source, states=states)
         return track
 
@@ -369,11 +369,11 @@ class Survey(NodeBoard):
         mark = Mark(self.since(transfer.at_us), str(transfer), transfer.duration_us)
         (lane.transfers if done else lane.failures).append(mark)
 
-    def lane(self, channel: str, node: int) -> NodeLane:
+    def lane(self, channel: str, node: int) -> _NodeLane:
         """Return the lane of a node."""
         lane = self.lanes.get((channel, node))
         if lane is None:
-            lane = self.lanes[channel, node] = NodeLane()
+            lane = self.lanes[channel, node] = _NodeLane()
         return lane
 
     def _take_signal(self, name: SignalName, since_us: int, signal: Signal, source: str) -> None:
@@ -384,7 +384,7 @@ class Survey(NodeBoard):
         if track is None:
             return
         if source == "dbc" and signal.text and track.states is None and not track.count:
-            track.states = Bands()  # an enumerated signal: its values have names
+            track.states = _Bands()  # an enumerated signal: its values have names
         track.take(1, float(value), float(value))
         if track.states is None:
             self.reach(since_us)

@@ -169,7 +169,7 @@ _STATUS: Final = "status"
 _OTHER: Final = "other"
 
 
-class LineRow(NamedTuple):
+class _LineRow(NamedTuple):
     """One kind of message on one line, in one direction.
 
     Attributes:
@@ -203,7 +203,7 @@ class LineTraffic:
     """Counts messages; what it keeps grows with their kinds, not with their number."""
 
     def __init__(self) -> None:
-        self._rows: dict[tuple[str, bool, str], LineRow] = {}
+        self._rows: dict[tuple[str, bool, str], _LineRow] = {}
 
     def take(self, line: LineRecord) -> None:
         """Count a message."""
@@ -211,9 +211,9 @@ class LineTraffic:
         key = line.channel, line.sent, _word_of(decoded)
         row = self._rows.get(key)
         self._rows[key] = (
-            LineRow(*key, 1, at_us, at_us, None, decoded.text)
+            _LineRow(*key, 1, at_us, at_us, None, decoded.text)
             if row is None
-            else LineRow(
+            else _LineRow(
                 *key, row.messages + 1, row.first_us, at_us, at_us - row.last_us, decoded.text
             )
         )
@@ -222,7 +222,7 @@ class LineTraffic:
         """Forget everything."""
         self._rows.clear()
 
-    def rows(self) -> tuple[LineRow, ...]:
+    def rows(self) -> tuple[_LineRow, ...]:
         """Return the rows by line, direction and kind."""
         return tuple(self._rows[key] for key in sorted(self._rows))
 
@@ -237,7 +237,7 @@ def _word_of(decoded: Decoded) -> str:
     return first.name if first.name in _ANSWERS else _STATUS
 
 
-def line_table(rows: tuple[LineRow, ...], now_us: int, width: int) -> list[str]:
+def line_table(rows: tuple[_LineRow, ...], now_us: int, width: int) -> list[str]:
     """Return the table; nothing where there are no rows."""
     if not rows:
         return []
@@ -439,7 +439,7 @@ class TopModel:
     def __init__(self, rates: traffic.BitRates = traffic.NO_RATES) -> None:
         self.traffic, self._serial, self.rates = traffic.Traffic(rates), LineTraffic(), rates
         self.view = TableView(styled=True, bit_rate=rates.nominal, keys=True)
-        self._held: tuple[traffic.TrafficSnapshot, tuple[LineRow, ...]] | None = None
+        self._held: tuple[traffic.TrafficSnapshot, tuple[_LineRow, ...]] | None = None
         self._now_us = 0
         self._meanings: dict[tuple[str, int], Decoded] = {}
         self._acts: dict[str, Callable[[], None]] = {
@@ -497,7 +497,7 @@ class TopModel:
         decoded = self._meanings.get((row.channel, row.ident))
         return _data_text(row, False) if decoded is None else meaning_text(decoded)
 
-    def _snapshot(self) -> tuple[traffic.TrafficSnapshot, tuple[LineRow, ...]]:
+    def _snapshot(self) -> tuple[traffic.TrafficSnapshot, tuple[_LineRow, ...]]:
         return self.traffic.snapshot(self._now_us), self._serial.rows()
 
     def _clear(self) -> None:

@@ -384,7 +384,7 @@ _OVERFLOW: Final = can.ControllerFlag.RECEIVE_OVERFLOW
 _PASSIVE: Final = can.ControllerFlag.RECEIVE_PASSIVE | can.ControllerFlag.TRANSMIT_PASSIVE
 
 
-class ErrorRow(NamedTuple):
+class _ErrorRow(NamedTuple):
     """What the error frames of a bus were.
 
     Attributes:
@@ -428,10 +428,10 @@ class ErrorStatistics:
         if _is_overflow(frame):
             self._overflows += 1
 
-    def row(self) -> ErrorRow:
+    def row(self) -> _ErrorRow:
         """Return what they were."""
         kinds = sorted(self._kinds.items(), key=lambda item: (-item[1], item[0]))
-        return ErrorRow(
+        return _ErrorRow(
             self._frames, self._state, self._tec, self._rec, self._overflows, tuple(kinds)
         )
 
@@ -471,7 +471,7 @@ class BusSecond(NamedTuple):
     bits: int
 
 
-class LoadRow(NamedTuple):
+class _LoadRow(NamedTuple):
     """How busy a bus was. Error frames and broken frames are not in it: nobody tells their length.
 
     Attributes:
@@ -519,10 +519,10 @@ class Load:
         """Return the window that is open."""
         return self._open
 
-    def row(self, now_us: int) -> LoadRow:
+    def row(self, now_us: int) -> _LoadRow:
         """Return how busy the bus was until now."""
         windows = (self._open.at_us - self._first_us) // WINDOW_US + 1
-        return LoadRow(
+        return _LoadRow(
             self._bits,
             self._latest(now_us),
             _busier(self._peak, self._open),
@@ -566,8 +566,8 @@ class BusRow(NamedTuple):
     frames: int
     first_us: int
     last_us: int
-    load: LoadRow
-    errors: ErrorRow
+    load: _LoadRow
+    errors: _ErrorRow
     went_back: int
     fd: int = 0
     unrated: int = 0

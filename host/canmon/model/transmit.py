@@ -80,7 +80,7 @@ class Counter:
 
 
 @dataclass(frozen=True, slots=True)
-class ChecksumField:
+class _ChecksumField:
     """One byte that is computed from others.
 
     Attributes:
@@ -108,7 +108,7 @@ class FrameFields:
     """The changing fields of a frame; checksums come after counters, in their order."""
 
     counters: tuple[Counter, ...] = ()
-    checksums: tuple[ChecksumField, ...] = ()
+    checksums: tuple[_ChecksumField, ...] = ()
 
     def check(self, size: int) -> None:
         """Raise ValueError where a field is not in data of so many bytes."""
@@ -149,7 +149,7 @@ def parse_counter(text: str) -> Counter:
     return Counter(byte, shift, bits, low, high)
 
 
-def parse_checksum(text: str) -> ChecksumField:
+def parse_checksum(text: str) -> _ChecksumField:
     """Read `BYTE:ALGORITHM`, as `7:crc8`, or over some bytes `7:crc8:1..6`.
 
     Raises:
@@ -163,7 +163,9 @@ def parse_checksum(text: str) -> ChecksumField:
         raise ValueError(f"no checksum {algorithm!r}; known: {', '.join(ALGORITHMS)}")
     if last is not None and int(first) > int(last):
         raise ValueError(f"{text!r} covers bytes {first} to {last}")
-    return ChecksumField(int(byte), algorithm, int(first or 0), None if last is None else int(last))
+    return _ChecksumField(
+        int(byte), algorithm, int(first or 0), None if last is None else int(last)
+    )
 
 
 # Frames of PDOs by the names of their objects: `5.rpdo1 target_velocity=100`.

@@ -318,7 +318,7 @@ def limits(objects: NamedObjects, entry: Entry) -> str:
 # Comparison of a node's values with those of a DCF or of another node.
 
 
-class ValueDifference(NamedTuple):
+class _ValueDifference(NamedTuple):
     """An object with a different value.
 
     Attributes:
@@ -336,24 +336,24 @@ class ValueDifference(NamedTuple):
 
 def differences(
     session: NetSession, objects: NamedObjects, values: Mapping[Entry, bytes]
-) -> Iterator[ValueDifference]:
+) -> Iterator[_ValueDifference]:
     """Read objects of a node, and yield those that differ; SdoTimeout if it does not answer."""
     for entry, wanted in sorted(values.items()):
         row = objects.rows.get(entry)
         if row is not None and not row.readable:
-            yield ValueDifference(entry, wanted, None, "it cannot be read")
+            yield _ValueDifference(entry, wanted, None, "it cannot be read")
             continue
         try:
             found = session.bus.read(objects.node_id, *entry, objects.size(entry))
         except SdoAborted as error:
             why = failure_text(error, lambda at: "").removeprefix(": ")
-            yield ValueDifference(entry, wanted, None, why)
+            yield _ValueDifference(entry, wanted, None, why)
             continue
         if not same(row, wanted, found):
-            yield ValueDifference(entry, wanted, found)
+            yield _ValueDifference(entry, wanted, found)
 
 
-def line(objects: NamedObjects, one: ValueDifference, where: str) -> str:
+def line(objects: NamedObjects, one: _ValueDifference, where: str) -> str:
     """Return both values of a difference, as text."""
     there = f"{shown(objects, one.entry, one.wanted)} {where}"
     here = one.why if one.found is None else f"{shown(objects, one.entry, one.found)} here"

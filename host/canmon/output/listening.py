@@ -215,7 +215,7 @@ Given = ParamSpec("Given")
 Result = TypeVar("Result")
 
 
-class FramesLost(click.ClickException):
+class _FramesLost(click.ClickException):
     """One line on standard error, and exit status 4."""
 
     exit_code = 4
@@ -226,7 +226,7 @@ def report(source: AnySource[object], strict: bool, more: Iterable[str] = ()) ->
 
     Raises:
         SourceFailed: it ended before its time.
-        FramesLost: frames were lost or could not be taken, and the caller is strict.
+        _FramesLost: frames were lost or could not be taken, and the caller is strict.
     """
     source.close()
     for word in (*source.messages(), *more):
@@ -237,10 +237,10 @@ def report(source: AnySource[object], strict: bool, more: Iterable[str] = ()) ->
     missing += [f"a bus was away {counted(source.gaps, 'time')}"] if source.gaps else []
     missing += [f"{source.unread} lines or frames passed over"] if source.unread else []
     if strict and missing:
-        raise FramesLost(", ".join(missing))
+        raise _FramesLost(", ".join(missing))
 
 
-class Interruptions(Interrupter):
+class _Interruptions(Interrupter):
     """Ctrl-C and the signals that end a program: they end what goes on, at once or behind it.
 
     Attributes:
@@ -276,9 +276,9 @@ class Interruptions(Interrupter):
 
 
 @contextmanager
-def until_interrupted() -> Iterator[Interruptions]:
+def until_interrupted() -> Iterator[_Interruptions]:
     """End the block at Ctrl-C, and at the signals that end a program, and go on behind it."""
-    interruptions = Interruptions()
+    interruptions = _Interruptions()
     with suppress(KeyboardInterrupt), taking_signals(interruptions.received):
         yield interruptions
 

@@ -31,7 +31,7 @@ from tickrig.host.text.page_text import content_policy, duration, harmless, json
 from tickrig.host.text.values import counted
 from tickrig.wire.canopen import nmt
 
-Around = Sequence[tuple[Record, Decoded]]
+_Around = Sequence[tuple[Record, Decoded]]
 
 _HERE: Final = Path(__file__).parent
 _MOST_POINTS: Final = 60_000
@@ -64,7 +64,7 @@ class Verdict(NamedTuple):
     """
 
     diagnosis: Diagnosis
-    around: Mapping[int, tuple[int, Around]]
+    around: Mapping[int, tuple[int, _Around]]
 
 
 @dataclass(frozen=True, slots=True)

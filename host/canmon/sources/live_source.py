@@ -29,10 +29,10 @@ _WAIT_US: Final = 100_000
 """How long a thread may take to see that it shall end."""
 
 Item = TypeVar("Item", bound="Record | LineRecord")
-Read_co = TypeVar("Read_co", bound="Record | LineRecord", covariant=True)
+_Read_co = TypeVar("_Read_co", bound="Record | LineRecord", covariant=True)
 
 
-class Reader(Protocol[Read_co]):
+class Reader(Protocol[_Read_co]):
     """One bus, or one serial port, that is open.
 
     Attributes:
@@ -49,7 +49,7 @@ class Reader(Protocol[Read_co]):
     def lost(self) -> int:
         """Frames that its driver says it dropped."""
 
-    def read(self, timeout_us: int, /) -> Sequence[Read_co | Mark]:
+    def read(self, timeout_us: int, /) -> Sequence[_Read_co | Mark]:
         """Wait for a first frame; LinkClosed if the bus is gone.
 
         A mark in front of all that it returns says that the bus went away or is back.

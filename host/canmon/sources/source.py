@@ -50,10 +50,10 @@ else:  # numpy, threads, python-can, pyserial: imported for what wants them
 
 # Where frames come from: buses, log files or standard input, under one face.
 
-Taken_co = TypeVar("Taken_co", covariant=True)
+_Taken_co = TypeVar("_Taken_co", covariant=True)
 
 
-class AnySource(Generic[Taken_co]):
+class AnySource(Generic[_Taken_co]):
     """Frames, or lines of a serial port, as they come in.
 
     Attributes:
@@ -100,7 +100,7 @@ class AnySource(Generic[Taken_co]):
         """Lines and frames that got here and could not be taken, as noise and CAN FD."""
         return sum(tally.unread for _, tally in self.tallies())
 
-    def poll(self, timeout_us: int, /) -> Sequence[Taken_co]:
+    def poll(self, timeout_us: int, /) -> Sequence[_Taken_co]:
         """Wait for a first frame, then return all that are there; none if none came."""
         return []
 
@@ -261,7 +261,7 @@ _BATCH: Final = 1_024
 """Frames of one poll."""
 
 
-class LoggedSource(AnySource[Record]):
+class _LoggedSource(AnySource[Record]):
     """What somebody recorded: frames up to the next marks at a time."""
 
     recorded = True
@@ -303,7 +303,7 @@ class LoggedSource(AnySource[Record]):
         self._items = ()
 
 
-class FileSource(LoggedSource):
+class FileSource(_LoggedSource):
     """One or more log files.
 
     Raises:
@@ -370,7 +370,7 @@ STDIN: Final = 0
 _READ_BYTES: Final = 1 << 16
 
 
-class StdinSource(LoggedSource):
+class StdinSource(_LoggedSource):
     """A pipe, a terminal or a file that somebody feeds."""
 
     live = True
@@ -439,7 +439,7 @@ class BlockLog(AnySource["Columns"]):
         return []
 
 
-class PieceLog(LoggedSource):
+class PieceLog(_LoggedSource):
     """A log file in pieces: columns where it has them, else frames up to the next marks.
 
     Raises:

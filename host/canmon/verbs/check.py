@@ -403,7 +403,7 @@ def command(  # noqa: PLR0913 - options
     if verdict.counts:
         click.get_current_context().exit(_BROKEN)
     if unjudged:
-        raise NothingJudged(unjudged)
+        raise _NothingJudged(unjudged)
 
 
 # What is wrong without a rule.
@@ -489,7 +489,7 @@ class _Usual:
         """Write what is usual as rules."""
         frames, words = self._diagnoser.kept.frames, " ".join(self._words)
         if not frames:
-            raise NothingJudged(_no_frame(self.source, self._words).replace("judged", "learnt"))
+            raise _NothingJudged(_no_frame(self.source, self._words).replace("judged", "learnt"))
         summaries = self._diagnoser.summaries()
         head = [
             f"Learnt from {one_line(words)}, {counted(frames, 'frame')}, by canmon check --init.",
@@ -538,7 +538,7 @@ class _Usual:
         if found.faults:
             click.get_current_context().exit(_BROKEN)
         if nothing:
-            raise NothingJudged(nothing)
+            raise _NothingJudged(nothing)
 
 
 def _fault_text(fault: diagnosis.BusFault, lines: DumpLines | None, most: int) -> str:
@@ -574,7 +574,7 @@ def _fault_json(fault: diagnosis.BusFault) -> str:
     )
 
 
-class NothingJudged(click.ClickException):
+class _NothingJudged(click.ClickException):
     """One line on standard error, and exit status 5."""
 
     exit_code = 5

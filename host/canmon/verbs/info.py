@@ -25,7 +25,7 @@ _UNREAD: Final = "not read, nor whether the log was ended: canmon stats does"
 
 
 @dataclass(frozen=True, slots=True)
-class LogHead:
+class _LogHead:
     """The beginning of a log, and its end where that is found at once.
 
     Attributes:
@@ -61,7 +61,7 @@ class LogHead:
         return self.whole or self.last_us is not None
 
 
-def read_head(path: Path) -> LogHead:
+def read_head(path: Path) -> _LogHead:
     """Read the first thousand frames, and the end of a log in text.
 
     Raises:
@@ -78,7 +78,7 @@ def read_head(path: Path) -> LogHead:
         last_us = None if reader.tally.shifted_us else _last_us(path)
     if kind is log_file.LogFormat.CSV and reader.tally.without_errors:
         kind = log_file.LogFormat.GVRET
-    return LogHead(
+    return _LogHead(
         kind,
         compressed,
         path.stat().st_size,
@@ -121,7 +121,7 @@ def command(log: Sequence[Path], jsonl: bool) -> None:
         click.echo(_json(path, head) if jsonl else "\n".join(_lines(path, head)))
 
 
-def _head(path: Path) -> LogHead:
+def _head(path: Path) -> _LogHead:
     try:
         return read_head(path)
     except log_file.LogFormatError as error:
@@ -132,7 +132,7 @@ def _head(path: Path) -> LogHead:
         raise SourceFailed(f"{path}: {error.strerror or error}") from None
 
 
-def _lines(path: Path, head: LogHead) -> list[str]:
+def _lines(path: Path, head: _LogHead) -> list[str]:
     more = "" if head.whole else " at least"
     lines = [
         str(path),
@@ -159,7 +159,7 @@ def _time(at_us: int | None) -> str:
     return f"{seconds}.{micros:06d} ({date})"
 
 
-def _json(path: Path, head: LogHead) -> str:
+def _json(path: Path, head: _LogHead) -> str:
 
     said = {
         "v": 1,

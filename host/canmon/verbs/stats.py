@@ -41,7 +41,7 @@ _LEFT: Final = 2
 """Columns that stand to the left: names."""
 
 
-class NodeRow(NamedTuple):
+class _NodeRow(NamedTuple):
     """What the identifiers of one node did together.
 
     Attributes:
@@ -59,14 +59,14 @@ class NodeRow(NamedTuple):
     bits: int
 
 
-def node_rows(rows: Iterable[IdRow]) -> list[NodeRow]:
+def node_rows(rows: Iterable[IdRow]) -> list[_NodeRow]:
     """Return a row for each node, identifiers without one last."""
     groups: dict[tuple[str, int], list[IdRow]] = {}
     for row in rows:
         groups.setdefault((row.channel, node_of(row.ident) or 0), []).append(row)
     order = sorted(groups, key=lambda key: (key[0], not key[1], key[1]))
     return [
-        NodeRow(
+        _NodeRow(
             channel,
             node or None,
             tuple(row.ident for row in groups[channel, node]),
@@ -119,7 +119,7 @@ def _id_cells(row: IdRow, bus_bits: int) -> list[str]:
     return [*head, *map(ms_text, times), count_text(gaps.missed), str(changed)]
 
 
-def _node_cells(row: NodeRow, bus: BusRow) -> list[str]:
+def _node_cells(row: _NodeRow, bus: BusRow) -> list[str]:
     span_us = bus.last_us - bus.first_us
     rate_hz = row.frames * 1e6 / span_us if span_us > 0 else 0.0
     share = f"{row.bits * 100 / bus.load.bits:.1f}"
@@ -183,7 +183,7 @@ def id_json(row: IdRow) -> str:
     )
 
 
-def node_json(row: NodeRow) -> str:
+def node_json(row: _NodeRow) -> str:
     """Write a node; null is what has no node-ID by default."""
     idents: Iterable[dict[str, object]] = map(_ident, row.idents)
     return _line(

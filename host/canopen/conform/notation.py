@@ -66,7 +66,7 @@ class Unbound(Exception):  # noqa: N818 - what the name is
         self.reason = reason
 
 
-class Names(Protocol):
+class _Names(Protocol):
     """What stands for the names in checks on one node."""
 
     def text(self, name: str, attribute: str, /) -> str:
@@ -86,14 +86,14 @@ class Names(Protocol):
         ...
 
 
-def _resolve(text: str, names: Names) -> str:
+def _resolve(text: str, names: _Names) -> str:
     """Replace all names in a text; Unbound if one has nothing."""
     if "$" not in text:
         return text
     return NAME.sub(lambda match: names.text(match[1] or match[2], match[3] or ""), text)
 
 
-def _resolve_address(target: str, names: Names) -> Address:
+def _resolve_address(target: str, names: _Names) -> Address:
     """Return the address of `$name`, `1017:00` or `$tpdo.comm:01`."""
     match = NAME.fullmatch(target)
     if match is not None and not match[3]:
@@ -359,7 +359,7 @@ class BoundCheck:
     resets: tuple[str, ...]
 
 
-def bind_check(check: Check, names: Names) -> BoundCheck:
+def bind_check(check: Check, names: _Names) -> BoundCheck:
     """Put numbers in place of names; Unbound if the node has nothing for one."""
     steps = tuple(_bind_step(step, names) for step in check.steps)
     actions = [step.action for step in steps]
@@ -381,7 +381,7 @@ def bind_check(check: Check, names: Names) -> BoundCheck:
     )
 
 
-def _bind_step(step: Step, names: Names) -> Step:
+def _bind_step(step: Step, names: _Names) -> Step:
     action = step.action
     if isinstance(action, OfObject) and isinstance(action.at, tuple):
         return step  # made of an object: all its words are numbers
@@ -396,7 +396,7 @@ def _bind_step(step: Step, names: Names) -> Step:
     return step._replace(action=make(*values))
 
 
-def _bind_value(value: Any, names: Names) -> Any:
+def _bind_value(value: Any, names: _Names) -> Any:
     if isinstance(value, str):
         return _resolve(value, names)
     if isinstance(value, tuple):
@@ -404,7 +404,7 @@ def _bind_value(value: Any, names: Names) -> Any:
     return value
 
 
-def _bind_word(word: Any, names: Names) -> Any:
+def _bind_word(word: Any, names: _Names) -> Any:
     """Bind words of a macro: an address, or a name without attribute, is an object."""
     if isinstance(word, tuple):
         return tuple(_bind_word(each, names) for each in word)

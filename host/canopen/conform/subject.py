@@ -156,7 +156,7 @@ _ReadNumber = Callable[[int, int], int | None]
 """Reads an unsigned number of the node by index and sub-index, None if it has none."""
 
 
-class NodeNames:
+class _NodeNames:
     """The `Names` of a node.
 
     Args:
@@ -335,7 +335,7 @@ class Subject:
 
     binding: Binding
     features: NodeFeatures
-    names: NodeNames
+    names: _NodeNames
     about: dict[str, str]
     has: frozenset[check.Address]
     values: frozenset[check.Address]
@@ -430,7 +430,7 @@ def examine(  # noqa: PLR0913, PLR0917 - all that is known
     binding = bind(device, client.upload, allow=plan.allow, never=plan.never)
     features = find_features(binding, client, claims)
     reader = binding.reader  # what it has read is not read again: a sixth of what is read here
-    names = NodeNames(node_id, binding, reader.number, others)
+    names = _NodeNames(node_id, binding, reader.number, others)
     entries = binding.device.entries
     has = frozenset((entry.index, entry.sub) for entry in entries)
     values = frozenset((e.index, e.sub) for e in entries if e.readable and e.writable)

@@ -28,7 +28,7 @@ OBJECTS: Final = "OD"
 _OF_EACH_OBJECT: Final = "each object of the EDS"
 
 
-class Group(NamedTuple):
+class _Group(NamedTuple):
     """Checks that belong together."""
 
     name: str
@@ -37,12 +37,12 @@ class Group(NamedTuple):
 
 
 @cache
-def _read_group(name: str) -> Group:
+def _read_group(name: str) -> _Group:
     """Return a group that comes with the package."""
     return parse_group(_text(name))
 
 
-def read_suite() -> tuple[Group, ...]:
+def read_suite() -> tuple[_Group, ...]:
     """Return all groups that come with the package, in the order in which they are judged."""
     return tuple(map(_read_group, ORDER))
 
@@ -70,7 +70,7 @@ def _text(name: str) -> str:
     return files(checks).joinpath(f"{name.lower()}.txt").read_text("utf-8")
 
 
-def parse_group(text: str) -> Group:
+def parse_group(text: str) -> _Group:
     """Read a file of checks: parted by empty lines; a line that begins with # is a comment.
 
     Raises:
@@ -78,7 +78,7 @@ def parse_group(text: str) -> Group:
     """
     blocks = re.split(r"\n\s*\n", re.sub(r"^#.*\n", "", text, flags=re.MULTILINE).strip())
     match = _head(blocks[0])
-    return Group(match[1], match[2], tuple(_checks(match[1], blocks[1:])))
+    return _Group(match[1], match[2], tuple(_checks(match[1], blocks[1:])))
 
 
 def _head(text: str) -> re.Match[str]:

@@ -28,7 +28,7 @@ _NO_LETTER: Final = re.compile("[\udc80-\udcff]")
 
 
 @dataclass(frozen=True, slots=True)
-class Fixed:
+class _Fixed:
     """A file that was mended.
 
     Attributes:
@@ -48,7 +48,7 @@ class Fixed:
         return replace(one, line=_origin(self.origins, one.line))
 
 
-def fix(document: Document, *, ascii_only: bool = False) -> Fixed:
+def fix(document: Document, *, ascii_only: bool = False) -> _Fixed:
     """Mend a file until nothing changes; lines that no finding names stay to the byte.
 
     A file that looks truncated stays as it is: mended, it would look whole. What is not Unicode
@@ -62,7 +62,7 @@ def fix(document: Document, *, ascii_only: bool = False) -> Fixed:
     origins = list(range(1, len(document.texts) + 1))
     left = failing(check(document), strict=True)
     if any(one.rule.name == _CUT for one in left):
-        return Fixed(document, (), tuple(left), tuple(origins))
+        return _Fixed(document, (), tuple(left), tuple(origins))
     for _ in range(_MOST_PASSES):
         plan = _Plan()
         wanted = [*left, *_beyond_ascii(document)] if ascii_only else left
@@ -72,7 +72,7 @@ def fix(document: Document, *, ascii_only: bool = False) -> Fixed:
         mended += (replace(one, line=_origin(origins, one.line)) for one in taken)
         document, origins = plan.carry_out(document, origins)
         left = failing(check(document), strict=True)
-    return Fixed(document, tuple(dict.fromkeys(mended)), tuple(left), tuple(origins))
+    return _Fixed(document, tuple(dict.fromkeys(mended)), tuple(left), tuple(origins))
 
 
 def _beyond_ascii(document: Document) -> Iterator[RuleFinding]:

@@ -19,7 +19,7 @@ class Severity(Enum):
     """Style, or something that may be left out."""
 
 
-class EdsRule(NamedTuple):
+class _EdsRule(NamedTuple):
     """One rule.
 
     Attributes:
@@ -37,21 +37,21 @@ class EdsRule(NamedTuple):
     fix: str
 
 
-def read_rules(path: Path) -> dict[str, EdsRule]:
+def read_rules(path: Path) -> dict[str, _EdsRule]:
     """Return the rules of a file by name, in its order.
 
     Args:
         path: a text file with a heading for each severity, as `[error]`, and a rule a line below
             it: name, clause, what breaks and what to do, with ` | ` between them.
     """
-    rules: dict[str, EdsRule] = {}
+    rules: dict[str, _EdsRule] = {}
     severity = Severity.ERROR
     for line in path.read_text("utf-8").splitlines():
         if line.startswith("["):
             severity = Severity(line.strip("[]"))
         elif line and not line.startswith("#"):
             name, *words = line.split(" | ")
-            rules[name] = EdsRule(name, severity, *words)
+            rules[name] = _EdsRule(name, severity, *words)
     return rules
 
 
@@ -91,7 +91,7 @@ class RuleFinding:
         edits: what mends it; empty where that takes knowledge of the device.
     """
 
-    rule: EdsRule
+    rule: _EdsRule
     file: str
     line: int
     section: str

@@ -180,7 +180,7 @@ def table(rows: list[dict[str, Any]], columns: tuple[str, ...]) -> list[str]:
 # What is another device in one file than in another.
 
 
-class Change(NamedTuple):
+class _Change(NamedTuple):
     """One difference.
 
     Attributes:
@@ -206,7 +206,7 @@ class Change(NamedTuple):
 _WHOLE: Final = ("object", "entry")
 
 
-def diff(one: Document, other: Document) -> list[Change]:
+def diff(one: Document, other: Document) -> list[_Change]:
     """Return all differences: device, identity, bit rates, then objects by index.
 
     The order of sections, the notation of numbers and what no device has (dates, file names,
@@ -215,7 +215,7 @@ def diff(one: Document, other: Document) -> list[Change]:
     return [*_device(one, other), *_objects(one, other)]
 
 
-def _device(one: Document, other: Document) -> Iterator[Change]:
+def _device(one: Document, other: Document) -> Iterator[_Change]:
     pairs = [
         ("vendor", one.device.info.vendor_name, other.device.info.vendor_name),
         ("product", one.device.info.product_name, other.device.info.product_name),
@@ -228,7 +228,7 @@ def _device(one: Document, other: Document) -> Iterator[Change]:
             pairs.append((key, _number(one, key), _number(other, key)))
     for what, old, new in pairs:
         if old != new:
-            yield Change("DeviceInfo", what, old, new)
+            yield _Change("DeviceInfo", what, old, new)
 
 
 def _number(document: Document, key: str) -> str:
@@ -241,7 +241,7 @@ def _number(document: Document, key: str) -> str:
     return f"0x{number:X}"
 
 
-def _objects(one: Document, other: Document) -> Iterator[Change]:
+def _objects(one: Document, other: Document) -> Iterator[_Change]:
     old, new = one.device.objects, other.device.objects
     all_subs: dict[int, set[int]] = {}
     for at, sub in (*one.rows, *other.rows):
@@ -251,28 +251,28 @@ def _objects(one: Document, other: Document) -> Iterator[Change]:
         before, after = old.get(index), new.get(index)
         if before is None or after is None:
             name = "" if before is None else before.name or "-"
-            yield Change(place, "object", name, "" if after is None else after.name or "-")
+            yield _Change(place, "object", name, "" if after is None else after.name or "-")
             continue
         if before.name != after.name:
-            yield Change(place, "name", before.name, after.name)
+            yield _Change(place, "name", before.name, after.name)
         if before.code is not after.code:
-            yield Change(place, "kind", before.code.name, after.code.name)
+            yield _Change(place, "kind", before.code.name, after.code.name)
         yield from _entries(one, other, index, all_subs.get(index, set()))
 
 
-def _entries(one: Document, other: Document, index: int, subs: set[int]) -> Iterator[Change]:
+def _entries(one: Document, other: Document, index: int, subs: set[int]) -> Iterator[_Change]:
     for sub in sorted(subs):
         before, after = one.rows.get((index, sub)), other.rows.get((index, sub))
         place = f"{index:04X}h:{sub:02X}"
         if before is None or after is None:
             old, new = (row.name or "-" if row else "" for row in (before, after))
-            yield Change(place, "entry", old, new)
+            yield _Change(place, "entry", old, new)
             continue
         fields = zip(_fields(before), _fields(after), strict=True)
         for (what, old), (_, new) in fields:
             named = what == "name" and len(subs) == 1
             if old != new and not named:
-                yield Change(place, what, old, new)
+                yield _Change(place, what, old, new)
 
 
 def _fields(row: EntryDescription) -> list[tuple[str, str]]:

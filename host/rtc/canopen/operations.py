@@ -46,7 +46,7 @@ def _confirm_us(entry: NodeEntry) -> int:
 
 
 @dataclass(frozen=True, slots=True)
-class LifeCycleScripts:
+class _LifeCycleScripts:
     """What is said to a node for each operation on its proxy."""
 
     activate: Callable[[NodeEntry], Script[None]]
@@ -104,12 +104,12 @@ def _control(entry: NodeEntry, words: tuple[tuple[int, int], ...]) -> Script[Non
             )
 
 
-_PLAIN: Final = LifeCycleScripts(_start, _enter_pre_operational, _reset_node)
+_PLAIN: Final = _LifeCycleScripts(_start, _enter_pre_operational, _reset_node)
 
-_LIFE_CYCLES: Final[Mapping[Role, LifeCycleScripts]] = {
+_LIFE_CYCLES: Final[Mapping[Role, _LifeCycleScripts]] = {
     Role.DEVICE_RTC: _PLAIN,
     Role.DEVICE: _PLAIN,
-    Role.DRIVE: LifeCycleScripts(_enable, _disable, _reset_drive),
+    Role.DRIVE: _LifeCycleScripts(_enable, _disable, _reset_drive),
 }
 
 

@@ -30,7 +30,7 @@ from tickrig.wire.rtc_types.rtc import (
 
 
 @dataclass(frozen=True, slots=True)
-class PdoFieldType:
+class _PdoFieldType:
     """How objects of a data type are seen at ports.
 
     Attributes:
@@ -77,14 +77,14 @@ PORT_KINDS: Final = (
 
 def _field_type(
     row: table_4.CanopenPortType[Any], one: type[Struct], many: type[Struct], bits: int = 0
-) -> PdoFieldType:
+) -> _PdoFieldType:
     bits = bits or row.element_bits
-    return PdoFieldType(row, one, many if 2 * bits <= MAX_PDO_BITS else None, bits)
+    return _PdoFieldType(row, one, many if 2 * bits <= MAX_PDO_BITS else None, bits)
 
 
 _BOOLEAN, _CHARACTER = PORT_KINDS[0], PORT_KINDS[1]
 
-PDO_FIELD_TYPES: Final[Mapping[tuple[int, int], PdoFieldType]] = {
+PDO_FIELD_TYPES: Final[Mapping[tuple[int, int], _PdoFieldType]] = {
     **{
         (row.data_type, row.element_bits): _field_type(row, one, many)
         for row, one, many in PORT_KINDS
@@ -120,7 +120,7 @@ def proxy_index(index: int) -> int:
 
 
 @dataclass(frozen=True, slots=True)
-class PdoField:
+class _PdoField:
     """A mapped object.
 
     Attributes:
@@ -130,7 +130,7 @@ class PdoField:
 
     mapped: MappedObject
     shift: int
-    type: PdoFieldType
+    type: _PdoFieldType
 
 
 @dataclass(frozen=True)
@@ -147,7 +147,7 @@ class PdoLayout:
 
     index: int
     cob_id: int
-    fields: tuple[PdoField, ...]
+    fields: tuple[_PdoField, ...]
     bits: int
     unknown: tuple[MappedObject, ...] = field(default=())
 
@@ -190,11 +190,11 @@ def lay_out(
     data_types: Mapping[tuple[int, int], int],
 ) -> PdoLayout:
     """Lay a PDO out by its mapping; objects below 20h are dummies, which nobody sees."""
-    fields, unknown, shift = list[PdoField](), list[MappedObject](), 0
+    fields, unknown, shift = list[_PdoField](), list[MappedObject](), 0
     for mapped in mapping:
         data_type = data_types.get((mapped.index, mapped.sub), 0)
         if (kind := PDO_FIELD_TYPES.get((data_type, mapped.bits))) is not None:
-            fields.append(PdoField(mapped, shift, kind))
+            fields.append(_PdoField(mapped, shift, kind))
         elif mapped.index >= 0x20:
             unknown.append(mapped)
         shift += mapped.bits

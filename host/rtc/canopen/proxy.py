@@ -158,7 +158,7 @@ class _SdoInPort(InPort[T]):
 
 
 @dataclass(frozen=True, slots=True)
-class SdoPortLayout:
+class _SdoPortLayout:
     """The objects of a port.
 
     Attributes:
@@ -211,7 +211,7 @@ class SdoSource:
         port: the OutPort.
     """
 
-    def __init__(self, layout: SdoPortLayout) -> None:
+    def __init__(self, layout: _SdoPortLayout) -> None:
         self.layout, self.port = layout, _SdoOutPort[Any](layout.name, layout.struct)
 
 
@@ -224,7 +224,7 @@ class SdoSink:
         pending: bytes that are to be written, None for nothing.
     """
 
-    def __init__(self, layout: SdoPortLayout) -> None:
+    def __init__(self, layout: _SdoPortLayout) -> None:
         self.layout, self.port = layout, _SdoInPort[Any](layout.name, layout.struct)
         self.pending: tuple[bytes, ...] | None = None
 
@@ -243,14 +243,14 @@ class SdoSink:
 
 def lay_out_sdo_ports(
     entry: NodeEntry, data_types: Mapping[tuple[int, int], int]
-) -> tuple[tuple[SdoPortLayout, ...], tuple[str, ...]]:
+) -> tuple[tuple[_SdoPortLayout, ...], tuple[str, ...]]:
     """Return the ports that a node is given, and why others cannot be.
 
     Args:
         entry: the node.
         data_types: of its EDS, by index and sub-index.
     """
-    made, refused = list[SdoPortLayout](), list[str]()
+    made, refused = list[_SdoPortLayout](), list[str]()
     for name, port in entry.sdo_ports.items():
         try:
             made.append(_lay_out(name, port, data_types))
@@ -261,7 +261,7 @@ def lay_out_sdo_ports(
 
 def _lay_out(
     name: str, port: SdoPortEntry, data_types: Mapping[tuple[int, int], int]
-) -> SdoPortLayout:
+) -> _SdoPortLayout:
     subs: tuple[int, ...] = (0,)
     if (port.index, 1) in data_types:
         subs = tuple(
@@ -278,9 +278,9 @@ def _lay_out(
     for row, one, many in pdo_layout.PORT_KINDS:
         if row.data_type == data_type and (port.type or _usual(row)) == row.name:
             if len(subs) == 1 and subs == (0,):
-                return SdoPortLayout(name, port.direction, port.index, subs, row, one)
+                return _SdoPortLayout(name, port.direction, port.index, subs, row, one)
             kind = row.sequence(len(subs))
-            return SdoPortLayout(name, port.direction, port.index, subs, kind, many)
+            return _SdoPortLayout(name, port.direction, port.index, subs, kind, many)
     wanted = port.type or "any type of a port"
     raise ValueError(f"{port.index:04X}h is {DataType(data_type).name} in the EDS, not {wanted}")
 
@@ -343,7 +343,7 @@ class ProxyRtc(RtComponent):
         self,
         entry: NodeEntry,
         layouts: tuple[pdo_layout.PdoLayout, ...],
-        sdo_layouts: tuple[SdoPortLayout, ...] = (),
+        sdo_layouts: tuple[_SdoPortLayout, ...] = (),
     ) -> None:
         super().__init__(entry.name)
         self.node_id = entry.id

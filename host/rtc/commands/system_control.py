@@ -33,7 +33,7 @@ LEASE_US: Final = 5_000_000
 
 
 @dataclass(frozen=True, slots=True)
-class NumberedValue:
+class _NumberedValue:
     """A value that an OutPort wrote; numbers count from 1 on, for each time it is watched."""
 
     number: int
@@ -47,12 +47,12 @@ class _WatchedPort:
     port: InPort[Any]
     requested_us: int
     count: int = 0
-    seen: deque[NumberedValue] = field(default_factory=lambda: deque(maxlen=HELD))
+    seen: deque[_NumberedValue] = field(default_factory=lambda: deque(maxlen=HELD))
 
     def take(self) -> None:
         while self.port.is_new and (value := self.port.read()) is not None:
             self.count += 1
-            self.seen.append(NumberedValue(self.count, value))
+            self.seen.append(_NumberedValue(self.count, value))
 
 
 class Probes:
@@ -70,7 +70,7 @@ class Probes:
         self._watches: dict[AnyPort, _WatchedPort] = {}
         self._injections: dict[AnyPort, OutPort[Any]] = {}
 
-    def watch(self, name: str, since: int = 0) -> tuple[tuple[NumberedValue, ...], int]:
+    def watch(self, name: str, since: int = 0) -> tuple[tuple[_NumberedValue, ...], int]:
         """Watch an OutPort from the first call on, and return what it wrote.
 
         Args:

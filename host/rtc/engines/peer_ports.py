@@ -137,7 +137,7 @@ class PeerEnd:
 # Buffers between the thread of a manager and those of an engine.
 
 
-class LockedBuffer(RingBuffer[P]):
+class _LockedBuffer(RingBuffer[P]):
     """A ring buffer that one thread fills and another one reads."""
 
     __slots__ = ("_lock",)
@@ -157,7 +157,7 @@ class LockedBuffer(RingBuffer[P]):
             return super().read()
 
 
-class ArrivalBuffer(RingBuffer[P]):
+class _ArrivalBuffer(RingBuffer[P]):
     """A ring buffer whose values come from other threads: they wait until they are let in.
 
     What waits counts as if it were in the buffer; so the status of a value is known at once.
@@ -192,7 +192,7 @@ class ArrivalBuffer(RingBuffer[P]):
             self._arrived.clear()
 
 
-class SendBuffer(RingBuffer[P]):
+class _SendBuffer(RingBuffer[P]):
     """A ring buffer that one thread fills and another one empties.
 
     Args:
@@ -240,13 +240,13 @@ class SendBuffer(RingBuffer[P]):
 
 # An InPort of ours: the peer pushes, or is pulled from.
 
-P_co = TypeVar("P_co", covariant=True)
+_P_co = TypeVar("_P_co", covariant=True)
 
 
-class _OutPortConsumer(Protocol[P_co]):
+class _OutPortConsumer(Protocol[_P_co]):
     """An OutPort of a peer, as an engine reaches it (OpenRTM-aist 1.x, OutPortConsumer)."""
 
-    def get(self) -> P_co | None:
+    def get(self) -> _P_co | None:
         """Take the next value out of the peer's port; None if it has none.
 
         It may wait up to a time-out. Whatever it raises means that there was no answer.
@@ -292,7 +292,7 @@ class InPortPushConnector(_InPortConnector[T, P]):
         RtcRefused: the port has a connector of this ID, or properties that cannot be.
     """
 
-    buffer: ArrivalBuffer[T]
+    buffer: _ArrivalBuffer[T]
 
     def __init__(
         self,
@@ -303,7 +303,7 @@ class InPortPushConnector(_InPortConnector[T, P]):
         post: Callable[[Callable[[], object]], object] | None = None,
     ) -> None:
         super().__init__(port, end, codec, calls)
-        self.buffer, self._post = ArrivalBuffer(end.options.inport), post or calls.post
+        self.buffer, self._post = _ArrivalBuffer(end.options.inport), post or calls.post
 
     def put(self, payload: P) -> PortStatus:
         """Put a value into the buffer, in any thread; it is there before the next tick.
@@ -426,13 +426,13 @@ class InPortPullConnector(_InPortConnector[T, P]):
 
 # An OutPort of ours: the peer is pushed to, or pulls.
 
-P_contra = TypeVar("P_contra", contravariant=True)
+_P_contra = TypeVar("_P_contra", contravariant=True)
 
 
-class _InPortConsumer(Protocol[P_contra]):
+class _InPortConsumer(Protocol[_P_contra]):
     """An InPort of a peer, as an engine reaches it (OpenRTM-aist 1.x, InPortConsumer)."""
 
-    def put(self, payload: P_contra, /) -> PortStatus:
+    def put(self, payload: _P_contra, /) -> PortStatus:
         """Put a value into the peer's port, and return what it says.
 
         It may wait up to a time-out. Whatever it raises means that there was no answer.
@@ -463,7 +463,7 @@ class OutPortPushConnector(connector.Connector[Any], Generic[T, P]):
         RtcRefused: the port has a connector of this ID, or properties that cannot be.
     """
 
-    buffer: SendBuffer[P]
+    buffer: _SendBuffer[P]
 
     def __init__(
         self,
@@ -475,7 +475,7 @@ class OutPortPushConnector(connector.Connector[Any], Generic[T, P]):
     ) -> None:
         options = replace(end.options, dataflow=connector.DataflowType.PUSH)
         super().__init__(end.profile(port), (port,), options)
-        self.buffer = SendBuffer(options.outport, partial(thread.submit, self._send))
+        self.buffer = _SendBuffer(options.outport, partial(thread.submit, self._send))
         self._codec, self._consumer, self._thread = codec, consumer, thread
         self._watch = PeerWatch(f"{port.full_name} to {end.port}")
         self.sent = self.refused = 0
@@ -530,12 +530,12 @@ class OutPortPullConnector(connector.Connector[Any], Generic[T, P]):
         RtcRefused: the port has a connector of this ID, or properties that cannot be.
     """
 
-    buffer: LockedBuffer[P]
+    buffer: _LockedBuffer[P]
 
     def __init__(self, port: OutPort[T], end: PeerEnd, codec: Codec[T, P]) -> None:
         options = replace(end.options, dataflow=connector.DataflowType.PULL)
         super().__init__(end.profile(port), (port,), options)
-        self.buffer, self._codec = LockedBuffer(options.outport), codec
+        self.buffer, self._codec = _LockedBuffer(options.outport), codec
 
     def write(self, value: T) -> PortStatus:
         """Take a value from the OutPort; INVALID_ARGS if it cannot be encoded."""

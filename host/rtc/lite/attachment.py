@@ -23,7 +23,7 @@ from tickrig.wire.rtc_lite.codes import LiteCommand
 from tickrig.wire.rtc_lite.frame import Framing
 
 
-class DeviceWatcher:
+class _DeviceWatcher:
     """Asks for the state of a device each 100 ticks from now on, and waits for nothing.
 
     Args:
@@ -87,7 +87,7 @@ class Attachment:
     context: ExecutionContext | None = None
     rate_hz: float = _RATE_HZ
     proxy: RtcLiteProxy = field(init=False)
-    _watcher: DeviceWatcher | None = field(default=None, init=False)  # for a device that is away
+    _watcher: _DeviceWatcher | None = field(default=None, init=False)  # for a device that is away
 
     def __post_init__(self) -> None:
         """Make the first proxy, and have the manager tick this."""
@@ -134,7 +134,7 @@ class Attachment:
         self.manager.delete(proxy.instance_name)
         self._notify(ProxyEventType.REMOVED, proxy)
         if self.settings.rediscover:
-            self._watcher = DeviceWatcher(self.link, self.settings)
+            self._watcher = _DeviceWatcher(self.link, self.settings)
         else:
             self.manager.remove_item(self)
 
@@ -145,7 +145,7 @@ class Attachment:
             self.proxy, self._watcher = self._add_proxy(), None
         except RtcRefused as error:
             _LOG.info("%s answers, but: %s", self.base_name, error)
-            self._watcher = DeviceWatcher(self.link, self.settings)
+            self._watcher = _DeviceWatcher(self.link, self.settings)
         else:
             self._notify(ProxyEventType.REDISCOVERED, self.proxy)
 

@@ -118,7 +118,7 @@ _KINDS: Final[dict[str, type[Any]]] = {
 
 
 @dataclass(frozen=True, slots=True)
-class InPortBridge:
+class _InPortBridge:
     """An InPort of the proxy, and the in-port of the device behind it."""
 
     port: InPort[Any]
@@ -126,7 +126,7 @@ class InPortBridge:
     port_type: LitePortType[Any]
 
     @classmethod
-    def of(cls, profile: messages.LitePortProfile) -> InPortBridge:
+    def of(cls, profile: messages.LitePortProfile) -> _InPortBridge:
         """Make the InPort of an in-port; DeviceRefused if its type is not known."""
         name, port_type = _read(profile)
         return cls(InPort(name, _KINDS[port_type.name]), profile.name, port_type)
@@ -149,14 +149,14 @@ class InPortBridge:
 
 
 @dataclass(frozen=True, slots=True)
-class OutPortBridge:
+class _OutPortBridge:
     """An OutPort of the proxy, and the out-port of the device behind it."""
 
     port: OutPort[Any]
     port_type: LitePortType[Any]
 
     @classmethod
-    def of(cls, profile: messages.LitePortProfile) -> OutPortBridge:
+    def of(cls, profile: messages.LitePortProfile) -> _OutPortBridge:
         """Make the OutPort of an out-port; DeviceRefused if its type is not known."""
         name, port_type = _read(profile)
         return cls(OutPort(name, _KINDS[port_type.name]), port_type)
@@ -205,8 +205,8 @@ class PortBridges:
         ins: Iterable[messages.LitePortProfile] = (),
         outs: Iterable[messages.LitePortProfile] = (),
     ) -> None:
-        self._ins = [InPortBridge.of(profile) for profile in ins]
-        self._outs = {profile.name: OutPortBridge.of(profile) for profile in outs}
+        self._ins = [_InPortBridge.of(profile) for profile in ins]
+        self._outs = {profile.name: _OutPortBridge.of(profile) for profile in outs}
         self.dropped = 0
 
     @property

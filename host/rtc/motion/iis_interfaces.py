@@ -23,7 +23,7 @@ S = TypeVar("S", bound=Struct)
 T = TypeVar("T", bound=Struct)
 
 
-class Adapter(RtComponent, Generic[S, T]):
+class _Adapter(RtComponent, Generic[S, T]):
     """Converts each value at its port `in` and writes it to `out`; what it cannot is left out.
 
     A subclass names the types of both ports in brackets, and overrides `convert`.
@@ -47,7 +47,7 @@ class Adapter(RtComponent, Generic[S, T]):
         return ReturnCode.RTC_OK
 
 
-class Velocity1To2(Adapter[rtc.TimedVelocity, iis.TimedVelocity]):
+class Velocity1To2(_Adapter[rtc.TimedVelocity, iis.TimedVelocity]):
     """A moving command of phase 1 for a robot of phase 2."""
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Velocity1To2", "IIS velocity, phase 1 to 2")
@@ -57,7 +57,7 @@ class Velocity1To2(Adapter[rtc.TimedVelocity, iis.TimedVelocity]):
         return iis.TimedVelocity(value.tm, vx=value.v, w=value.w)
 
 
-class Velocity2To1(Adapter[iis.TimedVelocity, rtc.TimedVelocity]):
+class Velocity2To1(_Adapter[iis.TimedVelocity, rtc.TimedVelocity]):
     """A moving command of phase 2 for a robot of phase 1; it does not go sideways."""
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Velocity2To1", "IIS velocity, phase 2 to 1")
@@ -67,7 +67,7 @@ class Velocity2To1(Adapter[iis.TimedVelocity, rtc.TimedVelocity]):
         return rtc.TimedVelocity(value.tm, value.vx, value.w)
 
 
-class Velocity2To3(Adapter[iis.TimedVelocity, iis.TimedVelocity2D]):
+class Velocity2To3(_Adapter[iis.TimedVelocity, iis.TimedVelocity2D]):
     """A moving command of phase 2 for a robot of phase 3."""
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Velocity2To3", "IIS velocity, phase 2 to 3")
@@ -78,7 +78,7 @@ class Velocity2To3(Adapter[iis.TimedVelocity, iis.TimedVelocity2D]):
         return iis.TimedVelocity2D(value.tm, value.id, data, value.error)
 
 
-class Velocity3To2(Adapter[iis.TimedVelocity2D, iis.TimedVelocity]):
+class Velocity3To2(_Adapter[iis.TimedVelocity2D, iis.TimedVelocity]):
     """A moving command of phase 3 for a robot of phase 2."""
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Velocity3To2", "IIS velocity, phase 3 to 2")
@@ -89,7 +89,7 @@ class Velocity3To2(Adapter[iis.TimedVelocity2D, iis.TimedVelocity]):
         return iis.TimedVelocity(value.tm, value.id, data.vx, data.vy, data.va, value.error)
 
 
-class Position2To3(Adapter[iis.TimedPosition, iis.TimedPose2D]):
+class Position2To3(_Adapter[iis.TimedPosition, iis.TimedPose2D]):
     """A self-position of phase 2 for those of phase 3."""
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Position2To3", "IIS self-position, phase 2 to 3")
@@ -102,7 +102,7 @@ class Position2To3(Adapter[iis.TimedPosition, iis.TimedPose2D]):
         return iis.TimedPose2D(value.tm, value.id, ports.to_pose_2d(pose), value.error)
 
 
-class Position3To2(Adapter[iis.TimedPose2D, iis.TimedPosition]):
+class Position3To2(_Adapter[iis.TimedPose2D, iis.TimedPosition]):
     """A self-position of phase 3, or of RH3, for those of phase 2."""
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Position3To2", "IIS self-position, phase 3 to 2")
@@ -115,7 +115,7 @@ class Position3To2(Adapter[iis.TimedPose2D, iis.TimedPosition]):
         return iis.TimedPosition(value.tm, value.id, *numbers, value.error)
 
 
-class PositiveHeading(Adapter[iis.TimedPose2D, iis.TimedPose2D]):
+class PositiveHeading(_Adapter[iis.TimedPose2D, iis.TimedPose2D]):
     """A pose of RH3 for an IIS interface: heading in 0..2 pi."""
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("PositiveHeading", "Heading in 0..2 pi")
@@ -128,7 +128,7 @@ class PositiveHeading(Adapter[iis.TimedPose2D, iis.TimedPose2D]):
         return iis.TimedPose2D(value.tm, value.id, data, value.error)
 
 
-class WrappedHeading(Adapter[iis.TimedPose2D, iis.TimedPose2D]):
+class WrappedHeading(_Adapter[iis.TimedPose2D, iis.TimedPose2D]):
     """A pose of an IIS interface for RH3: heading in -pi..pi."""
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("WrappedHeading", "Heading in -pi..pi")

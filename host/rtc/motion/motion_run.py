@@ -34,7 +34,7 @@ class TrackSample(NamedTuple):
     line: Pose | None
 
 
-class CrossTrack(NamedTuple):
+class _CrossTrack(NamedTuple):
     """Distance from the line: root of the mean square, and most, m."""
 
     rms: float
@@ -81,13 +81,13 @@ class MotionRun:
         return fsum(abs(b.twist.w - a.twist.w) for a, b in pairwise(self.samples))
 
     @property
-    def cross_track(self) -> CrossTrack:
+    def cross_track(self) -> _CrossTrack:
         """How far it was beside its long legs."""
         errors = [line.left(sample.pose) for line, leg in self._long_legs() for sample in leg] or [
             0.0
         ]
         square = fsum(error * error for error in errors) / len(errors)
-        return CrossTrack(sqrt(square), max(map(abs, errors)))
+        return _CrossTrack(sqrt(square), max(map(abs, errors)))
 
     def violations(self, limits: VelocityLimits) -> int:
         """Return how many commands were beyond a limit."""

@@ -43,7 +43,7 @@ class SubscriptionType(StrEnum):
     PERIODIC = "periodic"  # at a rate of the connector's own
 
 
-class PushPolicy(StrEnum):
+class _PushPolicy(StrEnum):
     """Which of the waiting values are pushed (`publisher.push_policy`)."""
 
     ALL = "all"
@@ -59,7 +59,7 @@ class ConnectorOptions:
     interface: InterfaceType
     dataflow: DataflowType
     subscription: SubscriptionType
-    push_policy: PushPolicy
+    push_policy: _PushPolicy
     skip_count: int
     push_rate_hz: float
     endian: Endian
@@ -106,7 +106,7 @@ class ConnectorOptions:
             read.word("interface_type", InterfaceType.DIRECT),
             read.word("dataflow_type", DataflowType.PUSH),
             read.word("subscription_type", SubscriptionType.FLUSH),
-            read.word("publisher.push_policy", PushPolicy.NEW),
+            read.word("publisher.push_policy", _PushPolicy.NEW),
             read.count("publisher.skip_count", 0),
             read.value("publisher.push_rate", 1_000.0, _rate, f"{MIN_RATE_HZ}..{MAX_RATE_HZ} Hz"),
             read.value("serializer.cdr.endian", Endian.LITTLE, _endian, ", ".join(Endian)),
@@ -187,8 +187,8 @@ class _Publisher(Generic[T]):
         self._period_us, self._skipped, self._planned_us = 1, 0, NEVER
         if options.subscription is SubscriptionType.PERIODIC:
             self._period_us = round(_SECOND_US / options.push_rate_hz)
-        elif self._policy is PushPolicy.FIFO:
-            self._policy = PushPolicy.ALL
+        elif self._policy is _PushPolicy.FIFO:
+            self._policy = _PushPolicy.ALL
 
     @property
     def due_us(self) -> int:
@@ -210,13 +210,13 @@ class _Publisher(Generic[T]):
         return taken
 
     def _pick(self) -> tuple[T, ...]:
-        if self._policy is PushPolicy.FIFO:
+        if self._policy is _PushPolicy.FIFO:
             return self._values.pop()
         values = self._values.clear()
         match self._policy:
-            case PushPolicy.NEW:
+            case _PushPolicy.NEW:
                 return values[-1:]
-            case PushPolicy.SKIP:
+            case _PushPolicy.SKIP:
                 return self._every(values)
             case _:
                 return values

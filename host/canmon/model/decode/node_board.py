@@ -59,7 +59,7 @@ _TARGETS: Final = {
 }
 
 
-class EmcyRecord(NamedTuple):
+class _EmcyRecord(NamedTuple):
     """An EMCY and when it came."""
 
     at_us: int
@@ -101,7 +101,7 @@ class NodeStatus:
     boots: int = 0
     unrequested_boots: int = 0
     late: int = 0
-    emcys: deque[EmcyRecord] = field(default_factory=lambda: deque(maxlen=_EMCY_KEPT))
+    emcys: deque[_EmcyRecord] = field(default_factory=lambda: deque(maxlen=_EMCY_KEPT))
     emcy_count: int = 0
     error_code: int = 0
     sdo_errors: int = 0
@@ -185,7 +185,7 @@ class NodeStatus:
         assert isinstance(code, int)
         self.emcy_count += 1
         self.error_code = code
-        self.emcys.append(EmcyRecord(at_us, code, decoded.text))
+        self.emcys.append(_EmcyRecord(at_us, code, decoded.text))
 
     def transfer(self, at_us: int, transfer: Transfer) -> None:
         """Take an SDO transfer that ended."""
@@ -423,7 +423,7 @@ _IDENTITY: Final = 0x1018
 _PROFILES: Final = {401: "I/O", 402: "drive", 405: "PLC", 406: "encoder", 410: "inclinometer"}
 
 
-class PdoContent(NamedTuple):
+class _PdoContent(NamedTuple):
     """A PDO that has a CAN-ID.
 
     Attributes:
@@ -441,12 +441,12 @@ class PdoContent(NamedTuple):
     text: str
 
 
-def pdo_contents(row: NodeStatus) -> list[PdoContent]:
+def pdo_contents(row: NodeStatus) -> list[_PdoContent]:
     """Return the PDOs of a node that are known, those that it sends first."""
     return list(_pdos(row))
 
 
-def _pdos(row: NodeStatus) -> Iterator[PdoContent]:
+def _pdos(row: NodeStatus) -> Iterator[_PdoContent]:
     memory = row.memory
     for pdo in sorted(pdos_of(row.node, memory.indices)):
         can_id, count = can_id_of(pdo, memory), memory.number(pdo.mapping, 0)
@@ -462,7 +462,7 @@ def _pdos(row: NodeStatus) -> Iterator[PdoContent]:
             names = _names(memory, pdo.mapping, min(count, MAX_MAPPED_OBJECTS))
             heard = row.pdos.get(pdo.kind)
             text = f"{heard.text if heard else ', '.join(names)} ({source})"
-        yield PdoContent(pdo.kind, can_id, pdo.receives, names, text)
+        yield _PdoContent(pdo.kind, can_id, pdo.receives, names, text)
 
 
 def _names(memory: NodeMemory, mapping: int, count: int) -> tuple[str, ...]:

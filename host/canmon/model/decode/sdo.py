@@ -21,7 +21,7 @@ from tickrig.wire.errors import WireError
 #
 # A third party hears both sides of an SDO dialogue, starts listening anywhere, and may miss
 # frames. So this is no client and no server, and it never refuses a frame: it holds what
-# was heard against what was expected (`TransferPhase`) and says what does not fit in
+# was heard against what was expected (`_TransferPhase`) and says what does not fit in
 # `flaws`, `retries` and `partial`.
 #
 # - One `SdoChannel` is one client and one server (a pair of CAN-IDs). It has at most one
@@ -49,7 +49,7 @@ from tickrig.wire.errors import WireError
 # An SDO transfer while it runs.
 
 
-class TransferPhase(Enum):
+class _TransferPhase(Enum):
     """What is expected next."""
 
     ASKED = auto()  # the answer to the request that began it
@@ -61,7 +61,7 @@ class TransferPhase(Enum):
 
 
 @dataclass(slots=True)
-class OpenTransfer:
+class _OpenTransfer:
     """What was heard of a transfer so far.
 
     Args:
@@ -94,7 +94,7 @@ class OpenTransfer:
     index: int | None = None
     sub: int | None = None
     begun_by: bytes = b""
-    phase: TransferPhase = TransferPhase.ASKED
+    phase: _TransferPhase = _TransferPhase.ASKED
     size: int | None = None
     sized: bool = True
     retries: int = 0
@@ -141,7 +141,7 @@ class OpenTransfer:
         # Segments behind the acknowledged one come again, in the next block.
         self.retries += max(self._block, default=0) > ackseq
         if self.block_last == ackseq:
-            self.phase = TransferPhase.BLOCK_ENDING
+            self.phase = _TransferPhase.BLOCK_ENDING
         self.block_last = None
         self._block.clear()
 
@@ -151,7 +151,7 @@ class OpenTransfer:
             del self.data[-end.fill :]
         if self.crc and not self.flaws and sdo_frame.crc16(bytes(self.data)) != end.crc:
             self.add_flaw("wrong CRC")
-        self.phase = TransferPhase.BLOCK_ENDED
+        self.phase = _TransferPhase.BLOCK_ENDED
 
     def add_flaw(self, text: str) -> None:
         """Note what does not fit, once."""
@@ -190,11 +190,11 @@ _Initiate = (
 _Answer = sdo.UploadInitiateResponse | sdo.DownloadInitiateResponse
 
 
-def begin(at_us: int, node: int, request: _Initiate, data: bytes) -> OpenTransfer:
+def begin(at_us: int, node: int, request: _Initiate, data: bytes) -> _OpenTransfer:
     """Open a transfer with the request that began it."""
     uploads = isinstance(request, sdo.UploadInitiateRequest | sdo_frame.BlockUploadInitiateRequest)
     direction = TransferDirection.UPLOAD if uploads else TransferDirection.DOWNLOAD
-    opened = OpenTransfer(
+    opened = _OpenTransfer(
         at_us, node, direction, TransferMode.EXPEDITED, request.index, request.sub, data
     )
     match request:
@@ -210,11 +210,11 @@ def begin(at_us: int, node: int, request: _Initiate, data: bytes) -> OpenTransfe
     return opened
 
 
-def answers(running: OpenTransfer, answer: _Answer) -> bool:
+def answers(running: _OpenTransfer, answer: _Answer) -> bool:
     """Say whether this is the answer to the request; block upload may be switched to another."""
     upload = isinstance(answer, sdo.UploadInitiateResponse)
     return (
-        running.phase is TransferPhase.ASKED
+        running.phase is _TransferPhase.ASKED
         and running.entry == (answer.index, answer.sub)
         and running.direction
         is (TransferDirection.UPLOAD if upload else TransferDirection.DOWNLOAD)
@@ -224,11 +224,11 @@ def answers(running: OpenTransfer, answer: _Answer) -> bool:
     )
 
 
-def _take_answer(running: OpenTransfer, answer: _Answer) -> str:
+def _take_answer(running: _OpenTransfer, answer: _Answer) -> str:
     """Take the answer: the value itself, or leave for segments."""
     if isinstance(answer, sdo.DownloadInitiateResponse):
         running.done = running.mode is TransferMode.EXPEDITED and not running.partial
-        running.phase = TransferPhase.SEGMENTS
+        running.phase = _TransferPhase.SEGMENTS
         return (
             "ready for segments" if running.mode is TransferMode.SEGMENTED else "download confirmed"
         )
@@ -239,18 +239,18 @@ def _take_answer(running: OpenTransfer, answer: _Answer) -> str:
         return "upload"
     running.mode, running.phase, running.size = (
         TransferMode.SEGMENTED,
-        TransferPhase.SEGMENTS,
+        _TransferPhase.SEGMENTS,
         answer.size,
     )
     size = "their size is not told" if answer.size is None else running.progress
     return f"segments follow, {size}"
 
 
-def _unheard(at_us: int, node: int, answer: _Answer) -> OpenTransfer:
+def _unheard(at_us: int, node: int, answer: _Answer) -> _OpenTransfer:
     """Open a transfer whose request was not heard."""
     upload = isinstance(answer, sdo.UploadInitiateResponse)
     direction = TransferDirection.UPLOAD if upload else TransferDirection.DOWNLOAD
-    opened = OpenTransfer(at_us, node, direction, TransferMode.SEGMENTED, answer.index, answer.sub)
+    opened = _OpenTransfer(at_us, node, direction, TransferMode.SEGMENTED, answer.index, answer.sub)
     opened.partial = True
     return opened
 
@@ -258,7 +258,7 @@ def _unheard(at_us: int, node: int, answer: _Answer) -> OpenTransfer:
 WRONG_TOGGLE: Final = "wrong toggle bit"
 
 
-def _check_toggle(running: OpenTransfer, toggle: bool) -> None:
+def _check_toggle(running: _OpenTransfer, toggle: bool) -> None:
     """Note that a client does not alternate the toggle bit, or does not begin with 0."""
     began = running.requested_toggle is not None or running.sent is not None
     first = running.taken is None and not began and not running.partial
@@ -266,7 +266,7 @@ def _check_toggle(running: OpenTransfer, toggle: bool) -> None:
         running.add_flaw(WRONG_TOGGLE)
 
 
-def _request_segment(running: OpenTransfer, request: sdo.UploadSegmentRequest) -> str:
+def _request_segment(running: _OpenTransfer, request: sdo.UploadSegmentRequest) -> str:
     """Take what a client of an upload asks for."""
     running.retries += running.requested_toggle == request.toggle
     _check_toggle(running, request.toggle)
@@ -274,7 +274,7 @@ def _request_segment(running: OpenTransfer, request: sdo.UploadSegmentRequest) -
     return f"asks for a segment, {running.progress} so far"
 
 
-def _take_segment(running: OpenTransfer, segment: sdo.Segment) -> str:
+def _take_segment(running: _OpenTransfer, segment: sdo.Segment) -> str:
     """Take a segment of an upload, unless it was sent twice or a toggle bit is wrong."""
     if segment.toggle != running.requested_toggle or segment.toggle == running.taken:
         if segment.toggle != running.requested_toggle is not None:
@@ -286,7 +286,7 @@ def _take_segment(running: OpenTransfer, segment: sdo.Segment) -> str:
     return f"segment, {running.progress}"
 
 
-def _send_segment(running: OpenTransfer, segment: sdo.Segment) -> str:
+def _send_segment(running: _OpenTransfer, segment: sdo.Segment) -> str:
     """Take a segment of a download; it counts when the server has confirmed it."""
     again = running.sent is not None and running.sent.toggle == segment.toggle
     if not again:
@@ -296,7 +296,7 @@ def _send_segment(running: OpenTransfer, segment: sdo.Segment) -> str:
     return f"segment of {len(segment.data)} B, {running.progress} so far"
 
 
-def _confirm_segment(running: OpenTransfer, response: sdo.DownloadSegmentResponse) -> str:
+def _confirm_segment(running: _OpenTransfer, response: sdo.DownloadSegmentResponse) -> str:
     """Take the receipt of a segment."""
     sent = running.sent
     if sent is None or sent.toggle != response.toggle or sent.toggle == running.taken:
@@ -314,9 +314,9 @@ _ORPHAN: Final = "of a block transfer whose beginning was not heard"
 _END_MASK: Final = 0xE3
 
 
-def _is_block_segment(running: OpenTransfer, sender: TransferDirection, data: bytes) -> bool:
+def _is_block_segment(running: _OpenTransfer, sender: TransferDirection, data: bytes) -> bool:
     """Tell a segment of a block from anything else: only the state can."""
-    if running.phase is not TransferPhase.BLOCK or running.direction is not sender:
+    if running.phase is not _TransferPhase.BLOCK or running.direction is not sender:
         return False
     if len(data) != sdo_frame.FRAME_BYTES or not data[0] & sdo_frame.BLOCK_SEQNO:
         return False  # 80h, an abort: no segment has the number 0
@@ -325,32 +325,32 @@ def _is_block_segment(running: OpenTransfer, sender: TransferDirection, data: by
     return running.block_last is None or data[0] & _END_MASK != sdo_frame.BLOCK_END
 
 
-def _take_block_segment(running: OpenTransfer, data: bytes) -> str:
+def _take_block_segment(running: _OpenTransfer, data: bytes) -> str:
     """Keep a segment until its receipt."""
     segment = sdo_frame.BlockSegment.parse(data)
     running.take_block_segment(segment)
     return f"segment {segment.seqno} of a block"
 
 
-def _take_block_frame(running: OpenTransfer, message: sdo.Request | sdo.Response) -> str:
+def _take_block_frame(running: _OpenTransfer, message: sdo.Request | sdo.Response) -> str:
     """Take any other frame of a block transfer."""
     upload = running.direction is TransferDirection.UPLOAD
     match message, running.phase:
         case (
             (sdo_frame.BlockDownloadInitiateResponse() | sdo_frame.BlockUploadInitiateResponse()),
-            TransferPhase.ASKED,
+            _TransferPhase.ASKED,
         ):
             return _answer(running, message)
-        case sdo_frame.BlockStart(), TransferPhase.BLOCK_READY:
-            running.phase = TransferPhase.BLOCK
+        case sdo_frame.BlockStart(), _TransferPhase.BLOCK_READY:
+            running.phase = _TransferPhase.BLOCK
             return "start of a block upload"
-        case sdo_frame.BlockAcknowledge(ackseq=ackseq, block_size=block_size), TransferPhase.BLOCK:
+        case sdo_frame.BlockAcknowledge(ackseq=ackseq, block_size=block_size), _TransferPhase.BLOCK:
             running.acknowledge_block(ackseq)
             running.block_size = block_size
             return f"segments to {ackseq} confirmed, {running.progress}"
-        case sdo_frame.BlockEnd(), (TransferPhase.BLOCK | TransferPhase.BLOCK_ENDING):
+        case sdo_frame.BlockEnd(), (_TransferPhase.BLOCK | _TransferPhase.BLOCK_ENDING):
             return _end(running, message)
-        case sdo_frame.BlockEnded(), TransferPhase.BLOCK_ENDED:
+        case sdo_frame.BlockEnded(), _TransferPhase.BLOCK_ENDED:
             running.done = True
             return "end of a block upload confirmed" if upload else "block download confirmed"
         case _:
@@ -358,20 +358,20 @@ def _take_block_frame(running: OpenTransfer, message: sdo.Request | sdo.Response
 
 
 def _answer(
-    running: OpenTransfer,
+    running: _OpenTransfer,
     answer: sdo_frame.BlockDownloadInitiateResponse | sdo_frame.BlockUploadInitiateResponse,
 ) -> str:
     running.crc = running.crc and answer.crc
     if isinstance(answer, sdo_frame.BlockUploadInitiateResponse):
         running.size = answer.size
-        running.phase = TransferPhase.BLOCK_READY
+        running.phase = _TransferPhase.BLOCK_READY
         return f"block upload of {'unknown size' if answer.size is None else f'{answer.size} B'}"
-    running.phase, running.block_size = TransferPhase.BLOCK, answer.block_size
+    running.phase, running.block_size = _TransferPhase.BLOCK, answer.block_size
     return f"ready for blocks of {answer.block_size} segments"
 
 
-def _end(running: OpenTransfer, end: sdo_frame.BlockEnd) -> str:
-    if running.phase is TransferPhase.BLOCK:
+def _end(running: _OpenTransfer, end: sdo_frame.BlockEnd) -> str:
+    if running.phase is _TransferPhase.BLOCK:
         running.add_flaw("a receipt was not heard")
     running.end_block(end)
     return f"end of the blocks, {running.progress}"
@@ -411,7 +411,7 @@ class SdoChannel:
 
     def __init__(self, node: int) -> None:
         self.node = node
-        self._running: OpenTransfer | None = None
+        self._running: _OpenTransfer | None = None
         self._latest: Transfer | None = None
         self._ended: list[Transfer] = []
 
@@ -499,7 +499,7 @@ class SdoChannel:
 
     def _begin(self, at_us: int, message: _Initiate, data: bytes) -> str:
         running = self._running
-        if running and running.begun_by == data and running.phase is TransferPhase.ASKED:
+        if running and running.begun_by == data and running.phase is _TransferPhase.ASKED:
             running.retries += 1
             return f"{running.direction} of {write_entry(running.entry)} asked for again"
         self._give_up(at_us)
@@ -525,14 +525,14 @@ class SdoChannel:
             self._running = opened
         return text
 
-    def _segmented(self, at_us: int, direction: TransferDirection) -> OpenTransfer:
+    def _segmented(self, at_us: int, direction: TransferDirection) -> _OpenTransfer:
         """Return the segmented transfer that runs, or one whose beginning was not heard."""
         running = self._running
-        if running and running.direction is direction and running.phase is TransferPhase.SEGMENTS:
+        if running and running.direction is direction and running.phase is _TransferPhase.SEGMENTS:
             return running
         self._give_up(at_us)
-        self._running = opened = OpenTransfer(at_us, self.node, direction, TransferMode.SEGMENTED)
-        opened.phase, opened.partial = TransferPhase.SEGMENTS, True
+        self._running = opened = _OpenTransfer(at_us, self.node, direction, TransferMode.SEGMENTED)
+        opened.phase, opened.partial = _TransferPhase.SEGMENTS, True
         return opened
 
     def _abort(self, at_us: int, message: sdo.Abort, *, by_client: bool) -> str:
@@ -543,7 +543,7 @@ class SdoChannel:
                 running.index, running.sub = entry
             self._end(running.close(at_us, TransferOutcome.ABORTED, code=code, by_client=by_client))
             return "aborted"
-        other = OpenTransfer(at_us, self.node, TransferDirection.UNKNOWN, TransferMode.EXPEDITED)
+        other = _OpenTransfer(at_us, self.node, TransferDirection.UNKNOWN, TransferMode.EXPEDITED)
         other.index, other.sub = entry or (None, None)
         other.partial = True
         self._ended.append(
@@ -563,6 +563,6 @@ def _named(message: sdo.Request | sdo.Response) -> tuple[int, int] | None:
     return None if index is None or sub is None else (index, sub)
 
 
-def _given_up(running: OpenTransfer, at_us: int) -> Transfer:
-    asked = running.phase is TransferPhase.ASKED
+def _given_up(running: _OpenTransfer, at_us: int) -> Transfer:
+    asked = running.phase is _TransferPhase.ASKED
     return running.close(at_us, TransferOutcome.UNANSWERED if asked else TransferOutcome.BROKEN)

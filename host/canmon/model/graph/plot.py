@@ -78,7 +78,7 @@ def _number_text(number: float, digits: int) -> str:
     return f"{number:.{digits}f}" if round(number, digits) else f"{0:.{digits}f}"
 
 
-class Bar(NamedTuple):
+class _Bar(NamedTuple):
     """The samples of one column.
 
     Attributes:
@@ -94,7 +94,7 @@ class Bar(NamedTuple):
     last: float
 
 
-def decimate(series: Series, from_us: int, to_us: int, columns: int) -> list[Bar | None]:
+def decimate(series: Series, from_us: int, to_us: int, columns: int) -> list[_Bar | None]:
     """Return what lies in each of so many columns of equal time; None where nothing does.
 
     Args:
@@ -106,11 +106,11 @@ def decimate(series: Series, from_us: int, to_us: int, columns: int) -> list[Bar
     at_us, values = series.at_us, series.values
     span_us = max(1, to_us + 1 - from_us)
     begin = bisect_left(at_us, from_us)
-    bars: list[Bar | None] = []
+    bars: list[_Bar | None] = []
     for column in range(1, columns + 1):
         end = bisect_left(at_us, from_us - (-span_us * column // columns), begin)
         piece = values[begin:end]
-        bars.append(Bar(piece[0], min(piece), max(piece), piece[-1]) if piece else None)
+        bars.append(_Bar(piece[0], min(piece), max(piece), piece[-1]) if piece else None)
         begin = end
     return bars
 
@@ -124,7 +124,7 @@ class Stop(NamedTuple):
     """
 
     x: int
-    bar: Bar
+    bar: _Bar
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,7 +144,7 @@ class Curve:
     stops: tuple[Stop, ...]
 
 
-class StateRun(NamedTuple):
+class _StateRun(NamedTuple):
     """A state that lasts.
 
     Attributes:
@@ -168,7 +168,7 @@ class Band:
     """
 
     label: str
-    runs: tuple[StateRun, ...]
+    runs: tuple[_StateRun, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -214,7 +214,7 @@ def _stops(series: Series, view: View, columns: int) -> tuple[Stop, ...]:
     return (*left, *inside, *right)
 
 
-def _runs(series: Series, view: View, columns: int) -> Iterator[StateRun]:
+def _runs(series: Series, view: View, columns: int) -> Iterator[_StateRun]:
     """Yield the states in a view; each lasts until another one is told."""
     if not series.at_us:
         return
@@ -232,16 +232,16 @@ def _runs(series: Series, view: View, columns: int) -> Iterator[StateRun]:
             begin, name = column, now
         elif now != name:
             if column > begin:
-                yield StateRun(begin, column, name)
+                yield _StateRun(begin, column, name)
             begin, name = column, now
     if begin >= 0:
-        yield StateRun(begin, columns, name)
+        yield _StateRun(begin, columns, name)
 
 
 def _outside(series: Series, index: int, view: View, columns: int) -> Stop:
     value = series.values[index]
     x = (series.at_us[index] - view.from_us) * columns // (view.span_us + 1)
-    return Stop(x, Bar(value, value, value, value))
+    return Stop(x, _Bar(value, value, value, value))
 
 
 def _range(curves: Sequence[Curve], axis: int, columns: int) -> tuple[float, float]:
@@ -517,7 +517,7 @@ class Canvas:
         return cells
 
 
-class Reading(NamedTuple):
+class _Reading(NamedTuple):
     """A curve at a moment.
 
     Attributes:
@@ -540,18 +540,18 @@ class Reading(NamedTuple):
         return f"{self.label} {value} {self.unit}".rstrip()
 
 
-def read_out(series: Iterable[Series], at_us: int) -> tuple[Reading, ...]:
+def read_out(series: Iterable[Series], at_us: int) -> tuple[_Reading, ...]:
     """Return what each series last said at a moment: a signal holds until its next frame."""
     return tuple(_reading(one, at_us) for one in series)
 
 
-def _reading(series: Series, at_us: int) -> Reading:
+def _reading(series: Series, at_us: int) -> _Reading:
     index = series.before(at_us)
     if index is None:
-        return Reading(series.label, None, 0, series.unit)
+        return _Reading(series.label, None, 0, series.unit)
     age_us = at_us - series.at_us[index]
     value = series.values[index]
-    return Reading(series.label, value, age_us, series.unit, series.name(value))
+    return _Reading(series.label, value, age_us, series.unit, series.name(value))
 
 
 _COLOURS: Final = (36, 33, 35, 32, 34, 31)

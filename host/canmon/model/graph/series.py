@@ -223,7 +223,7 @@ class ObjectName:
 
 
 @dataclass(frozen=True, slots=True)
-class BusSignal:
+class _BusSignal:
     """What a bus or a node does, beside the values of objects.
 
     Attributes:
@@ -265,7 +265,7 @@ class CurveSpec:
     """
 
     label: str
-    source: FrameSlice | ObjectName | BusSignal
+    source: FrameSlice | ObjectName | _BusSignal
     axis: int
     text: str
 
@@ -284,11 +284,11 @@ def parse_signal(text: str) -> CurveSpec:
     return CurveSpec(label or "", source, int(axis or 1), signal)
 
 
-def _object(text: str) -> ObjectName | BusSignal:
+def _object(text: str) -> ObjectName | _BusSignal:
     told = _BUS_SIGNAL.fullmatch(text.lower())
     if told is not None and 1 <= int(told[1] or 1) <= 127:
         kind = told[2] or (LOAD if told[0] == LOAD else SYNC_JITTER)
-        return BusSignal(kind, int(told[1]) if told[1] else None)
+        return _BusSignal(kind, int(told[1]) if told[1] else None)
     match = _OBJECT.fullmatch(text)
     if match is None or not 1 <= int(match[1] or 1) <= 127:
         raise ValueError(f"{text!r} is neither an object, as 3.position, nor a slice, as 181[2:6]s")
@@ -475,7 +475,7 @@ class Collector:
             match word.source:
                 case FrameSlice():
                     self._slices[word.source.key].append((word.source, series))
-                case BusSignal():
+                case _BusSignal():
                     self._samplers.append(_Sampler(word, word.source, series, rates))
                 case _:
                     self._objects.append(_Object(word, word.source, series, self.object_names))
@@ -528,9 +528,9 @@ class Collector:
         for one in self._samplers:
             if (one.wanted.kind, one.node) == (beside.wanted.kind, node):
                 return
-        word = replace(beside.word, source=BusSignal(beside.wanted.kind, node))
+        word = replace(beside.word, source=_BusSignal(beside.wanted.kind, node))
         series = Series("", word.axis, most=beside.series.most)
-        sampler = _Sampler(word, BusSignal(beside.wanted.kind, node), series, self._rates)
+        sampler = _Sampler(word, _BusSignal(beside.wanted.kind, node), series, self._rates)
         sampler.take(record, decoded)
         self.series.append(series)
         self._samplers.append(sampler)
@@ -566,7 +566,9 @@ class _Sampler:
         rates: of the bus.
     """
 
-    def __init__(self, word: CurveSpec, wanted: BusSignal, series: Series, rates: BitRates) -> None:
+    def __init__(
+        self, word: CurveSpec, wanted: _BusSignal, series: Series, rates: BitRates
+    ) -> None:
         self.word, self.wanted, self.series, self.node = word, wanted, series, wanted.node
         self._rates, self._channel = rates, ""
         self._begin_us, self._bits = -1, 0

@@ -94,7 +94,7 @@ class CanLogReader:
         """Read the file."""
         return cast("Iterator[Record]", self.blocks(None))
 
-    def blocks(self, apart: TakeApart | None) -> Iterator[Record | BlfBlock]:
+    def blocks(self, apart: _TakeApart | None) -> Iterator[Record | BlfBlock]:
         """Read the file; what `apart` takes apart of a BLF log comes as it gives it."""
         self.tally = LogTally()
         names: dict[object, str] = {}
@@ -113,7 +113,7 @@ class CanLogReader:
         """Read the file; its marks are counted alone."""
         return iter(self)
 
-    def _messages(self, apart: TakeApart | None) -> Iterator[can.Message | BlfBlock]:
+    def _messages(self, apart: _TakeApart | None) -> Iterator[can.Message | BlfBlock]:
         logging.getLogger("can.io.blf").addHandler(_UNSAID)
         with log_file.open_log(self._path) as file:
             try:
@@ -138,7 +138,9 @@ class CanLogReader:
         except NotImplementedError as error:
             raise log_file.LogError(f"{self._path}: {log_file.NO_MF4}") from error
 
-    def _blf(self, reader: _BlfReader, apart: TakeApart | None) -> Iterator[can.Message | BlfBlock]:
+    def _blf(
+        self, reader: _BlfReader, apart: _TakeApart | None
+    ) -> Iterator[can.Message | BlfBlock]:
         count, reader.tally, reader.apart = 0, self.tally, apart
         for message in cast("Iterator[can.Message | BlfBlock]", reader):
             count += 1 if isinstance(message, can.Message) else message.frames
@@ -179,7 +181,7 @@ class BlfBlock(NamedTuple):
     end: int
 
 
-TakeApart = Callable[[bytes, float], BlfBlock | None]
+_TakeApart = Callable[[bytes, float], BlfBlock | None]
 """Takes the contents of a container apart, whose log begins at a time in s."""
 
 _FILE: Final = struct.Struct("<4sL8xQ8xL")  # signature, sizes of header and file, objects
@@ -216,7 +218,7 @@ class _BlfReader(can.BLFReader):
     """
 
     tally: LogTally
-    apart: TakeApart | None = None
+    apart: _TakeApart | None = None
 
     def _parse_data(self, data: bytes) -> Iterator[Any]:
         if self.apart is not None and (block := self.apart(data, self.start_timestamp)):

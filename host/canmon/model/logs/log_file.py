@@ -171,7 +171,7 @@ _FOREIGN: Final = {
 
 
 @dataclass(slots=True)
-class BadLines:
+class _BadLines:
     """Lines that are none of their log.
 
     Attributes:
@@ -220,7 +220,7 @@ class LogTally:
         without_errors: why the log has no error frames whatever happened; empty if it may.
     """
 
-    bad_lines: BadLines = field(default_factory=BadLines)
+    bad_lines: _BadLines = field(default_factory=_BadLines)
     passed_over: Counter[str] = field(default_factory=Counter)
     lost: int = 0
     untimed: int = 0

@@ -507,7 +507,7 @@ _MOST_MARKS: Final = 1_000
 """Between two frames: more are a damaged log."""
 
 
-class LineParser(Protocol):
+class _LineParser(Protocol):
     """Reads the lines of one log, in their order."""
 
     def read(self, line: str, tally: LogTally, /) -> Record | str | None:
@@ -527,7 +527,7 @@ class LineLogReader:
     """
 
     comments: tuple[str, ...] = ()
-    make_lines: Callable[[], LineParser]
+    make_lines: Callable[[], _LineParser]
 
     def __init__(self, path: Path, kind: log_file.LogFormat) -> None:
         self._path, self._kind, self.tally = path, kind, LogTally()

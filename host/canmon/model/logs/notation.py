@@ -174,7 +174,7 @@ FD, FD_BRS, FD_ESI = "#", "!", "*"
 """Behind the data of a row: base64 does not have them."""
 
 
-class Counting(Protocol):
+class _Counting(Protocol):
     """Tells the time of a counter of microseconds.
 
     Attributes:
@@ -242,7 +242,7 @@ def gvret_row(record: Record, bus: int) -> str:
     return f"{head},{len(frame.data)},{cells},"
 
 
-def parse_csv_line(text: str, tally: log_file.LogTally, clock: Counting) -> Record | str | None:
+def parse_csv_line(text: str, tally: log_file.LogTally, clock: _Counting) -> Record | str | None:
     """Return a frame, the name of a header or of what was counted instead, or None.
 
     What a row is, itself tells: one of python-can, of `canmon dump --csv`, or of SavvyCAN.
@@ -259,7 +259,7 @@ def parse_csv_line(text: str, tally: log_file.LogTally, clock: Counting) -> Reco
         return None
 
 
-def _of_savvycan(match: re.Match[str], tally: log_file.LogTally, clock: Counting) -> Record:
+def _of_savvycan(match: re.Match[str], tally: log_file.LogTally, clock: _Counting) -> Record:
     """Return the frame of a row; some programs do not say of a CAN-ID that it has 29 bits."""
     stamp, ident, extended, direction, bus, length, cells = match.groups()
     can_id, size = int(ident, 16), int(length)

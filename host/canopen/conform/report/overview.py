@@ -141,7 +141,7 @@ UNWELL: Final = (CheckVerdict.FAIL, CheckVerdict.BLOCKED, CheckVerdict.INCONCLUS
 """What somebody has to look at, the worst first."""
 
 
-class GroupRow(NamedTuple):
+class _GroupRow(NamedTuple):
     """Checks that belong together.
 
     Attributes:
@@ -173,12 +173,12 @@ def counts_text(counts: dict[CheckVerdict, int]) -> str:
     return ", ".join(f"{number} {verdict}" for verdict, number in counts.items()) or "none"
 
 
-def by_group(report: Report) -> list[GroupRow]:
+def by_group(report: Report) -> list[_GroupRow]:
     """Return the groups, in the order in which they were met."""
     return _rows(report, lambda result: result.check.group)
 
 
-def by_clause(report: Report) -> list[GroupRow]:
+def by_clause(report: Report) -> list[_GroupRow]:
     """Return the clauses, by document and number."""
     rows = _rows(report, lambda result: result.check.source)
     return sorted(rows, key=lambda row: [_number(part) for part in re.split(r"(\d+)", row.name)])
@@ -212,11 +212,11 @@ def repair_commands(report: Report) -> tuple[str, ...]:
     return tuple(f"{head} {shlex.quote(words)} --yes" for words in report.repairs)
 
 
-def _rows(report: Report, name_of: Callable[[Result], str]) -> list[GroupRow]:
+def _rows(report: Report, name_of: Callable[[Result], str]) -> list[_GroupRow]:
     rows: dict[str, list[Result]] = {}
     for result in report.results:
         rows.setdefault(name_of(result), []).append(result)
-    return [GroupRow(name, tuple(results)) for name, results in rows.items()]
+    return [_GroupRow(name, tuple(results)) for name, results in rows.items()]
 
 
 def _number(part: str) -> tuple[int, str]:

@@ -33,7 +33,6 @@ _ENTRY: Final = (
     *("InvertedSRAD", "UniqueID", "StorageLocation"),
 )
 OF_DCF: Final = ("ParameterValue", "Denotation", "UploadFile", "DownloadFile", "ParamRefd")
-OF_MODULE: Final = ("Count", "ObjExtend")
 _OURS: Final = ("MaxBytes", "DefaultBytes", "Unit", "Factor")
 """Not of CiA 306; our reader, and in part the canopen library, take them."""
 
@@ -64,7 +63,7 @@ _BY_SECTION: Final = {
     **{section: _spelled("SupportedObjects", "Lines") for section in _KEYS},
 }
 _OBJECT: Final = _spelled(*_ENTRY, *OF_DCF, *_OURS)
-_OF_MODULE: Final = {**_OBJECT, **_spelled(*OF_MODULE)}
+_OF_MODULE: Final = {**_OBJECT, **_spelled("Count", "ObjExtend")}
 
 _OBJECT_NUMBERS: Final = frozenset(
     {

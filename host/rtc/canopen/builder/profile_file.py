@@ -98,7 +98,7 @@ _DEFAULT_WORD_BITS: Final = 32
 _DEFAULT_NODE_ID: Final = 16
 
 
-class ProfileError(ValueError):
+class _ProfileError(ValueError):
     """A profile that cannot be used; one line says where and why."""
 
 
@@ -121,7 +121,7 @@ def parse_project(text: str) -> Project:
     """Read a profile.
 
     Raises:
-        ProfileError: no TOML, an unknown key, a value of another kind, or what no
+        _ProfileError: no TOML, an unknown key, a value of another kind, or what no
             DeviceRTC can be.
     """
     from tickrig.host.text.toml_reader import load_toml  # noqa: PLC0415 - a TAB needs none
@@ -139,16 +139,16 @@ def parse_project(text: str) -> Project:
         )
         node_id = _take(content, "node_id", int, _DEFAULT_NODE_ID)
         if not 1 <= node_id <= 127:
-            raise ProfileError(f"node_id {node_id} is not in 1..127")
+            raise _ProfileError(f"node_id {node_id} is not in 1..127")
         return Project(profile, node_id, _take(content, "strict_cia301", bool, False))
     except ValueError as error:
-        raise ProfileError(str(error)) from None
+        raise _ProfileError(str(error)) from None
 
 
 def _tables(content: _Table) -> list[_Table]:
     tables = content.get("port", [])
     if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
-        raise ProfileError("port: ports are tables [[port]]")
+        raise _ProfileError("port: ports are tables [[port]]")
     return tables
 
 
@@ -165,14 +165,14 @@ def _port(number: int, table: _Table, word_bits: int) -> CanopenPortProfile:
             _member(table, "transport", PortTransport) if "transport" in table else None,
         )
     except ValueError as error:
-        raise ProfileError(f"port {number}: {error}") from None
+        raise _ProfileError(f"port {number}: {error}") from None
 
 
 def _member(table: _Table, key: str, kind: type[E]) -> E:
     """Return a member of an enumeration by its value."""
     value, known = _take(table, key, str), [str(item.value) for item in kind]
     if value not in known:
-        raise ProfileError(f"{key} {value!r} is not one of {', '.join(known)}")
+        raise _ProfileError(f"{key} {value!r} is not one of {', '.join(known)}")
     return kind(value)
 
 
@@ -181,20 +181,20 @@ def _port_type(name: str, length: int, word_bits: int) -> CanopenPortType[Any]:
         integer(word_bits) if name == INTEGER else PORT_TYPES.get(name)
     )
     if element is None:
-        raise ProfileError(f"type {name!r} is not one of {', '.join((*PORT_TYPES, INTEGER))}")
+        raise _ProfileError(f"type {name!r} is not one of {', '.join((*PORT_TYPES, INTEGER))}")
     return element if length == 1 else element.sequence(length)
 
 
 def _check_keys(table: _Table, known: tuple[str, ...]) -> None:
     for key in table:
         if key not in known:
-            raise ProfileError(f"no key {key}; known: {', '.join(known)}")
+            raise _ProfileError(f"no key {key}; known: {', '.join(known)}")
 
 
 def _take(table: _Table, key: str, kind: type[Any], default: Any = None) -> Any:
     value = table.get(key, default)
     if value is None:
-        raise ProfileError(f"{key} is missing")
+        raise _ProfileError(f"{key} is missing")
     if type(value) is not kind:
-        raise ProfileError(f"{key} {value!r} is {_KINDS[kind]}")
+        raise _ProfileError(f"{key} {value!r} is {_KINDS[kind]}")
     return value

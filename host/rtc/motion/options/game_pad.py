@@ -18,7 +18,7 @@ from tickrig.wire.rtc_types import iis
 # What `GamePad` reads: sticks of a game pad on Linux (extra `gamepad`), or keys of a terminal.
 
 
-class GamePadDevice(Protocol):
+class _GamePadDevice(Protocol):
     """A device with sticks or keys; reading it does not wait."""
 
     def poll(self, now_us: int, /) -> StickPosition:
@@ -29,7 +29,7 @@ class GamePadDevice(Protocol):
         """Give the device back."""
 
 
-_GamePadOpener = Callable[[str], GamePadDevice]
+_GamePadOpener = Callable[[str], _GamePadDevice]
 """Opens the pad that DeviceFileName names; LinkClosed if it cannot."""
 
 
@@ -79,12 +79,12 @@ class KeyboardPad:
 _KEYBOARD: Final = "keyboard"
 
 
-def open_pad(name: str) -> GamePadDevice:
+def open_pad(name: str) -> _GamePadDevice:
     """Open `keyboard`, or a device such as `/dev/input/event5`; LinkClosed if it cannot be."""
     return KeyboardPad() if name == _KEYBOARD else EvdevPad(name)
 
 
-class GamePad(DeviceComponent[GamePadDevice]):
+class GamePad(DeviceComponent[_GamePadDevice]):
     """Writes a velocity each period while a hand pushes, and one of 0 when it lets go.
 
     The specification only names it; ports and parameters are ours.
@@ -108,11 +108,11 @@ class GamePad(DeviceComponent[GamePadDevice]):
         self._opener = opener
         self._pushed = False
 
-    def open_client(self) -> GamePadDevice:
+    def open_client(self) -> _GamePadDevice:
         """Open the pad."""
         return self._opener(self.device.value)
 
-    def exchange(self, ec: ExecutionContext, client: GamePadDevice) -> None:
+    def exchange(self, ec: ExecutionContext, client: _GamePadDevice) -> None:
         """Look where the hand pushes."""
         forward, left, turn = (self._outside_dead_zone(part) for part in client.poll(ec.now_us))
         pushed = any((forward, left, turn))
