@@ -146,7 +146,10 @@ def _derated_a(limit_a: float, winding_c: float, winding_max_c: float) -> float:
 _AGES_S: Final = 1e9  # after this all temperatures stand still
 
 
-class _Heat(Part):
+_RESISTANCE_STEP: Final = 0.005  # how far the resistance may be off before it is followed
+
+
+class Heat(Part):
     """Temperatures and I2t budget of a servo, from the squared current.
 
     Attributes:
@@ -156,13 +159,26 @@ class _Heat(Part):
         i2t: the overload of the power stage.
     """
 
-    __slots__ = ("_thermal", "_winding_max_c", "ambient_c", "i2t", "since_us", "temperatures")
+    __slots__ = ("_parameters", "_thermal", "ambient_c", "i2t", "since_us", "temperatures")
 
     def __init__(self, parameters: ServoParameters, ambient_c: float) -> None:
         self._thermal, self.i2t = ThermalModel(parameters.motor), I2t(parameters.stage)
-        self._winding_max_c = parameters.motor.winding_max_c
+        self._parameters = parameters
         self.since_us, self.ambient_c = 0, ambient_c
         self.temperatures: _Temperatures = (ambient_c, ambient_c)
+
+    def later(self, now_us: int, square_a2s: float) -> Heat:
+        """Return what `pass_time` makes of it."""
+        found = Heat(self._parameters, self.ambient_c)
+        found.temperatures, found.since_us = self.temperatures, self.since_us
+        found.i2t.filled_a2s, found.i2t.reduced = self.i2t.filled_a2s, self.i2t.reduced
+        found.pass_time(now_us, square_a2s)
+        return found
+
+    def shapes(self, resistance_ohm: float) -> bool:
+        """Return whether a resistance is so far off that the motor must follow the present one."""
+        present = self.resistance_ohm
+        return abs(present - resistance_ohm) > _RESISTANCE_STEP * present
 
     @property
     def limit_a(self) -> float:
@@ -204,7 +220,7 @@ class _Heat(Part):
         return self._thermal.after(self.temperatures, seconds, square_a2, self.ambient_c)
 
     def _limit_at(self, winding_c: float) -> float:
-        return _derated_a(self.i2t.limit_a, winding_c, self._winding_max_c)
+        return _derated_a(self.i2t.limit_a, winding_c, self._parameters.motor.winding_max_c)
 
 
 # External conditions of a servo, and the limit of its drive.
@@ -341,7 +357,7 @@ class Readings(ServoSettings):
     def __init__(self, parameters: ServoParameters) -> None:
         super().__init__(parameters.stage.supply_v)
         self.parameters, self._plant = parameters, Plant(parameters)
-        self._heat = _Heat(parameters, self.ambient_c)
+        self._heat = Heat(parameters, self.ambient_c)
         self.counts_per_turn = parameters.encoders.counts_per_turn
         self.gear_ratio = parameters.gear.ratio
         self._degrees_per_count = 360.0 / self.counts_per_turn / self.gear_ratio

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from enum import Enum
-from math import copysign, floor, pi
+from math import copysign, floor, inf, pi
 from typing import Final
 
 from tickrig.device.servo.parameters import ServoParameters
 from tickrig.device.servo.plant import BREAKAWAY, STEP_S, Plant
-from tickrig.device.servo.readings import Readings
+from tickrig.device.servo.readings import Heat, Readings
 from tickrig.device.twin import Part
 
 # Theory of operation
@@ -40,19 +40,20 @@ from tickrig.device.twin import Part
 #   reached (`_Loops`). While it rests no steps are made, and the temperatures come in closed
 #   form, from one place, `Heat.at`. `_wake` pays for the time of rest before
 #   anything else changes.
-# - Several steps in one go are the same steps. `_work_out` repeats `Loops.follow` and
-#   `turn`, `Plant.drive`, `_rub`, `_lead`, `_mean` and `_turn` and the counting of `_step`,
-#   over locals and in the same order of operations. `tests/device/servo/test_run_ahead.py`
-#   compares them to the bit: a change of one formula, or of the order of two additions,
-#   must be made in both. Where anything special begins (friction holds, the demand is cut,
-#   heat is due, a bound is left) the run ends before that step, and single steps go on.
-#   `device/canopen/ds402/stretch.py` is its user.
+# - Several steps in one go are the same steps. `run_ahead` repeats `Loops.follow` and
+#   `turn`, `Plant.drive`, `_rub`, `_lead`, `_mean` and `_turn`, the counting of `_step` and
+#   the look of `_update_limit`, over locals and in the same order of operations.
+#   `tests/device/servo/test_run_ahead.py` compares them to the bit: a change of one formula,
+#   or of the order of two additions, must be made in both. Where anything special begins
+#   (friction holds, the demand is cut, the resistance is followed, a bound is left) the run
+#   ends before that step, and single steps go on. Its user is
+#   `device/canopen/ds402/stretch.py`.
 # - No step depends on what was tried. `run_ahead` changes nothing; `follow` takes it over.
 #
 # Numbers: motors, stages and gears stand in parameters.py with their sources; gains are
 # natural frequencies, so they keep their meaning with another motor. 1 ms is the tick of
 # the drives on CAN; 20 ms between two looks at heat is small against the second for which a
-# stage bears its peak current and the 16 s of a winding, and `plain_steps` counts from it.
+# stage bears its peak current and the 16 s of a winding.
 
 # The velocity and position loops of a drive.
 
@@ -131,15 +132,38 @@ class _Loops(Part):
 
 # Several control steps of a servo in one go, without events.
 
-_Demands = list[tuple[float, float]]
-"""Position in counts and velocity in counts/s, for each step."""
 
-_Bounds = tuple[float, float, float, float, float, float]
+class Line(Part):
+    """Position demands on a straight line to a goal, and standstill there.
+
+    Attributes:
+        position: the present demand, counts.
+        velocity: the present demand, counts/s.
+        goal: end of the line, counts.
+        left: steps up to the goal.
+        added: velocity that is demanded beside that of the line, counts/s.
+        most: largest velocity of the line, counts/s; a run ends before a step that needs more.
+    """
+
+    __slots__ = ("added", "goal", "left", "most", "position", "velocity")
+
+    def __init__(self, start: tuple[float, float], goal: float, left: int) -> None:
+        self.position, self.velocity = start
+        self.goal, self.left = goal, left
+        self.added, self.most = 0.0, inf
+
+    def go_on(self, steps: int, demand: tuple[float, float]) -> None:
+        """Pass over steps, up to a demand."""
+        self.position, self.velocity = demand
+        self.left = max(0, self.left - steps)
+
+
+Bounds = tuple[float, float, float, float, int]
 """Bounds of a run, which ends before a step that would leave them.
 
-Largest current demand, A; largest voltage at the winding, V; lowest and highest position, counts;
-largest distance from the demanded position, counts; velocity, counts/s, up to which the motor
-counts as standing: it may not stand while a higher velocity is demanded.
+Lowest and highest position, counts; largest distance from the demanded position, counts; velocity,
+counts/s, up to which the motor counts as standing: it may not stand while a higher velocity is
+demanded; highest temperature of the winding, 0.1 degC.
 """
 
 Four = tuple[float, float, float, float]
@@ -151,95 +175,26 @@ class RunAhead(Part):
     Attributes:
         steps: number of steps.
         counts: of the encoder.
+        demand: position, counts, and velocity, counts/s, that are demanded then.
         motion: position of the motor, counts; its speed, rad/s; current in the winding, A;
             integral of the velocity loop, A.
         losses: energy from the power stage since the start, J; heat of the winding, J;
             heat of friction, J; integral of the squared current, A^2 s.
+        heat: of the servo.
     """
 
-    __slots__ = ("counts", "losses", "motion", "steps")
+    __slots__ = ("counts", "demand", "heat", "losses", "motion", "steps")
 
-    def __init__(self, steps: int, counts: int, motion: Four, losses: Four) -> None:
-        self.steps, self.counts, self.motion, self.losses = steps, counts, motion, losses
-
-
-def _work_out(  # noqa: PLR0915 - one loop over locals
-    plant: Plant, loops: _Loops, encoder: tuple[int, float], demands: _Demands, bounds: _Bounds
-) -> RunAhead:
-    """Compute steps of loops and plant with a position demand, exactly as single steps do.
-
-    The state does not change. The run ends before the first step in which friction stops or holds
-    the shaft, the demand is cut, or the bounds are left; `Servo` then continues with single steps.
-
-    Args:
-        plant: in its present state.
-        loops: in their present state; no demand is cut.
-        encoder: its present count, and its offset in counts.
-        demands: for each step, without acceleration.
-        bounds: the bounds of the run.
-    """
-    # one loop over locals takes half the time of calls
-    (s0, s1, s2, s3), (a0, a1, a2, a3) = plant.rows
-    k, el, b, per_rad = plant.constants
-    rad, stiffness, integral_gain, proportional, viscous, dry = loops.gains
-    r, load, blocked = plant.resistance_ohm, plant.load_nm, plant.blocked
-    low, high = plant.friction_nm
-    low_breakaway, high_breakaway = low * BREAKAWAY, high * BREAKAWAY
-    (counts, lost_counts), (most_a, most_v, first, last, window, slow) = encoder, bounds
-    losses = plant.losses
-    electrical, copper = losses.electrical_j, losses.copper_j
-    rubbed, squares = losses.friction_j, losses.square_a2s
-    angle, w, i, integral = plant.position, plant.speed_rad_s, plant.current_a, loops.integral_a
-    fast, steps = slow + 1.0, 0
-    for position, velocity in demands:
-        error = position - counts
-        if velocity == 0.0 and -1.0 < error < 1.0:
-            error = 0.0
-        wanted = (velocity + stiffness * error) * rad
-        error = wanted - w
-        led = integral + integral_gain * error
-        current = led + proportional * error + viscous * wanted
-        if wanted != 0.0:
-            current += dry if wanted > 0.0 else -dry  # `copysign` is a call of Python
-        current += 0.0  # no acceleration is fed forward
-        if w == 0.0 or blocked or not -most_a <= current <= most_a:
-            break
-        free = s0 * i + s1 * w + s2 * current + s3 * load
-        friction = -free / s3
-        if low_breakaway <= friction <= high_breakaway:
-            break
-        friction = low if friction < low else high
-        speed = free + s3 * friction
-        slope_v = el * (current - i) / STEP_S
-        if (
-            not -most_v <= r * i + k * w + slope_v <= most_v
-            or not -most_v <= r * current + k * speed + slope_v <= most_v
-        ):
-            break
-        way = a0 * i + a1 * w + a2 * current + a3 * (load + friction)
-        ahead = angle + way * per_rad
-        seen = floor(ahead - lost_counts + 0.5)
-        rate = speed * per_rad
-        rolls = not -fast <= rate <= fast or abs(round(rate)) > slow  # `round` is one, too
-        turns = rolls or -slow <= velocity <= slow
-        follows = turns and -window <= position - seen <= window
-        if not (follows and first <= seen <= last and speed):
-            break
-        square = (i * i + i * current + current * current) / 3 * STEP_S
-        middle = (6 * way / STEP_S - w - speed) / 4
-        mean = (i * w + 2 * (i + current) * middle + current * speed) * STEP_S / 6
-        electrical += r * square + el * (current * current - i * i) / 2 + k * mean
-        squares += square
-        copper += r * square
-        rubbed += b * (w * w + w * speed + speed * speed) / 3 * STEP_S - friction * way
-        angle, w, i, integral, counts = ahead, speed, current, led, seen
-        steps += 1
-    return RunAhead(steps, counts, (angle, w, i, integral), (electrical, copper, rubbed, squares))
+    def __init__(
+        self, state: tuple[int, int], demand: tuple[float, float], motion: Four, losses: Four,
+        heat: Heat,
+    ) -> None:  # fmt: skip
+        self.steps, self.counts = state
+        self.demand, self.motion, self.losses, self.heat = demand, motion, losses, heat
 
 
 STEP_US: Final = 1_000
 _SLOW_US: Final = 20_000  # between two looks at heat and overload
-_RESISTANCE_STEP: Final = 0.005  # how far the resistance may be off before it is followed
 
 
 class _Demand(Enum):
@@ -329,40 +284,121 @@ class Servo(Readings):
     # several control steps in one go
 
     @property
-    def plain_steps(self) -> int:
-        """Largest number of plain control steps that `run_ahead` can compute."""
-        feed = self._values[2]
+    def is_plain(self) -> bool:
+        """Whether the next control steps may be plain ones, which `run_ahead` can compute."""
         special = self.resting or self._off or self.encoder_unplugged or self._loops.cut
-        if special or feed != 0.0 or self._demand is not _Demand.POSITION:
-            return 0
-        # The step at whose end heat is updated is made singly: it may change resistance
-        # and limit.
-        return (_SLOW_US - STEP_US - self.now_us + self._heat.since_us) // STEP_US
+        return not special and self._values[2] == 0.0 and self._demand is _Demand.POSITION
 
-    def run_ahead(
-        self, demands: _Demands, counts: tuple[float, float], error: float, standstill: float
+    def run_ahead(  # noqa: PLR0912, PLR0915 - one loop over locals
+        self, line: Line, most_steps: int, bounds: Bounds
     ) -> RunAhead:
-        """Compute up to `plain_steps` control steps without applying them.
+        """Compute control steps without applying them, exactly as single steps do.
+
+        The run ends before the first step in which friction stops or holds the shaft, the demand is
+        cut, the resistance is followed, or the bounds are left; single steps continue then.
 
         Args:
-            demands: position and velocity for each step, the first equal to the present demand.
-            counts: as in `_Bounds`.
-            error: the same.
-            standstill: the same.
+            line: the demands, without acceleration, beginning with the present one.
+            most_steps: largest number of steps.
+            bounds: the bounds of the run.
         """
-        first, last = counts
-        bounds = (self._limit_a, self._limit_v, first, last, error, standstill)
-        encoder = self.counts, self._lost_counts
-        return _work_out(self._plant, self._loops, encoder, demands, bounds)
+        # one loop over locals takes half the time of calls
+        plant, loops, heat = self._plant, self._loops, self._heat
+        (s0, s1, s2, s3), (a0, a1, a2, a3) = plant.rows
+        k, el, b, per_rad = plant.constants
+        rad, stiffness, integral_gain, proportional, viscous, dry = loops.gains
+        r, load, blocked = plant.resistance_ohm, plant.load_nm, plant.blocked
+        low, high = plant.friction_nm
+        low_breakaway, high_breakaway = low * BREAKAWAY, high * BREAKAWAY
+        first, last, window, slow, hottest_dc = bounds
+        losses, counts, lost_counts = plant.losses, self.counts, self._lost_counts
+        electrical, copper = losses.electrical_j, losses.copper_j
+        rubbed, squares = losses.friction_j, losses.square_a2s
+        angle, w, i, integral = plant.position, plant.speed_rad_s, plant.current_a, loops.integral_a
+        fast, steps = slow + 1.0, 0
+        position, velocity, left = line.position, line.velocity, line.left
+        goal, added, most = line.goal, line.added, line.most
+        most_a, most_v = self._limit_a, self._limit_v
+        look = (
+            _SLOW_US - STEP_US - self.now_us + heat.since_us
+        ) // STEP_US  # the step that ends with it
+        while steps < most_steps:
+            ahead_velocity = 0.0
+            if left:
+                ahead_velocity = (goal - position) / (left * STEP_S)
+                if not -most <= ahead_velocity <= most:
+                    break
+            error = position - counts
+            if velocity == 0.0 and -1.0 < error < 1.0:
+                error = 0.0
+            wanted = (velocity + stiffness * error) * rad
+            error = wanted - w
+            led = integral + integral_gain * error
+            current = led + proportional * error + viscous * wanted
+            if wanted != 0.0:
+                current += dry if wanted > 0.0 else -dry  # `copysign` is a call of Python
+            current += 0.0  # no acceleration is fed forward
+            if w == 0.0 or blocked or not -most_a <= current <= most_a:
+                break
+            free = s0 * i + s1 * w + s2 * current + s3 * load
+            friction = -free / s3
+            if low_breakaway <= friction <= high_breakaway:
+                break
+            friction = low if friction < low else high
+            speed = free + s3 * friction
+            slope_v = el * (current - i) / STEP_S
+            if (
+                not -most_v <= r * i + k * w + slope_v <= most_v
+                or not -most_v <= r * current + k * speed + slope_v <= most_v
+            ):
+                break
+            way = a0 * i + a1 * w + a2 * current + a3 * (load + friction)
+            ahead = angle + way * per_rad
+            seen = floor(ahead - lost_counts + 0.5)
+            rate = speed * per_rad
+            rolls = not -fast <= rate <= fast or abs(round(rate)) > slow  # `round` is one, too
+            turns = rolls or -slow <= velocity <= slow
+            follows = turns and -window <= position - seen <= window
+            if not (follows and first <= seen <= last and speed):
+                break
+            square = (i * i + i * current + current * current) / 3 * STEP_S
+            squared = squares + square
+            if steps == look:  # looks belong to a run: three wake-ups fewer in 40 ms
+                warmer = heat.later(self.now_us + (steps + 1) * STEP_US, squared)
+                if warmer.shapes(r) or round(warmer.temperatures[0] * 10) > hottest_dc:
+                    break
+                heat, most_a, squared = warmer, self._allowed_a(warmer), 0.0
+                look += _SLOW_US // STEP_US
+            squares = squared
+            middle = (6 * way / STEP_S - w - speed) / 4
+            mean = (i * w + 2 * (i + current) * middle + current * speed) * STEP_S / 6
+            electrical += r * square + el * (current * current - i * i) / 2 + k * mean
+            copper += r * square
+            rubbed += b * (w * w + w * speed + speed * speed) / 3 * STEP_S - friction * way
+            angle, w, i, integral, counts = ahead, speed, current, led, seen
+            if left:
+                position, velocity, left = (
+                    *(position + ahead_velocity * STEP_S, ahead_velocity + added, left - 1),
+                )
+            else:
+                velocity = 0.0
+            steps += 1
+        return RunAhead(
+            (steps, counts), (position, velocity), (angle, w, i, integral),
+            (electrical, copper, rubbed, squares), heat,
+        )  # fmt: skip
 
-    def follow(self, run: RunAhead, position: float, velocity: float) -> None:
-        """Apply the steps of a run, then set a position as `drive_position` does."""
+    def follow(self, run: RunAhead) -> None:
+        """Apply the steps of a run, then set its demand as `drive_position` does."""
         plant, losses = self._plant, self._plant.losses
         plant.position, plant.speed_rad_s, plant.current_a, self._loops.integral_a = run.motion
         losses.electrical_j, losses.copper_j, losses.friction_j, losses.square_a2s = run.losses
         self.counts, self.current_limited = run.counts, False
         self.now_us += run.steps * STEP_US
-        self._values = (position, velocity, 0.0)
+        if run.heat is not self._heat:
+            self._heat = run.heat
+            self._limit_a = self._allowed_a(run.heat)
+        self._values = (*run.demand, 0.0)
 
     # time
 
@@ -381,7 +417,7 @@ class Servo(Readings):
         self._heat.ambient_c = self.ambient_c
         self._off = self.phase_open or self.supply_v < parameters.stage.supply_min_v
         self._limit_v = self.supply_v * parameters.stage.duty_max
-        self._limit_a = max(min(self.current_limit_a, self._heat.limit_a), 0.0)
+        self._limit_a = self._allowed_a(self._heat)
 
     def step_to(self, now_us: int) -> None:
         """Advance in control steps to `now_us`."""
@@ -441,10 +477,12 @@ class Servo(Readings):
         plant, heat = self._plant, self._heat
         heat.pass_time(self.now_us, plant.losses.square_a2s)
         plant.losses.square_a2s = 0.0
-        resistance = heat.resistance_ohm
-        if abs(resistance - plant.resistance_ohm) > _RESISTANCE_STEP * resistance:
-            plant.shape(plant.inertia_kg_m2, resistance)
-        self._limit_a = max(min(self.current_limit_a, heat.limit_a), 0.0)
+        if heat.shapes(plant.resistance_ohm):
+            plant.shape(plant.inertia_kg_m2, heat.resistance_ohm)
+        self._limit_a = self._allowed_a(heat)
+
+    def _allowed_a(self, heat: Heat) -> float:
+        return max(min(self.current_limit_a, heat.limit_a), 0.0)
 
     def _rest(self) -> None:
         """Enter rest, unless the current will change."""

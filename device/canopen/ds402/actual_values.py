@@ -27,13 +27,14 @@ _FOLLOWING_ERROR: Final = int(Statusword.MODE_13)
 
 def statusword_of(drive: Ds402) -> int:
     """Return the present statusword 6041h of a drive."""
+    limited = drive.limited  # first, as it catches up: the winding warms up in the ticks ahead
     supervision, state = drive.supervision, drive.automaton.state
     status = _STATE_BITS[state]
     if supervision.has_supply:
         status |= _VOLTAGE_ENABLED
     if supervision.warns:
         status |= _WARNING
-    if drive.limited:
+    if limited:
         status |= _INTERNAL_LIMIT
     if state is DriveState.OPERATION_ENABLED:
         status |= int(drive.mode.flags)

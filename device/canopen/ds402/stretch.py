@@ -5,13 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from tickrig.device.canopen.slave import TICK_US
-from tickrig.device.servo.servo import RunAhead
 from tickrig.device.twin import Part
 
 if TYPE_CHECKING:
     from tickrig.device.canopen.ds402.axis import Axis
     from tickrig.device.canopen.ds402.drive import Ds402
-    from tickrig.device.servo.servo import Servo
+    from tickrig.device.servo.servo import Bounds, Line, RunAhead, Servo
 
 _FEWEST: Final = 2
 """Smallest number of ticks that is worth the effort."""
@@ -23,8 +22,8 @@ class Stretch(Part):
     Between two SYNCs a drive in csp does the same each millisecond. If its rig allows it, the drive
     computes as many such ticks as the latest quiet period lasted; when a value is read, or the next
     tick with work comes, it takes over the ticks that have passed. The first tick in which anything
-    else would happen is left to `on_execute`: heat, a cut demand, a following error, standstill,
-    the end of the range. (32 drives in csp: 2.5 times as fast.)
+    else would happen is left to `on_execute`: a cut demand, a following error, standstill, too hot
+    a winding, the end of the range. (32 drives in csp: 2.5 times as fast.)
 
     Args:
         drive: the drive.
@@ -36,9 +35,8 @@ class Stretch(Part):
         self._drive, self._axis, self._servo = drive, axis, servo
         self._run: RunAhead | None = None
         self._began_us = self._requested_us = self._quiet_us = 0
-        self._path: list[tuple[float, float]] = []
-        self._error = self._standstill = 0.0
-        self._counts = (0.0, 0.0)
+        self._line: Line
+        self._bounds: Bounds
 
     def plan(self, now_us: int, *, requested: bool) -> int:
         """Compute the ticks after the one at this time.
@@ -53,14 +51,13 @@ class Stretch(Part):
         most, servo = self._most_us(now_us, requested=requested) // TICK_US, self._servo
         if most < _FEWEST or servo is None or not self._drive.goes_on_plainly:
             return 0
-        path = self._drive.mode.ahead(min(most, servo.plain_steps))
-        if len(path) < _FEWEST:
+        line = self._drive.mode.ahead() if servo.is_plain else None
+        if line is None:
             return 0
-        axis = self._axis
-        self._path = [(axis.reference.position, axis.reference.velocity), *path]
-        self._counts, self._standstill = axis.unwrapped, axis.standstill
-        self._error = axis.settings.following_error_window
-        run = self._work_out(servo, len(path))
+        axis, (first, last) = self._axis, self._axis.unwrapped
+        window, hottest_dc = axis.settings.following_error_window, self._drive.bounds.winding_dc
+        self._line, self._bounds = line, (first, last, window, axis.standstill, hottest_dc)
+        run = servo.run_ahead(line, most, self._bounds)
         if run.steps < _FEWEST:
             return 0
         self._run, self._began_us = run, now_us
@@ -81,7 +78,7 @@ class Stretch(Part):
             self._take(servo, run)
         elif steps > 0:
             run.steps -= steps
-            self._take(servo, self._work_out(servo, steps))
+            self._take(servo, servo.run_ahead(self._line, steps, self._bounds))
 
     def drop(self) -> None:
         """Discard the computed ticks, because something is about to change."""
@@ -99,13 +96,10 @@ class Stretch(Part):
         left_us = self._quiet_us - since_us
         return min(left_us - TICK_US if left_us > 0 else since_us, horizon.until_us - now_us)
 
-    def _work_out(self, servo: Servo, steps: int) -> RunAhead:
-        return servo.run_ahead(self._path[:steps], self._counts, self._error, self._standstill)
-
     def _take(self, servo: Servo, run: RunAhead) -> None:
-        """Compute the ticks of a run."""
-        position, velocity = self._path[run.steps]
-        self._path = self._path[run.steps :]
+        """Take the ticks of a run over."""
+        self._line.go_on(run.steps, run.demand)
         self._began_us += run.steps * TICK_US
-        servo.follow(run, position, velocity)
+        servo.follow(run)
+        position, velocity = run.demand
         self._drive.skip(run.steps, self._began_us, position, velocity)

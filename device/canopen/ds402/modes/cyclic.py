@@ -9,6 +9,7 @@ from tickrig.device.canopen.ds402 import indices
 from tickrig.device.canopen.ds402.automaton import Statusword
 from tickrig.device.canopen.ds402.axis import STEP_S, Control, Ramp
 from tickrig.device.canopen.ds402.modes.mode import DriveView, Mode
+from tickrig.device.servo.servo import Line
 
 _STEP_US: Final = 1_000
 
@@ -99,21 +100,13 @@ class CyclicPosition(LatchedSetPoint):
         self._left -= 1
         return False
 
-    def ahead(self, steps: int) -> list[tuple[float, float]]:
-        """Return the remaining points of the line, then its end."""
+    def ahead(self) -> Line | None:
+        """Return the rest of the line."""
         if self._latched is not None or self.drive.fresh:
-            return []
-        position, left, most = self.reference.position, self._left, self.settings.max_velocity
-        line: list[tuple[float, float]] = []
-        for _ in range(steps):
-            if left:
-                velocity = (self._goal - position) / (left * STEP_S)
-                if not -most <= velocity <= most:
-                    break
-                position, left = position + velocity * STEP_S, left - 1
-                line.append((position, velocity + self._ahead))
-            else:
-                line.append((position, 0.0))
+            return None
+        reference = self.reference
+        line = Line((reference.position, reference.velocity), self._goal, self._left)
+        line.added, line.most = self._ahead, self.settings.max_velocity
         return line
 
     def skip(self, steps: int) -> None:
@@ -170,9 +163,9 @@ class InterpolatedPosition(CyclicPosition):
         self.flags = Statusword.MODE_12 | (Statusword.TARGET_REACHED if settled else 0)
         return settled
 
-    def ahead(self, steps: int) -> list[tuple[float, float]]:
-        """Return no steps: its bits in the statusword change on the way."""
-        return []
+    def ahead(self) -> Line | None:
+        """Return none: its bits in the statusword change on the way."""
+        return None
 
     def halt(self, now_us: int) -> bool:
         """Brake according to 605Dh; the next record begins a line."""

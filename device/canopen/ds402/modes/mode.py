@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from tickrig.device.canopen.ds402 import indices
 from tickrig.device.canopen.ds402.automaton import Controlword, Statusword
 from tickrig.device.canopen.ds402.axis import Axis, Clamped, Control, Limits, Stopping, Switches
 from tickrig.device.canopen.ds402.settings import Parameters, Settings
 from tickrig.device.twin import Part
+
+if TYPE_CHECKING:
+    from tickrig.device.servo.servo import Line
 
 
 @dataclass(slots=True, kw_only=True)
@@ -96,16 +99,14 @@ class Mode(Part):
         """Run one control period; see `step`."""
         return self.halt(now_us)
 
-    def ahead(self, steps: int) -> list[tuple[float, float]]:
-        """Return position and velocity of the reference after each of the next steps.
+    def ahead(self) -> Line | None:
+        """Return what the reference does in the next steps, without input.
 
-        The state does not change. The list ends before a step that needs a single `step`, such as
-        one that a limit cuts.
-
-        Args:
-            steps: largest number of steps, without input.
+        Returns:
+            The line, with what ends it: a limit that would cut it, for one. None if each step needs
+            a single `step`.
         """
-        return []
+        return None
 
     def skip(self, steps: int) -> None:
         """Advance the mode by a number of steps; the caller sets the reference."""

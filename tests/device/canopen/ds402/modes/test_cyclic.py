@@ -255,24 +255,28 @@ def test_a_line_is_ahead_as_it_is_then_run(wheel: Wheel) -> None:
     wheel.enable(8)
     wheel.write(0x607A, 200)
     wheel.step("080#")
-    ahead = wheel.drive.mode.ahead(20)
-    run = []
+    ahead, run = wheel.drive.mode.ahead(), []
     for _ in range(20):
         wheel.step()
         run.append((wheel.drive.axis.reference.position, wheel.drive.axis.reference.velocity))
-    assert ahead == run
-    assert ahead[-1] == pytest.approx((200, 0))
+    assert ahead is not None
+    assert (ahead.goal, ahead.left, ahead.added) == (200.0, 9, 0.0)
+    assert (ahead.position, ahead.velocity) == pytest.approx((20, 20_000))
+    assert run[ahead.left] == (run[ahead.left - 1][0], 0.0)
+    assert run[-1] == pytest.approx((200, 0))
 
 
-def test_a_line_is_ahead_up_to_where_a_limit_cuts_it(wheel: Wheel) -> None:
+def test_a_line_is_ahead_with_the_limit_that_cuts_it(wheel: Wheel) -> None:
     wheel.step("000#0101")
     wheel.enable(8)
     wheel.write(0x607A, 10_000_000)
     wheel.step("080#")
-    assert wheel.drive.mode.ahead(20) == []
+    ahead = wheel.drive.mode.ahead()
+    assert ahead is not None
+    assert (ahead.goal - ahead.position) / (ahead.left / 1_000) > ahead.most == 25_000 * RPM
 
 
 @pytest.mark.parametrize("mode", [1, 7])
 def test_other_modes_are_known_step_by_step_alone(wheel: Wheel, mode: int) -> None:
     wheel.enable(mode)
-    assert wheel.drive.mode.ahead(20) == []
+    assert wheel.drive.mode.ahead() is None
