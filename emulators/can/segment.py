@@ -120,8 +120,10 @@ class CanSegment(TransmissionOutcomes):
     @in_kernel
     def advance(self, now_us: int) -> None:
         """Advance to `now_us`."""
-        while self.advance_until_received(now_us):
-            pass
+        if self._stale:
+            self._plan()
+        while self._due_us <= now_us:
+            self.advance_until_received(now_us)
         self.now_us = max(self.now_us, now_us)
 
     @in_kernel
@@ -153,7 +155,10 @@ class CanSegment(TransmissionOutcomes):
         if not frames:
             return
         if self._start >= now and not self._stale:
-            self._withdraw()
+            if self._winners:
+                self._withdraw()
+            else:
+                self._plan_anew()
         if self._faults.active and (delay_us := self._faults.delay_us(end.number)):
             end.held, self._arbiter.slow = now + delay_us * self.unit, True
         end.enqueue(frames)

@@ -47,7 +47,7 @@ from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from heapq import heapify, heapreplace
 from itertools import compress
-from operator import not_
+from operator import attrgetter, not_
 from typing import Any, Final, Protocol, TypeVar, overload
 
 from tickrig.device.horizon import Horizon
@@ -88,6 +88,7 @@ class Coupling(Protocol):
 # The wires of a rig: only those with traffic are asked.
 
 _NOBODY: Final[tuple[Host, ...]] = ()
+_arrived_us = attrgetter("arrived_us")
 
 
 class Wires(Part):
@@ -426,6 +427,10 @@ class Rig(Copyable):
             if (next_us := self._go_on(t_us, host)) > t_us:
                 self._pass_to(t_us)
                 return
+            arrived = host is not None and host.arrived_us <= next_us
+            if arrived and self._jumps and not (self.watchers or self._couplings):
+                self._pass_to(next_us)  # no device has work, and nobody looks
+                return
             self._happen(next_us)
             if host is not None and host.arrived_us <= next_us:
                 self._wires.advance(self.now_us)
@@ -499,8 +504,10 @@ class Rig(Copyable):
         hosts = (*self.hosts,) if host is None else (*self.hosts, host)
         while True:
             next_us = self._planned_us
-            if hosts and (arrived_us := min([each.arrived_us for each in hosts])) < next_us:
-                return max(self.now_us, arrived_us)
+            if hosts:
+                arrived_us: int = min(map(_arrived_us, hosts))
+                if arrived_us < next_us:
+                    return max(self.now_us, arrived_us)
             if not self._wires.advance_until_received(min(next_us - 1, until_us), hosts):
                 return next_us
 
@@ -548,7 +555,8 @@ class Rig(Copyable):
         self._wires.advance_busy(now_us)
         self._tick(now_us)
         self._horizon.passed_us = now_us
-        self._couple(now_us)
+        if self._couplings:
+            self._couple(now_us)
         for bridge in self._bridges:
             bridge.give_out(now_us)
         if self.watchers:

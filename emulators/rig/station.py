@@ -162,8 +162,9 @@ class Timetable(TimetableFields):
         """Drop ticks without valid entries."""
         while self._ticks:
             at_us = self._ticks[0]
-            if any(station.at_us == at_us for station in self._stations[at_us]):
-                self.first_us = at_us
-                return
+            for station in self._stations[at_us]:
+                if station.at_us == at_us:
+                    self.first_us = at_us
+                    return
             del self._stations[heappop(self._ticks)]
         self.first_us = NEVER

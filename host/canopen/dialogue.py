@@ -175,33 +175,21 @@ class QueuedScript(NamedTuple):
     moves: bool = True
 
 
-class Unanswered:
-    """The objects whose questions the server may still answer, the earliest question first."""
+class Unanswered(list[Object]):
+    """The objects whose questions the server may still answer, the earliest question first.
 
-    def __init__(self) -> None:
-        self._objects: list[Object] = []
-
-    def __contains__(self, at: Object) -> bool:
-        """Whether an answer about the object may still come."""
-        return at in self._objects
-
-    def __len__(self) -> int:
-        """How many questions are open; one that was repeated counts once."""
-        return len(self._objects)
+    A question that was repeated counts once.
+    """
 
     def add(self, at: Object) -> None:
         """Add a question."""
-        if self._objects[-1:] != [at]:
-            self._objects.append(at)
+        if self[-1:] != [at]:
+            self.append(at)
 
     def hear(self, at: Object) -> None:
         """Drop the questions before those about the object: the server is past them."""
-        if at in self._objects:
-            del self._objects[: self._objects.index(at)]
-
-    def clear(self) -> None:
-        """Drop all: the latest question was answered, and it was the only one about its object."""
-        self._objects.clear()
+        if at in self:
+            del self[: self.index(at)]
 
     def fence(self, at: Object) -> Object:
         """Return an object whose answer shows that no answer about `at` can follow.
@@ -210,14 +198,14 @@ class Unanswered:
         again. If all fences are open, the oldest question is forgotten: a server that answers
         now has left more than 250 questions unanswered.
         """
-        last = self._objects[-1]
+        last = self[-1]
         if last in FENCES and last != at:
             return last
         while True:
             for fence in FENCES:
-                if fence != at and fence not in self._objects:
+                if fence != at and fence not in self:
                     return fence
-            del self._objects[0]
+            del self[0]
 
 
 class Dialogue:
@@ -306,8 +294,8 @@ class Dialogue:
             answer = sdo.parse_response(data)
         except WireError:
             return
-        named = _named(answer)
-        if named is not None:
+        named = (answer.index, answer.sub) if isinstance(answer, _NAMING) else None
+        if named is not None and self._unanswered[:1] != [named]:
             self._unanswered.hear(named)
         step = self._step
         if not isinstance(step, SdoRequest) or self._expected is None:
@@ -402,9 +390,8 @@ class Dialogue:
                 self._go_on(None)
 
     def _next(self) -> None:
-        if self._jobs:
-            self.job = self._jobs.popleft()
-            self._go_on(None)
+        self.job = self._jobs.popleft()
+        self._go_on(None)
 
     def _go_on(self, value: object) -> None:
         """Give a script what came of its step, and take the steps up to one that waits."""
@@ -412,9 +399,13 @@ class Dialogue:
         assert job is not None
         self._step, self._expected, self.due_us = None, None, NEVER
         try:
-            step = _resume(job.script, value)
-            while not self._take(step):
-                step = job.script.send(None)
+            script = job.script
+            step = script.throw(value) if isinstance(value, Exception) else script.send(value)
+            while not isinstance(step, SdoRequest):
+                if self._take(step):
+                    return
+                step = script.send(None)
+            self._request(step)
         except StopIteration as end:
             self._end(job.done, end.value)
         except (errors.SdoFailed, errors.StateTimeout, errors.WrongIdentity) as error:
@@ -424,15 +415,12 @@ class Dialogue:
         """End a job, tell how, and go on with the next unless that began one."""
         self.job = None
         callback(what)
-        if self.job is None:
+        if self._jobs and self.job is None:
             self._next()
 
     def _take(self, step: Step) -> bool:
-        """Take a step; True if it waits."""
+        """Take another step than an SDO request; True if it waits."""
         match step:
-            case SdoRequest():
-                self._step = step
-                self._request(step)
             case AwaitState() | AwaitReport():
                 self._step, self.due_us = step, self._now_us + step.timeout_us
             case Pause():
@@ -450,6 +438,7 @@ class Dialogue:
     def _request(self, step: SdoRequest) -> None:
         """Ask what a step asks, or first what has to be asked before; or wait with it."""
         at = step.index, step.sub
+        self._step = step
         if step.goes_on:
             self._send_request(at, step.request)
         elif at in self._unanswered:
@@ -464,7 +453,7 @@ class Dialogue:
         self._transfer = self._expected = at
         self._misnamed = b""
         self._unanswered.add(at)
-        self._say(request)
+        self._send(sdo_frame.REQUEST_COB_ID + self._node_id, request)
         self._sent_us, self.due_us = self._now_us, self._now_us + self.sdo_timeout_us
 
     def _say(self, data: bytes) -> None:
@@ -479,16 +468,3 @@ _NAMING: Final = (
     sdo_frame.BlockUploadInitiateResponse,
 )
 """Responses that name an object, the most frequent one first."""
-
-
-def _named(answer: sdo.Response) -> Object | None:
-    """Return the object that a response names, None if it names none."""
-    if isinstance(answer, _NAMING):
-        return answer.index, answer.sub
-    return None
-
-
-def _resume(script: Script[Any], value: object) -> Step:
-    if isinstance(value, Exception):
-        return script.throw(value)
-    return script.send(value)

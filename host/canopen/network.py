@@ -164,22 +164,23 @@ class NodeSession:
             return state
         return None
 
-    def run(self, script: dialogue.Script[T], now_us: int, listen: _Listen) -> T:
+    def run(self, script: dialogue.Script[T], listen: _Listen) -> T:
         """Run a script to its end, and return or raise what it does.
 
         Args:
             script: what is said; nothing else is said meanwhile.
-            now_us: the time.
             listen: waits.
 
         Raises:
             LinkClosed: the bus is gone.
         """
         ended: list[T | Exception] = []
-        now_us = self._take(listen(now_us))
-        self.dialogue.start(now_us, dialogue.QueuedScript("", script, ended.append, ended.append))
+        job = dialogue.QueuedScript("", script, ended.append, ended.append)
+        self.dialogue.start(self._take(listen(0)), job)
         while not ended:
-            self.dialogue.tick(self._take(listen(self.dialogue.due_us)))
+            now_us = self._take(listen(self.dialogue.due_us))
+            if not ended:
+                self.dialogue.tick(now_us)
         if isinstance(ended[0], Exception):
             raise ended[0]
         return ended[0]

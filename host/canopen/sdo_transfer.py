@@ -10,7 +10,13 @@ from __future__ import annotations
 from tickrig.host.canopen.dialogue import Answer, Script, SdoFrame, SdoRequest
 from tickrig.host.canopen.errors import SdoAborted
 from tickrig.wire.canopen import sdo
-from tickrig.wire.canopen.sdo_frame import EXPEDITED_BYTES, SEGMENT_BYTES, AbortCode
+from tickrig.wire.canopen.sdo_frame import (
+    EXPEDITED_BYTES,
+    SEGMENT_BYTES,
+    AbortCode,
+    ClientCommand,
+    frame_at,
+)
 
 
 def upload(index: int, sub: int, size: int = 0) -> Script[bytes]:
@@ -26,7 +32,7 @@ def upload(index: int, sub: int, size: int = 0) -> Script[bytes]:
         SdoAborted: the device refuses, or answers something else.
         SdoTimeout: it does not answer.
     """
-    answer = yield SdoRequest(sdo.UploadInitiateRequest(index, sub).encode(), index, sub)
+    answer = yield SdoRequest(frame_at(ClientCommand.UPLOAD, index, sub), index, sub)
     match answer:
         case sdo.UploadInitiateResponse():
             if answer.data is not None:

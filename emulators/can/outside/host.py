@@ -78,7 +78,7 @@ class CanHost:
     def send(self, traffic: Frames, /) -> None:
         """Queue frames; no time passes."""
         self._check_usable()
-        self._put(self.now_us, traffic)
+        self._put(self._rig.now_us, traffic)
 
     def is_own(self, at_us: int) -> bool:
         """Return whether the frame that ended at a time was sent here; called once for each."""
@@ -110,7 +110,7 @@ class CanHost:
         first = self.take(timeout_us)
         received = () if first is None else (first, *self._inbox)
         self._inbox.clear()
-        return self.now_us, received
+        return self._rig.now_us, received
 
     def take(self, timeout_us: int | None) -> tuple[int, CanFrame] | None:
         """Wait until a frame has arrived; return it with its time, None after the timeout.
@@ -129,7 +129,7 @@ class CanHost:
                 if rig.now_us >= deadline_us:
                     self._look(timeout_us)
                     return None
-                self._step(deadline_us)
+                rig.run_to(deadline_us if deadline_us < NEVER else self._chunk_us(), self._end)
         return inbox.popleft()
 
     def close(self) -> None:
@@ -166,13 +166,11 @@ class CanHost:
         if refusal := self._looks.refusal(self.now_us, _LOOKING):
             raise LinkError(refusal)
 
-    def _step(self, deadline_us: int) -> None:
-        """Run the rig until a frame has arrived."""
-        if deadline_us == NEVER:
-            if self._rig.next_us == NEVER:
-                raise LinkTimeout("nothing will ever happen on this bus, and no timeout was given")
-            deadline_us = self._rig.next_us + _CHUNK_US
-        self._rig.run_to(deadline_us, self._end)
+    def _chunk_us(self) -> int:
+        """Return how far the rig runs without a timeout."""
+        if self._rig.next_us == NEVER:
+            raise LinkTimeout("nothing will ever happen on this bus, and no timeout was given")
+        return self._rig.next_us + _CHUNK_US
 
     def _wake(self) -> None:
         """Stop the rig when the next periodic frame is due."""

@@ -103,7 +103,7 @@ class NodeBus:
         session = self._sessions[node_id]
         session.dialogue.sdo_timeout_us = max(timeout_us, self._timeout_us)
         try:
-            return session.run(script, self.now_us, self.listen)
+            return session.run(script, self.listen)
         except BaseException:
             with suppress(LinkClosed):
                 session.dialogue.abort(AbortCode.GENERAL)

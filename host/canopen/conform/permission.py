@@ -76,7 +76,8 @@ class Permission:
             if not is_request or frame.remote or not _is_upload(frame.data):
                 raise NotAllowed(f"{frame} is more than reading: --communication")
         elif is_request:
-            self._check_request(frame.data)
+            if self._never:
+                self._check_request(frame.data)
         elif frame.can_id == NMT_COB_ID and not frame.extended:
             self._check_nmt(frame.data)
         elif frame.can_id == LSS_MASTER_COB_ID and self._level < Level.INTRUSIVE:

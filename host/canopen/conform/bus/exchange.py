@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import defaultdict, deque
 from collections.abc import Callable, Iterable, Sequence
 from enum import Enum
+from functools import lru_cache
 from typing import Final
 
 from tickrig.host.canopen.conform.bus.frame_pattern import can_id_of, matches, unlike, wanted_text
@@ -134,35 +135,6 @@ class Presence(Enum):
     TWO = 2
 
 
-class _Answers:
-    """Counts uploads that begin, and answers to them, by object."""
-
-    def __init__(self) -> None:
-        self._uploads, self._answered = defaultdict[bytes, int](int), defaultdict[bytes, int](int)
-        self._silent = True
-
-    def count_request(self, data: bytes) -> None:
-        """Count a request."""
-        if data and data[0] & sdo_frame.SPECIFIER == sdo_frame.ClientCommand.UPLOAD:
-            self._uploads[data[_MULTIPLEXER]] += 1
-
-    def count_response(self, data: bytes) -> None:
-        """Count a response."""
-        self._silent = False
-        if data and data[0] & sdo_frame.SPECIFIER in _ANSWERS:
-            self._answered[data[_MULTIPLEXER]] += 1
-
-    @property
-    def presence(self) -> Presence:
-        """How many nodes have answered: two, if most objects were told twice each time."""
-        if self._silent:
-            return Presence.NONE
-        told = self._answered
-        twice = sum(told.get(at, 0) == 2 * times for at, times in self._uploads.items())
-        many = len(self._uploads) >= _LEAST and 2 * twice > len(self._uploads)
-        return Presence.TWO if many else Presence.ONE
-
-
 # How much of the bus the tester may use, and how much others use.
 
 ASSUMED_BIT_RATE: Final = 125_000
@@ -181,8 +153,12 @@ _FOREIGN_LOAD: Final = 0.5
 """With more of it by other nodes, a late or missing answer says nothing of the node."""
 
 
+_bits = lru_cache(1_024)(frame_bits)
+"""Most requests are sent more than once, and most answers are the same then."""
+
+
 class _Allowance:
-    """What may be sent: a bucket that fills with the allowed share of the bit rate.
+    """What may be sent: the allowed share of the bit rate, in windows of `_WINDOW_US`.
 
     Args:
         bit_rate: of the bus in bit/s.
@@ -193,27 +169,17 @@ class _Allowance:
     """
 
     def __init__(self, bit_rate: int, max_load: float) -> None:
-        self._bits_us = bit_rate * max_load / 1e6
-        self._most = self._left = self._bits_us * _WINDOW_US
-        self._at_us = 0
+        self._bits_us, self._paid_us = bit_rate * max_load / 1e6, 0.0
         self.slowness = max(1.0, _PLENTY_BIT_S / (bit_rate * max_load))
 
     def use(self, now_us: int, frame: CanFrame) -> None:
         """Count a frame of the tester, or an answer to one."""
-        self._fill(now_us)
-        self._left -= frame_bits(frame)
+        self._paid_us = max(self._paid_us, now_us) + _bits(frame) / self._bits_us
 
     def wait_us(self, now_us: int) -> int:
         """Return how long nothing may be sent, at most `_LONGEST_WAIT_US`."""
-        self._fill(now_us)
-        if self._left >= 0:
-            return 0
-        return min(_LONGEST_WAIT_US, int(-self._left / self._bits_us) + 1)
-
-    def _fill(self, now_us: int) -> None:
-        if now_us > self._at_us:
-            self._left = min(self._most, self._left + (now_us - self._at_us) * self._bits_us)
-            self._at_us = now_us
+        ahead_us = self._paid_us - now_us - _WINDOW_US
+        return min(_LONGEST_WAIT_US, int(ahead_us) + 1) if ahead_us > 0 else 0
 
 
 class _ForeignLoad:
@@ -321,7 +287,8 @@ class BusExchange:
         self._origins: dict[tuple[int, bool], tuple[str, bool]] = {}
         self._multiplexer, self.transfer, self._ready_us = b"", (0, 0), 0
         self.unanswered: list[tuple[int, int]] = []
-        self._answers, self._others_by = _Answers(), _NODES
+        self._uploads, self._answered = defaultdict[bytes, int](int), defaultdict[bytes, int](int)
+        self._is_silent, self._others_by = True, _NODES
         self.played: int | None = None
         self._shared_host, self._late_us = shared_host, 0
         self._unread: defaultdict[str, deque[tuple[int, CanFrame]]] = defaultdict(_queue)
@@ -351,8 +318,13 @@ class BusExchange:
 
     @property
     def presence(self) -> Presence:
-        """How many nodes have answered so far."""
-        return self._answers.presence
+        """How many nodes have answered so far: two, if most objects were told twice each time."""
+        if self._is_silent:
+            return Presence.NONE
+        told = self._answered
+        twice = sum(told.get(at, 0) == 2 * times for at, times in self._uploads.items())
+        many = len(self._uploads) >= _LEAST and 2 * twice > len(self._uploads)
+        return Presence.TWO if many else Presence.ONE
 
     def end_listening(self) -> None:
         """From now on the node may send anything anywhere: others are told by their heartbeat."""
@@ -394,11 +366,13 @@ class BusExchange:
         self._allowance.use(now_us, frame)
         if is_request:
             data = frame.data
-            if data[:1] and data[0] in _UNANSWERED:
-                self._ready_us = now_us + _PAUSE_US
             self._multiplexer = data[_MULTIPLEXER]
-            self._answers.count_request(data)
-            if len(data) >= _MULTIPLEXER.stop and data[0] & sdo_frame.SPECIFIER in _BEGINNING:
+            if data and data[0] in _UNANSWERED:
+                self._ready_us = now_us + _PAUSE_US
+            specifier = data[0] & sdo_frame.SPECIFIER if data else None
+            if specifier == sdo_frame.ClientCommand.UPLOAD:
+                self._uploads[self._multiplexer] += 1
+            if len(data) >= _MULTIPLEXER.stop and specifier in _BEGINNING:
                 self.unanswered.append(sdo_frame.index_sub(data))
         link.send((frame,))
 
@@ -554,15 +528,15 @@ class BusExchange:
     def _take_response(self, at_us: int, frame: CanFrame) -> None:
         data = frame.data
         self._allowance.use(at_us, frame)
-        self._answers.count_response(data)
-        if len(data) >= _MULTIPLEXER.stop:
-            at = sdo_frame.index_sub(data)
-            if data[_MULTIPLEXER] == self._multiplexer:
-                self.transfer = at
-            self._settle(at, data)
-
-    def _settle(self, at: tuple[int, int], data: bytes) -> None:
-        """Drop the objects that the node has answered about, or will not answer about any more."""
+        self._is_silent, multiplexer = False, data[_MULTIPLEXER]
+        if data and data[0] & sdo_frame.SPECIFIER in _ANSWERS:
+            self._answered[multiplexer] += 1
+        if len(data) < _MULTIPLEXER.stop:
+            return
+        at = sdo_frame.index_sub(data)
+        if multiplexer == self._multiplexer:
+            self.transfer = at
+        # The node has answered about these objects, or will not answer about them any more.
         if at in self.unanswered:  # and those asked before it
             del self.unanswered[: self.unanswered.index(at) + 1]
         elif data[0] in _NAMING:  # the node names another object

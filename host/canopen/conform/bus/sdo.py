@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Final, TypeVar
+from typing import Final, ParamSpec, TypeVar
 
 from tickrig.host.canopen.conform.bus.exchange import BusExchange, StepFailed
 from tickrig.host.canopen.conform.check import ANSWER_MS, Address
@@ -17,6 +17,7 @@ from tickrig.wire.canopen.sdo import Abort
 
 # Reads and writes objects of the node under test, beside its checks.
 
+P = ParamSpec("P")
 T = TypeVar("T")
 
 SizeOf = Callable[[int, int], int]
@@ -63,11 +64,11 @@ class SdoClient:
             SdoMisnamed: it answers, and names another object.
             LinkClosed: the bus is gone.
         """
-        return self._twice(lambda: upload(index, sub, self.size_of(index, sub)))
+        return self._twice(upload, index, sub, self.size_of(index, sub))
 
     def download(self, index: int, sub: int, data: bytes) -> None:
         """Write an object, as `upload` reads one; raises the same."""
-        self._twice(lambda: download(index, sub, data))
+        self._twice(download, index, sub, data)
 
     def number(self, index: int, sub: int) -> int | None:
         """Return an unsigned number of at most 32 bits, None if the node gives none."""
@@ -76,12 +77,12 @@ class SdoClient:
         except SdoFailed:
             return None
 
-    def _twice(self, make: Callable[[], Script[T]]) -> T:
+    def _twice(self, make: Callable[P, Script[T]], *words: P.args, **named: P.kwargs) -> T:
         """Run a script, and once more if the node did not answer: one frame may be lost."""
         try:
-            return self.run(make())
+            return self.run(make(*words, **named))
         except SdoTimeout:
-            return self.run(make())
+            return self.run(make(*words, **named))
 
     def abort(self) -> None:
         """End a transfer that a check left open; stacks look which object the abort names."""
@@ -94,9 +95,10 @@ class SdoClient:
         for at in exchange.unanswered:  # by the check, which talks for itself
             talk.remember(at)
         try:
-            return self._session.run(script, exchange.now_us, exchange.listen)
+            return self._session.run(script, exchange.listen)
         finally:
-            talk.clear()
+            if talk.job is not None:
+                talk.clear()
             exchange.unanswered.clear()
 
     def _keep_misnamed(self, at: tuple[int, int], data: bytes) -> None:
