@@ -289,7 +289,7 @@ def _at(action: Callable[[], None], now_us: int) -> None:
     action()
 
 
-class FaultRow(NamedTuple):
+class _FaultRow(NamedTuple):
     """The status of a fault of a running emulator.
 
     Attributes:
@@ -457,19 +457,19 @@ class Operator(Copyable):
         armed = self._wire.armed
         return tuple(f for f in self.faults if f in armed or self._inputs_fault(f))
 
-    def fault_rows(self) -> list[FaultRow]:
+    def fault_rows(self) -> list[_FaultRow]:
         """Return the status of each fault."""
         present = frozenset(self.active_faults)
         return [self._row(name, on=name in present) for name in self.faults]
 
-    def _row(self, name: str, *, on: bool) -> FaultRow:
+    def _row(self, name: str, *, on: bool) -> _FaultRow:
         since_us, words = self._begun.get(name, (None, ())) if on else (None, ())
         form = self._wire.fault_types.get(name)
         if form is None:
-            return FaultRow(name, self._inputs.table[name].text, {}, on, since_us, None)
+            return _FaultRow(name, self._inputs.table[name].text, {}, on, since_us, None)
         given = spelled(name, form, words)
         arguments = {each.name: given.get(each.name, each.default) for each in form.all_arguments}
-        return FaultRow(name, form.text, arguments, on, since_us, self._wire.acted(name))
+        return _FaultRow(name, form.text, arguments, on, since_us, self._wire.acted(name))
 
     def _inputs_fault(self, name: str) -> bool:
         return name in self._inputs.table and bool(self._inputs[name])

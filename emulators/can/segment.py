@@ -64,7 +64,7 @@ if TYPE_CHECKING:
 _ERROR_BITS: Final = 6 + RECESSIVE_BITS  # an error flag, and what follows it
 _ECHO_BITS: Final = 6  # the error flags of the others, which begin when the first one ends
 _HEADER_BITS: Final = 19  # from start of frame to DLC
-KEPT_LENGTHS: Final = 8_192
+_KEPT_LENGTHS: Final = 8_192
 
 
 class CanSegment(TransmissionOutcomes):
@@ -269,7 +269,7 @@ class CanSegment(TransmissionOutcomes):
         self._finish, self._due_us = self._come_back, -(-self._start // self.unit)
 
     def _length(self, frame: CanFrame) -> int:
-        if len(self._lengths) >= KEPT_LENGTHS:
+        if len(self._lengths) >= _KEPT_LENGTHS:
             self._lengths.clear()
         bits = frame_bits(frame)
         if not (frame[2] or frame[3]):

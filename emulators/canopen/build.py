@@ -193,7 +193,7 @@ def describe_rtc(spec: str) -> DeviceDescription:
     )
 
 
-NAME: Final = "canopen-slave"
+_NAME: Final = "canopen-slave"
 
 _logger = log_of(__name__)
 
@@ -215,7 +215,7 @@ def make_bench(  # noqa: PLR0913 - options, by keyword
     for one, station in zip(node_faults, stations, strict=False):
         one.station = station
     return CanEmulator(
-        NAME,
+        _NAME,
         Nodes(nodes, bodies),
         stations,
         wire,

@@ -250,7 +250,7 @@ class Node(Copyable):
 # The physical side of several nodes and bodies in one table.
 
 
-class NodePart(Protocol):
+class _NodePart(Protocol):
     """A node, or a body on nodes: an object with a name and a physical side.
 
     Attributes:
@@ -288,10 +288,10 @@ class Nodes:
         bodies: bodies on the nodes, or separate ones.
     """
 
-    def __init__(self, nodes: Sequence[Node], bodies: Sequence[NodePart] = ()) -> None:
+    def __init__(self, nodes: Sequence[Node], bodies: Sequence[_NodePart] = ()) -> None:
         self.nodes, self.parts = tuple(nodes), (*nodes, *bodies)
         self._alone = self.parts[0] if len(nodes) == 1 or len(self.parts) == 1 else None
-        self._by_name: Mapping[str, NodePart] = {part.name: part for part in self.parts}
+        self._by_name: Mapping[str, _NodePart] = {part.name: part for part in self.parts}
         self.inputs = _NodeInputs(self)
         self.outputs: Mapping[str, OutputSignal] = {
             self.full_name(part, item.name): replace(item, name=self.full_name(part, item.name))
@@ -311,11 +311,11 @@ class Nodes:
             raise KeyError(name)
         return part.read(rest)
 
-    def full_name(self, part: NodePart, name: str) -> str:
+    def full_name(self, part: _NodePart, name: str) -> str:
         """Return the full name of a signal of a part."""
         return name if part is self._alone else f"{part.name}/{name}"
 
-    def find(self, name: str) -> tuple[NodePart | None, str]:
+    def find(self, name: str) -> tuple[_NodePart | None, str]:
         """Return the part that a name belongs to, and the rest of the name."""
         prefix, slash, rest = name.partition("/")
         if slash:

@@ -44,17 +44,17 @@ class RunOptions:
         raise NotImplementedError
 
 
-OptionsT = TypeVar("OptionsT", bound=RunOptions)
+_OptionsT = TypeVar("_OptionsT", bound=RunOptions)
 
 
-class EmulatorRun(ABC, Generic[OptionsT]):
+class EmulatorRun(ABC, Generic[_OptionsT]):
     """One run.
 
     Args:
         options: the command line.
     """
 
-    def __init__(self, options: OptionsT) -> None:
+    def __init__(self, options: _OptionsT) -> None:
         self._options, self._in_real_time = options, options.in_real_time
         self._clock = ServingClock()
         self._running: RunningEmulator | None = None

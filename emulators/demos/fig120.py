@@ -61,10 +61,10 @@ class CurveSample(NamedTuple):
 _HEAD: Final = "  time s   potentiometer V   290h    reference deg   shaft deg"
 
 
-def row(sample: CurveSample) -> str:
+def _row(sample: CurveSample) -> str:
     """Write a sample as a line of the table.
 
-    >>> row(CurveSample(0.35, 2.5, 16384, 90.0021))
+    >>> _row(CurveSample(0.35, 2.5, 16384, 90.0021))
     '   0.350             2.500   00 40         90.0027     90.0021'
     """
     data = sample.reference.to_bytes(2, "little", signed=True).hex(" ").upper()
@@ -266,14 +266,14 @@ class _BusStage:
         self._hand.request("set", name=name, value=value)
 
 
-Fig120Stage = VirtualStage | _BusStage
+_Fig120Stage = VirtualStage | _BusStage
 """Both devices, and the bus that the master is on at first."""
 
 
 @contextmanager
 def bus_stage(
     arguments: Sequence[str], open_bus: Callable[[], can.BusABC]
-) -> Iterator[Fig120Stage]:
+) -> Iterator[_Fig120Stage]:
     """Start the emulator on a bus, and a master beside it.
 
     Args:
@@ -317,7 +317,7 @@ _AT_REST_DEG: Final = 0.01
 
 
 @dataclass(frozen=True, slots=True)
-class Act:
+class _Act:
     """A part of the demonstration.
 
     Attributes:
@@ -333,14 +333,14 @@ class Act:
     is_step: bool = False
 
 
-def acts() -> Iterator[Act]:
+def _acts() -> Iterator[_Act]:
     """Give the steps of the report's table, then a slow turn back."""
     for volts in _STEPS_V:
-        yield Act(
+        yield _Act(
             f"The potentiometer is set to {volts} V.", _STEP_US, partial(_held, volts), is_step=True
         )
-    yield Act("It is turned back slowly.", _TURN_US, _turned_back)
-    yield Act("It rests.", _REST_US, partial(_held, 0.0))
+    yield _Act("It is turned back slowly.", _TURN_US, _turned_back)
+    yield _Act("It rests.", _REST_US, partial(_held, 0.0))
 
 
 def _held(volts: float, done: float) -> float:
@@ -351,7 +351,7 @@ def _turned_back(done: float) -> float:
     return round(_STEPS_V[-1] / 2 * (1 + cos(pi * done)), 3)
 
 
-def run_demo(stage: Fig120Stage, echo: _Echo) -> list[CurveSample]:
+def run_demo(stage: _Fig120Stage, echo: _Echo) -> list[CurveSample]:
     """Play it.
 
     Returns:
@@ -373,10 +373,10 @@ def run_demo(stage: Fig120Stage, echo: _Echo) -> list[CurveSample]:
     return _turn(stage, echo)
 
 
-def _turn(stage: Fig120Stage, echo: _Echo) -> list[CurveSample]:
+def _turn(stage: _Fig120Stage, echo: _Echo) -> list[CurveSample]:
     samples: list[CurveSample] = []
     start_us = begin_us = stage.now_us
-    for act in acts():
+    for act in _acts():
         echo(f"\n{act.title}\n{_HEAD}")
         first = len(samples)
         for at_us in range(begin_us, begin_us + act.duration_us, stage.step_us):
@@ -384,7 +384,7 @@ def _turn(stage: Fig120Stage, echo: _Echo) -> list[CurveSample]:
             stage.set(_POTENTIOMETER, act.volts((at_us - begin_us) / act.duration_us))
             sample = _look(stage, start_us)
             if (at_us - begin_us) % _PERIOD_US < stage.step_us:
-                echo(row(sample))
+                echo(_row(sample))
             samples.append(sample)
         begin_us += act.duration_us
         if act.is_step:
@@ -392,7 +392,7 @@ def _turn(stage: Fig120Stage, echo: _Echo) -> list[CurveSample]:
     return samples
 
 
-def _look(stage: Fig120Stage, start_us: int) -> CurveSample:
+def _look(stage: _Fig120Stage, start_us: int) -> CurveSample:
     return CurveSample(
         (stage.now_us - start_us) / 1e6,
         _number(stage.get(_POTENTIOMETER)),

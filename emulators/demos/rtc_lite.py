@@ -64,7 +64,7 @@ class VirtualSetup:
         self._nodes[name].inputs.set(_POWER_CUT, 0 if on else 1)
 
 
-class PtySetup:
+class _PtySetup:
     """Emulators in processes of their own, each on a pseudo-terminal, in real time."""
 
     def __init__(
@@ -88,11 +88,11 @@ class PtySetup:
             self._controls[name].request("fault", spec=_POWER_CUT)
 
 
-DemoSetup = VirtualSetup | PtySetup
+_DemoSetup = VirtualSetup | _PtySetup
 
 
 @contextmanager
-def pty_setup() -> Iterator[PtySetup]:
+def pty_setup() -> Iterator[_PtySetup]:
     """Start both emulators, and open their terminals.
 
     Raises:
@@ -107,7 +107,7 @@ def pty_setup() -> Iterator[PtySetup]:
             controls[name] = stack.enter_context(control)
             links[name] = stack.enter_context(closing(SerialLink(str(child.link), _BAUD)))
             places[name] = str(child.link.resolve())
-        yield PtySetup(links, controls, places)
+        yield _PtySetup(links, controls, places)
 
 
 # `tickrig demo rtc-lite`: numbers through two devices, a power cut, and the way back.
@@ -132,7 +132,7 @@ _CHAIN: Final = ("ConsoleIn0", "LiteA0", "LiteB0", "ConsoleOut0")
 _SETTINGS: Final = ProxySettings(rediscover=True)
 
 
-def run_demo(setup: DemoSetup, echo: _Echo) -> None:
+def run_demo(setup: _DemoSetup, echo: _Echo) -> None:
     """Play it; it takes six seconds of the stage's time.
 
     Raises:
@@ -149,7 +149,7 @@ class _DemoRun:
     is removed and comes back; `_restore` brings the system to Active from any of these states.
     """
 
-    def __init__(self, setup: DemoSetup, echo: _Echo) -> None:
+    def __init__(self, setup: _DemoSetup, echo: _Echo) -> None:
         self._setup, self._echo, self._manager = setup, echo, setup.manager
         self._events: list[ProxyEvent] = []
         self._links = {name: MonitoredLink(link, self._say) for name, link in setup.links.items()}

@@ -65,10 +65,10 @@ class TraceFile(NonCopyable):
         self._file.close(Record(now_us, Mark.END).encode())
 
 
-W_contra = TypeVar("W_contra", contravariant=True)
+_W_contra = TypeVar("_W_contra", contravariant=True)
 
 
-class Trace(Protocol[W_contra]):
+class _Trace(Protocol[_W_contra]):
     """Storage of the recorded ticks of a device."""
 
     @property
@@ -76,7 +76,7 @@ class Trace(Protocol[W_contra]):
         """Whether a copy of the device is also recorded, in memory."""
         ...
 
-    def hear(self, now_us: int, done: Sequence[str], received: W_contra, sent: W_contra) -> None:
+    def hear(self, now_us: int, done: Sequence[str], received: _W_contra, sent: _W_contra) -> None:
         """Record the actions on the device before a tick, and its traffic in the tick."""
 
 
@@ -91,7 +91,7 @@ class TracedDevice(Generic[W]):
         trace: storage of the ticks.
     """
 
-    def __init__(self, device: Device[W], trace: Trace[W]) -> None:
+    def __init__(self, device: Device[W], trace: _Trace[W]) -> None:
         self._device: Any = device
         self._trace = trace
         bank: Inputs | None = getattr(device, "inputs", None)

@@ -185,7 +185,7 @@ def _set_signal(device: Emulated[bytes], record: trace.Record) -> None:
 
 # Replay the recorded run of a bench, device by device.
 
-Traffic = bytes | Frames
+_Traffic = bytes | Frames
 
 
 @dataclass(frozen=True)
@@ -361,7 +361,7 @@ def replay_device(
     Raises:
         TraceError: the trace names an input that the device does not have.
     """
-    nothing: Traffic = () if recording.header.on_can(name) else b""
+    nothing: _Traffic = () if recording.header.on_can(name) else b""
     said = [*traffic_of(recording.of(name), trace.Mark.FROM_DEVICE)]
     return _first_difference(said, play_device(recording, name, device), nothing)
 
@@ -372,7 +372,7 @@ def play_device(recording: BenchRecording, name: str, device: Device[Any]) -> li
     Raises:
         TraceError: the trace names an input that the device does not have.
     """
-    nothing: Traffic = () if recording.header.on_can(name) else b""
+    nothing: _Traffic = () if recording.header.on_can(name) else b""
     records = recording.of(name)
     received = ((at, what) for at, what, _ in traffic_of(records, trace.Mark.TO_DEVICE))
     changes = (
@@ -385,7 +385,7 @@ def play_device(recording: BenchRecording, name: str, device: Device[Any]) -> li
 
 def traffic_of(
     records: Sequence[BenchRecord], mark: trace.Mark
-) -> Iterator[tuple[int, Traffic, int]]:
+) -> Iterator[tuple[int, _Traffic, int]]:
     """Yield the traffic of one direction: time, all data of the tick, its first line."""
     passed = (record for record in records if record.mark is mark)
     for at_us, group in groupby(passed, key=lambda record: record.at_us):

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
-F = TypeVar("F", bound=Callable[..., object])
+_F = TypeVar("_F", bound=Callable[..., object])
 
 
 def _load() -> Any:
@@ -30,11 +30,11 @@ kernel: bool = _KERNEL is not None
 """Whether this installation has the kernel."""
 
 
-def in_kernel(method: F) -> F:
+def in_kernel(method: _F) -> _F:
     """Replace a method by the kernel's function of the same name, if there is one."""
     if _KERNEL is None:
         return method
-    replaced: F = _KERNEL.method(method.__qualname__, method)
+    replaced: _F = _KERNEL.method(method.__qualname__, method)
     return replaced
 
 

@@ -20,7 +20,7 @@
 #     for what changed between steps (an input set, an object written). It stands at one tick;
 #     entries for later ones are ignored.
 #   - All other stations are asked in each step (`_looked_at`), as serial lines say `due_us` alone.
-#   - Wires are asked when something ends next (`Wires`). An idle wire is not asked: it calls
+#   - Wires are asked when something ends next (`_Wires`). An idle wire is not asked: it calls
 #     `on_traffic` when something may end earlier than it said.
 # `_planned_us` is the earliest of tick and action. `_go_on` lets wires run up to just before it,
 # but stops where a station was woken, for that may have entered an earlier tick.
@@ -91,7 +91,7 @@ _NOBODY: Final[tuple[Host, ...]] = ()
 _arrived_us = attrgetter("arrived_us")
 
 
-class Wires(Part):
+class _Wires(Part):
     """Wires that are advanced together, each separately as long as this has no visible effect.
 
     A transmission that ends on one wire may let a station send on another, but not before its next
@@ -211,8 +211,8 @@ LATE_KEPT: Final = 1_000
 """Number of late steps whose times are kept."""
 
 
-T = TypeVar("T")
-U = TypeVar("U")
+_T = TypeVar("_T")
+_U = TypeVar("_U")
 
 
 class Rig(Copyable):
@@ -273,7 +273,7 @@ class Rig(Copyable):
         self._jumps = not (dense or self._in_real_time)
         periods = {station.tick_us for station in stations}
         self._periods = tuple(sorted(periods | {coupling.tick_us for coupling in couplings}))
-        self._timetable, self._wires = Timetable(), Wires(self._periods)
+        self._timetable, self._wires = Timetable(), _Wires(self._periods)
         self._horizon, self._until_us = Horizon(), 0
         attached = [self._attach(station) and not dense for station in stations]
         self.stations, self._woken = stations, tuple(compress(stations, attached))
@@ -319,10 +319,10 @@ class Rig(Copyable):
     def fork(self) -> Rig: ...
 
     @overload
-    def fork(self, part: T, /) -> tuple[Rig, T]: ...
+    def fork(self, part: _T, /) -> tuple[Rig, _T]: ...
 
     @overload
-    def fork(self, part: T, other: U, /) -> tuple[Rig, T, U]: ...
+    def fork(self, part: _T, other: _U, /) -> tuple[Rig, _T, _U]: ...
 
     @overload
     def fork(self, *parts: Any) -> tuple[Any, ...]: ...

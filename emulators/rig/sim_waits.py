@@ -24,7 +24,7 @@ MOST_LOOKS: Final = 10_000
 """Largest number of polls at one instant; then the host gets an error, because it would wait
 endlessly."""
 
-T = TypeVar("T")
+_T = TypeVar("_T")
 
 
 class OneThread(Copyable):
@@ -94,18 +94,18 @@ class Passing(Protocol):
         ...
 
 
-class SimQueue(Generic[T]):
+class SimQueue(Generic[_T]):
     """A `queue.Queue` for one thread: waiting advances the time."""
 
     def __init__(self, passing: Passing) -> None:
         self._passing = passing
-        self._items: deque[T] = deque()
+        self._items: deque[_T] = deque()
 
-    def put(self, item: T) -> None:
+    def put(self, item: _T) -> None:
         """Append an item."""
         self._items.append(item)
 
-    def get(self, block: bool = True, timeout: float | None = None) -> T:
+    def get(self, block: bool = True, timeout: float | None = None) -> _T:
         """Return the first item; raise queue.Empty after the timeout."""
         self._passing.wait(lambda: bool(self._items), timeout if block else 0)
         if not self._items:

@@ -26,7 +26,7 @@ from tickrig.host.tui import FramedApp, KeyFooter
 _SendRequests = Callable[[Sequence[Object]], Awaitable[list[Object]]]
 """Sends requests of the control socket to an emulator, and returns the answers."""
 
-REFRESH_S: Final = 0.1
+_REFRESH_S: Final = 0.1
 _STEP_PCT: Final = 10
 
 HELP: Final = """\
@@ -127,7 +127,7 @@ class RrcPanel(FramedApp):
     def on_ready(self) -> None:
         """Start to poll the emulator."""
         self._when_ready()
-        self.set_interval(REFRESH_S, self.look)
+        self.set_interval(_REFRESH_S, self.look)
 
     async def look(self) -> None:
         """Fetch the present state, and show it."""

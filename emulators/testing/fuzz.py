@@ -46,10 +46,10 @@ def check_words(name: str, words: object, on_can: bool) -> None:
 
 # The acts that a finding needs.
 
-T = TypeVar("T")
+_T = TypeVar("_T")
 
 
-def _shortened(acts: list[T], fails: Callable[[list[T]], bool]) -> list[T]:
+def _shortened(acts: list[_T], fails: Callable[[list[_T]], bool]) -> list[_T]:
     """Leave out each act without which the same goes wrong.
 
     Args:

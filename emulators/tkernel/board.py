@@ -11,7 +11,7 @@ from tickrig.device.physical import InputBank, InputSignal, OutputSignal, Signal
 from tickrig.emulators.tkernel.node_manager import REFUSED, NodeLimits, NodeManager
 from tickrig.wire.instant import NEVER
 
-INPUTS: Final = (
+_INPUTS: Final = (
     InputSignal("reset", "the reset button", SignalType.BUTTON),
     InputSignal("power_cut", "the supply is off, and everything is lost", SignalType.FAULT),
 )
@@ -62,7 +62,7 @@ class Board:
 
     def __init__(self, limits: NodeLimits, start: _StartSystem, lines: _SolderedLines) -> None:
         self.limits, self._start, self._lines = limits, start, lines
-        self.inputs = InputBank(INPUTS, on_change=self._input_set)
+        self.inputs = InputBank(_INPUTS, on_change=self._input_set)
         self.manager: NodeManager | None = None
         self.boots, self._changed, self._up_us = 0, True, NEVER
         self._state, self._stack = _BoardState.OFF, ExitStack()

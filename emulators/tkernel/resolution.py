@@ -26,7 +26,7 @@ _OUTPUTS: Final = (
 
 
 @dataclass(frozen=True, slots=True)
-class Response:
+class _Response:
     """An answer of HTTP.
 
     Attributes:
@@ -73,7 +73,7 @@ class ResolutionService:
         """Return the present value of an output; KeyError if it is unknown."""
         return self._counts[name]
 
-    def respond(self, path: str) -> Response:
+    def respond(self, path: str) -> _Response:
         """Answer a GET."""
         inputs = self.inputs
         delay_us = inputs["delay_ms"] * 1_000 if inputs["slow"] else 0
@@ -81,8 +81,8 @@ class ResolutionService:
         self._counts["requests"] += 1
         self._counts["unknown" if text is None else "found"] += 1
         if text is None:
-            return Response(404, "unknown\n", delay_us)
-        return Response(200, "out of order" if inputs["broken"] else text, delay_us)
+            return _Response(404, "unknown\n", delay_us)
+        return _Response(200, "out of order" if inputs["broken"] else text, delay_us)
 
     def _find(self, path: str) -> str | None:
         match path.split("/"):

@@ -187,10 +187,10 @@ class SimNetwork(canopen.Network):
 
     def send_periodic(
         self, can_id: int, data: _Data, period: float, remote: bool = False
-    ) -> SimPeriodic:
+    ) -> _SimPeriodic:
         """Send a frame each `period` seconds while time passes."""
         frame = _frame(can_id, data, remote=remote)
-        return SimPeriodic(self.host.repeat((frame,), round(period * 1e6)))
+        return _SimPeriodic(self.host.repeat((frame,), round(period * 1e6)))
 
     def subscribe(self, can_id: int, callback: _Callback) -> None:
         """Subscribe to a CAN-ID, and put the callback on the rig's clock."""
@@ -219,7 +219,7 @@ class SimNetwork(canopen.Network):
         retime(target, self._names, _LIBRARY)
 
 
-class SimPeriodic(canopen.network.PeriodicMessageTask):
+class _SimPeriodic(canopen.network.PeriodicMessageTask):
     """A frame that the library sends periodically."""
 
     def __init__(self, repeat: Repeat) -> None:

@@ -41,7 +41,7 @@ _SOFTWARE: Final = (0x1F56, 1)
 
 
 @dataclass(frozen=True, slots=True)
-class BusNode:
+class _BusNode:
     """A slave.
 
     Attributes:
@@ -89,7 +89,7 @@ class _NodeMaker:
         self._joints = dict(self._joints_of(robot)) if robot else {}
         self._robot = (Path(robot.name),) if robot else ()
 
-    def nodes(self) -> Iterator[BusNode]:
+    def nodes(self) -> Iterator[_BusNode]:
         """Yield all valid slaves."""
         for slave in self._bus.slaves.values():
             keys = node_keys.read_keys(
@@ -119,7 +119,7 @@ class _NodeMaker:
 
     def _node(
         self, slave: BusSlave, keys: node_keys.NodeKeys, sheet: eds.DeviceDescription
-    ) -> BusNode:
+    ) -> _BusNode:
         sheet = replace(sheet, template=self._identified(slave, sheet.template))
         profile, about = keys.profile or self._profile, ""
         start = dict(keys.start)
@@ -140,7 +140,7 @@ class _NodeMaker:
         files = (slave.sheet, *self._robot)
         description = replace(sheet, start=start, files=files)
         self._check_start(slave, keys, description)
-        return BusNode(slave.name, slave.node_id, slave.place.line, description, about)
+        return _BusNode(slave.name, slave.node_id, slave.place.line, description, about)
 
     def _identified(self, slave: BusSlave, dictionary: Dictionary) -> Dictionary:
         """Return the dictionary with the identity of the file; 0 leaves a value unchanged."""
@@ -304,7 +304,7 @@ class BusNodes:
         remarks: warnings, one line each.
     """
 
-    nodes: tuple[BusNode, ...]
+    nodes: tuple[_BusNode, ...]
     remarks: tuple[str, ...] = ()
 
 
@@ -366,7 +366,7 @@ def _is_same(file: Path, version: eds.Version) -> bool:
 class _Made(NamedTuple):
     """The result of reading a file: slaves, errors, warnings, added objects."""
 
-    nodes: tuple[BusNode, ...]
+    nodes: tuple[_BusNode, ...]
     mistakes: list[FileMistake]
     remarks: list[FileMistake]
     added: list[FileMistake]

@@ -35,7 +35,7 @@ _SCANNER: Final = "LRFCapture_URG0"
 """The component of a range finder, if the cart has one."""
 
 
-class RunStopped(Exception):  # noqa: N818 - no error
+class _RunStopped(Exception):  # noqa: N818 - no error
     """The user ended the run."""
 
 
@@ -141,7 +141,7 @@ class _SerialBaseConnection:
 
 
 class RunWatcher:
-    """Draws samples if requested, and raises `RunStopped` after a signal."""
+    """Draws samples if requested, and raises `_RunStopped` after a signal."""
 
     def __init__(self, options: MotionOptions, points: Sequence[Pose]) -> None:
         self._ended = self._asking = False
@@ -157,23 +157,23 @@ class RunWatcher:
 
     @contextmanager
     def asking(self) -> Iterator[None]:
-        """Ask the user a question; raise `RunStopped` if the user ends the run."""
+        """Ask the user a question; raise `_RunStopped` if the user ends the run."""
         self._asking = True
         try:
             yield
         except (click.Abort, KeyboardInterrupt):
-            raise RunStopped from None
+            raise _RunStopped from None
         finally:
             self._asking = False
         if self._ended:  # click.pause passes Ctrl-C over
-            raise RunStopped
+            raise _RunStopped
 
     def watch(self, sample: TrackSample) -> None:
         """Handle a sample."""
         if self._map is not None:
             self._map.watch(sample)
         if self._ended:
-            raise RunStopped
+            raise _RunStopped
 
 
 @contextmanager
@@ -183,7 +183,7 @@ def watched(options: MotionOptions, points: Sequence[Pose]) -> Iterator[RunWatch
     with stopped_by_signals(watcher.end):
         try:
             yield watcher
-        except RunStopped:
+        except _RunStopped:
             click.echo("stopped", err=True)
             raise SystemExit(INTERRUPTED) from None
 

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 _LOG = logging.getLogger(__name__)
 
 
-class SimPort(SerialBase):
+class _SimPort(SerialBase):
     """Base of `SimSerial` without the transfer of bytes.
 
     Attributes:
@@ -60,7 +60,7 @@ class SimPort(SerialBase):
         """Copy it with its rig; `rig.fork(port)` does so."""
         return copyreg.__newobj__, (type(self),), vars(self)  # type: ignore[attr-defined]
 
-    def __deepcopy__(self, memo: dict[int, Any]) -> SimPort:
+    def __deepcopy__(self, memo: dict[int, Any]) -> _SimPort:
         """Return a port on a twin of the rig."""
         return twin(self, memo)
 
@@ -212,7 +212,7 @@ _ROOM_BYTES: Final = 256
 """Largest room in the buffer for which a write waits at once."""
 
 
-class SimSerial(SimPort):
+class SimSerial(_SimPort):
     """A `serial.Serial` whose device is on a rig.
 
     Calls, settings and exceptions are pyserial's. Calls that wait advance the rig's time: `read`
@@ -258,7 +258,7 @@ class SimSerial(SimPort):
         """Open the port: on its own line, or on that of a `tickrig://` URL.
 
         Raises:
-            SerialException: no rig offers the name; see `SimPort.open`.
+            SerialException: no rig offers the name; see `_SimPort.open`.
         """
         own_name, own_side = self._own
         if not self.is_open and self.port is not None:

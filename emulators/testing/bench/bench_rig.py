@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 
 # Journal of a bench: lines and frames of all wires, and actions on the devices.
 
-KEPT: Final = 10_000
+_KEPT: Final = 10_000
 """Number of lines kept; earlier ones are only counted."""
 
 _MAPPINGS_KEPT: Final = 4_000
@@ -68,7 +68,7 @@ class Journal(WireLog):
     """
 
     def __init__(self) -> None:
-        super().__init__(KEPT)
+        super().__init__(_KEPT)
         self._logs: list[tuple[str, WireLog]] = []
         self._mappings: deque[WireLine] = deque(maxlen=_MAPPINGS_KEPT)
 
@@ -168,7 +168,7 @@ class Journal(WireLog):
 
     def mappings(self) -> tuple[WireLine, ...]:
         """Return earlier frames that define the contents of PDOs."""
-        first = self._count - KEPT
+        first = self._count - _KEPT
         return tuple(line for line in self._mappings if line.number <= first)
 
 
@@ -209,7 +209,7 @@ def missing_of(lines: Sequence[WireLine]) -> str:
 # Several devices in one table: their signals, and the faults of their wires.
 
 
-class Assembly(Copyable):
+class _Assembly(Copyable):
     """The physical side of several devices.
 
     Signals of a single device have their plain name, those of several have the device as prefix:
@@ -275,7 +275,7 @@ class _AssemblyInputs(Copyable):
         changed: not used: each device has that of its own inputs.
     """
 
-    def __init__(self, assembly: Assembly) -> None:
+    def __init__(self, assembly: _Assembly) -> None:
         self._assembly, self.changed = assembly, False
 
     @property
@@ -335,7 +335,7 @@ class _AssemblyInputs(Copyable):
 class _Table(Mapping[str, InputSignal]):
     """The descriptions, created on request: nodes have many objects."""
 
-    def __init__(self, assembly: Assembly) -> None:
+    def __init__(self, assembly: _Assembly) -> None:
         self._assembly = assembly
 
     def __getitem__(self, name: str) -> InputSignal:
@@ -360,11 +360,11 @@ class _Table(Mapping[str, InputSignal]):
 class BenchOperator(Operator):
     """The operator of several devices."""
 
-    _assembly: Assembly
+    _assembly: _Assembly
     _wires: tuple[str, ...]
 
     @classmethod
-    def at(cls, assembly: Assembly, queue: EventQueue, faults: AssemblyFaults) -> BenchOperator:
+    def at(cls, assembly: _Assembly, queue: EventQueue, faults: AssemblyFaults) -> BenchOperator:
         """Return the operator of several devices, with scheduled actions in a queue."""
         hands = cls(assembly.inputs, assembly.tick_us, queue, faults)
         hands._assembly, hands._wires = assembly, faults.wires
@@ -401,10 +401,10 @@ class Parts:
     seed: int = 0
 
     @property
-    def assembly(self) -> Assembly:
+    def assembly(self) -> _Assembly:
         """The physical side of all devices."""
         devices = {name: part for mount in self.mounts for name, part in mount.parts.items()}
-        return Assembly({**devices, **{body.name: Nodes([], [body]) for body in self.bodies}})
+        return _Assembly({**devices, **{body.name: Nodes([], [body]) for body in self.bodies}})
 
     @property
     def faults(self) -> AssemblyFaults:

@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 _logger = log_of(__name__)
 
 
-class NoNodeIdError(ValueError):
+class _NoNodeIdError(ValueError):
     """A CANopen device without a node-ID."""
 
 
@@ -156,7 +156,7 @@ def _slave_of(
 
     Raises:
         ValueError: its file cannot be read.
-        NoNodeIdError: it has no node-ID.
+        _NoNodeIdError: it has no node-ID.
     """
     kind = Path(device.type) if device.kind is DeviceKind.EDS else device.type
     description = late.describe(eds_cache(), kind, device.profile or AUTO)
@@ -164,7 +164,7 @@ def _slave_of(
         _logger.warning("%s: %s", device.name, line)
     node_id = description.node_id if device.node_id is None else device.node_id
     if node_id is None:
-        raise NoNodeIdError(f"{device.name}: {device.type} gives no node-ID: add node_id = 1..127")
+        raise _NoNodeIdError(f"{device.name}: {device.type} gives no node-ID: add node_id = 1..127")
     slave: CanopenSlave | None = device.made.take(device.made_of())
     if slave is None:
         dictionary, memory = description.make_dictionary(), None
@@ -179,7 +179,7 @@ def _slave_of(
 
 # The rig of a bench, with all settings of its rig file.
 
-NAME = "bench"
+_NAME = "bench"
 
 
 def rig_of(
@@ -212,7 +212,7 @@ def rig_of(
     )
     for store in parts.stores:
         state.rig.watchers.append(late.store_keeper(store))
-    rig = BenchRig(NAME, state)
+    rig = BenchRig(_NAME, state)
     _begin_faults(plan, rig)
     return rig
 
@@ -304,7 +304,7 @@ def _slave(mount: BusMount, plan: DevicePlan) -> tuple[CanopenSlave, DeviceEntry
     """Return a named slave and its trace entry."""
     try:
         slave, entry = _slave_of(plan, {})
-    except NoNodeIdError:
+    except _NoNodeIdError:
         raise ValueError(
             f"{plan.name}: {plan.type} gives no node-ID: write '5={plan.type}'"
         ) from None

@@ -110,7 +110,7 @@ def when(rig: BenchRig, condition: Condition, act: Callable[[], None]) -> None:
 DAY_US: Final = 86_400_000_000
 """Longest wait of a body in virtual time without a limit."""
 
-T = TypeVar("T")
+_T = TypeVar("_T")
 
 _NO_LOOP: Final = "no running event loop"
 """Message of asyncio without a running loop."""
@@ -139,7 +139,7 @@ class Wait:
         return came
 
 
-class TaskWait(Protocol):
+class _TaskWait(Protocol):
     """An object that advances the time for the body of a test."""
 
     @property
@@ -152,7 +152,7 @@ class TaskWait(Protocol):
         ...
 
 
-def run_body(waiting: TaskWait, body: Coroutine[Any, Any, T]) -> T:
+def run_body(waiting: _TaskWait, body: Coroutine[Any, Any, _T]) -> _T:
     """Run the body of a test, advancing the time while it waits.
 
     Raises:
@@ -165,12 +165,12 @@ def run_body(waiting: TaskWait, body: Coroutine[Any, Any, T]) -> T:
         try:
             wait = _step(body, came)
         except StopIteration as end:
-            result: T = end.value
+            result: _T = end.value
             return result
         came = _wait(waiting, wait)
 
 
-def _wait(waiting: TaskWait, wait: Wait) -> bool:
+def _wait(waiting: _TaskWait, wait: Wait) -> bool:
     """Advance the time until a condition is true; return False after the time-out."""
     begun_us, for_ever = waiting.now_us, wait.until_us == NEVER
     try:
@@ -186,7 +186,7 @@ def _wait(waiting: TaskWait, wait: Wait) -> bool:
     return came
 
 
-class Task(Generic[T]):
+class Task(Generic[_T]):
     """A body that runs beside the test, between two ticks.
 
     Args:
@@ -194,10 +194,10 @@ class Task(Generic[T]):
         body: the body; it must not advance the time itself.
     """
 
-    def __init__(self, rig: BenchRig, body: Coroutine[Any, Any, T]) -> None:
+    def __init__(self, rig: BenchRig, body: Coroutine[Any, Any, _T]) -> None:
         self._rig, self._body = rig, body
         self._wait: Wait | None = None
-        self._result: list[T] = []
+        self._result: list[_T] = []
         self._error: BaseException | None = None
         self._raised = False
         rig.rig.watchers.append(self._look)
@@ -208,7 +208,7 @@ class Task(Generic[T]):
         """Whether it has ended, with or without an exception."""
         return self._wait is None
 
-    def result(self) -> T:
+    def result(self) -> _T:
         """Return its result, or raise its exception.
 
         Raises:
@@ -226,7 +226,7 @@ class Task(Generic[T]):
         if self._error is not None and not self._raised:
             self.result()
 
-    def __await__(self) -> Generator[Wait, bool, T]:
+    def __await__(self) -> Generator[Wait, bool, _T]:
         """Wait for its end."""
         yield Wait(lambda: self.done)
         return self.result()

@@ -37,11 +37,11 @@ _MOST_BYTES: Final = 64 << 20
 """Largest size of an answer."""
 
 
-class WorkerDied(Exception):  # noqa: N818 - nobody's fault
+class _WorkerDied(Exception):  # noqa: N818 - nobody's fault
     """The process of a worker has ended; the message says how."""
 
 
-class RunHung(Exception):  # noqa: N818 - that of the test
+class _RunHung(Exception):  # noqa: N818 - that of the test
     """A run took too long; its worker was ended."""
 
 
@@ -53,7 +53,7 @@ class _WorkerProcess:
 
     Raises:
         Refusal: pytest refuses it.
-        WorkerDied: the process has ended before its first answer.
+        _WorkerDied: the process has ended before its first answer.
     """
 
     def __init__(self, order: CampaignOrder) -> None:
@@ -80,7 +80,7 @@ class _WorkerProcess:
             if not isinstance(answer, Collected):
                 raise CampaignRefusal(str(answer))
             self.collected: Collected = answer
-        except RunHung:
+        except _RunHung:
             raise CampaignRefusal(f"the tests were not collected within {_START_S:g} s") from None
         except BrokenPipeError:
             raise self._died() from None
@@ -89,7 +89,7 @@ class _WorkerProcess:
                 self.end()
 
     def request(self, runs: Sequence[Run]) -> None:
-        """Request runs; WorkerDied if the process has ended."""
+        """Request runs; _WorkerDied if the process has ended."""
         try:
             self._conn.send(list(runs))
         except OSError:
@@ -99,14 +99,14 @@ class _WorkerProcess:
         """Wait for the verdict of a run.
 
         Raises:
-            RunHung: no verdict in time.
-            WorkerDied: the process has ended, or sent something else.
+            _RunHung: no verdict in time.
+            _WorkerDied: the process has ended, or sent something else.
         """
         answer = self._receive(timeout_s)
         try:
             return verdicts_of([answer], [run])[0]
         except ValueError as mistake:
-            raise WorkerDied(f"when it sent {mistake}") from None
+            raise _WorkerDied(f"when it sent {mistake}") from None
 
     def _receive(self, timeout_s: float) -> object:
         """Wait for an answer; time in which this process is stopped does not count."""
@@ -115,22 +115,22 @@ class _WorkerProcess:
             while not self._conn.poll(_LOOK_S):
                 waited_s += _LOOK_S
                 if waited_s >= timeout_s:
-                    raise RunHung
+                    raise _RunHung
             data = self._conn.recv_bytes(_MOST_BYTES)
         except (EOFError, OSError):
             raise self._died() from None
         try:
             return pickle.loads(data)
         except Exception as error:  # pickle raises anything
-            raise WorkerDied(f"when it sent unreadable data: {error!r}") from None
+            raise _WorkerDied(f"when it sent unreadable data: {error!r}") from None
 
-    def _died(self) -> WorkerDied:
+    def _died(self) -> _WorkerDied:
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(_LOOK_S)
         status = self._process.poll()
         if status is not None and status < 0:
-            return WorkerDied(f"by signal {-status}, {signal.strsignal(-status)}")
-        return WorkerDied(f"with exit status {status}")
+            return _WorkerDied(f"by signal {-status}, {signal.strsignal(-status)}")
+        return _WorkerDied(f"with exit status {status}")
 
     @property
     def is_alive(self) -> bool:
@@ -197,10 +197,10 @@ class Crew:
                 for verdict in self._request(left, digest):
                     verdicts.append(verdict)
                     left.popleft()
-            except RunHung:
+            except _RunHung:
                 reason = f"no verdict within {self.order.timeout_s:g} s"
                 verdicts.append(RunVerdict(left.popleft().number, HUNG, 0, "", reason))
-            except WorkerDied as death:  # its run is done again
+            except _WorkerDied as death:  # its run is done again
                 number = left[0].number
                 deaths[number] += 1
                 if deaths[number] == _ATTEMPTS:
@@ -246,7 +246,7 @@ class Crew:
         for attempt in range(_ATTEMPTS):
             try:
                 return _WorkerProcess(self.order)
-            except WorkerDied as death:
+            except _WorkerDied as death:
                 if attempt == _ATTEMPTS - 1:
                     raise CampaignRefusal(f"no worker starts; the last ended {death}") from None
         raise AssertionError

@@ -28,7 +28,7 @@ from tickrig.emulators.testing.campaign.order import (
 from tickrig.emulators.testing.campaign.plan import CampaignPlan
 from tickrig.host.text.page_text import one_line
 
-CONNECT_S: Final = 10.0
+_CONNECT_S: Final = 10.0
 _SCHEDULER: Final = "Scheduler"
 """Type name of a scheduler, in place of a worker's `Worker`."""
 
@@ -83,10 +83,10 @@ class DaskWorkers:
         if re.fullmatch(r"\w+://.+:[0-9]+", url) is None:
             raise CampaignRefusal(f"--scheduler {url}: write tcp://HOST:PORT")
         try:
-            asyncio.run(asyncio.wait_for(_ask_for_scheduler(url), CONNECT_S))
-            self._client = Client(url, timeout=CONNECT_S, set_as_default=False)
+            asyncio.run(asyncio.wait_for(_ask_for_scheduler(url), _CONNECT_S))
+            self._client = Client(url, timeout=_CONNECT_S, set_as_default=False)
         except TimeoutError:
-            raise CampaignRefusal(f"--scheduler {url}: no answer within {CONNECT_S:g} s") from None
+            raise CampaignRefusal(f"--scheduler {url}: no answer within {_CONNECT_S:g} s") from None
         except Exception as error:  # Dask raises anything when something else listens there
             text = one_line(str(error).partition("\n")[0]) or type(error).__name__
             raise CampaignRefusal(f"--scheduler {url}: no Dask scheduler: {text}") from None
@@ -163,7 +163,7 @@ class DaskWorkers:
 
 async def _ask_for_scheduler(url: str) -> None:
     """Raise unless a scheduler answers; a `Client` waits for the answer without a limit."""
-    async with rpc(url, timeout=CONNECT_S) as scheduler:
+    async with rpc(url, timeout=_CONNECT_S) as scheduler:
         answer = await scheduler.identity()
     if not isinstance(answer, dict) or answer.get("type") != _SCHEDULER:
         raise ValueError(f"{one_line(repr(answer))[:60]} answers there")

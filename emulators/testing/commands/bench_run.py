@@ -38,7 +38,7 @@ _INTERRUPTED: Final = 130
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class BenchOptions(RunOptions):
+class _BenchOptions(RunOptions):
     """The command line.
 
     Attributes:
@@ -78,7 +78,7 @@ def run_bench(
         virtual: in virtual time.
         control: where its control socket is to be; None for what the file says.
         seed: of all chance; None for what the file says.
-        others: the other options, as `BenchOptions` has them.
+        others: the other options, as `_BenchOptions` has them.
 
     Raises:
         Refused: the command line asks for something that cannot be done.
@@ -97,7 +97,7 @@ def run_bench(
     plan = plan if seed is None else replace(plan, seed=seed)
     control = None if virtual else control or plan.real.control
     command = _command(file, plan.seed, virtual=virtual, **others)
-    options = BenchOptions(virtual=virtual, control=control, command=command, **others)
+    options = _BenchOptions(virtual=virtual, control=control, command=command, **others)
     with mistakes_in(each.type for each in plan.devices.values()):
         return _BenchRun(plan, options).run()
 
@@ -127,7 +127,7 @@ def _span(us: int) -> str:
     return f"{us}us" if us % 1_000_000 else f"{us // 1_000_000}s"
 
 
-class _BenchRun(EmulatorRun[BenchOptions]):
+class _BenchRun(EmulatorRun[_BenchOptions]):
     """One run.
 
     Args:
@@ -135,7 +135,7 @@ class _BenchRun(EmulatorRun[BenchOptions]):
         options: the command line.
     """
 
-    def __init__(self, plan: RigPlan, options: BenchOptions) -> None:
+    def __init__(self, plan: RigPlan, options: _BenchOptions) -> None:
         super().__init__(options)
         self._plan = plan
         self._outside: OutsideEnds | None = None
@@ -235,7 +235,7 @@ class _BenchRun(EmulatorRun[BenchOptions]):
         bench.stop()
 
     def _greet(self, bench: RunningEmulator) -> None:
-        for line in columns(self._row(mount) for mount in self._mounts):
+        for line in _columns(self._row(mount) for mount in self._mounts):
             click.echo(line)
         say(f"{self._plan.path} in real time. Ctrl-C ends.")
         self._say_how("Add --control PATH to press buttons and make faults.")
@@ -265,10 +265,10 @@ class _BenchRun(EmulatorRun[BenchOptions]):
         )
 
 
-def columns(rows: Iterable[tuple[str, ...]]) -> Iterator[str]:
+def _columns(rows: Iterable[tuple[str, ...]]) -> Iterator[str]:
     """Yield rows with their columns below each other.
 
-    >>> list(columns([("a", "bc"), ("def", "g")]))
+    >>> list(_columns([("a", "bc"), ("def", "g")]))
     ['a    bc', 'def  g']
     """
     rows = list(rows)

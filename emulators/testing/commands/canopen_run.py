@@ -64,7 +64,7 @@ class _BusYml(NamedTuple):
     urdf: Path | None = None
 
 
-class BusPortOpener(NamedTuple):
+class _BusPortOpener(NamedTuple):
     """A bus outside.
 
     Attributes:
@@ -78,7 +78,7 @@ class BusPortOpener(NamedTuple):
     channel: str
 
 
-def open_bus(options: BusOptions, stack: ExitStack) -> BusPortOpener:
+def open_bus(options: BusOptions, stack: ExitStack) -> _BusPortOpener:
     """Open the bus from options, environment or configuration files of python-can.
 
     Raises:
@@ -89,10 +89,10 @@ def open_bus(options: BusOptions, stack: ExitStack) -> BusPortOpener:
     stack.callback(close_bus, bus)
     name = interface if channel is None else f"{interface} {channel}"
     label = "_".join(str(channel).split()) if channel not in (None, "") else interface
-    return BusPortOpener(port_on(bus, interface, f"CAN bus {name}"), name, label)
+    return _BusPortOpener(port_on(bus, interface, f"CAN bus {name}"), name, label)
 
 
-class RigNodes(NamedTuple):
+class _RigNodes(NamedTuple):
     """Content of a rig file.
 
     Attributes:
@@ -119,7 +119,7 @@ class _CanopenOptions(RunOptions):
     """
 
     specs: tuple[NodeSpec, ...] = ()
-    rig: RigNodes = field(default_factory=RigNodes)
+    rig: _RigNodes = field(default_factory=_RigNodes)
     bus_yml: _BusYml = field(default_factory=_BusYml)
     profile: str = AUTO
     bus: BusOptions = field(default_factory=BusOptions)
@@ -294,7 +294,7 @@ def emulate(
         specs = (*_specs(given, node_id), *_more(nodes))
     except ValueError as error:
         raise Refused(str(error)) from None
-    file = RigNodes() if rig is None else read_rig(rig)
+    file = _RigNodes() if rig is None else read_rig(rig)
     sdo = _sdo_limits(options.pop("sdo_timeout"), options.pop("sdo_memory"))
     run = _CanopenRun(
         _CanopenOptions(
@@ -309,7 +309,7 @@ def emulate(
 _MORE_THAN_NODES: Final = "there is more than nodes on one bus ({what}): tickrig run {path}"
 
 
-def read_rig(path: Path) -> RigNodes:
+def read_rig(path: Path) -> _RigNodes:
     """Read the nodes of a rig file, and the body that they move.
 
     Raises:
@@ -325,7 +325,7 @@ def read_rig(path: Path) -> RigNodes:
         refuse_path("rig", error)
     if what := _beyond_nodes(plan):
         raise Refused(f"rig {path}: {_MORE_THAN_NODES.format(what=what, path=path)}")
-    return RigNodes(tuple(map(_described, plan.devices.values())), plan.body)
+    return _RigNodes(tuple(map(_described, plan.devices.values())), plan.body)
 
 
 def _beyond_nodes(plan: RigPlan) -> str:

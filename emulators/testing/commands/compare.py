@@ -71,7 +71,7 @@ def _compare_ticks(
     said = replay.traffic_of(recording.of(name), Mark.FROM_DEVICE)
     played = ((at, data, 0) for at, data in replay.play_device(recording, name, configured.device))
     return _ComparedRun(
-        list(cut(split(Mark.FROM_DEVICE), said)), list(cut(split(Mark.FROM_DEVICE), played))
+        list(_cut(split(Mark.FROM_DEVICE), said)), list(_cut(split(Mark.FROM_DEVICE), played))
     )
 
 
@@ -96,7 +96,7 @@ def _compare_port(
     records, device = recording.of(name), make().device
     until_us = recording.until_us + tolerance.allowed_us(recording.until_us)
     split = make().type.line.splitter or line_splitter
-    recorded = list(cut(split(Mark.FROM_DEVICE), replay.traffic_of(records, Mark.FROM_DEVICE)))
+    recorded = list(_cut(split(Mark.FROM_DEVICE), replay.traffic_of(records, Mark.FROM_DEVICE)))
 
     def run(begin_us: int) -> _ComparedRun:
         emulated = _play(make(), records, begin_us, begin_us + until_us)
@@ -172,7 +172,7 @@ def _act(emulator: Emulator, record: BenchRecord, now_us: int) -> None:
         replay.do(emulator.device, record)
 
 
-def cut(split: Splitter, traffic: Iterable[tuple[int, object, int]]) -> Iterator[Said]:
+def _cut(split: Splitter, traffic: Iterable[tuple[int, object, int]]) -> Iterator[Said]:
     """Yield the lines of the traffic, each with time and line number of its end."""
     for at_us, data, line in traffic:
         assert isinstance(data, bytes)
@@ -185,7 +185,7 @@ def cut(split: Splitter, traffic: Iterable[tuple[int, object, int]]) -> Iterator
 _ALWAYS: Final = (0x080, 0x580, 0x700)
 """CAN-IDs of a node without an object: EMCY, answers of its SDO server, heartbeat."""
 
-EMCY: Final = (0x1014, 0)
+_EMCY: Final = (0x1014, 0)
 _SDO_SERVERS: Final = range(0x1200, 0x1280)
 _TPDOS: Final = range(0x1800, 0x1A00)
 _UNUSED: Final = 1 << 31
@@ -306,7 +306,7 @@ class _Produced:
 
     def __init__(self, slave: CanopenSlave) -> None:
         self._slave = slave
-        wanted = [EMCY, *((x, 2) for x in _SDO_SERVERS), *((x, 1) for x in _TPDOS)]
+        wanted = [_EMCY, *((x, 2) for x in _SDO_SERVERS), *((x, 1) for x in _TPDOS)]
         found = [slave.dictionary.find(*each) for each in wanted]
         self._entries = [entry for entry in found if entry is not None]
 

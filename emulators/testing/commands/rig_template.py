@@ -38,7 +38,7 @@ _MOST_NODES: Final = 127
 _NO_NAME: Final = re.compile(r"\W+", re.ASCII)
 
 
-class TypeRefusedError(ValueError):
+class _TypeRefusedError(ValueError):
     """A type of which no device can be made; the text says why."""
 
 
@@ -51,7 +51,7 @@ def rig_template(types: Iterable[str], file: str, folder: Path) -> str:
         folder: where it will be: other files are looked for there.
 
     Raises:
-        TypeRefusedError: a device cannot be made.
+        _TypeRefusedError: a device cannot be made.
     """
     made = list(_make(types, folder))
     nodes = [found for _, found in made if found.baud is None]
@@ -73,11 +73,11 @@ def _make(types: Iterable[str], folder: Path) -> Iterator[tuple[DevicePlan, Prob
         try:
             kind, place = kind_of(given, folder)
         except ValueError as error:
-            raise TypeRefusedError(str(error)) from None
+            raise _TypeRefusedError(str(error)) from None
         plan = DevicePlan(name=_name(given, names), kind=kind, type=place, wire="")
         found = probe(plan)
         if not isinstance(found, Probe):
-            raise TypeRefusedError(f"{given}: {found[0].reason}")
+            raise _TypeRefusedError(f"{given}: {found[0].reason}")
         node_id = _free(found.node_id or 1, node_ids) if found.baud is None else None
         yield replace(plan, type=given, node_id=node_id), found
 
@@ -186,7 +186,7 @@ def init(types: tuple[str, ...], file: Path) -> None:
     folder = Path() if on_output else file.parent
     try:
         text = rig_template(types or ("rrc",), _RIG if on_output else file.name, folder)
-    except TypeRefusedError as error:
+    except _TypeRefusedError as error:
         raise Refused(f"--device {error}") from None
     if on_output:
         click.echo(text, nl=False)

@@ -164,8 +164,8 @@ BIT_RATE: Final = 1_000_000
 _NODE_IDS: Final = range(1, 128)
 _LEVELS: Final = tuple(level.word for level in Level)
 
-Called = Callable[[], SlaveCall]
-Node = Slave | CanopenSlave | BenchDevice | Called
+_Called = Callable[[], SlaveCall]
+Node = Slave | CanopenSlave | BenchDevice | _Called
 """Objects that can be tested."""
 
 
@@ -254,7 +254,7 @@ def _source(
         return replace(source, stimulus=lambda number: guarded(stimulus)) if stimulus else source
     if is_slave(node) and not isinstance(node, type):
         return SlaveBench(node, bit_rate, stimulus).source
-    return SlaveBench(CalledSlave(cast("Called", node)), bit_rate, stimulus).source
+    return SlaveBench(CalledSlave(cast("_Called", node)), bit_rate, stimulus).source
 
 
 def level_of(word: str) -> Level:

@@ -14,7 +14,7 @@ from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.instant import NEVER
 
 _INITIALISING: Final = 0
-Data = bytes | bytearray | Iterable[int] | None
+_Data = bytes | bytearray | Iterable[int] | None
 
 
 class LocalNodeSlave:
@@ -97,12 +97,12 @@ class _Network(canopen.Network):
         sent, self._sent = tuple(self._sent), []
         return sent
 
-    def send_message(self, can_id: int, data: Data, remote: bool = False) -> None:
+    def send_message(self, can_id: int, data: _Data, remote: bool = False) -> None:
         """Send a frame."""
         self._sent.append(CanFrame(can_id, bytes(data or b""), remote))
 
     def send_periodic(
-        self, can_id: int, data: Data, period: float, remote: bool = False
+        self, can_id: int, data: _Data, period: float, remote: bool = False
     ) -> _Periodic:
         """Send a frame now, and again each `period` seconds."""
         task = _Periodic(self.tasks, can_id, data, round(period * 1e6), self._slave.now_us)
@@ -114,7 +114,7 @@ class _Periodic(canopen.network.PeriodicMessageTask):
     """A periodic frame."""
 
     def __init__(
-        self, tasks: list[_Periodic], can_id: int, data: Data, period_us: int, due_us: int
+        self, tasks: list[_Periodic], can_id: int, data: _Data, period_us: int, due_us: int
     ) -> None:
         self._tasks, self.can_id, self.data = tasks, can_id, bytes(data or b"")
         self.period_us, self.due_us = max(TICK_US, period_us), due_us
@@ -124,6 +124,6 @@ class _Periodic(canopen.network.PeriodicMessageTask):
         if self in self._tasks:
             self._tasks.remove(self)
 
-    def update(self, data: Data) -> None:
+    def update(self, data: _Data) -> None:
         """Send other data from the next time on."""
         self.data = bytes(data or b"")

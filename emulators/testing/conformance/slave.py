@@ -69,12 +69,12 @@ def is_slave(node: object) -> TypeGuard[Slave]:
 
 # A slave from a callable: its factory for each power-on, and error messages.
 
-STEP: Final = (0, ())
+_STEP: Final = (0, ())
 """A time and frames."""
 _EXAMPLE: Final = "what makes the slave at each power-on, as `lambda: Mini(5).step`"
 
 
-class NoFrames(Exception):  # noqa: N818 - what the slave has returned
+class _NoFrames(Exception):  # noqa: N818 - what the slave has returned
     """The result of a slave cannot be sent on a bus; the message describes it."""
 
 
@@ -98,7 +98,7 @@ class CalledSlave:
         call = make()
         if is_slave(call):
             raise ValueError(f"{_name(make)} makes a slave: give the slave itself")
-        if not _takes(call, *STEP):
+        if not _takes(call, *_STEP):
             given = f"{_name(make)} makes {_name(call)}"
             raise ValueError(f"{given}, which takes no time and frames: give {_EXAMPLE}")
         self._make, self._call, self.due_us = make, call, 0
@@ -115,30 +115,30 @@ class CalledSlave:
 
 def is_step(node: object) -> bool:
     """Return whether it is the callable for each millisecond, not its factory."""
-    return not is_slave(node) and _takes(node, *STEP) and not _takes(node)
+    return not is_slave(node) and _takes(node, *_STEP) and not _takes(node)
 
 
 def checked_frames(sent: object) -> Frames:
     """Return the frames of a slave if they can be sent on a bus.
 
     Raises:
-        NoFrames: they cannot.
+        _NoFrames: they cannot.
     """
     if type(sent) is tuple and all(map(_is_plain, sent)):
         return sent
     if isinstance(sent, CanFrame | str | bytes) or not isinstance(sent, Iterable):
-        raise NoFrames(f"returned {_short(sent)}, not a list of CanFrame")
+        raise _NoFrames(f"returned {_short(sent)}, not a list of CanFrame")
     frames = tuple(sent)
     for frame in frames:
         if not isinstance(frame, CanFrame):
-            raise NoFrames(f"returned {_short(frame)} where a CanFrame should be")
+            raise _NoFrames(f"returned {_short(frame)} where a CanFrame should be")
         can_id, data, *_ = tuple[object, ...](frame)
         if not (isinstance(can_id, int) and isinstance(data, bytes | bytearray)):
-            raise NoFrames(f"returned {_short(frame)}: can_id is an int, data are bytes")
+            raise _NoFrames(f"returned {_short(frame)}: can_id is an int, data are bytes")
         try:
             frame.checked()
         except FieldError as error:
-            raise NoFrames(f"returned {_short(frame)}: {error}") from None
+            raise _NoFrames(f"returned {_short(frame)}: {error}") from None
     return frames
 
 
@@ -230,7 +230,7 @@ def _crash_text(error: Exception, who: str) -> str:
     >>> _crash_text(KeyError("x"), "your slave")
     "your slave raised KeyError: 'x'"
     """
-    if isinstance(error, NoFrames):
+    if isinstance(error, _NoFrames):
         return f"{who} {error}"
     kind = type(error)
     name = kind.__name__ if kind.__module__ == "builtins" else f"{kind.__module__}.{kind.__name__}"
@@ -240,7 +240,7 @@ def _crash_text(error: Exception, who: str) -> str:
 
 def _crash_lines(error: Exception) -> list[str]:
     """Return the traceback lines, outermost first, without ours before the user's."""
-    if isinstance(error, NoFrames):
+    if isinstance(error, _NoFrames):
         return []
     return list(_lines(error, _OURS)) or list(_lines(error, "no module"))
 

@@ -15,8 +15,8 @@ from typing import Any, Final, TypeVar, TypeVarTuple
 from tickrig.emulators.rig.sim_waits import Passing
 from tickrig.emulators.testing.host_clock.host_code import HostTimeError
 
-T = TypeVar("T")
-Ts = TypeVarTuple("Ts")
+_T = TypeVar("_T")
+_Ts = TypeVarTuple("_Ts")
 
 _EXECUTOR_S: Final = 5.0
 """How long, in real time, a loop waits for a function that it runs in a thread."""
@@ -45,8 +45,8 @@ class _BenchLoop(asyncio.SelectorEventLoop):
         return self._passing.time_s
 
     def run_in_executor(
-        self, executor: Executor | None, func: Callable[[*Ts], T], *args: *Ts
-    ) -> asyncio.Future[T]:
+        self, executor: Executor | None, func: Callable[[*_Ts], _T], *args: *_Ts
+    ) -> asyncio.Future[_T]:
         """Run a function in a thread, and wait for it without advancing the virtual time.
 
         Args:

@@ -21,7 +21,7 @@ _FAILED: Final = "failed"
 _EVERY: Final = "every"
 
 
-class Option(NamedTuple):
+class _Option(NamedTuple):
     """An option of the command line, which the configuration file has as well.
 
     Attributes:
@@ -43,19 +43,19 @@ class Option(NamedTuple):
 
 
 OPTIONS: Final = (
-    Option("bench", "RIG.TOML", "rig file of the bench, in place of what `bench_config` gives"),
-    Option("bench_mode", "MODE", "virtual, real or hardware; several, with commas, run each test"),
-    Option("bench_seed", "N", "seed of all chance, or `random`, which is printed"),
-    Option("bench_artifacts", "DIR", "keep trace, candump and transcript of failed tests here"),
-    Option("bench_artifacts_of", "WHICH", "of which tests: failed or every"),
-    Option("bench_compare", "", "run each test twice; what differs between the runs is a failure"),
-    Option("bench_report", "OUT.HTML", "write a report of all tests that have a bench"),
-    Option("bench_requirements", "FILE", "what the report has to show: a requirement a line"),
-    Option("bench_param", "NAME=V,V", "run tests that take NAME with each value; many", many=True),
+    _Option("bench", "RIG.TOML", "rig file of the bench, in place of what `bench_config` gives"),
+    _Option("bench_mode", "MODE", "virtual, real or hardware; several, with commas, run each test"),
+    _Option("bench_seed", "N", "seed of all chance, or `random`, which is printed"),
+    _Option("bench_artifacts", "DIR", "keep trace, candump and transcript of failed tests here"),
+    _Option("bench_artifacts_of", "WHICH", "of which tests: failed or every"),
+    _Option("bench_compare", "", "run each test twice; what differs between the runs is a failure"),
+    _Option("bench_report", "OUT.HTML", "write a report of all tests that have a bench"),
+    _Option("bench_requirements", "FILE", "what the report has to show: a requirement a line"),
+    _Option("bench_param", "NAME=V,V", "run tests that take NAME with each value; many", many=True),
 )
 
 
-class BenchParameter(NamedTuple):
+class _BenchParameter(NamedTuple):
     """What tests take by name, as an argument or through fixtures.
 
     Attributes:
@@ -92,7 +92,7 @@ class PluginSettings(NamedTuple):
     compare: bool = False
     report: Path | None = None
     requirements: Path | None = None
-    parameters: tuple[BenchParameter, ...] = ()
+    parameters: tuple[_BenchParameter, ...] = ()
 
     @classmethod
     def of(cls, config: pytest.Config) -> PluginSettings:
@@ -123,7 +123,7 @@ class PluginSettings(NamedTuple):
 SETTINGS: Final = pytest.StashKey[PluginSettings]()
 
 
-def _wanted(config: pytest.Config, option: Option) -> str:
+def _wanted(config: pytest.Config, option: _Option) -> str:
     given = config.getoption(option.name)
     if isinstance(given, list):
         given = "\n".join(given)
@@ -165,9 +165,9 @@ def _seed(text: str) -> int | None:
     return int(text)
 
 
-def _parameters(text: str) -> tuple[BenchParameter, ...]:
+def _parameters(text: str) -> tuple[_BenchParameter, ...]:
     """Read the lines `NAME=VALUE,VALUE`."""
-    found: dict[str, BenchParameter] = {}
+    found: dict[str, _BenchParameter] = {}
     for line in filter(None, map(str.strip, text.splitlines())):
         name, _, listed = line.partition("=")
         words = tuple(dict.fromkeys(values.split_list(listed)))
@@ -175,7 +175,7 @@ def _parameters(text: str) -> tuple[BenchParameter, ...]:
             raise pytest.UsageError(f"--bench-param {line}: write NAME=VALUE,VALUE, as flip=0.001")
         if name in found:
             raise pytest.UsageError(f"--bench-param {line}: {name} has values already")
-        found[name] = BenchParameter(name, words)
+        found[name] = _BenchParameter(name, words)
     return tuple(found.values())
 
 

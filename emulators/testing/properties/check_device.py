@@ -88,7 +88,7 @@ _TRIES: Final = 200
 """So often something shorter is looked for, once something was found."""
 
 
-def search(
+def _search(
     check: Callable[..., None],
     drawn: st.SearchStrategy[Session],
     names: tuple[str, ...],
@@ -195,7 +195,7 @@ def check_device(  # noqa: PLR0913 - by name
     if traffic is None:
         traffic = strategies.frames() if on_can else strategies.chunks()
     bench = partial(DeviceBench, make=make, wire=wire, start=start)
-    find = partial(search, drawn=strategies.sessions(device, traffic), max_examples=max_examples)
+    find = partial(_search, drawn=strategies.sessions(device, traffic), max_examples=max_examples)
     checks = DeviceChecks(bench, remembers, pauses)
     try:
         find(checks.check_ticks, names=("session",))

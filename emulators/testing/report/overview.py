@@ -64,7 +64,7 @@ class OverallVerdict(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class RequirementRow:
+class _RequirementRow:
     """A requirement and its tests.
 
     Attributes:
@@ -125,7 +125,7 @@ def counts(tests: Iterable[TestRecord]) -> dict[Outcome, int]:
     return {outcome: found[outcome] for outcome in Outcome}
 
 
-def requirement_rows(report: BenchReport, tests: Iterable[ReportedTest]) -> list[RequirementRow]:
+def requirement_rows(report: BenchReport, tests: Iterable[ReportedTest]) -> list[_RequirementRow]:
     """Return the requirements, by verdict and then by name, numbers in their order."""
     texts = {requirement.name: requirement.text for requirement in report.requirements}
     shown_by: dict[str, list[ReportedTest]] = {name: [] for name in texts}
@@ -133,7 +133,7 @@ def requirement_rows(report: BenchReport, tests: Iterable[ReportedTest]) -> list
         for name in dict.fromkeys(test.record.requirements):
             shown_by.setdefault(name, []).append(test)
     rows = [
-        RequirementRow(name, texts.get(name, ""), tuple(shown), name in texts or not texts)
+        _RequirementRow(name, texts.get(name, ""), tuple(shown), name in texts or not texts)
         for name, shown in shown_by.items()
     ]
     order = list(OverallVerdict)

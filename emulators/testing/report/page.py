@@ -86,7 +86,7 @@ class _PageRoom:
             case _PagePart.JOURNAL:
                 return _size_of("".join(_journal_texts(test)))
             case _PagePart.TRACE:
-                return _size_of(cut(test.trace, _TRACE_BYTES)[0])
+                return _size_of(_cut(test.trace, _TRACE_BYTES)[0])
 
 
 def _journal_texts(test: TestRecord) -> Iterator[str]:
@@ -100,7 +100,7 @@ def _size_of(text: str) -> int:
     return len(str(escape(text)).encode("utf-8", "replace"))
 
 
-def cut(text: str, most: int) -> tuple[str, int]:
+def _cut(text: str, most: int) -> tuple[str, int]:
     """Return whole lines of at most so many characters from the beginning, and how many are cut."""
     if len(text) <= most:
         return text, 0
@@ -251,10 +251,10 @@ def _test_on_page(
     return _TestOnPage(
         place,
         timeline if _PagePart.TIMELINE in parts else None,
-        cut(test.longrepr, _TEXT_BYTES)[0] if _PagePart.TEXT in parts else "",
+        _cut(test.longrepr, _TEXT_BYTES)[0] if _PagePart.TEXT in parts else "",
         lines if _PagePart.JOURNAL in parts else (),
         test.journal_left_out + len(test.journal) - len(lines),
-        cut(test.trace, _TRACE_BYTES)[0] if _PagePart.TRACE in parts else "",
+        _cut(test.trace, _TRACE_BYTES)[0] if _PagePart.TRACE in parts else "",
         tuple(_left_out(test, timeline, parts)),
         opened,
     )
@@ -269,7 +269,7 @@ def _left_out(test: TestRecord, timeline: Timeline | None, parts: set[_PagePart]
     for part, name, text, most in texts:
         if text and part not in parts:
             yield f"{name}, {page_text.size(len(text))}"
-        elif missing := cut(text, most)[1]:
+        elif missing := _cut(text, most)[1]:
             yield f"the last {page_text.size(missing)} of {name}"
     if timeline and _PagePart.TIMELINE not in parts:
         yield "the plots"

@@ -38,7 +38,7 @@ _MOST: Final = 2**63 - 1
 _MOST_SHARED: Final = 50_000
 """So many values of a column are remembered before the memory of them is emptied."""
 
-T = TypeVar("T")
+_T = TypeVar("_T")
 
 _Reader = Callable[[Any], Any]
 """Makes a value of what JSON gives."""
@@ -61,7 +61,7 @@ def to_data(value: Any) -> Any:  # what a value holds is open
     return asdict(value)
 
 
-def from_data(kind: type[T], data: object) -> T:
+def from_data(kind: type[_T], data: object) -> _T:
     """Make a value of a report out of what `to_data` gave.
 
     Args:
@@ -72,7 +72,7 @@ def from_data(kind: type[T], data: object) -> T:
         ReportError: a key or value that it cannot have.
     """
     hint: Any = kind
-    value: T = _reader(hint)(data)
+    value: _T = _reader(hint)(data)
     return value
 
 
@@ -365,7 +365,7 @@ def _made(kind: type[Any], values: Mapping[str, Any]) -> Any:
 
 
 _PAGES: Final = (".html", ".htm", "")
-JSON: Final = ".json"
+_JSON: Final = ".json"
 """Ends the name of a report that is kept as JSON."""
 
 
@@ -376,9 +376,9 @@ def check_report(path: Path) -> None:
         ValueError: Jinja2 is not there, the folder is not, or nothing can be written to it; or
             the name is that of a folder, or of a kind of file that no report is.
     """
-    if path.suffix.lower() not in (*_PAGES, JSON) and not is_special(path):
+    if path.suffix.lower() not in (*_PAGES, _JSON) and not is_special(path):
         raise ValueError(f"report {path}: it is a page, as report.html, or JSON, as report.json")
-    if path.suffix.lower() != JSON and find_spec("jinja2") is None:
+    if path.suffix.lower() != _JSON and find_spec("jinja2") is None:
         raise ValueError("a report needs Jinja2: pip install 'tickrig[report]'")
     check_file(path, "report")
 
@@ -392,7 +392,7 @@ def write_report(report: BenchReport, path: Path) -> None:
         OSError: the file cannot be written; its `filename` is `path`.
         ImportError: Jinja2 (extra `report`) is not there.
     """
-    if path.suffix.lower() == JSON:
+    if path.suffix.lower() == _JSON:
         write_run(report, path)
         return
     write_whole(path, page.html_page(report))

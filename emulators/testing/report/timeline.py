@@ -200,7 +200,7 @@ _ACTION: Final = "!"
 _MISS: Final = "?"
 
 
-class TimelineEvent(NamedTuple):
+class _TimelineEvent(NamedTuple):
     """Something at a moment.
 
     Attributes:
@@ -228,7 +228,7 @@ class Timeline:
 
     axis: TimeAxis
     faults: tuple[TimeSpan, ...]
-    events: tuple[TimelineEvent, ...]
+    events: tuple[_TimelineEvent, ...]
     lanes: tuple[Lane, ...]
     left_out: tuple[str, ...]
 
@@ -275,9 +275,11 @@ def _fault_span(fault: bench_report.PlannedFault, axis: TimeAxis) -> TimeSpan:
     return TimeSpan(left, round(right - left, 2), fault.name[:_WORD_CHARACTERS])
 
 
-def _events(journal: Sequence[bench_report.JournalLine], axis: TimeAxis) -> Iterator[TimelineEvent]:
+def _events(
+    journal: Sequence[bench_report.JournalLine], axis: TimeAxis
+) -> Iterator[_TimelineEvent]:
     seen = [line for line in journal if line.mark in (_ACTION, _MISS)][-_MOST_EVENTS:]
     for line in seen:
-        yield TimelineEvent(
+        yield _TimelineEvent(
             axis.part(line.at_us), line.text[:_EVENT_CHARACTERS], line.mark == _MISS
         )

@@ -163,16 +163,16 @@ def _configured(name: str, config: Mapping[str, object], seed: int = 0) -> Confi
 
 # What stands in for a device that cannot be made: it has every name, and takes every value.
 
-T = TypeVar("T")
+_T = TypeVar("_T")
 
 
-class _Everything(Mapping[str, T], Generic[T]):
+class _Everything(Mapping[str, _T], Generic[_T]):
     """A table that has every name, with the same behind it."""
 
-    def __init__(self, item: T) -> None:
+    def __init__(self, item: _T) -> None:
         self._item = item
 
-    def __getitem__(self, name: str) -> T:
+    def __getitem__(self, name: str) -> _T:
         return self._item
 
     def __contains__(self, name: object) -> bool:

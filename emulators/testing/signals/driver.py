@@ -38,7 +38,7 @@ SLASH: Final = "/"
 
 
 @dataclass(frozen=True, slots=True)
-class DeviceSignal:
+class _DeviceSignal:
     """An input or output of a device.
 
     Attributes:
@@ -69,7 +69,7 @@ class _SignalScope:
     ) -> None:
         self.signals, self.devices = signals, devices
 
-    def find(self, name: str, owner: str) -> str | DeviceSignal | None:
+    def find(self, name: str, owner: str) -> str | _DeviceSignal | None:
         """Return what a name means: the name of a signal, something of a device, or None.
 
         Args:
@@ -86,13 +86,13 @@ class _SignalScope:
                 return found
         return None
 
-    def device_signal(self, key: str) -> DeviceSignal | None:
+    def device_signal(self, key: str) -> _DeviceSignal | None:
         """Return the input or output `DEVICE/NAME`, None if there is none."""
         device_name, _, name = key.partition(SLASH)
         device = self.devices.get(device_name)
         if device is None or not (name in device.inputs.table or name in device.outputs):
             return None
-        return DeviceSignal(device, name)
+        return _DeviceSignal(device, name)
 
     def needed(self, key: str) -> Iterator[str]:
         """Yield the signals whose value of now a signal is computed of."""
@@ -260,7 +260,7 @@ class _RunningSignal(Copyable):
     def __init__(self, spec: SignalSpec) -> None:
         self.spec, self.due_us = spec, 0
         self.setting: Setting = nan
-        self.terms: Mapping[str, _RunningSignal | DeviceSignal] = {}
+        self.terms: Mapping[str, _RunningSignal | _DeviceSignal] = {}
 
     @property
     def number(self) -> float:
@@ -480,7 +480,7 @@ class _Target(Copyable):
 
     __slots__ = ("_item", "_signal", "_value")
 
-    def __init__(self, signal: DeviceSignal, item: InputSignal) -> None:
+    def __init__(self, signal: _DeviceSignal, item: InputSignal) -> None:
         self._signal, self._item = signal, item
         self._value: Setting | None = None
 

@@ -42,7 +42,7 @@ _FROM: Final[Mapping[str, _Reader]] = {"from": sources.time, **_COMMON}
 
 
 @dataclass(frozen=True, slots=True)
-class Form:
+class _Form:
     """A table that a signal can be.
 
     Attributes:
@@ -92,12 +92,12 @@ def _integral(folder: Path, fields: _Fields) -> sources.Integral:
     return sources.Integral(fields["integral"], fields.get("start", 0.0))
 
 
-FORMS: Final[Mapping[str, Form]] = {
-    "ramp": Form(
+FORMS: Final[Mapping[str, _Form]] = {
+    "ramp": _Form(
         {"ramp": sources.pair, "over": sources.some_time, "repeat": flag, **_FROM}, _ramp, ("over",)
     ),
     **{
-        shape: Form(
+        shape: _Form(
             {shape: sources.pair, "period": sources.some_time, "phase_deg": sources.number}
             | ({"duty": sources.part} if shape == "square" else {})
             | dict(_FROM),
@@ -106,23 +106,23 @@ FORMS: Final[Mapping[str, Form]] = {
         )
         for shape in sources.SHAPES
     },
-    "noise": Form(
+    "noise": _Form(
         {"noise": sources.spread, "mean": sources.number, "seed": sources.seed, **_FROM},
         _noise,
         every_us=_EVERY_US,
     ),
-    "table": Form(
+    "table": _Form(
         {"table": anything, "column": text, "interpolation": text, "repeat": flag} | dict(_FROM),
         read_table,
     ),
-    "formula": Form({"formula": sources.formula, **_COMMON}, _formula),
-    "lag": Form(
+    "formula": _Form({"formula": sources.formula, **_COMMON}, _formula),
+    "lag": _Form(
         {"lag": sources.formula, "tau": sources.some_time, "start": sources.number, **_COMMON},
         _lag,
         ("tau",),
         _EVERY_US,
     ),
-    "integral": Form(
+    "integral": _Form(
         {"integral": sources.formula, "start": sources.number, **_COMMON},
         _integral,
         every_us=_EVERY_US,

@@ -170,7 +170,7 @@ class WatchedFrameLink(WatchedLink[Frames]):
 # A monitored pyserial port.
 
 
-class SerialGone(PortGone, serial.SerialException):
+class _SerialGone(PortGone, serial.SerialException):
     """A port is gone; for hosts, pyserial's own error."""
 
 
@@ -188,7 +188,7 @@ class WatchedPort(serial.SerialBase):
         except serial.PortNotOpenError:
             raise
         except serial.SerialException as error:
-            raise SerialGone(f"{self.port}: {error}") from error
+            raise _SerialGone(f"{self.port}: {error}") from error
         if data:
             self._watch.passed(Mark.FROM_DEVICE, data)
         if len(data) < size and wanted_s is not None:
@@ -204,7 +204,7 @@ class WatchedPort(serial.SerialBase):
         except (serial.PortNotOpenError, serial.SerialTimeoutException):
             raise
         except serial.SerialException as error:
-            raise SerialGone(f"{self.port}: {error}") from error
+            raise _SerialGone(f"{self.port}: {error}") from error
         self._watch.passed(Mark.TO_DEVICE, bytes(data))
         return written
 
@@ -218,7 +218,7 @@ def open_watched_serial(url: str, watch: DoorWatch, options: dict[str, Any]) -> 
         options: those of `serial.Serial`.
 
     Raises:
-        SerialGone: it cannot be opened.
+        _SerialGone: it cannot be opened.
         ValueError: an option is out of range.
     """
     try:
@@ -228,7 +228,7 @@ def open_watched_serial(url: str, watch: DoorWatch, options: dict[str, Any]) -> 
         port.open()
         let_wait(port)
     except (serial.SerialException, OSError) as error:
-        raise SerialGone(f"cannot open {url!r}: {explain_open_error(url, error)}") from error
+        raise _SerialGone(f"cannot open {url!r}: {explain_open_error(url, error)}") from error
     return port
 
 

@@ -66,7 +66,7 @@ class LinePlace:
 
 
 class Doors:
-    """The `HostDoors` of benches in real time; ports left open by hosts are closed with them.
+    """The `_HostDoors` of benches in real time; ports left open by hosts are closed with them.
 
     Args:
         places: addresses of the wires, by name.

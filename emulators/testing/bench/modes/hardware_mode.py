@@ -50,7 +50,7 @@ def _places_of(
     return places
 
 
-T = TypeVar("T")
+_T = TypeVar("_T")
 
 _Begin = Callable[[int], None]
 """An action that has waited, called with the time."""
@@ -184,7 +184,7 @@ class HardwareMode(BenchMode):
         host_us = max(self._pace.late_us, self._waits.worst_us)
         return too_slow(host=host_us, emulator=self._operators.late_us)
 
-    def act(self, action: Callable[[BenchRig], T]) -> NoReturn:
+    def act(self, action: Callable[[BenchRig], _T]) -> NoReturn:
         """Raise NotOnThisBench: there is no rig."""
         raise NotOnThisBench("this works on emulated devices alone: here are real ones")
 

@@ -26,13 +26,13 @@ if TYPE_CHECKING:
     from tickrig.host.links.link import Link
 
 
-T = TypeVar("T")
+_T = TypeVar("_T")
 
 Address = str | dict[str, Any]
 """URL of a line for `serial.serial_for_url`, or options of a bus for `can.Bus`."""
 
 
-class HostDoors(Protocol):
+class _HostDoors(Protocol):
     """Opens the wires of a bench for hosts; each wire by its name.
 
     A wire of the other kind raises ValueError, one without an address `NotOnThisBench`.
@@ -78,12 +78,12 @@ class BenchMode(ABC):
     """
 
     name: ClassVar[str]
-    doors: HostDoors
+    doors: _HostDoors
 
     def __init__(self, rig: BenchRig, tolerance: Tolerances) -> None:
         self._rig, self.tolerance = rig, tolerance
 
-    def _query(self, question: Callable[[BenchRig], T]) -> T:
+    def _query(self, question: Callable[[BenchRig], _T]) -> _T:
         """Return a value from the rig without changing it."""
         return question(self._rig)
 
@@ -111,7 +111,7 @@ class BenchMode(ABC):
         """Execute a request of the control socket; ValueError if it is refused."""
 
     @abstractmethod
-    def act(self, action: Callable[[BenchRig], T]) -> T:
+    def act(self, action: Callable[[BenchRig], _T]) -> _T:
         """Run a function on the rig between two ticks."""
 
     @abstractmethod
@@ -207,7 +207,7 @@ class EmulatedMode(BenchMode):
         """The object that answers requests."""
         return EmulatorControl(self._rig)
 
-    def _query(self, question: Callable[[BenchRig], T]) -> T:
+    def _query(self, question: Callable[[BenchRig], _T]) -> _T:
         return self.act(question)
 
     def request(self, do: str, **fields: object) -> Object:

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 # A rig in real time, in its own thread, with calls from other threads.
 
-T = TypeVar("T")
+_T = TypeVar("_T")
 
 _JOIN_S: Final = 10.0
 """Time after which a step counts as stuck."""
@@ -74,11 +74,11 @@ class _RigThread:
             self._thread = threading.Thread(target=self._run, name="tickrig bench", daemon=True)
             self._thread.start()
 
-    def call(self, do: Callable[[], T]) -> T:
+    def call(self, do: Callable[[], _T]) -> _T:
         """Run a function between two ticks; return its result, or raise its exception."""
         if not self.here and (future := self._await()):
             self._calls.put(partial(_settle, future, do))
-            result: T = self._result(future)
+            result: _T = self._result(future)
             return result
         return do()
 
@@ -121,7 +121,7 @@ class _RigThread:
         self._raise_error()
         return None
 
-    def _result(self, future: Future[T]) -> T:
+    def _result(self, future: Future[_T]) -> _T:
         try:
             if (error := future.exception()) is not None:
                 raise error  # without the frames of `result`
@@ -174,7 +174,7 @@ class _RigThread:
         self._stopping = True
 
 
-def _settle(future: Future[T], do: Callable[[], T]) -> None:
+def _settle(future: Future[_T], do: Callable[[], _T]) -> None:
     """Set a future to the result of a function."""
     try:
         future.set_result(do())
@@ -234,7 +234,7 @@ class _Answers(RequestDispatcher):
 _IN_REAL_TIME: Final = Tolerances(stick_pct=0, time_us=100_000)
 
 
-class HostInCondition(BaseException):
+class _HostInCondition(BaseException):
     """A condition that is asked between two ticks cannot wait for a device."""
 
 
@@ -247,7 +247,7 @@ class _Watch(HostPace):
 
     def used(self) -> None:
         if self._thread.here:
-            raise HostInCondition
+            raise _HostInCondition
 
     def passed(self, mark: Mark, traffic: Any) -> None:
         """Do nothing: the rig records it itself."""
@@ -315,7 +315,7 @@ class RealMode(EmulatedMode):
     def _tick_us(self) -> int:
         return self._rig.state.assembly.tick_us
 
-    def act(self, action: Callable[[BenchRig], T]) -> T:
+    def act(self, action: Callable[[BenchRig], _T]) -> _T:
         """Run a function on the rig between two ticks."""
         return self._thread.call(partial(action, self._rig))
 
@@ -330,7 +330,7 @@ class RealMode(EmulatedMode):
         the caller instead, once per tick.
         """
         if self._judging and self._thread.here:
-            raise HostInCondition
+            raise _HostInCondition
         self._begin()
         until_us = self.now_us + within_us
         ask = partial(self._judge, done)
@@ -339,7 +339,7 @@ class RealMode(EmulatedMode):
                 return True
             self._sleep_until(until_us)
             return self._thread.call(ask)
-        except HostInCondition:
+        except _HostInCondition:
             return self._ask_until(done, until_us)
 
     def _judge(self, done: Callable[[], bool]) -> bool:

@@ -77,7 +77,7 @@ class RigPassing:
         return done()
 
 
-T = TypeVar("T")
+_T = TypeVar("_T")
 
 
 class _Offers:
@@ -86,7 +86,7 @@ class _Offers:
     def __init__(self) -> None:
         self._open: list[AbstractContextManager[object]] = []
 
-    def enter(self, offer: AbstractContextManager[T]) -> None:
+    def enter(self, offer: AbstractContextManager[_T]) -> None:
         """Offer a name until it is withdrawn."""
         offer.__enter__()
         self._open.append(offer)
@@ -102,7 +102,7 @@ class _Offers:
 
 
 class _VirtualDoors:
-    """The `HostDoors` of a bench in virtual time.
+    """The `_HostDoors` of a bench in virtual time.
 
     Args:
         rig: the rig.
@@ -213,7 +213,7 @@ class VirtualMode(EmulatedMode):
         rig = self._rig.rig
         return rig.now_us if rig.acting_us is None else rig.acting_us
 
-    def act(self, action: Callable[[BenchRig], T]) -> T:
+    def act(self, action: Callable[[BenchRig], _T]) -> _T:
         """Run a function on the rig between two ticks."""
         return action(self._rig)
 

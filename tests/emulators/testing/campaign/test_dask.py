@@ -154,7 +154,7 @@ def test_what_is_no_scheduler_is_told(
 ) -> None:
     from tickrig.emulators.testing.campaign import dask_workers  # noqa: PLC0415 - an extra
 
-    monkeypatch.setattr(dask_workers, "CONNECT_S", 0.5)
+    monkeypatch.setattr(dask_workers, "_CONNECT_S", 0.5)
     plan = CampaignPlan(
         CampaignOrder(tests=()), Collected((), (), ""), Seeds.parse("0"), Shard.parse("1/1")
     )
