@@ -96,7 +96,7 @@ if TYPE_CHECKING or _KERNEL is None:
             *("received", "routes", "shorted", "unit", "whole"),
         )
 
-    def run(rig: object, parts: object, until_us: int, unseen_us: int, /) -> bool:
+    def run(rig: object, parts: object, until_us: int, unseen_us: int, host: object, /) -> bool:
         """Run a rig up to a time in C, as `Rig.run_to`; return False if more work is left.
 
         Args:
@@ -104,6 +104,7 @@ if TYPE_CHECKING or _KERNEL is None:
             parts: its timetable, bus, event queue, horizon, watchers, hosts and stations.
             until_us: the time.
             unseen_us: until this time nothing reads a device.
+            host: an end that waits for traffic; None for none.
         """
         return False
 

@@ -33,8 +33,8 @@
 # present time, in case the drive is read all the same.
 #
 # With the kernel (`kernel.py`), a rig whose stations are all on one bus, in virtual time, without
-# bridges, couplings and hosts, is run in C from tick to tick: `run` is the loop of
-# `_go_on`, `_happen` and `_run` over the same fields. It returns False where an action is due or a
+# bridges, couplings and `hosts`, is run in C from tick to tick, for a host that waits on that bus
+# too: `run` is the loop of `_go_on`, `_happen` and `_run` over the same fields. It returns False where an action is due or a
 # plug is pulled, and the loop here goes on.
 #
 # In real time (`_in_real_time`) the rig wakes at every tick, bridges take in before it and give out
@@ -417,12 +417,11 @@ class Rig(Copyable):
             unseen_us: how long after that time devices are probably not read and inputs not set
                 between ticks; doing so is allowed, but slower.
         """
-        if host is None and self._short:
-            self._until_us = t_us + unseen_us
-            if run(self, self._short, t_us, self._until_us):
-                return
+        self._until_us = t_us + unseen_us if host is None else 0
+        if self._short and run(self, self._short, t_us, self._until_us, host):
+            return
         self._enter_due()
-        self._foresee(t_us + unseen_us if host is None else 0)
+        self._foresee(self._until_us)
         while True:
             if (next_us := self._go_on(t_us, host)) > t_us:
                 self._pass_to(t_us)
@@ -435,7 +434,7 @@ class Rig(Copyable):
             if host is not None and host.arrived_us <= next_us:
                 self._wires.advance(self.now_us)
                 return
-            if host is None and self._short and run(self, self._short, t_us, self._until_us):
+            if self._short and run(self, self._short, t_us, self._until_us, host):
                 return
 
     def run_for(self, duration_us: int) -> None:

@@ -86,6 +86,8 @@ acts = st.tuples(
             "join",
             "watch",
             "put",
+            "wait",
+            "wait",
         )
     ),
     st.integers(0, MOST_NODES - 1),
@@ -102,6 +104,7 @@ class Played:
         self.wire = CanWire(bit_rate, seed=3)
         self.log: list[tuple[int, CanFrame | ErrorFrame]] = []
         self.watched: list[tuple[int, bool, int, int]] = []
+        self.waited: list[tuple[int, Frames]] = []
         self.wire.observers.append(self.hear)
         ends = [self.wire.end() for _ in made]
         self.nodes = [Node(n, tick_us, its) for n, (tick_us, its) in enumerate(made)]
@@ -137,6 +140,12 @@ class Played:
             case "join":
                 self.ends.append(self.wire.end(frozenset({0x100, 0x181})))
                 self.wire.bus.recover(end, self.rig.now_us)
+            case "wait":
+                self.waited.append((self.rig.now_us, self.host.poll(self.rig.now_us)))
+                self.host.send(self.rig.now_us, frames)
+                self.rig.run_to(self.rig.now_us + after_us, self.host)
+                self.waited.append((self.rig.now_us, self.host.inbox))
+                return
         self.rig.run_for(after_us)
 
     def watch(self, now_us: int) -> None:
@@ -159,6 +168,7 @@ class Played:
         return (
             self.log,
             self.watched,
+            self.waited,
             heard,
             ends,
             rest,
