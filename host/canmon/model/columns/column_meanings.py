@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from struct import unpack
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
@@ -10,10 +10,17 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from tickrig.host.canmon.model.columns import cells
 from tickrig.host.canmon.model.columns.columns import Columns, Ints, by_channel, records, select
 from tickrig.host.canmon.model.decode.dbc_file import DbcFile, signal_of
 from tickrig.host.canmon.model.decode.decoded import Decoded
-from tickrig.host.canmon.model.decode.decoder import BusDecoder, Decoder, Effect, Route
+from tickrig.host.canmon.model.decode.decoder import (
+    BusDecoder,
+    Decoder,
+    Effect,
+    Route,
+    told_by_none,
+)
 from tickrig.host.canmon.model.decode.node_board import NodeBoard
 from tickrig.host.canmon.model.decode.pdos import Field, PdoDecoder
 from tickrig.host.canmon.model.frames import ERROR, EXTENDED, REMOTE, Record, decoded_text
@@ -36,8 +43,8 @@ if TYPE_CHECKING:
 # comes behind is sorted anew. It takes 2 us a frame, where a frame by itself takes 10 to 20.
 
 _Payloads = npt.NDArray[np.uint64]
-_Write = Callable[[_Payloads, Ints], Iterable[str]]
-"""Writes what some frames mean, by their payloads and lengths; remote frames are not among them."""
+_Write = Callable[[cells.Texts, Ints, _Payloads, Ints], None]
+"""Writes what frames mean, by rows, payloads and lengths; remote frames are not among them."""
 
 _FEW: Final = 16
 """Frames that are decoded one by one sooner than at once."""
@@ -45,8 +52,6 @@ _SETTLED: Final = 256
 """So many frames are decoded one by one where what a CAN-ID means has changed."""
 _MOST_LAYOUTS: Final = 1 << 10
 """Of PDOs whose format strings are kept."""
-_MOST_TEXTS: Final = 1 << 16
-"""Texts that are kept of a signal."""
 
 
 class ColumnMeanings:
@@ -63,24 +68,22 @@ class ColumnMeanings:
         self._messages: dict[tuple[int, bool], _Write | None] = {}
         self._pdos: dict[int, tuple[PdoDecoder, _Write]] = {}
 
-    def texts(self, columns: Columns) -> Sequence[str]:
+    def texts(self, columns: Columns) -> cells.Texts:
         """Return what each frame means, empty where nothing is known."""
-        texts = np.full(len(columns), "", object)
+        texts, rows = cells.Texts(len(columns)), np.arange(len(columns))
         if not self._apart:
-            self._one_by_one(columns, np.arange(len(columns)), texts)
-            return _list(texts)
+            self._one_by_one(columns, rows, texts)
+            return texts
         left = self._take_messages(columns, texts)
-        for channel, rows, frames in by_channel(select(columns, left)) if len(left) else ():
-            found = texts[left[rows]]
-            self._take_bus(self._decoder.bus(channel), frames, found)
-            texts[left[rows]] = found
-        return _list(texts)
+        for channel, found, frames in by_channel(select(columns, left)) if len(left) else ():
+            self._take_bus(self._decoder.bus(channel), frames, left[found], texts)
+        return texts
 
-    def _one_by_one(self, columns: Columns, rows: Ints, texts: npt.NDArray[np.object_]) -> None:
+    def _one_by_one(self, columns: Columns, rows: Ints, texts: cells.Texts) -> None:
         for row, record in zip(rows.tolist(), records(select(columns, rows)), strict=True):
-            texts[row] = _text(self._decoder, record)
+            texts.put_one(row, _text(self._decoder, record))
 
-    def _take_messages(self, columns: Columns, texts: npt.NDArray[np.object_]) -> Ints:
+    def _take_messages(self, columns: Columns, texts: cells.Texts) -> Ints:
         """Take error frames, extended ones and those of DBC files; return which rows are left."""
         ident = columns.ident
         plain = ident & np.uint32(ERROR) == 0
@@ -100,7 +103,7 @@ class ColumnMeanings:
             near = rows[~far]
             if len(near):
                 lengths = columns.dlc[near].astype(np.int64)
-                texts[near] = _objects(write(columns.payload[near], lengths))
+                write(texts, near, columns.payload[near], lengths)
         return np.flatnonzero(left)
 
     def _message(self, can_id: int, extended: bool) -> _Write | None:
@@ -111,22 +114,21 @@ class ColumnMeanings:
             self._messages[ident] = None if file is None else _message_writer(file, *ident)
         return self._messages[ident]
 
-    def _take_bus(self, bus: BusDecoder, frames: Columns, texts: npt.NDArray[np.object_]) -> None:
-        """Decode data and remote frames with 11-bit identifiers."""
+    def _take_bus(self, bus: BusDecoder, frames: Columns, places: Ints, texts: cells.Texts) -> None:
+        """Decode data and remote frames with 11-bit identifiers, whose places are other rows."""
         begin = 0
         while begin < len(frames):
-            begin = self._take_settled(bus, frames, begin, texts)
-            end = min(begin + _SETTLED, len(frames))
-            rows = np.arange(begin, end)
+            begin = self._take_settled(bus, frames, begin, places, texts)
+            rows = np.arange(begin, min(begin + _SETTLED, len(frames)))
             for row, record in zip(rows.tolist(), records(select(frames, rows)), strict=True):
                 before = bus.changes
-                texts[row] = _text(self._decoder, record)
+                texts.put_one(int(places[row]), _text(self._decoder, record))
                 begin = row + 1
                 if bus.changes != before and len(frames) - begin > _SETTLED:
                     break
 
     def _take_settled(
-        self, bus: BusDecoder, frames: Columns, begin: int, texts: npt.NDArray[np.object_]
+        self, bus: BusDecoder, frames: Columns, begin: int, places: Ints, texts: cells.Texts
     ) -> int:
         """Decode frames until what a CAN-ID means changes; return the row behind that."""
         ident = frames.ident[begin:]
@@ -141,7 +143,7 @@ class ColumnMeanings:
             rows = order[first : first + _SETTLED]
             for row, record in zip(rows.tolist(), records(select(frames, rows)), strict=True):
                 before = bus.changes
-                texts[row] = _text(self._decoder, record)
+                texts.put_one(int(places[row]), _text(self._decoder, record))
                 if bus.changes != before:
                     end = row + 1
                     break
@@ -150,42 +152,44 @@ class ColumnMeanings:
         for found, route in groups:
             if route is not None and len(found) >= _FEW:
                 rows = found[: np.searchsorted(found, end)]
-                texts[rows] = _objects(self._settled(route, select(frames, rows)))
+                if len(rows):
+                    self._settled(route, select(frames, rows), places[rows], texts)
         return end
 
-    def _settled(self, route: Route, frames: Columns) -> Iterable[str]:
+    def _settled(self, route: Route, frames: Columns, places: Ints, texts: cells.Texts) -> None:
         """Write frames of one CAN-ID whose meaning lasts."""
         layout = getattr(route, "__self__", None)
-        plain = not (frames.ident & np.uint32(REMOTE)).any()
-        if isinstance(layout, PdoDecoder) and plain:
+        remote = frames.ident & np.uint32(REMOTE) != 0
+        lengths = frames.dlc.astype(np.int64)
+        if isinstance(layout, PdoDecoder) and not remote.any():
             made = self._pdos.get(id(layout))
             if made is None or made[0] is not layout:
                 if len(self._pdos) >= _MOST_LAYOUTS:
                     self._pdos.clear()
                 made = self._pdos[id(layout)] = layout, _pdo_writer(layout)
-            return made[1](frames.payload, frames.dlc.astype(np.int64))
-        parts = frames.ident, frames.payload, frames.dlc
-        keys = list(zip(*(part.tolist() for part in parts), strict=True))
-        firsts = dict(zip(reversed(keys), range(len(keys) - 1, -1, -1), strict=True))
-        found = records(select(frames, np.fromiter(firsts.values(), np.int64, len(firsts))))
-        said = [one_line(decoded_text(route(one.at_us, one.frame))) for one in found]  # type: ignore[arg-type]
-        return map(dict(zip(firsts, said, strict=True)).__getitem__, keys)
+            made[1](texts, places, frames.payload, lengths)
+            return
+        payloads = frames.payload
+        if told_by_none(route):
+            lengths, payloads = lengths & 0, payloads & np.uint64(0)
+        for rows in _alike(lengths | remote.astype(np.int64) << 4):
+            _, firsts, which = np.unique(payloads[rows], True, True)
+            found = records(select(frames, rows[firsts]))
+            said = [one_line(decoded_text(route(one.at_us, one.frame))) for one in found]  # type: ignore[arg-type]
+            if any(said):
+                texts.put(places[rows], cells.of_texts(said)[which])
+
+
+def _alike(numbers: Ints) -> list[Ints]:
+    """Return the rows of each small number."""
+    present = np.flatnonzero(np.bincount(numbers)).tolist()
+    if len(present) == 1:
+        return [np.arange(len(numbers))]
+    return [np.flatnonzero(numbers == number) for number in present]
 
 
 def _text(decoder: Decoder, record: Record) -> str:
     return one_line(decoded_text(decoder.take(record)))
-
-
-def _list(texts: npt.NDArray[np.object_]) -> Sequence[str]:
-    found: Sequence[str] = texts.tolist()
-    return found
-
-
-def _objects(texts: Iterable[str]) -> npt.NDArray[np.object_]:
-    found = list(texts)
-    objects = np.empty(len(found), object)
-    objects[:] = found
-    return objects
 
 
 def _groups(numbers: npt.NDArray[np.uint32]) -> list[tuple[int, Ints]]:
@@ -201,52 +205,31 @@ class _Column(NamedTuple):
 
     Attributes:
         head: its name, and what stands before its value.
-        numbers: returns it as a number, of each payload.
-        text: writes a number; None where the number is the text.
+        write: returns its text in each payload.
         unit: stands behind it.
     """
 
     head: str
-    numbers: Callable[[_Payloads], Sequence[float]]
-    text: Callable[[Any], str] | None
+    write: Callable[[_Payloads], Sequence[cells.Part]]
     unit: str = ""
 
 
 def _writer(begin: str, columns: Sequence[_Column], end: str = "") -> _Write:
     """Return what writes the signals of frames of one length."""
-    slots = [f"{_escaped(one.head)}%s{_escaped(one.unit)}" for one in columns]
-    form = " ".join([_escaped(begin), *slots, *([_escaped(end)] if end else [])])
-    if not columns:
-        text = (form % ()).rstrip()
-        return lambda payloads, _: [text] * len(payloads)
-    kept: list[dict[float, str]] = [{} for _ in columns]
 
-    def write(payloads: _Payloads, lengths: Ints) -> Iterable[str]:
-        values = [
-            _written(one, one.numbers(payloads), texts)
-            for one, texts in zip(columns, kept, strict=True)
-        ]
-        return map(form.__mod__, zip(*values, strict=True))
+    def write(texts: cells.Texts, rows: Ints, payloads: _Payloads, lengths: Ints) -> None:
+        parts, constant = list[cells.Part](), begin
+        for one in columns:
+            parts.append(cells.encoded(f"{constant} {one.head}"))
+            parts += one.write(payloads)
+            constant = one.unit
+        if not columns:
+            constant = f"{begin} {end}".rstrip()
+        elif end:
+            constant = f"{constant} {end}"
+        texts.put(rows, cells.together(len(rows), [*parts, cells.encoded(constant)]))
 
     return write
-
-
-def _written(
-    column: _Column, numbers: Sequence[float], texts: dict[float, str]
-) -> Iterable[object]:
-    """Return numbers as they are written; those that come again and again are written once."""
-    if column.text is None:
-        return numbers
-    different = set(numbers)
-    new = different - texts.keys()
-    if len(texts) + len(new) > _MOST_TEXTS:
-        if len(new) * 2 > len(numbers):
-            return map(column.text, numbers)
-        texts.clear()
-        new = different
-    for number in new:
-        texts[number] = column.text(number)
-    return map(texts.__getitem__, numbers)
 
 
 def _blank_end(text: str) -> bool:
@@ -254,38 +237,134 @@ def _blank_end(text: str) -> bool:
     return text != text.rstrip()
 
 
-def _escaped(text: str) -> str:
-    return text.replace("%", "%%")
-
-
 def _by_length(make: Callable[[int], _Write]) -> _Write:
     """Return what writes frames of any length, by what `make` returns for one."""
     made: dict[int, _Write] = {}
 
-    def write(payloads: _Payloads, lengths: Ints) -> Iterable[str]:
-        present = np.flatnonzero(np.bincount(lengths)).tolist()
-        for length in present:
-            made[length] = made.get(length) or make(length)
-        if len(present) == 1:
-            return made[present[0]](payloads, lengths)
-        texts = np.empty(len(payloads), object)
-        for length in present:
-            rows = np.flatnonzero(lengths == length)
-            texts[rows] = _objects(made[length](payloads[rows], lengths[rows]))
-        return _list(texts)
+    def write(texts: cells.Texts, rows: Ints, payloads: _Payloads, lengths: Ints) -> None:
+        for found in _alike(lengths):
+            length = int(lengths[found[0]])
+            write_one = made[length] = made.get(length) or make(length)
+            write_one(texts, rows[found], payloads[found], lengths[found])
 
     return write
 
 
-def _bits(payloads: _Payloads, shift: int, mask: int, sign: int = 0) -> npt.NDArray[Any]:
-    """Return the numbers that some bits are."""
-    raw = payloads >> np.uint64(shift) & np.uint64(mask)
-    return ((raw ^ np.uint64(sign)) - np.uint64(sign)).view(np.int64) if sign else raw
+class _Bits(NamedTuple):
+    """Where the bits of a signal are.
+
+    Attributes:
+        shift: its lowest bit.
+        length: how many it has.
+        sign: its sign bit, 0 if it has none.
+        swapped: it is big-endian.
+    """
+
+    shift: int
+    length: int
+    sign: int = 0
+    swapped: bool = False
+
+    def of(self, payloads: _Payloads) -> _Payloads:
+        """Return the bits as they are in each payload."""
+        if self.swapped:
+            payloads = payloads.byteswap()
+        return payloads >> np.uint64(self.shift) & np.uint64((1 << self.length) - 1)
+
+    def signed(self, bits: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
+        """Return the numbers that they are; those of 2^63 and more are negative."""
+        numbers, sign = bits.view(np.int64), self.sign
+        return (numbers ^ sign) - sign if 0 < sign < 1 << 63 else numbers
+
+    def number(self, bits: int) -> int:
+        """Return the number that some bits are."""
+        return (bits ^ self.sign) - self.sign
 
 
-def _numbers(bits: Callable[[_Payloads], npt.NDArray[Any]], payloads: _Payloads) -> Sequence[float]:
-    numbers: Sequence[float] = bits(payloads).tolist()
-    return numbers
+def _each_column(head: str, bits: _Bits, write: Callable[[int], str], unit: str = "") -> _Column:
+    """Return a signal whose numbers are written one by one, those of few bits once for all."""
+
+    def told(raw: int) -> str:
+        return write(bits.number(raw))
+
+    if bits.length <= _SHORT:
+        table = cells.TextTable(bits.length, told)
+        return _Column(head, lambda payloads: [table.cells(bits.of(payloads).view(np.int64))], unit)
+    return _Column(head, lambda payloads: [cells.of_few(bits.of(payloads), told)], unit)
+
+
+def _whole_column(
+    head: str, bits: _Bits, scale: tuple[int, int], write: Callable[[int], str], unit: str = ""
+) -> _Column:
+    """Return a signal that is a whole number, times one and plus another.
+
+    Args:
+        head: as of a column.
+        bits: of the signal.
+        scale: by what it is multiplied, and what is added.
+        write: writes one number, as it is written.
+        unit: as of a column.
+    """
+    times, more = scale
+    limit = (cells.WHOLE - abs(more)) // max(1, abs(times))
+
+    def told(payloads: _Payloads) -> Sequence[cells.Part]:
+        raw = bits.of(payloads)
+        numbers = bits.signed(raw)
+        right = _within(numbers, raw, bits, limit)
+        if right is None:
+            return cells.whole(numbers * times + more if scale != (1, 0) else numbers)
+        parts = cells.whole(np.where(right, numbers, 0) * times + more)
+        return [_mended(parts, right, raw, lambda found: write(bits.number(found)))]
+
+    if limit <= 0 or max(abs(times), abs(more)) >= cells.WHOLE:
+        return _each_column(head, bits, write, unit)
+    return _Column(head, told, unit)
+
+
+def _scaled_column(
+    head: str, bits: _Bits, scale: tuple[float, float], write: Callable[[int], str], unit: str = ""
+) -> _Column:
+    """Return a signal that is a number with decimals; the arguments are as of a whole one."""
+    exact = cells.Scale.of(*scale)
+    if exact is None:
+        return _each_column(head, bits, write, unit)
+
+    def told(payloads: _Payloads) -> Sequence[cells.Part]:
+        raw = bits.of(payloads)
+        numbers = bits.signed(raw)
+        parts, right = cells.scaled(numbers, exact)
+        within = _within(numbers, raw, bits, cells.WHOLE)
+        if within is not None:
+            right &= within
+        if right.all():
+            return parts
+        return [_mended(parts, right, raw, lambda found: write(bits.number(found)))]
+
+    return _Column(head, told, unit)
+
+
+def _within(
+    numbers: npt.NDArray[np.int64], raw: _Payloads, bits: _Bits, limit: int
+) -> cells.Mask | None:
+    """Say which numbers are at most `limit`; None where all are."""
+    if 1 << bits.length <= limit:
+        return None
+    right = (numbers <= limit) & (numbers >= -limit)
+    if not bits.sign:
+        right &= raw <= np.uint64(limit)
+    return None if right.all() else right
+
+
+def _mended(
+    parts: Sequence[cells.Part], right: cells.Mask, raw: _Payloads, write: Callable[[int], str]
+) -> cells.Cells:
+    """Return a text in which those that are not right are written anew."""
+    wrong = np.flatnonzero(~right)
+    anew = cells.of_texts(map(write, raw[wrong].tolist()))
+    rows = cells.widened(cells.together(len(raw), parts), anew.shape[1])
+    rows[wrong] = cells.widened(anew, rows.shape[1])
+    return rows
 
 
 # PDOs.
@@ -313,15 +392,15 @@ def _field_column(field: Field) -> _Column | None:
     name, shift, mask, sign, convert, unit, text = field
     if shift >= 8 * MAX_DATA_BYTES or not isinstance(convert(0) if convert else 0, int | float):
         return None
-    bits = partial(_bits, shift=shift, mask=mask, sign=0 if convert else sign)
-    numbers = partial(_numbers, bits)
 
     def write(raw: int) -> str:
         return (text(raw) if text else "") or str(convert(raw) if convert else raw)
 
-    return _Column(
-        one_line(f"{name}="), numbers, write if convert or text else None, one_line(unit)
-    )
+    head, unit = one_line(f"{name}="), one_line(unit)
+    bits = _Bits(shift, mask.bit_length(), 0 if convert or text else sign)
+    if convert or text or bits.length <= _SHORT:
+        return _each_column(head, bits, write, unit)
+    return _whole_column(head, bits, (1, 0), str, unit)
 
 
 # Messages of DBC files.
@@ -353,9 +432,11 @@ def _message_writer(file: DbcFile, can_id: int, extended: bool) -> _Write:
         write = _writer(one_line(f"dbc {message.name}"), columns)
         chance = np.random.default_rng(1).integers(0, 1 << 64, _SAMPLES, np.uint64, False)
         samples = np.append(chance, np.array([0, (1 << 64) - 1], np.uint64)) & _MASKS[length]
-        lengths = np.full(len(samples), length)
-        alike = list(write(samples, lengths)) == list(single(samples, lengths))
-        return write if alike else single
+        rows, both = np.arange(len(samples)), (cells.Texts(len(samples)), cells.Texts(len(samples)))
+        for put, texts in zip((write, single), both, strict=True):
+            put(texts, rows, samples, np.full(len(samples), length))
+        ours, theirs = map(cells.Texts.lines, both)
+        return write if ours == theirs else single
 
     return _by_length(make)
 
@@ -370,37 +451,34 @@ def _message_columns(message: DbcMessage, length: int) -> list[_Column] | None:
         start = signal.start ^ 7 if swapped else signal.start  # from the first bit on the bus
         if start + signal.length > 8 * min(length, message.length):
             continue
-        shift = 8 * MAX_DATA_BYTES - start - signal.length if swapped else start
-        sign = 1 << signal.length - 1 if signal.is_signed and not signal.is_float else 0
-        if signal.is_float and signal.length not in _FLOATS:
+        column = _signal_column(signal, start, swapped)
+        if column is None:
             return None
-        bits = partial(_bits, shift=shift, mask=(1 << signal.length) - 1, sign=sign)
-        choices: Mapping[int, object] = signal.choices or {}
-        unit = signal.unit or ""
-        if any(map(_blank_end, (unit, *map(str, choices.values())))):
-            return None
-        if swapped:
-            bits = partial(_swapped, bits)
-        head = one_line(f"{signal.name}=")
-        if choices or signal.is_float or signal.length <= _SHORT:
-            columns.append(_Column(head, partial(_numbers, bits), partial(_scaled, signal)))
-        else:
-            columns.append(_Column(head, _scaler(signal, bits), None, one_line(unit)))
+        columns.append(column)
     return columns
 
 
-def _scaler(
-    signal: SignalOfDbc, bits: Callable[[_Payloads], npt.NDArray[Any]]
-) -> Callable[[_Payloads], Sequence[float]]:
-    """Return what picks a number out of payloads and scales it, as cantools does."""
-    conversion = signal.conversion
-    scale, offset = conversion.scale, conversion.offset
-    whole = type(scale) is int
-    if scale == 1 and offset == 0 and whole:
-        return partial(_numbers, bits)
-    if not whole:
-        return partial(_numbers, lambda payloads: bits(payloads).astype(float) * scale + offset)
-    return lambda payloads: [raw * scale + offset for raw in bits(payloads).tolist()]
+def _signal_column(signal: SignalOfDbc, start: int, swapped: bool) -> _Column | None:
+    """Return how a signal is written; None where cantools must do it."""
+    choices: Mapping[int, object] = signal.choices or {}
+    unit, floats = signal.unit or "", signal.is_float
+    blank = any(map(_blank_end, (unit, *map(str, choices.values()))))
+    if blank or (floats and (choices or signal.length not in _FLOATS)):
+        return None
+    shift = 8 * MAX_DATA_BYTES - start - signal.length if swapped else start
+    sign = 1 << signal.length - 1 if signal.is_signed and not floats else 0
+    bits, head = _Bits(shift, signal.length, sign, swapped), one_line(f"{signal.name}=")
+    if choices or floats or signal.length <= _SHORT:
+        return _each_column(head, bits, partial(_scaled, signal))
+    conversion, unit = signal.conversion, one_line(unit)
+    scale = conversion.scale, conversion.offset
+
+    def write(raw: int) -> str:
+        return str(conversion.raw_to_scaled(raw))
+
+    if all(map(float.is_integer, map(float, scale))):
+        return _whole_column(head, bits, (int(scale[0]), int(scale[1])), write, unit)
+    return _scaled_column(head, bits, scale, write, unit)
 
 
 def _scaled(signal: SignalOfDbc, raw: int) -> str:
@@ -413,12 +491,6 @@ def _scaled(signal: SignalOfDbc, raw: int) -> str:
     return one_line(f"{found.text or str(found.value)}{found.unit}")
 
 
-def _swapped(
-    bits: Callable[[_Payloads], npt.NDArray[Any]], payloads: _Payloads
-) -> npt.NDArray[Any]:
-    return bits(payloads.byteswap())
-
-
 _MASKS: Final = np.array([(1 << 8 * count) - 1 for count in range(9)], np.uint64)
 """Words of which the first bytes are wanted."""
 
@@ -426,11 +498,10 @@ _MASKS: Final = np.array([(1 << 8 * count) - 1 for count in range(9)], np.uint64
 def _single(decode: Callable[[bytes], Decoded], length: int) -> _Write:
     """Return what decodes frames of a length one by one."""
 
-    def write(payloads: _Payloads, lengths: Ints) -> Iterable[str]:
-        for payload in payloads.tolist():
-            yield one_line(
-                decoded_text(decode(payload.to_bytes(MAX_DATA_BYTES, "little")[:length]))
-            )
+    def write(texts: cells.Texts, rows: Ints, payloads: _Payloads, lengths: Ints) -> None:
+        for row, payload in zip(rows.tolist(), payloads.tolist(), strict=True):
+            data = payload.to_bytes(MAX_DATA_BYTES, "little")[:length]
+            texts.put_one(row, one_line(decoded_text(decode(data))))
 
     return write
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import lru_cache
 from typing import Any, Final
 
@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tickrig.host.canmon.model import frames
+from tickrig.host.canmon.model.columns import cells
 from tickrig.host.canmon.model.columns.columns import Columns, Ints
 from tickrig.wire.can import ERROR_FLAG, EXTENDED_MAX, MAX_DATA_BYTES, STANDARD_MAX
 
@@ -21,23 +22,15 @@ from tickrig.wire.can import ERROR_FLAG, EXTENDED_MAX, MAX_DATA_BYTES, STANDARD_
 #
 # It takes 0.3 us a frame, where writing each line takes 3 us.
 
-_Cells = npt.NDArray[np.uint8]
-"""A part of each line: a row of characters, zeros where it has fewer."""
-
 _ABSENT: Final = 256
 """The row of a byte that is not there."""
 
 
-def _table(texts: Sequence[str], dtype: str) -> npt.NDArray[Any]:
-    """Return texts as numbers of one width, that a table of them may be looked up at once."""
-    size = np.dtype(dtype).itemsize
-    return np.array([text.encode() for text in texts], f"S{size}").view(dtype)
-
-
-_SPACED: Final = _table([*(f" {byte:02X}" for byte in range(256)), ""], "<u4")
-_PAIRS: Final = _table([*(f"{byte:02X}" for byte in range(256)), ""], "<u2")
-_THREE: Final = _table([f"{number:03d}" for number in range(1_000)], "<u4")
-_STANDARD: Final = _table([f"{can_id:03X}" for can_id in range(STANDARD_MAX + 1)], "<u4")
+_SPACED: Final = cells.table([*(f" {byte:02X}" for byte in range(256)), ""], "<u4")
+_PAIRS: Final = cells.table([*(f"{byte:02X}" for byte in range(256)), ""], "<u2")
+_THREE: Final = cells.table([f"{number:03d}" for number in range(1_000)], "<u4")
+_STANDARD: Final = cells.table([f"{can_id:03X}" for can_id in range(STANDARD_MAX + 1)], "<u4")
+_BLANKS: Final = np.array([b" " * count for count in range(frames.DATA_WIDTH + 3)])
 
 
 def fits(columns: Columns) -> bool:
@@ -45,83 +38,52 @@ def fits(columns: Columns) -> bool:
     return all(name.isascii() and name.isprintable() for name in columns.channels)
 
 
-def _cells(numbers: npt.NDArray[Any]) -> _Cells:
-    """Return the characters in numbers of a table, a row for each frame."""
-    return np.ascontiguousarray(numbers).view(np.uint8).reshape(len(numbers), -1)
-
-
-def _of_values(values: npt.NDArray[Any], write: Callable[[int], str]) -> _Cells:
-    """Write numbers of which few are different."""
-    found, places = np.unique(values, return_inverse=True)
-    texts = np.array([write(value).encode() for value in found.tolist()], "S")
-    return _cells(texts[:, np.newaxis])[places]
-
-
-def _where(rows: npt.NDArray[np.bool_], text: bytes, other: bytes = b"") -> _Cells:
-    """Write one text in some rows, and another one in all others."""
-    width = max(len(text), len(other))
-    both = np.array([other, text], f"S{width}")
-    return _cells(both[:, np.newaxis])[rows.astype(np.int8)]
-
-
-def _lines(count: int, parts: Sequence[bytes | _Cells]) -> str:
-    """Put the parts of all lines together."""
-    widths = [len(part) if isinstance(part, bytes) else part.shape[1] for part in parts]
-    matrix, begin = np.empty((count, sum(widths)), np.uint8), 0
-    for part, width in zip(parts, widths, strict=True):
-        cells = np.frombuffer(part, np.uint8) if isinstance(part, bytes) else part
-        matrix[:, begin : begin + width] = cells
-        begin += width
-    return matrix.tobytes().translate(None, b"\0").decode("ascii")
-
-
-def _seconds(span_us: Ints, write: Callable[[int], str]) -> list[bytes | _Cells]:
+def _seconds(span_us: Ints, write: Callable[[int], str]) -> list[cells.Part]:
     """Write times of at least 0, whose seconds have a form of their own."""
     seconds = span_us // 1_000_000
     micros = span_us - seconds * 1_000_000
     high, low = np.divmod(micros, 1_000)
-    return [_of_values(seconds, write), b".", _cells(_THREE[high]), _cells(_THREE[low])]
+    return [cells.of_few(seconds, write), b".", cells.of(_THREE[high]), cells.of(_THREE[low])]
 
 
-def _channels(columns: Columns, write: Callable[[str], str] = str) -> _Cells:
-    texts = np.array([write(name).encode() for name in columns.channels], "S")
-    return _cells(texts[:, np.newaxis])[columns.channel]
+def _channels(columns: Columns) -> cells.Part:
+    if len(columns.channels) == 1:
+        return columns.channels[0].encode()
+    return cells.of_texts(columns.channels)[columns.channel]
 
 
-def _escaped(name: str) -> str:
-    return name.replace("%", "%%")
-
-
-def _octets(columns: Columns, table: npt.NDArray[Any], remote: npt.NDArray[np.bool_]) -> _Cells:
+def _octets(columns: Columns, table: npt.NDArray[Any], remote: cells.Mask) -> cells.Cells:
     """Write the bytes of the data."""
     octets = columns.payload.astype("<u8").view(np.uint8).reshape(-1, MAX_DATA_BYTES)
     lengths = np.where(remote, 0, columns.dlc)
     there = np.arange(MAX_DATA_BYTES) < lengths[:, np.newaxis]
-    return _cells(table[np.where(there, octets, np.int16(_ABSENT))])
+    return cells.of(table[np.where(there, octets, np.int16(_ABSENT))])
 
 
-def _idents(ident: npt.NDArray[np.uint32]) -> tuple[_Cells, npt.NDArray[np.bool_]]:
+def _idents(ident: npt.NDArray[np.uint32]) -> tuple[cells.Cells, cells.Mask]:
     """Write identifiers of three or eight digits, and say which have eight."""
     long = ident & np.uint32(frames.EXTENDED | frames.ERROR) != 0
-    short = _cells(_STANDARD[ident & STANDARD_MAX])
+    short = cells.of(_STANDARD[ident & STANDARD_MAX])
     if not long.any():
         return short, long
-    cells = np.zeros((len(ident), 8), np.uint8)
-    cells[:, : short.shape[1]] = short
+    rows = cells.widened(short, 8)
     flagged = ident[long] & np.uint32(EXTENDED_MAX | ERROR_FLAG)
     octets = flagged.astype(">u4").view(np.uint8).reshape(-1, 4)
-    cells[long] = _cells(_PAIRS[octets])
-    return cells, long
+    rows[long] = cells.of(_PAIRS[octets])
+    return rows, long
 
 
 def log_lines(columns: Columns) -> str:
     """Write frames as `log_line` does, each line with its end."""
     ident, remote = columns.ident, columns.ident & np.uint32(frames.REMOTE) != 0
-    sharp: list[bytes | _Cells] = [b"#"]
+    sharp: list[cells.Part] = [b"#"]
     if remote.any():
         lengths = np.where(remote, columns.dlc, 0)
-        sharp += [_where(remote, b"R"), _of_values(lengths, lambda length: str(length or ""))]
-    return _lines(
+        sharp += [
+            cells.where(remote, b"R"),
+            cells.of_few(lengths, lambda length: str(length or "")),
+        ]
+    return cells.joined(
         len(columns),
         [
             b"(",
@@ -132,7 +94,7 @@ def log_lines(columns: Columns) -> str:
             _idents(ident)[0],
             *sharp,
             _octets(columns, _PAIRS, remote),
-            _where(columns.sent, b" T"),
+            cells.where(columns.sent, b" T"),
             b"\n",
         ],
     )
@@ -148,7 +110,7 @@ class ScreenText:
     def __init__(self, lines: frames.DumpLines) -> None:
         self._lines = lines
 
-    def text(self, columns: Columns, meanings: Sequence[str] | None = None) -> str:
+    def text(self, columns: Columns, meanings: cells.Texts | None = None) -> str:
         """Write frames, each line with its end.
 
         Args:
@@ -157,38 +119,35 @@ class ScreenText:
         """
         lines = self._lines
         ident, remote = columns.ident, columns.ident & np.uint32(frames.REMOTE) != 0
-        cells, long = _idents(ident)
-        escape: Callable[[str], str] = str if meanings is None else _escaped
-        parts = [*self._stamps(columns.at_us), b"  ", _channels(columns, escape)]
+        idents, long = _idents(ident)
+        parts = [*self._stamps(columns.at_us), b"  ", _channels(columns)]
         if lines.extra:
-            parts += [b"  ", _where(columns.sent, b"TX - -", b"RX - -")]
-        parts += [b"  ", *self._indents(long), cells, b"  "]
-        told = _cells(_THREE[columns.dlc])[:, 2:3]
-        data: list[bytes | _Cells] = [b" [", told, b"] ", _octets(columns, _SPACED, remote)]
+            parts += [b"  ", cells.where(columns.sent, b"TX - -", b"RX - -")]
+        parts += [b"  ", *self._indents(long), idents, b"  "]
+        length = cells.of(_THREE[columns.dlc])[:, 2:3]
+        data: list[cells.Part] = [b" [", length, b"] ", _octets(columns, _SPACED, remote)]
         errors = ident & np.uint32(frames.ERROR) != 0
         if remote.any():
-            data.append(_where(remote, b" remote request"))
+            data.append(cells.where(remote, b" remote request"))
         if errors.any():
-            data.append(_where(errors, b"   ERRORFRAME"))
+            data.append(cells.where(errors, b"   ERRORFRAME"))
         if meanings is None:
-            return _lines(len(columns), [*parts, *data, b"\n"])
-        said = np.fromiter(map(bool, meanings), np.bool_, len(meanings))
+            return cells.joined(len(columns), [*parts, *data, b"\n"])
         blanks = frames.DATA_WIDTH + 1 - len(b" [8] ") - 3 * np.where(remote, 5, columns.dlc)
-        blanks = np.where(said, 3 + np.where(errors, 0, blanks), 0)
-        data += [_of_values(blanks, lambda count: " " * count), b"%s\n"]
-        return _lines(len(columns), [*parts, *data]) % tuple(meanings)
+        blanks = np.where(meanings.cells[:, 0] != 0, 3 + np.where(errors, 0, blanks), 0)
+        return meanings.lines([*parts, *data, cells.of(_BLANKS[blanks])])
 
-    def _indents(self, long: npt.NDArray[np.bool_]) -> list[bytes | _Cells]:
+    def _indents(self, long: cells.Mask) -> list[cells.Part]:
         """Return what stands before identifiers of three digits once one of eight was there."""
         lines = self._lines
         if lines.width > len("7FF"):
-            return [_where(long, b"", b"     ")]
+            return [cells.where(long, b"", b"     ")]
         if not long.any():
             return []
         lines.width = len("1FFFFFFF")
-        return [_where(np.maximum.accumulate(long) & ~long, b"     ")]
+        return [cells.where(np.maximum.accumulate(long) & ~long, b"     ")]
 
-    def _stamps(self, at_us: Ints) -> list[bytes | _Cells]:
+    def _stamps(self, at_us: Ints) -> list[cells.Part]:
         lines = self._lines
         if lines.form is frames.Stamp.NONE:
             return []
@@ -202,7 +161,7 @@ class ScreenText:
             zero = lines.form is frames.Stamp.ZERO
             spans = at_us - lines.first_us if zero else np.diff(at_us, prepend=lines.last_us)
             told = [
-                _where(spans < 0, b"-"),
+                cells.where(spans < 0, b"-"),
                 *_seconds(np.abs(spans), lambda seconds: f"{seconds:03d}"),
             ]
         lines.last_us = int(at_us[-1])
@@ -249,21 +208,21 @@ def _asc_lines(columns: Columns, begin_us: int, number: Callable[[str], int]) ->
         numbers[place] = number(columns.channels[place])
     extended = ident & np.uint32(frames.EXTENDED) != 0
     if extended.any():
-        idents = _of_values(ident & np.uint32(frames.EXTENDED | EXTENDED_MAX), _asc_ident)
+        idents = cells.of_few(ident & np.uint32(frames.EXTENDED | EXTENDED_MAX), _asc_ident)
     else:
-        idents = _cells(_asc_standard()[ident & STANDARD_MAX, np.newaxis])
-    return _lines(
+        idents = cells.of(_asc_standard()[ident & STANDARD_MAX, np.newaxis])
+    return cells.joined(
         len(columns),
         [
             *_seconds(columns.at_us - begin_us, lambda seconds: f"{seconds:4d}"),
             b" ",
-            _of_values(numbers[columns.channel], lambda number: str(number + 1)),
+            cells.of_few(numbers[columns.channel], lambda number: str(number + 1)),
             b"  ",
             idents,
             b" ",
-            _where(columns.sent, b"Tx  ", b"Rx  "),
-            _where(remote, b" r ", b" d "),
-            _cells(_THREE[columns.dlc])[:, 2:3],
+            cells.where(columns.sent, b"Tx  ", b"Rx  "),
+            cells.where(remote, b" r ", b" d "),
+            cells.of(_THREE[columns.dlc])[:, 2:3],
             _octets(columns, _SPACED, remote),
             b"\n",
         ],

@@ -381,6 +381,11 @@ def _raw(at_us: int, frame: CanFrame) -> Decoded:
     return Decoded("raw")
 
 
+def told_by_none(route: Route) -> bool:
+    """Say whether a route tells the same of all data."""
+    return (route.func if isinstance(route, partial) else route) in (_unmapped, _raw)
+
+
 FD: Final = Decoded("fd", None, "no CANopen service")
 """CANopen is spoken in classic frames (CiA 301, 5.3); CANopen FD is another protocol."""
 
