@@ -30,6 +30,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING, Final, NamedTuple, assert_never
 
+from tickrig.host.text.values import parse_time_us
 from tickrig.wire.can import ERROR_FLAG, EXTENDED_MAX, CanFrame, ErrorFrame, FdFrame
 
 if TYPE_CHECKING:
@@ -414,6 +415,66 @@ def date_text(at_us: int) -> str:
         return f"{datetime.fromtimestamp(seconds):%Y-%m-%d %H:%M:%S}.{micros:06d}"
     except (ValueError, OverflowError, OSError):
         return seconds_text(at_us, 10)
+
+
+class LogTime(NamedTuple):
+    """A moment of a log, as a user writes it.
+
+    Attributes:
+        us: since the epoch where it is dated, else after the first frame of the log.
+        dated: it is a date, or seconds of the epoch.
+        text: how it was written.
+    """
+
+    us: int
+    dated: bool
+    text: str
+
+    def after(self, first_us: int) -> int:
+        """Return it on the clock of a log whose first frame came at this time."""
+        return self.us if self.dated else first_us + self.us
+
+
+_EPOCH_S: Final = 1_000_000_000
+"""Numbers from here on are seconds of the epoch (September 2001): no log is so long."""
+
+
+def parse_log_time(text: str) -> LogTime:
+    """Read a moment of a log: a time after its first frame, a date, or seconds of the epoch.
+
+    A date without a zone is one of this machine's zone, as it is shown.
+
+    Raises:
+        ValueError: it is none of them.
+
+    >>> parse_log_time("2.5"), parse_log_time("300ms").us
+    (LogTime(us=2500000, dated=False, text='2.5'), 300000)
+    >>> parse_log_time("2026-11-29T12:00:05.25Z").us, parse_log_time("1795953605.25").us
+    (1795953605250000, 1795953605250000)
+    """
+    seconds = text.strip().removeprefix("(").removesuffix(")")
+    if re.fullmatch(r"[0-9]{10,11}(\.[0-9]{1,6})?", seconds):
+        whole, _, fraction = seconds.partition(".")
+        return LogTime(int(whole) * 1_000_000 + int(f"{fraction:0<6}"), dated=True, text=text)
+    if re.match(r"[0-9]{4}-", seconds):
+        return LogTime(_date_us(seconds), dated=True, text=text)
+    try:
+        return LogTime(parse_time_us(seconds), dated=False, text=text)
+    except ValueError:
+        raise ValueError(
+            f"{text!r} is not a time: write 2.5, 300ms after the first frame,"
+            " or a date as 2026-11-29 12:00:05.5"
+        ) from None
+
+
+def _date_us(text: str) -> int:
+    from datetime import UTC, datetime, timedelta  # noqa: PLC0415 - seldom wanted
+
+    try:
+        date = datetime.fromisoformat(re.sub(r" ?UTC$", "+00:00", text)).astimezone()
+    except (ValueError, OverflowError, OSError):
+        raise ValueError(f"{text!r} is not a date as 2026-11-29 12:00:05.5") from None
+    return (date - datetime(1970, 1, 1, tzinfo=UTC)) // timedelta(microseconds=1)
 
 
 def line_text(line: LineRecord, text: str) -> str:

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from tickrig.host.canmon.model.columns.columns import Columns
     from tickrig.host.canmon.model.frames import AnyRecord, LineRecord
     from tickrig.host.canmon.model.traffic import TrafficSnapshot
+    from tickrig.host.canmon.output.printer import FilteredDecoder
 else:  # numpy
     column_frames = LazyModule("tickrig.host.canmon.model.columns.columns")
     column_traffic = LazyModule("tickrig.host.canmon.model.columns.column_traffic")
@@ -240,6 +241,13 @@ def report(source: AnySource[object], strict: bool, more: Iterable[str] = ()) ->
         raise _FramesLost(", ".join(missing))
 
 
+def expect_frames(source: AnySource[object], meaning: FilteredDecoder | None = None) -> None:
+    """End with status 1 where filters or a cut left out all frames of a log; `report` says it."""
+    nothing = source.nothing_passed or (meaning is not None and meaning.nothing_passed)
+    if nothing and (source.recorded or not source.live):
+        raise click.exceptions.Exit(_NOT_COME)
+
+
 class _Interruptions(Interrupter):
     """Ctrl-C and the signals that end a program: they end what goes on, at once or behind it.
 
@@ -286,6 +294,7 @@ def until_interrupted() -> Iterator[_Interruptions]:
 Item = TypeVar("Item", bound="AnyRecord")
 
 _POLL_US: Final = 20_000
+_NOT_COME: Final = 1
 _PATIENCE_US: Final = 5_000_000
 """How long a bus is heard where nothing else ends it."""
 

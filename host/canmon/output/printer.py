@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from enum import StrEnum
 from math import isfinite
 from typing import TYPE_CHECKING, Final, assert_never
@@ -15,6 +16,7 @@ from tickrig.host.canmon.model.logs.log_writer import comment, log_line
 from tickrig.host.canmon.model.logs.notation import DUMP_HEADER, drop_line, json_line, line_json
 from tickrig.host.cli.start import as_is
 from tickrig.host.text.page_text import json_text, one_line
+from tickrig.host.text.values import counted
 from tickrig.wire.can import CanFrame, ErrorFrame
 
 if TYPE_CHECKING:
@@ -26,6 +28,7 @@ if TYPE_CHECKING:
     from tickrig.host.canmon.model.decode.decoder import Decoder
     from tickrig.host.canmon.model.decode.filter import Filter
     from tickrig.host.canmon.model.frames import AnyRecord
+    from tickrig.host.canmon.sources.source import LogCut
 else:  # slow; seldom wanted; numpy
     column_meanings = LazyModule("tickrig.host.canmon.model.columns.column_meanings")
     column_text = LazyModule("tickrig.host.canmon.model.columns.column_text")
@@ -46,17 +49,29 @@ class FilteredDecoder:
     Args:
         decoder: tells what frames mean; None where nobody asks.
         wanted: which frames pass; None for all. It needs a decoder.
+
+    Attributes:
+        taken: how many frames came.
+        passed: any of them passed.
     """
 
     def __init__(self, decoder: Decoder | None, wanted: Filter | None) -> None:
         self._decoder, self._wanted = decoder, wanted
+        self.taken, self.passed = 0, False
         self._missing: filters.MissingSignals | None = None
         if wanted is not None and (wanted.signals or wanted.words):
             self._missing = filters.MissingSignals(wanted.signals, wanted.words)
 
+    def learning(self, cut: LogCut) -> LogCut:
+        """Return the same cut; the decoder learns from the frames in front of it."""
+        if self._decoder is None or cut.begin is None:
+            return cut
+        return replace(cut, earlier=self._decoder.take)
+
     def take(self, records: Sequence[AnyRecord]) -> Iterator[DecodedFrame]:
         """Pass on what is wanted; all frames are decoded, for the decoder learns from each."""
         decoder, wanted, missing = self._decoder, self._wanted, self._missing
+        self.taken += len(records)
         for record in records:
             if decoder is None:
                 decoded = None
@@ -65,11 +80,24 @@ class FilteredDecoder:
             if missing and decoded is not None:
                 missing.take(record, decoded)
             if wanted is None or (decoded is not None and wanted.matches(record, decoded)):
+                self.passed = True
                 yield record, decoded
 
+    @property
+    def nothing_passed(self) -> bool:
+        """Whether frames came, and the filter let none pass."""
+        return self._wanted is not None and self.taken > 0 and not self.passed
+
     def messages(self) -> list[str]:
-        """Say which signals and kinds the filter asks for that never came, one line each."""
-        return [] if self._missing is None else self._missing.messages()
+        """Say which signals and kinds the filter asks for that never came, one line each.
+
+        Where none is missing, say that no frame passed.
+        """
+        said = [] if self._missing is None else self._missing.messages()
+        if not said and self.nothing_passed and self._wanted is not None:
+            frames = counted(self.taken, "frame")
+            said.append(f"-F {self._wanted.text!r} lets none of {frames} pass")
+        return said
 
 
 # What `dump` prints of each frame: candump's lines, its log format, JSON or CSV.

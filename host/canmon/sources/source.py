@@ -17,7 +17,7 @@ from __future__ import annotations
 import heapq
 import os
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from importlib.util import find_spec
@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final, Generic, TypeVar, cast
 
 from tickrig._lazy import LazyModule
-from tickrig.host.canmon.model.frames import CandumpFilter, Record, flagged_id
+from tickrig.host.canmon.model.frames import CandumpFilter, LogTime, Record, date_text, flagged_id
 from tickrig.host.canmon.model.logs import log_file
 from tickrig.host.canmon.model.logs.log_reader import Item, LogLines, among, read_log
 from tickrig.host.cli.can_options import BusOptions
@@ -115,6 +115,11 @@ class AnySource(Generic[_Taken_co]):
     def errors(self) -> list[str]:
         """Say what of it tells of errors on the bus beside error frames."""
         return [text for name, tally in self.tallies() for text in tally.errors(name)]
+
+    @property
+    def nothing_passed(self) -> bool:
+        """Whether frames came, and filters of SOURCE words or a cut left out all of them."""
+        return False
 
     @property
     def without_errors(self) -> str:
@@ -251,6 +256,117 @@ def _chosen(filters: str) -> CandumpFilter | None:
         return CandumpFilter.parse(filters) if filters else None
 
 
+# A part of a log, cut out by times.
+
+
+@dataclass(frozen=True, slots=True)
+class LogCut:
+    """Which part of a log is wanted; by default all of it.
+
+    Attributes:
+        begin: of the part; None for the first frame of the log.
+        end: of it, likewise for the last frame.
+        earlier: takes each frame in front of the part, as a decoder that learns from it.
+    """
+
+    begin: LogTime | None = None
+    end: LogTime | None = None
+    earlier: Callable[[Record], object] | None = None
+
+    def __bool__(self) -> bool:
+        """Say whether any frame can be left out."""
+        return self.begin is not None or self.end is not None
+
+    def __str__(self) -> str:
+        """Write it as its options."""
+        return " ".join(
+            f"--{name} {time.text}"
+            for name, time in (("from", self.begin), ("to", self.end))
+            if time is not None
+        )
+
+
+class _CutLog:
+    """Lets that part of a log pass which is wanted. Time may go back: each frame counts by itself.
+
+    Args:
+        cut: what is wanted.
+
+    Attributes:
+        over: something came that is later than the part.
+    """
+
+    def __init__(self, cut: LogCut) -> None:
+        self._cut, self.over = cut, False
+        self._origin_us: int | None = None
+        self._begin_us, self._end_us = 0, 0
+        self._first_us, self._last_us, self._passed = 0, 0, False
+
+    def note(self, at_us: int) -> None:
+        """Take the time of the first frame of a file: the first of all is where times begin."""
+        if self._origin_us is not None and self._origin_us <= at_us:
+            return
+        self._origin_us = self._first_us = self._last_us = at_us
+        begin, end = self._cut.begin, self._cut.end
+        self._begin_us = at_us if begin is None else begin.after(at_us)
+        self._end_us = _NEVER_US if end is None else end.after(at_us)
+        if begin is None:  # time may go back below the first frame
+            self._begin_us = -_NEVER_US
+
+    def noted(self, items: Iterator[Item]) -> Iterator[Item]:
+        """Yield all items of a file, and take the time of the first."""
+        for item in islice(items, 1):
+            self.note(item.at_us)
+            yield item
+        yield from items
+
+    def items(self, items: Sequence[Item]) -> list[Item]:
+        """Return those of the part; those in front of it are for who learns from them."""
+        if items and self._origin_us is None:
+            self.note(items[0].at_us)
+        passed: list[Item] = []
+        for item in items:
+            self._last_us = max(self._last_us, item.at_us)
+            if item.at_us < self._begin_us:
+                if self._cut.earlier is not None and isinstance(item, Record):
+                    self._cut.earlier(item)
+            elif item.at_us > self._end_us:
+                self.over = True
+            else:
+                passed.append(item)
+        self._passed = self._passed or any(isinstance(item, Record) for item in passed)
+        return passed
+
+    def block(self, block: Columns) -> Columns:
+        """Return those frames of a block that are of the part."""
+        if len(block):
+            if self._origin_us is None:
+                self.note(int(block.at_us[0]))
+            self._last_us = max(self._last_us, int(block.at_us.max()))
+        inside = (block.at_us >= self._begin_us) & (block.at_us <= self._end_us)
+        if not inside.all():
+            block = column_blocks.select(block, inside.nonzero()[0])
+        self._passed |= bool(len(block))
+        return block
+
+    @property
+    def empty(self) -> bool:
+        """Whether frames came, and none was in the part."""
+        return self._origin_us is not None and not self._passed
+
+    def messages(self) -> list[str]:
+        """Say that nothing was in the part, and where the log lies; nothing if something was."""
+        if not self.empty:
+            return []
+        span_s = (self._last_us - self._first_us) / 1e6
+        dates = f"{date_text(self._first_us)} to {date_text(self._last_us)}"
+        return [f"{self._cut}: no frame is there; the log has {span_s:g} s, {dates}"]
+
+
+_NEVER_US: Final = 1 << 62
+_WHOLE: Final = LogCut()
+
+
 # Opening what SOURCE words name: buses, serial ports, log files or standard input.
 
 
@@ -266,14 +382,24 @@ class _LoggedSource(AnySource[Record]):
 
     recorded = True
 
-    def __init__(self) -> None:
+    def __init__(self, cut: LogCut = _WHOLE) -> None:
         self._items: Sequence[Item] = ()
         self._said_lost, self._no_more = 0, False
+        self._cut = _CutLog(cut) if cut else None
 
     @property
     def lost(self) -> int:
         """Frames that its recorder lost in front of those that come next."""
-        return super().lost if self._ended else self._said_lost
+        return super().lost if self._ended and self._cut is None else self._said_lost
+
+    @property
+    def nothing_passed(self) -> bool:
+        """Whether frames came, and a filter or a cut left out all of them."""
+        return self._cut is not None and self._cut.empty
+
+    def messages(self) -> list[str]:
+        """Say what was no frame or got lost, and that nothing is in the part that is wanted."""
+        return [*super().messages(), *(self._cut.messages() if self._cut else ())]
 
     def _read(self, timeout_us: int) -> Sequence[Item]:
         """Return what is next, or none; `_no_more` says whether that was all."""
@@ -284,7 +410,12 @@ class _LoggedSource(AnySource[Record]):
         if self._ended:
             self.marks = ()
             return []
-        items = self._items or self._read(timeout_us)
+        items = self._items
+        if not items:
+            items = self._read(timeout_us)
+            if self._cut is not None:
+                items = self._cut.items(items)
+                self._no_more |= self.live and self._cut.over
         kinds = list(map(type, items))
         end = kinds.index(log_file.Mark) if log_file.Mark in kinds else len(kinds)
         marks = list(takewhile(lambda item: isinstance(item, log_file.Mark), items[end:]))
@@ -312,14 +443,17 @@ class FileSource(_LoggedSource):
 
     live = False
 
-    def __init__(self, files: Sequence[FileSpec]) -> None:
-        super().__init__()
+    def __init__(self, files: Sequence[FileSpec], cut: LogCut = _WHOLE) -> None:
+        super().__init__(cut)
         self._names = [str(file.path) for file in files]
+        self._silent = {str(file.path) for file in files if file.chosen is not None}
         self._readers = [read_log(file.path) for file in files]
         for file in files:
             _check_readable(file.path)
         streams = [
-            _chosen_items(file, reader.items())
+            self._chosen_items(
+                file, self._cut.noted(reader.items()) if self._cut else reader.items()
+            )
             for file, reader in zip(files, self._readers, strict=True)
         ]
         self._stream = streams[0] if len(streams) == 1 else _merged(streams)
@@ -339,6 +473,35 @@ class FileSource(_LoggedSource):
         self._no_more = len(batch) < _BATCH
         return batch
 
+    def _chosen_items(self, file: FileSpec, items: Iterator[Item]) -> Iterator[Item]:
+        """Return what of a file passes its filter; all of it without one."""
+        chosen = file.chosen
+        return items if chosen is None else self._passing(str(file.path), chosen, items)
+
+    def _passing(self, name: str, chosen: CandumpFilter, items: Iterator[Item]) -> Iterator[Item]:
+        passing = (
+            one for one in items if isinstance(one, log_file.Mark) or chosen.passes(flagged_id(one))
+        )
+        for one in passing:
+            yield one
+            if isinstance(one, Record):
+                self._silent.discard(name)
+                break
+        yield from passing
+
+    @property
+    def nothing_passed(self) -> bool:
+        """Whether frames came, and a filter or a cut left out all of them."""
+        return super().nothing_passed or (self._no_more and self._silent == {*self._names})
+
+    def messages(self) -> list[str]:
+        """Say what was no frame or got lost, and which filters let nothing pass."""
+        silent = [name for name in self._names if self._no_more and name in self._silent]
+        return [
+            *super().messages(),
+            *(f"{name}: the filter behind its name lets no frame pass" for name in silent),
+        ]
+
     def close(self) -> None:
         """Read no more."""
         super().close()
@@ -351,15 +514,6 @@ def _check_readable(path: Path) -> None:
         path.open("rb").close()
     except OSError as error:
         raise SourceFailed(f"{path}: {error.strerror}") from error
-
-
-def _chosen_items(file: FileSpec, items: Iterator[Item]) -> Iterator[Item]:
-    chosen = file.chosen
-    if chosen is None:
-        return items
-    return (
-        one for one in items if isinstance(one, log_file.Mark) or chosen.passes(flagged_id(one))
-    )
 
 
 def _merged(streams: Sequence[Iterator[Item]]) -> Iterator[Item]:
@@ -375,8 +529,8 @@ class StdinSource(_LoggedSource):
 
     live = True
 
-    def __init__(self, descriptor: int = STDIN) -> None:
-        super().__init__()
+    def __init__(self, descriptor: int = STDIN, cut: LogCut = _WHOLE) -> None:
+        super().__init__(cut)
         self._descriptor, self._lines = descriptor, LogLines()
 
     def tallies(self) -> Iterable[tuple[str, log_file.LogTally]]:
@@ -414,8 +568,9 @@ class BlockLog(AnySource["Columns"]):
 
     no_columns = False
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, cut: LogCut = _WHOLE) -> None:
         _check_readable(path)
+        self._cut = _CutLog(cut) if cut else None
         self._path, self._reader = path, column_reader.read_columns(path)
         self._blocks = iter(self._reader)
 
@@ -423,12 +578,23 @@ class BlockLog(AnySource["Columns"]):
         """Return the tally of the file."""
         return [(str(self._path), self._reader.tally)]
 
+    @property
+    def nothing_passed(self) -> bool:
+        """Whether frames came, and none was in the part that is wanted."""
+        return self._cut is not None and self._cut.empty
+
+    def messages(self) -> list[str]:
+        """Say what was no frame or got lost, and that nothing is in the part that is wanted."""
+        return [*super().messages(), *(self._cut.messages() if self._cut else ())]
+
     def poll(self, timeout_us: int, /) -> list[Columns]:
         """Return the next block; it never waits."""
         try:
-            return [next(self._blocks)]
+            block = next(self._blocks)
+            return [block if self._cut is None else self._cut.block(block)]
         except StopIteration:
-            pass
+            # a block does not say where frames were lost: in the part, or outside it
+            self.no_columns = self._cut is not None and self.lost > 0
         except column_blocks.NoColumnsError:
             self.no_columns = True
         except log_file.LogError as error:
@@ -448,8 +614,8 @@ class PieceLog(_LoggedSource):
 
     live = False
 
-    def __init__(self, path: Path) -> None:
-        super().__init__()
+    def __init__(self, path: Path, cut: LogCut = _WHOLE) -> None:
+        super().__init__(cut)
         _check_readable(path)
         self._path, self._reader = path, column_reader.read_columns(path)
         self._stream = self._reader.pieces()
@@ -477,27 +643,37 @@ class PieceLog(_LoggedSource):
 
     def _next(self) -> Columns | Sequence[Item] | None:
         try:
-            return next(self._stream, None)
+            piece = next(self._stream, None)
+            if self._cut is None or piece is None:
+                return piece
+            if isinstance(piece, Sequence):
+                return self._cut.items(piece)
+            block = self._cut.block(piece)
+            return block if len(block) else ()
         except (OSError, log_file.LogError) as error:
             self.failed = str(error)
         return None
 
 
-def block_log(words: Sequence[str]) -> BlockLog | None:
+def block_log(words: Sequence[str], cut: LogCut = _WHOLE) -> BlockLog | None:
     """Open the log that SOURCE words name; None if it is better read frame by frame.
+
+    Args:
+        words: SOURCE words.
+        cut: which part of it is wanted; where frames in front of it are taken, the answer is None.
 
     Raises:
         Refused: words that name nothing.
         SourceFailed: a file that cannot be read.
     """
-    path = _large_log(words)
-    return None if path is None else BlockLog(path)
+    path = None if cut.earlier else _large_log(words)
+    return None if path is None else BlockLog(path, cut)
 
 
-def piece_log(words: Sequence[str]) -> PieceLog | None:
+def piece_log(words: Sequence[str], cut: LogCut = _WHOLE) -> PieceLog | None:
     """Open the log that SOURCE words name in pieces; None and errors as `block_log`."""
-    path = _large_log(words)
-    return None if path is None else PieceLog(path)
+    path = None if cut.earlier else _large_log(words)
+    return None if path is None else PieceLog(path, cut)
 
 
 def _large_log(words: Sequence[str]) -> Path | None:
@@ -513,7 +689,9 @@ def _large_log(words: Sequence[str]) -> Path | None:
         return None  # who reads it frame by frame says so
 
 
-def open_source(words: Sequence[str], options: BusOptions | None = None) -> Source:
+def open_source(
+    words: Sequence[str], options: BusOptions | None = None, cut: LogCut = _WHOLE
+) -> Source:
     """Open what SOURCE words name: one or more buses, or files, or standard input.
 
     Files are merged by time; buses are read as frames come in.
@@ -521,6 +699,7 @@ def open_source(words: Sequence[str], options: BusOptions | None = None) -> Sour
     Args:
         words: SOURCE words; without any the options name a bus.
         options: interface, bit rate and such of the buses.
+        cut: which part of the files or of standard input is wanted; a bus is refused then.
 
     Raises:
         Refused: words that name nothing, or things that do not go together.
@@ -535,9 +714,11 @@ def open_source(words: Sequence[str], options: BusOptions | None = None) -> Sour
     files = [word for word in parsed if isinstance(word, FileSpec)]
     buses = [word for word in parsed if isinstance(word, BusSpec)]
     if parsed == [None]:
-        return StdinSource()
+        return StdinSource(cut=cut)
     if len(files) == len(parsed) > 0:
-        return FileSource(files)
+        return FileSource(files, cut)
+    if cut:
+        raise Refused(f"{cut} cuts a part out of a log, and {' '.join(words) or 'a bus'} is none")
     if any(isinstance(word, LineSpec) for word in parsed):
         raise Refused("serial lines are shown by dump, top and tui: " + " ".join(words))
     if len(buses) < len(parsed):
@@ -545,12 +726,14 @@ def open_source(words: Sequence[str], options: BusOptions | None = None) -> Sour
     return cast("Source", open_live(buses or [BusSpec()], [], options)[0])  # buses alone: frames
 
 
-def open_any(words: Sequence[str], options: BusOptions) -> AnySource[AnyRecord]:
+def open_any(
+    words: Sequence[str], options: BusOptions, cut: LogCut = _WHOLE
+) -> AnySource[AnyRecord]:
     """Open what SOURCE words name, as `open_source` does; serial ports and buses may be mixed."""
     parsed = [parse_source(word) for word in words]
     lines = [word for word in parsed if isinstance(word, LineSpec)]
-    if not lines:
-        return open_source(words, options)
+    if not lines or cut:
+        return open_source(words, options, cut)
     buses = [word for word in parsed if isinstance(word, BusSpec)]
     if len(buses) + len(lines) < len(parsed):
         raise Refused("serial ports, files and standard input cannot be mixed: " + " ".join(words))

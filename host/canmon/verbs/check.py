@@ -34,7 +34,14 @@ from tickrig.host.canmon.model.frames import (
     seconds_text,
 )
 from tickrig.host.canmon.output import listening
-from tickrig.host.canmon.sources.source import AnySource, BlockLog, Source, block_log, open_source
+from tickrig.host.canmon.sources.source import (
+    AnySource,
+    BlockLog,
+    LogCut,
+    Source,
+    block_log,
+    open_source,
+)
 from tickrig.host.canmon.verbs import decode_options
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.messages import Refused, refuse_path, refusing, until_unread
@@ -281,6 +288,7 @@ _MOST_AROUND: Final = 1_000
     _rule_options,
     decode_options.decode_options,
     listening.span_option,
+    decode_options.cut_options,
     click.option(
         "--around",
         type=click.IntRange(0, _MOST_AROUND),
@@ -315,6 +323,7 @@ def command(  # noqa: PLR0913 - options
     eds: decode_options.EdsOptions,
     dbc: Sequence[Path],
     span_us: int | None,
+    cut: LogCut,
     around: int,
     init: bool,
     output: Path | None,
@@ -346,6 +355,7 @@ def command(  # noqa: PLR0913 - options
     canmon check run.log
     canmon check can0 -b 500000 --for 60s
     canmon check run.log --eds 3=drive.eds --max 5
+    canmon check run.log --from 2.5 --to 30
     canmon check --init good.log -o good.toml
     canmon check next.log good.toml
     canmon check run.log --no-emcy --no-sdo-abort --nodes 3,16-18
@@ -364,7 +374,7 @@ def command(  # noqa: PLR0913 - options
     objects = decode_options.read_eds_files(eds) if any(eds) else {}
     if _is_empty(rules):
         make = partial(diagnosis.Diagnoser, bit_rate, objects, rules=known)
-        held_frames = _Usual(words, bus, make, reopen=reopen)
+        held_frames = _Usual(words, bus, make, cut, reopen=reopen)
         held_frames.listen(span_us)
         if init:
             held_frames.learn(output)
@@ -379,11 +389,11 @@ def command(  # noqa: PLR0913 - options
     kept = bool(report_path or sarif_path)
     shown = Stamp(stamp) if stamp else None
     verdict = _FindingPrinter(jsonl, shown, kept=kept, rules=rules.names())
-    log = None if decoder else block_log(words)
+    log = None if decoder else block_log(words, cut)
     if log is not None:
         checker = column_check.ColumnChecker(rules, bit_rate, heartbeats)
         log = _in_blocks(log, checker, verdict, span_us)
-    frames = log or open_source(words, bus)
+    frames = log or open_source(words, bus, cut)
     if reopen:
         frames.reopen()
     with closing(frames):
@@ -422,6 +432,7 @@ class _Usual:
         words: SOURCE words.
         bus: options of buses.
         make: makes what judges the frames.
+        cut: which part of a log is taken.
         reopen: wait for a bus that goes away.
 
     Attributes:
@@ -433,24 +444,26 @@ class _Usual:
         words: Sequence[str],
         bus: BusOptions,
         make: Callable[[], diagnosis.Diagnoser],
+        cut: LogCut,
         *,
         reopen: bool,
     ) -> None:
         self._words, self._bus, self._reopen = words, bus, reopen
+        self._cut = cut
         self._make, self._diagnoser = make, make()
         self._watch, self._end_us = listening.Stopwatch(), 0
         self.source: AnySource[Columns] | Source
 
     def listen(self, span_us: int | None) -> None:
         """Take all that comes, until somebody interrupts it or the time is over."""
-        log = block_log(self._words)
+        log = block_log(self._words, self._cut)
         if log is not None:
             with closing(log):
                 if listening.take_blocks(log, self._diagnoser.take, span_us):
                     self.source = log
                     return
             self._diagnoser = self._make()  # CAN FD: read it again, frame by frame
-        source = open_source(self._words, self._bus)
+        source = open_source(self._words, self._bus, self._cut)
         if self._reopen:
             source.reopen()
         self.source = source

@@ -17,8 +17,10 @@ import click
 
 from tickrig._lazy import LazyModule
 from tickrig.host.canmon import eds_document
+from tickrig.host.canmon.model.frames import LogTime, parse_log_time
+from tickrig.host.canmon.sources.source import LogCut
 from tickrig.host.cli.can_options import BusCommand, bus_options, fd_options
-from tickrig.host.cli.messages import refusing, say
+from tickrig.host.cli.messages import Refused, refusing, say
 from tickrig.host.cli.options import PATH, Decorator, add_options
 
 if TYPE_CHECKING:
@@ -150,6 +152,35 @@ strict_option: Final[Decorator] = click.option(
 reopen_option: Final[Decorator] = click.option(
     "--reopen", is_flag=True, help="Wait for a bus that goes away until it is back."
 )
+
+
+def cut_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add `--from` and `--to`, together as `cut`."""
+
+    @functools.wraps(command)
+    def with_cut(
+        *words: object, begin: LogTime | None, end: LogTime | None, **options: object
+    ) -> object:
+        if begin and end and begin.dated == end.dated and begin.us > end.us:
+            raise Refused(f"--to {end.text} is before --from {begin.text}")
+        return command(*words, cut=LogCut(begin, end), **options)
+
+    end = log_time_option("--to", "end", help="End there, likewise.")
+    return log_time_option(
+        "--from", "begin", help="Begin 2.5 s after the first frame of a log, or at a date."
+    )(end(with_cut))
+
+
+def log_time_option(option: str, name: str, **attributes: Any) -> Decorator:
+    """Return the option of a moment of a log; `parse_log_time` says how it is written."""
+
+    def parsed(
+        context: click.Context, parameter: click.Parameter, text: str | None
+    ) -> LogTime | None:
+        with refusing(option):
+            return None if text is None else parse_log_time(text)
+
+    return click.option(option, name, metavar="TIME", callback=parsed, **attributes)
 
 
 def source_command(*options: Decorator) -> Callable[[Callable[..., Any]], click.Command]:

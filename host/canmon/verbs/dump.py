@@ -20,7 +20,13 @@ from tickrig.host.canmon.model.frames import DumpLines, Stamp
 from tickrig.host.canmon.model.recorder.files import RecordingPlan
 from tickrig.host.canmon.model.recorder.recorder import FilterTrigger
 from tickrig.host.canmon.output import printer
-from tickrig.host.canmon.output.listening import bit_rate_of, report, say_marks, until_interrupted
+from tickrig.host.canmon.output.listening import (
+    bit_rate_of,
+    expect_frames,
+    report,
+    say_marks,
+    until_interrupted,
+)
 from tickrig.host.canmon.output.printer import DecodedFrame, FilteredDecoder
 from tickrig.host.canmon.output.recording import (
     NAMES,
@@ -32,6 +38,7 @@ from tickrig.host.canmon.output.recording import (
 from tickrig.host.canmon.sources.source import (
     AnySource,
     LineSpec,
+    LogCut,
     PieceLog,
     open_any,
     open_source,
@@ -129,6 +136,7 @@ _shown: Final = add_options(
     ),
 )
 _ending: Final = add_options(
+    decode_options.cut_options,
     decode_options.reopen_option,
     click.option("-n", "count", type=click.IntRange(1), metavar="N", help="End after N frames."),
     click.option(
@@ -152,6 +160,7 @@ def dump(  # noqa: PLR0913 - options
     wanted: str | None,
     eds: decode_options.EdsOptions,
     dbc: Sequence[Path],
+    cut: LogCut,
     count: int | None,
     quiet_ms: int | None,
     reopen: bool,
@@ -172,6 +181,7 @@ def dump(  # noqa: PLR0913 - options
     canmon dump can0 -l fault.log --trigger emcy --pre 10s --post 2s
     canmon dump can0 -l fault.log --trigger rules.toml --trigger 'statusword.fault'
     canmon dump run.asc.gz -L > run.log
+    canmon dump run.log --from 2.5 --to 3 -t a
     ssh robot canmon dump can0 --jsonl | canmon top -
 
     A recording in parts has an index, as run.index.jsonl, which is gone on with
@@ -202,18 +212,20 @@ def dump(  # noqa: PLR0913 - options
     if recording is not None and recording.triggers and chosen is not None:
         kept, chosen = FilterTrigger(wanted or "", chosen), None  # triggers see all frames
     meaning = printer.FilteredDecoder(decoder, chosen)
+    cut = meaning.learning(cut)
     lines = DumpLines(Stamp(stamp or ""), extra)
     writer = printer.StdoutWriter(printer.printer_of(form, lines, plain, errors), form)
     take: _Take = writer.take
     alike = (
         form in (printer.DumpFormat.TEXT, printer.DumpFormat.LOG) and file is None and not errors
     )
-    if alike and chosen is None and count is None and (pieces := piece_log(source)):
+    if alike and chosen is None and count is None and (pieces := piece_log(source, cut)):
         _pass_pieces(pieces, meaning, writer, printer.BlockPrinter(form, lines, decoder))
         report(pieces, strict)
+        expect_frames(pieces)
         return
     with ExitStack() as held:
-        frames = held.enter_context(closing(open_any(source, bus)))
+        frames = held.enter_context(closing(open_any(source, bus, cut)))
         if reopen or (recording is not None and recording.plan.numbered):
             frames.reopen()
         if recording is not None:
@@ -228,6 +240,8 @@ def dump(  # noqa: PLR0913 - options
             whole = take if recording is None else signals.behind(take)
             _pass_on(frames, meaning, whole, count, quiet_ms)
     report(frames, strict, meaning.messages())
+    if not signals.came:
+        expect_frames(frames, meaning)
 
 
 def _pass_pieces(
@@ -291,6 +305,7 @@ def _pass_on(
 @click.argument("source", nargs=-1, metavar="SOURCE...")
 @click.argument("log", type=PATH)
 @decode_options.filter_option
+@decode_options.cut_options
 @decode_options.decode_options
 @decode_options.strict_option
 def conv(  # noqa: PLR0913 - options
@@ -298,6 +313,7 @@ def conv(  # noqa: PLR0913 - options
     source: Sequence[str],
     log: Path,
     wanted: str | None,
+    cut: LogCut,
     eds: decode_options.EdsOptions,
     dbc: Sequence[Path],
     strict: bool,
@@ -312,6 +328,7 @@ def conv(  # noqa: PLR0913 - options
     canmon conv left.log right.asc.gz both.log
     canmon conv run.log,123:7FF run.csv
     canmon conv run.log faults.log -F 'emcy or error'
+    canmon conv run.log part.blf --from 2.5 --to 3
 
     {source}
     """  # noqa: D301 - click wants the backspace
@@ -319,11 +336,10 @@ def conv(  # noqa: PLR0913 - options
         raise click.UsageError("Missing argument 'LOG'.")
     chosen = decode_options.read_filter(wanted)
     decoder = None if chosen is None else decode_options.make_decoder(eds, dbc)
-    meaning, pieces = (
-        FilteredDecoder(decoder, chosen),
-        piece_log(source) if chosen is None else None,
-    )
-    frames = pieces or open_source(source)
+    meaning = FilteredDecoder(decoder, chosen)
+    cut = meaning.learning(cut)
+    pieces = piece_log(source, cut) if chosen is None else None
+    frames = pieces or open_source(source, cut=cut)
     with closing(frames), whole_log(log, source) as place:
         with (
             closing(LogFile(RecordingPlan(path=place), source, kept=place == log)) as out,
@@ -336,6 +352,7 @@ def conv(  # noqa: PLR0913 - options
         if signals.came and place != log:
             raise click.exceptions.Exit(INTERRUPTED)
     report(frames, strict, meaning.messages())
+    expect_frames(frames, meaning)
 
 
 def _convert_pieces(

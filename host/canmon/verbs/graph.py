@@ -8,7 +8,7 @@ import shutil
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import closing
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -16,7 +16,14 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from tickrig._lazy import LazyModule
-from tickrig.host.canmon.model.frames import REMOTE, Record, date_text, ident_text, rate_text
+from tickrig.host.canmon.model.frames import (
+    REMOTE,
+    LogTime,
+    Record,
+    date_text,
+    ident_text,
+    rate_text,
+)
 from tickrig.host.canmon.model.graph.plot import render
 from tickrig.host.canmon.model.graph.series import (
     BUS_SIGNALS,
@@ -40,6 +47,7 @@ from tickrig.host.canmon.sources.source import BlockLog, block_log, open_source
 from tickrig.host.canmon.verbs.decode_options import (
     decode_options,
     explained,
+    log_time_option,
     make_decoder,
     strict_option,
 )
@@ -66,9 +74,9 @@ class _GraphRequest:
 
     Attributes:
         files: files to write.
-        from_us: beginning of the view after the first sample, None for all.
-        to_us: its end, likewise.
-        at_us: what is read out, likewise.
+        begin: of the view, None for all.
+        end: of it, likewise.
+        at: what is read out, likewise.
         ranges: of axes.
         size: of a picture in pixels.
         window_us: what is shown of a bus.
@@ -77,27 +85,29 @@ class _GraphRequest:
     """
 
     files: tuple[Path, ...]
-    from_us: int | None
-    to_us: int | None
-    at_us: int | None
+    begin: LogTime | None
+    end: LogTime | None
+    at: LogTime | None
     ranges: dict[int, tuple[float, float]]
     size: tuple[int, int]
     window_us: int
     span_us: int | None
     title: str
 
-    def view(self, series: Sequence[Series]) -> View:
-        """Return the view that is asked for; Refused if nothing is in it."""
+    def view(self, series: Sequence[Series], first_us: int | None) -> View:
+        """Return the view that is asked for; Refused if it is none.
+
+        Args:
+            series: what is seen.
+            first_us: when the first frame came: there times begin.
+        """
         whole = View.of(series)
-        first_us = whole.from_us
+        origin_us = whole.from_us if first_us is None else first_us
+        from_us = whole.from_us if self.begin is None else self.begin.after(origin_us)
+        to_us = max(whole.to_us, from_us + 1) if self.end is None else self.end.after(origin_us)
         with refusing():
-            return View(
-                first_us + (self.from_us or 0),
-                whole.to_us if self.to_us is None else first_us + self.to_us,
-                self.ranges,
-                None if self.at_us is None else first_us + self.at_us,
-                first_us,
-            )
+            at_us = None if self.at is None else self.at.after(origin_us)
+            return View(from_us, to_us, self.ranges, at_us, origin_us)
 
 
 def _checked_files(
@@ -148,9 +158,9 @@ SIZE: Final = (100, 28)
     help=".svg .html .png .csv",
 )
 @click.option("--title", default="", metavar="TEXT", help="Of a picture.")
-@time_option("--from", "from_us", help="Begin 3s after the first sample.")
-@time_option("--to", "to_us", help="End 9s after the first sample.")
-@time_option("--at", "at_us", help="Read out the values there.")
+@log_time_option("--from", "begin", help="Begin 2.5 s after the first frame, or at a date.")
+@log_time_option("--to", "end", help="End there, likewise.")
+@log_time_option("--at", "at", help="Read out the values there, likewise.")
 @click.option("--range", "ranges", multiple=True, metavar="AXIS=LOW..HIGH", help="As 1=-5..5.")
 @click.option(
     "--size", metavar="WxH", default="960x400", callback=_size, help="Of a picture; 960x400 pixels."
@@ -206,8 +216,10 @@ def command(source: str, signals: Sequence[str], **options: Any) -> None:
             follow(frames, [source], collector.take_all, request.span_us, lines)
         if not frames.live and not frames.failed:
             _refuse_missing(source, collector)
-        _show(source, collector.series, request)
+        shown = _show(source, collector, request)
     report(frames, strict)
+    if not shown and (frames.recorded or not frames.live):
+        raise click.exceptions.Exit(_NOTHING_SHOWN)
 
 
 def _refuse_missing(source: str, collector: Collector) -> None:
@@ -297,14 +309,20 @@ def _live(
     return render(series, view, width, height, colour="NO_COLOR" not in os.environ)
 
 
-def _show(source: str, series: Sequence[Series], request: _GraphRequest) -> None:
-    """Write the files, else print the picture; say what has no samples."""
+_NOTHING_SHOWN: Final = 1
+
+
+def _show(source: str, collector: Collector, request: _GraphRequest) -> bool:
+    """Write the files, else print the picture; return whether any sample is in it."""
+    series = collector.series
     for one in series:
         if not one:
             click.echo(f"{one.label}: no samples", err=True)
         if one.not_numbers:
             click.echo(f"{one.label}: {one.not_numbers} samples are no numbers", err=True)
-    view = request.view(series)
+    view = request.view(series, collector.first_us)
+    if missed := _missed(series, view):
+        click.echo(missed, err=True)
     for file in request.files:
         write_graph(file, series, view, request.size, _title(source, view, request.title))
     if not request.files:
@@ -313,6 +331,19 @@ def _show(source: str, series: Sequence[Series], request: _GraphRequest) -> None
         lines = render(series, view, width, min(height - 1, SIZE[1]), colour=colour)
         show = partial(paint, sys.stdout) if colour else click.echo
         show("\n".join(line.rstrip() for line in lines) + "\n" * colour)
+    return any(series) and not missed
+
+
+def _missed(series: Sequence[Series], view: View) -> str:
+    """Say that all samples lie outside a view; empty if one is in it, or there is none at all."""
+    whole = View.of(series)
+    if not any(series) or (whole.from_us <= view.to_us and view.from_us <= whole.to_us):
+        return ""
+    spans = [
+        f"{one.seconds(one.from_us):g} to {one.seconds(one.to_us):g} s"
+        for one in (view, replace(whole, origin_us=view.origin_us))
+    ]
+    return f"no sample from {spans[0]}: they go from {spans[1]}"
 
 
 def _title(source: str, view: View, title: str) -> str:

@@ -14,10 +14,18 @@ from tickrig.host.canmon.extensions import make_decoder
 from tickrig.host.canmon.model.decode.node_board import NodeBoard, board_json, render_board
 from tickrig.host.canmon.model.decode.node_memory import EdsObjects
 from tickrig.host.canmon.model.frames import Record
-from tickrig.host.canmon.output.listening import Stopwatch, follow, report, span_option, take_blocks
-from tickrig.host.canmon.sources.source import BlockLog, block_log, open_source
+from tickrig.host.canmon.output.listening import (
+    Stopwatch,
+    expect_frames,
+    follow,
+    report,
+    span_option,
+    take_blocks,
+)
+from tickrig.host.canmon.sources.source import BlockLog, LogCut, block_log, open_source
 from tickrig.host.canmon.verbs.decode_options import (
     EdsOptions,
+    cut_options,
     eds_option,
     read_eds_files,
     source_command,
@@ -38,13 +46,15 @@ _MANY: Final = 1_000
 @source_command(
     eds_option,
     span_option,
+    cut_options,
     click.option("--jsonl", is_flag=True, help="One JSON object a node, at the end."),
 )
-def command(
+def command(  # noqa: PLR0913 - options
     *,
     source: Sequence[str],
     eds: EdsOptions,
     span_us: int | None,
+    cut: LogCut,
     jsonl: bool,
     strict: bool,
     **options: Any,
@@ -58,16 +68,16 @@ def command(
     \b
     canmon nodes can0
     canmon nodes can0 --eds 3=drive.eds --for 5s --jsonl
-    canmon nodes run.log
+    canmon nodes run.log --to 2.5
 
     Keys: q quit.
 
     {source}
     """  # noqa: D301 - click wants the backspace
     found = read_eds_files(eds)
-    view, log = _NodesView(found), block_log(source)
+    view, log = _NodesView(found), block_log(source, cut)
     whole = log is not None and view.decoder.standard and take_blocks(log, view.take_block, span_us)
-    frames = (log if whole else None) or open_source(source, BusOptions(**options))
+    frames = (log if whole else None) or open_source(source, BusOptions(**options), cut)
     with closing(frames):
         if not isinstance(frames, BlockLog):
             view = view if log is None else _NodesView(found)
@@ -76,6 +86,7 @@ def command(
             for line in view.json(live=frames.live) if jsonl else view.lines(live=frames.live):
                 click.echo(line)
     report(frames, strict)
+    expect_frames(frames)
 
 
 class _NodesView:

@@ -7,6 +7,7 @@ import sys
 from array import array
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
@@ -19,9 +20,9 @@ from tickrig.host.canmon.model.logs.log_reader import LogReader, read_log
 from tickrig.host.canmon.model.traffic import bucket_of, middle_us
 from tickrig.host.canmon.output.listening import Pace, until_interrupted
 from tickrig.host.canmon.sources.source import log_path
+from tickrig.host.canmon.verbs.decode_options import log_time_option
 from tickrig.host.cli.can_options import BusOptions, bus_options, fd_options
 from tickrig.host.cli.messages import Refused, SourceFailed, refusing, until_unread
-from tickrig.host.text.values import parse_time_with_unit_us
 from tickrig.wire.can import CanFrame, ErrorFrame, FdFrame
 from tickrig.wire.errors import FieldError, WireError
 
@@ -172,6 +173,7 @@ class Lateness:
 
 
 _POLL_US: Final = 100_000
+_NOTHING_SENT: Final = 1
 _CAN_ID: Final = re.compile(r"[0-9A-Fa-f]{3}|[0-9A-Fa-f]{8}")
 
 
@@ -179,8 +181,8 @@ _CAN_ID: Final = re.compile(r"[0-9A-Fa-f]{3}|[0-9A-Fa-f]{8}")
 @click.argument("log")
 @click.argument("buses", nargs=-1, metavar="[BUS|BUS=RECORDED...]")
 @click.option("--speed", default="1", metavar="FACTOR", help="2 is twice as fast; max.")
-@click.option("--from", "from_", metavar="TIME", default="0s", help="Begin 3s after its start.")
-@click.option("--to", metavar="TIME", help="End 9s after its start.")
+@log_time_option("--from", "begin", help="Begin 2.5 s after its first frame, or at a date.")
+@log_time_option("--to", "end", help="End there, likewise.")
 @click.option("--loop", default="1", metavar="N", help="How often, or forever.")
 @click.option("--step", is_flag=True, help="Wait for Enter before each frame.")
 @click.option("--wait-rx", metavar="ID", help="Begin when this CAN-ID, as 581, is received.")
@@ -205,11 +207,13 @@ def command(log: str, buses: Sequence[str], step: bool, **options: Any) -> None:
     plan = _plan(reader, route, options)
     receives = wait_rx is not None
     with bus_source.transmitters(words, BusOptions(**options), receives=receives) as opened:
-        _play(
+        ended = _play(
             plan, {word or "": bus for word, bus in zip(words, opened, strict=True)}, step, wait_rx
         )
     for word in reader.tally.messages(str(path)):
         click.echo(word, err=True)
+    if not ended:
+        raise click.exceptions.Exit(_NOTHING_SENT)
 
 
 def _routes(
@@ -241,16 +245,24 @@ def _routes(
 def _plan(
     log: LogReader, route: Callable[[str], str | None], options: dict[str, Any]
 ) -> ReplayPlan:
-    speed, loop, to = (options.pop(name) for name in ("speed", "loop", "to"))
+    speed, loop, begin, end = (options.pop(name) for name in ("speed", "loop", "begin", "end"))
+    dated = any(time is not None and time.dated for time in (begin, end))
+    first_us = _first_us(log) if dated else 0
     with refusing():
         return ReplayPlan(
             log,
             route,
             _speed(speed),
-            parse_time_with_unit_us(options.pop("from_")),
-            None if to is None else parse_time_with_unit_us(to),
+            0 if begin is None else max(0, begin.after(first_us) - first_us),
+            None if end is None else end.after(first_us) - first_us,
             _loops(loop),
         )
+
+
+def _first_us(log: LogReader) -> int:
+    """Return when the first frame came; SourceFailed if the log cannot be read."""
+    with _failing():
+        return next((record.at_us for record in log), 0)
 
 
 def _speed(text: str) -> float:
@@ -286,9 +298,10 @@ def _play(
     buses: dict[str, bus_source.Transmitter],
     step: bool,
     wait_rx: CanFrame | None,
-) -> None:
+) -> bool:
+    """Send what is planned; return False if nothing was in the log to be sent."""
     late, pace = Lateness(), Pace()
-    with until_interrupted(), until_unread():
+    with until_interrupted() as signals, until_unread():
         if wait_rx is not None:
             _wait_for(wait_rx, list(buses.values()))
             pace = Pace()
@@ -302,12 +315,20 @@ def _play(
     summary += [str(late)] if plan.speed and not step else []
     summary += [f"{plan.left_out} left out"] if plan.left_out else []
     click.echo("; ".join(summary), err=True)
+    return bool(late.count) or step or signals.came
 
 
 def _due(plan: ReplayPlan) -> Iterator[_Due]:
     """Yield what is planned; SourceFailed if the log cannot be read."""
-    try:
+    with _failing():
         yield from plan
+
+
+@contextmanager
+def _failing() -> Iterator[None]:
+    """Raise SourceFailed where the block cannot read a log."""
+    try:
+        yield
     except OSError as error:
         raise SourceFailed(f"{error.filename}: {error.strerror}") from error
     except LogError as error:

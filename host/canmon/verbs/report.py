@@ -24,7 +24,14 @@ from tickrig.host.canmon.model.logs.log_writer import write_log
 from tickrig.host.canmon.model.survey import Piece, Survey, excerpts
 from tickrig.host.canmon.model.traffic import BitRates
 from tickrig.host.canmon.output import listening, report_page
-from tickrig.host.canmon.sources.source import AnySource, BlockLog, Source, block_log, open_source
+from tickrig.host.canmon.sources.source import (
+    AnySource,
+    BlockLog,
+    LogCut,
+    Source,
+    block_log,
+    open_source,
+)
 from tickrig.host.canmon.verbs import decode_options
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.messages import Refused, SourceFailed, refuse_path, refusing
@@ -56,6 +63,7 @@ _MOST_AROUND: Final = 200
         help="Frames before and after a finding.",
     ),
     listening.span_option,
+    decode_options.cut_options,
 )
 def command(  # noqa: PLR0913 - options
     *,
@@ -68,6 +76,7 @@ def command(  # noqa: PLR0913 - options
     title: str | None,
     around: int,
     span_us: int | None,
+    cut: LogCut,
     strict: bool,
     **options: Any,
 ) -> None:
@@ -82,6 +91,7 @@ def command(  # noqa: PLR0913 - options
     canmon report run.log -o run.html
     canmon report run.blf -o run.html --eds 3=drive.eds -b 500000
     canmon report next.log good.toml -o next.html
+    canmon report run.log --from 2.5 --to 30 -o part.html
     canmon report can0 --for 60s -o bus.html --pdf bus.pdf
 
     A bus is recorded first, until Ctrl-C or for --for. A file that canmon check
@@ -97,7 +107,7 @@ def command(  # noqa: PLR0913 - options
     bus, objects = BusOptions(**options), decode_options.read_eds_files(eds)
     rates, words = listening.bit_rates_of(source, bus), _named(source)
     with TemporaryDirectory(prefix="canmon-") as folder:
-        read = _Reading(source, bus, Path(folder), span_us)
+        read = _Reading(source, bus, Path(folder), span_us, cut)
         try:
             seen = read.whole(lambda: _Seen(objects, dbc, rates, rules))
             verdict = _verdict(seen, read, around)
@@ -113,6 +123,7 @@ def command(  # noqa: PLR0913 - options
     for line in report_page.summary(seen.survey, verdict, head):
         click.echo(line)
     listening.report(read.source, strict)
+    listening.expect_frames(read.source)
 
 
 def _named(words: Sequence[str]) -> str:
@@ -247,6 +258,7 @@ class _Reading:
         bus: the options of buses.
         folder: for what is recorded.
         span_us: how long a bus is heard; None until somebody interrupts it.
+        cut: which part of a log is read.
 
     Attributes:
         source: what was read first, closed at its end.
@@ -254,15 +266,20 @@ class _Reading:
     """
 
     def __init__(
-        self, words: Sequence[str], bus: BusOptions, folder: Path, span_us: int | None
+        self,
+        words: Sequence[str],
+        bus: BusOptions,
+        folder: Path,
+        span_us: int | None,
+        cut: LogCut,
     ) -> None:
-        self._words, self._bus = list(words), bus
-        self.source: AnySource[Any] = open_source(words, bus)
+        self._words, self._bus, self._cut = list(words), bus, cut
+        self.source: AnySource[Any] = open_source(words, bus, cut)
         self._recorded = self.source.live
         if span_us is not None and not self._recorded:
             raise Refused("--for is how long a bus is recorded: leave it out for a log")
         if self._recorded:
-            self._words = [str(folder / "bus.log")]
+            self._words, self._cut = [str(folder / "bus.log")], LogCut()
             self._record(self.source, Path(self._words[0]), words, span_us)
 
     @property
@@ -277,7 +294,7 @@ class _Reading:
 
     def whole(self, make: Callable[[], _Seen]) -> _Seen:
         """Read all of it."""
-        seen, log = make(), block_log(self._words)
+        seen, log = make(), block_log(self._words, self._cut)
         if log is not None and _in_columns(seen.decoder):
             with closing(log):
                 if seen.by_columns(log):
@@ -303,14 +320,14 @@ class _Reading:
         self.source.close()
 
     def _pieces(self) -> Iterator[Piece]:
-        log = block_log(self._words)
+        log = block_log(self._words, self._cut)
         if log is not None:
             with closing(log):
                 while not log.ended:
                     yield from map(column_survey.ColumnPiece, log.poll(0))
             if not log.no_columns:
                 return
-        source = open_source(self._words, self._bus)
+        source = open_source(self._words, self._bus, self._cut)
         with closing(source):
             while not source.ended:
                 yield _FramePiece(source.poll(0))

@@ -22,8 +22,8 @@ from tickrig.host.canmon.model.frames import (
 )
 from tickrig.host.canmon.model.traffic import BitRates, BusRow, IdRow, Traffic, TrafficSnapshot
 from tickrig.host.canmon.output import listening
-from tickrig.host.canmon.sources.source import BlockLog, Source, block_log, open_source
-from tickrig.host.canmon.verbs.decode_options import source_command
+from tickrig.host.canmon.sources.source import BlockLog, LogCut, Source, block_log, open_source
+from tickrig.host.canmon.verbs.decode_options import cut_options, source_command
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.messages import until_unread
 from tickrig.host.text.page_text import json_text
@@ -207,13 +207,15 @@ def _line(what: str, **members: object) -> str:
         "--by", type=click.Choice(["id", "node"]), default="id", help="A row each (default: id)."
     ),
     listening.span_option,
+    cut_options,
     click.option("--jsonl", is_flag=True, help="One JSON object a row."),
 )
-def command(
+def command(  # noqa: PLR0913 - options
     *,
     source: Sequence[str],
     by: str,
     span_us: int | None,
+    cut: LogCut,
     jsonl: bool,
     strict: bool,
     **options: Any,
@@ -227,16 +229,16 @@ def command(
 
     \b
     canmon stats run.log -b 500000
-    canmon stats run.blf --by node
+    canmon stats run.blf --by node --from 60 --to 90
     canmon stats can0 --for 10s --jsonl
 
     {source}
     """  # noqa: D301 - click wants the backspace
     bus = BusOptions(**options)
     rates = listening.bit_rates_of(source, bus)
-    log = block_log(source)
+    log = block_log(source, cut)
     snapshot = listening.count_blocks(log, span_us)
-    frames = (log if snapshot else None) or open_source(source, bus)
+    frames = (log if snapshot else None) or open_source(source, bus, cut)
     with closing(frames):
         if not isinstance(frames, BlockLog):
             snapshot = _one_by_one(frames, source, span_us, rates)
@@ -245,6 +247,7 @@ def command(
         for line in (_jsonl if jsonl else _tables)(snapshot, by, rates.nominal):
             click.echo(line)
     listening.report(frames, strict)
+    listening.expect_frames(frames)
 
 
 def _one_by_one(

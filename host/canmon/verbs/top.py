@@ -12,7 +12,7 @@ import click
 from tickrig.host.canmon.model.top_model import TopModel
 from tickrig.host.canmon.output import listening
 from tickrig.host.canmon.output.printer import FilteredDecoder
-from tickrig.host.canmon.sources.source import BlockLog, block_log, open_any
+from tickrig.host.canmon.sources.source import BlockLog, LogCut, block_log, open_any
 from tickrig.host.canmon.verbs import decode_options
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.messages import until_unread
@@ -28,6 +28,7 @@ _Take = Callable[["Sequence[AnyRecord]"], None]
     decode_options.filter_option,
     decode_options.decode_options,
     listening.span_option,
+    decode_options.cut_options,
     decode_options.reopen_option,
 )
 def command(  # noqa: PLR0913 - options
@@ -38,6 +39,7 @@ def command(  # noqa: PLR0913 - options
     eds: decode_options.EdsOptions,
     dbc: Sequence[Path],
     span_us: int | None,
+    cut: LogCut,
     reopen: bool,
     strict: bool,
     **options: Any,
@@ -70,10 +72,11 @@ def command(  # noqa: PLR0913 - options
     take: _Take = model.take
     if not plain:
         take = lambda records: model.take_decoded(meaning.take(records))  # noqa: E731
-    log = block_log(source) if plain else None
+    cut = meaning.learning(cut)
+    log = block_log(source, cut) if plain else None
     snapshot = listening.count_blocks(log, span_us)
     model.press("d" if decode else "")
-    frames = (log if snapshot else None) or open_any(source, bus)
+    frames = (log if snapshot else None) or open_any(source, bus, cut)
     if reopen:
         frames.reopen()
 
@@ -89,3 +92,4 @@ def command(  # noqa: PLR0913 - options
         with until_unread():
             click.echo("\n".join(model.final(frames.lost, snapshot)))
     listening.report(frames, strict, meaning.messages())
+    listening.expect_frames(frames, meaning)

@@ -133,6 +133,18 @@ def test_what_was_recorded_on_one_bus_goes_where_it_is_told(wire: Wire, log: str
     assert "late p50" in result.stderr
 
 
+def test_a_replay_begins_at_a_date_and_ends_with_1_where_nothing_is(wire: Wire, log: str) -> None:
+    first_s = float(LOG.partition(")")[0].strip("("))
+    path = Path(log)
+    path.write_text(f"({first_s - 5:.6f}) can0 7FF#\n{LOG}", "ascii")
+    early, late = ("--to", f"{first_s - 1:.6f}"), ("--from", "2100-01-01")
+    assert canmon("play", log, wire.word, "--speed", "max", *late).exit_code == 1
+    assert canmon("play", log, f"{wire.word}=nobus", "--speed", "max").exit_code == 1
+    assert wire.all() == []
+    assert canmon("play", log, wire.word, "--speed", "max", *early).exit_code == 0
+    assert wire.all() == ["7FF#"]
+
+
 def test_frames_are_played_one_by_one(wire: Wire, log: str) -> None:
     result = canmon("play", log, wire.word, "--step", stdin="\n\n")
     assert wire.all() == ["080#", "705#05"]

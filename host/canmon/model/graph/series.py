@@ -454,6 +454,7 @@ class Collector:
     Attributes:
         series: one for each word.
         object_names: names of the objects that were heard while one was looked for.
+        first_us: when the first frame of all was heard; None before it.
     """
 
     def __init__(
@@ -467,6 +468,7 @@ class Collector:
     ) -> None:
         self.series = [Series(word.label or word.text, word.axis, most=most) for word in words]
         self.object_names: dict[str, None] = {}
+        self.first_us: int | None = None
         self._decoder, self._each_node, self._rates = decoder, each_node, rates
         self._slices: defaultdict[int, list[tuple[FrameSlice, Series]]] = defaultdict(list)
         self._objects: list[_Object] = []
@@ -538,10 +540,14 @@ class Collector:
     def take_all(self, records: Iterable[Record]) -> None:
         """Take the values in frames."""
         for record in records:
+            if self.first_us is None:
+                self.first_us = record.at_us
             self.take(record)
 
     def take_columns(self, columns: Columns) -> None:
         """Take the values of slices in a block of a log."""
+        if self.first_us is None and len(columns):
+            self.first_us = int(columns.at_us[0])
         for key, pairs in self._slices.items():
             chosen = columns.ident == key
             for cut, series in pairs:

@@ -93,6 +93,27 @@ def test_a_signal_without_samples_is_told(log: str) -> None:
     assert (result.exit_code, result.stderr) == (0, "186[0]: no samples\n")
 
 
+def test_a_graph_without_any_sample_ends_with_1(log: str) -> None:
+    assert canmon(log, "186[0]").exit_code == 1
+    for words in (["--from", "9s"], ["--from", "9", "--to", "10"]):
+        result = canmon(log, "185[2:6]s", *words)
+        assert result.exit_code == 1
+        assert "no sample from 9 to " in result.stderr
+        assert result.stderr.endswith("they go from 0 to 0.04 s\n")
+
+
+def test_times_of_a_graph_count_from_the_first_frame_or_are_dates(log: str, tmp_path: Path) -> None:
+    lines = Path(log).read_text("ascii")
+    Path(log).write_text(f"(1599999999.990000) can0 705#7F\n{lines}", "ascii")
+    rows = []
+    for begin, end in (("20ms", "0.021"), ("1600000000.010", "1600000000.011")):
+        file = tmp_path / "g.csv"
+        result = canmon(log, "a=185[2:6]s", "-o", str(file), "--from", begin, "--to", end)
+        assert (result.exit_code, result.output) == (0, "")
+        rows.append(file.read_text("ascii").splitlines()[1:])
+    assert rows[0] == rows[1] == ["1600000000.010000,100", "1600000000.011000,121"]
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
@@ -102,7 +123,7 @@ def test_a_signal_without_samples_is_told(log: str) -> None:
         (["185[0]", "--range", "1=5..5"], "--range '1=5..5' is not AXIS=LOW..HIGH"),
         (["185[0]", "--range", "5"], "--range '5' is not AXIS=LOW..HIGH"),
         (["185[0]", "--from", "x"], "--from 'x' is not a time"),
-        (["185[0]", "--from", "9s"], "shows nothing"),
+        (["185[0]", "--from", "9s", "--to", "8s"], "shows nothing"),
         (["185[0]", "--eds", "x"], "--eds 'x' is not NODE=FILE"),
     ],
 )
