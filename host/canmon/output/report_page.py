@@ -15,7 +15,13 @@ from typing import Final, NamedTuple
 
 from tickrig.host.canmon.model.check.diagnosis import RULES, BusFault, Diagnosis
 from tickrig.host.canmon.model.decode.decoded import Decoded
-from tickrig.host.canmon.model.decode.node_board import NodeStatus, pdo_contents, told_identity
+from tickrig.host.canmon.model.decode.node_board import (
+    FROM_TWO_NODES,
+    NodeStatus,
+    name_text,
+    pdo_contents,
+    told_identity,
+)
 from tickrig.host.canmon.model.decode.node_memory import HEARTBEAT_TIME
 from tickrig.host.canmon.model.frames import (
     REMOTE,
@@ -259,20 +265,20 @@ _HEADS: Final = (
 def _node(
     survey: Survey, row: NodeStatus, diagnosis: Diagnosis, *, several: bool
 ) -> dict[str, object]:
-    lane, memory = survey.lane(row.channel, row.node), row.memory
+    lane = survey.lane(row.channel, row.node)
     label = f"{row.channel} node {row.node}" if several else f"Node {row.node}"
     gaps = _gaps(survey, row, lane.gaps, diagnosis)
     boots = f"{row.boots}" + f" ({row.unrequested_boots} unasked)" * bool(row.unrequested_boots)
-    filed = bool(row.name) and not memory.was_received(_DEVICE_NAME)
+    name = name_text(row)
     cells = (
-        *(label, row.name + _FROM_EDS * filed, told_identity(row) or "not read", row.state_text),
+        *(label, name, told_identity(row) or "not read", row.state_text),
         *(_heartbeat(row, gaps, diagnosis), boots, row.drive_state),
         *(_emcys(lane.emcys), _failures(lane.failures)),
     )
     return {
         "key": _key(row.channel, row.node),
         "label": one_line(label),
-        "short": one_line(row.name + _FROM_EDS * filed or row.drive_state),
+        "short": one_line(name or row.drive_state),
         "cells": [one_line(cell) for cell in cells],
         "states": [part for at_us, state in lane.states.changes for part in (at_us, state)],
         "pdos": _bins(_pdo_counts(survey, row), survey.counts.width_us),
@@ -291,7 +297,6 @@ def _node(
 
 
 _FROM_EDS: Final = " (EDS)"
-_DEVICE_NAME: Final = (0x1008, 0)
 
 
 def _of_node(diagnosis: Diagnosis, row: NodeStatus, rule: str) -> list[BusFault]:
@@ -304,7 +309,7 @@ def _of_node(diagnosis: Diagnosis, row: NodeStatus, rule: str) -> list[BusFault]
 
 def _heartbeat(row: NodeStatus, gaps: Thinned[Mark], diagnosis: Diagnosis) -> str:
     if _of_node(diagnosis, row, "doubled-node"):  # their gaps give the period of neither
-        return "from two nodes" if row.reported_us is not None else ""
+        return FROM_TWO_NODES if row.reported_us is not None else ""
     if row.period_us is None:
         return ""
     filed = not row.learnt and not row.memory.was_received(HEARTBEAT_TIME)

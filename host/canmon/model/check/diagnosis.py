@@ -104,7 +104,6 @@ _NEAR_US: Final = 100_000
 _KEPT_TEXTS: Final = 3
 _LOST_AFTER: Final = 1.5
 """A heartbeat is lost after so many of its periods, as on the node board."""
-_LEAST_PAIRS: Final = 4
 _LOAD_US: Final = 500_000
 _LOAD_STEP_US: Final = 50_000
 _STOPPED: Final = 5
@@ -639,23 +638,10 @@ class _BusJudge:
 
     def _two_beats(self, ident: int, rows: Sequence[int], times: Sequence[int]) -> bool:
         """Notice two heartbeats that go beside each other: each second one keeps the period."""
-        gaps = [b - a for a, b in pairwise(times)]
-        pairs = [b - a for a, b in zip(times, times[2:], strict=False)]
-        for values in (gaps, pairs):
-            if len(values) < _LEAST_PAIRS:
-                continue
-            period = sorted(values)[len(values) // 2]
-            found = [
-                at
-                for at, pair in enumerate(pairs)
-                if abs(pair - period) <= 0.05 * period
-                and abs(gaps[at] - gaps[at + 1]) > 0.2 * period
-            ]
-            short = sorted(min(gaps[at], gaps[at + 1]) for at in found)
-            if len(found) >= _LEAST_PAIRS and short[-1] - short[0] <= 0.1 * period:
-                self._double(ident, [rows[at + 1] for at in found])
-                return True
-        return False
+        found = node_memory.two_beats(times)
+        if found is not None:
+            self._double(ident, [rows[at + 1] for at in found.places])
+        return found is not None
 
     def _double(self, ident: int, rows: Sequence[int]) -> None:
         text = "a second heartbeat comes beside the first: two nodes have this node-ID"

@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 from tickrig.host.canmon.model.check.bus_frames import BusFrames, Hit
 from tickrig.host.canmon.model.decode import decoded
 from tickrig.host.canmon.model.decode.decoder import Decoder
-from tickrig.host.canmon.model.decode.node_memory import STATUSWORD, drive_state
+from tickrig.host.canmon.model.decode.node_memory import PAIR_US, STATUSWORD, drive_state
 from tickrig.host.canmon.model.decode.sdo import WRONG_TOGGLE
 from tickrig.host.canmon.model.decode.services import nmt_state_name
 from tickrig.host.canmon.model.frames import ERROR, REMOTE, Record, ms_text
@@ -45,8 +45,6 @@ _PATIENCE_US: Final = 1_000_000
 """An SDO request at the end of a log may still be answered for so long."""
 _OBEYS_US: Final = 1_000_000
 """A node follows an NMT command within so long."""
-_PAIR_US: Final = 100_000
-"""Two answers, or boot-ups, of two nodes with one node-ID come within so long."""
 _PDO_PARAMETERS: Final = range(0x1400, 0x1C00)
 _SYNC_PARAMETERS: Final = range(0x1005, 0x1008)
 _HEARTBEAT_TIME: Final = 0x1017
@@ -293,7 +291,7 @@ class BusEvents:
         heard = self._first.get(node, self._row) < self._row
         latest = one.boots[-1] if one.boots else None
         if heard and not one.reset:
-            if not self._untimed and latest is not None and at_us - self._times[latest] <= _PAIR_US:
+            if not self._untimed and latest is not None and at_us - self._times[latest] <= PAIR_US:
                 said = ms_text(at_us - int(self._times[latest]))
                 self._hit(
                     *("doubled-node", node, nmt.ERROR_CONTROL_COB_ID + node),
@@ -365,7 +363,7 @@ class BusEvents:
             not self._untimed
             and latest[2] == one.requests
             and data[:4] == latest[1][:4]
-            and at_us - latest[0] <= _PAIR_US
+            and at_us - latest[0] <= PAIR_US
         ):
             self._hit(
                 *("doubled-node", node, sdo_frame.RESPONSE_COB_ID + node),

@@ -8,7 +8,7 @@ Who a node is, and what its PDOs carry, as far as anybody said it.
 >>> eds = EdsObjects({}, {at: value.to_bytes(4, "little") for at, value in values.items()})
 >>> row = NodeStatus("can0", 5, NodeMemory(eds))
 >>> identity_words(row)
-'CiA 402 drive, vendor 0000013Fh, revision 1.2'
+'EDS: CiA 402 drive, vendor 0000013Fh, revision 1.2'
 >>> [(pdo.kind, hex(pdo.can_id), pdo.text) for pdo in pdo_contents(row)]
 [('tpdo1', '0x185', 'statusword (eds)')]
 """
@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Final, NamedTuple
 
 from tickrig.host.canmon.model.decode.decoded import Decoded, Transfer, TransferOutcome, write_entry
@@ -25,9 +26,12 @@ from tickrig.host.canmon.model.decode.decoder import Decoder
 from tickrig.host.canmon.model.decode.node_memory import (
     DEVICE_TYPE,
     HEARTBEAT_TIME,
+    LATE,
+    PAIR_US,
     Heartbeats,
     NodeMemory,
     drive_state,
+    two_beats,
 )
 from tickrig.host.canmon.model.decode.pdos import (
     DUMMIES,
@@ -48,7 +52,9 @@ from tickrig.wire.canopen.pdo import MAX_MAPPED_OBJECTS
 # All nodes at a glance: states, heartbeats, boot-ups, EMCYs, SDO errors, drives.
 
 _EMCY_KEPT: Final = 16
+_BEATS_KEPT: Final = 12
 _DEVICE_NAME: Final = (0x1008, 0)
+_FROM_EDS: Final = " (EDS)"
 
 _TARGETS: Final = {
     NmtCommand.START: NmtState.OPERATIONAL,
@@ -91,6 +97,8 @@ class NodeStatus:
         name: the device name it told.
         present: it has sent anything that is known to be its own.
         pdos: the latest of each of its PDOs, by kind.
+        doubled: two nodes have this node-ID, as far as their heartbeats and boot-ups say it: what
+            is shown of the node is of both, and their gaps give the period of neither.
     """
 
     channel: str
@@ -110,8 +118,13 @@ class NodeStatus:
     name: str = ""
     present: bool = False
     pdos: dict[str, Decoded] = field(default_factory=dict)
+    doubled: bool = False
     _reset_requested: bool = False
     _heartbeats: Heartbeats = field(init=False)
+    _beats_us: deque[int] = field(default_factory=lambda: deque(maxlen=_BEATS_KEPT))
+    _each_us: int = 0  # the period of each of two nodes
+    _alike: int = 0  # gaps in a row that are as long as the one before
+    _booted_us: int | None = None
 
     def __post_init__(self) -> None:
         """Wait for its first heartbeat."""
@@ -143,6 +156,8 @@ class NodeStatus:
 
     def is_late(self, now_us: int) -> bool:
         """Say whether a heartbeat is missing."""
+        if self._each_us:
+            return now_us - self._beats_us[-1] > LATE * self._each_us
         return self._heartbeats.is_late(now_us)
 
     @property
@@ -162,6 +177,11 @@ class NodeStatus:
     def boot(self, at_us: int) -> None:
         """Take its boot-up: it is pre-operational then (CiA 301, boot-up)."""
         self.boots += 1
+        if self._booted_us is not None and not self._reset_requested:
+            self.doubled |= 0 <= at_us - self._booted_us <= PAIR_US
+        self._booted_us = at_us
+        self._beats_us.clear()
+        self._each_us = self._alike = 0
         self.unrequested_boots += self.present and not self._reset_requested
         self._reset_requested, self.drive_state, self.error_code = False, "", 0
         self._heartbeats.boot(at_us)
@@ -171,7 +191,20 @@ class NodeStatus:
         """Take a heartbeat, or the answer to a guarding request."""
         self.late += self.is_late(at_us)
         self._heartbeats.take(at_us)
+        self._beat(at_us)
         self._report(state)
+
+    def _beat(self, at_us: int) -> None:
+        """Notice a second heartbeat beside the first, and when there is none any more."""
+        self._beats_us.append(at_us)
+        gaps = [b - a for a, b in pairwise(list(self._beats_us)[-3:])]
+        alike = len(gaps) < 2 or abs(gaps[1] - gaps[0]) <= 0.2 * max(map(abs, gaps))
+        self._alike = self._alike + 1 if alike else 0
+        if alike and not self._each_us:  # nearly always
+            return
+        found = None if self._alike >= _BEATS_KEPT else two_beats(list(self._beats_us))
+        self._each_us = 0 if found is None else found.period_us
+        self.doubled = found is not None
 
     def _report(self, state: int) -> None:
         self.state, self.commanded, self.present = state, None, True
@@ -301,6 +334,8 @@ class NodeBoard:
 _VERSION: Final = 1
 _GAP: Final = "  "
 _BAR_CELLS: Final = 5
+FROM_TWO_NODES: Final = "from two nodes"
+"""Stands for a heartbeat period, where two nodes have one node-ID."""
 _HEADS: Final = ("NODE", "NAME", "NMT STATE", "HEARTBEAT", "BOOT-UPS", "DRIVE", "EMCY", "SDO ERROR")
 
 
@@ -338,7 +373,7 @@ def _cells(row: NodeStatus, now_us: int, *, with_bus: bool) -> tuple[str, ...]:
     )
     return (
         f"{row.channel} {row.node}" if with_bus else str(row.node),
-        row.known_name,
+        name_text(row),
         row.state_text,
         _heartbeat(row, now_us),
         boots if row.boots else "",
@@ -353,6 +388,8 @@ def _heartbeat(row: NodeStatus, now_us: int) -> str:
     age_us, period_us = row.age_us(now_us), row.period_us
     if age_us is None:
         return "never heard" if row.period_us else ""
+    if row.doubled:
+        return FROM_TWO_NODES + " LATE" * row.is_late(now_us)
     if period_us is None:
         return f"{age_us // 1_000} ms ago"
     share = min(_BAR_CELLS, age_us * _BAR_CELLS * 2 // (3 * period_us))
@@ -404,8 +441,9 @@ def _fields(row: NodeStatus, now_us: int) -> dict[str, object]:
         "node": row.node,
         "name": row.known_name,
         "state": row.state_text,
-        "heartbeat_ms": None if period_us is None else period_us / 1_000,
+        "heartbeat_ms": None if period_us is None or row.doubled else period_us / 1_000,
         "learnt": row.learnt,
+        "doubled": row.doubled,
         "age_ms": None if age_us is None else age_us / 1_000,
         "late": row.is_late(now_us),
         "late_count": row.late,
@@ -477,13 +515,20 @@ def maker_text(row: NodeStatus) -> str:
     vendor, product = row.memory.number(_IDENTITY, 1), row.memory.number(_IDENTITY, 2)
     words = [row.memory.eds.vendor or ("" if not vendor else f"{vendor:08X}h")]
     words += [f"{product:08X}h"] if product else []
-    return " ".join(filter(None, words))
+    text = " ".join(filter(None, words))
+    read = row.memory.was_received((_IDENTITY, 1)) or row.memory.was_received((_IDENTITY, 2))
+    return text + _FROM_EDS * bool(text and not read)
+
+
+def name_text(row: NodeStatus) -> str:
+    """Return the name of a node, marked where its EDS says it, and not the node."""
+    name, told = row.known_name, row.memory.was_received(_DEVICE_NAME)
+    return name + _FROM_EDS * bool(name and not told)
 
 
 def identity_words(row: NodeStatus) -> str:
     """Return profile, vendor, product, revision and serial number, as far as they are known."""
-    words = _identity(row.memory.number, row.memory.eds.vendor)
-    return words or "not known: no EDS, and nobody has read 1000h or 1018h"
+    return told_identity(row) or "not known: no EDS, and nobody has read 1000h or 1018h"
 
 
 def told_identity(row: NodeStatus) -> str:

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import re
 from collections import deque
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -502,6 +503,48 @@ class Heartbeats:
         else:
             self.gaps.append(gap_us)
             self._merged = 1
+
+
+_LEAST_PAIRS: Final = 4
+PAIR_US: Final = 100_000
+"""Boot-ups, or answers to one request, that are no further from each other are of two nodes."""
+
+
+class TwoBeats(NamedTuple):
+    """Two heartbeats that go beside each other: each second one keeps the period.
+
+    Attributes:
+        period_us: of one of them.
+        places: of the gaps where one comes beside the other.
+    """
+
+    period_us: int
+    places: list[int]
+
+
+def two_beats(times: Sequence[int]) -> TwoBeats | None:
+    """Find two heartbeats beside each other in the times of one CAN-ID.
+
+    >>> two_beats([0, 30, 100, 130, 200, 230, 300, 330]).period_us
+    100
+    >>> two_beats([0, 100, 200, 300, 400, 500, 600]) is None
+    True
+    """
+    gaps = [b - a for a, b in pairwise(times)]
+    pairs = [b - a for a, b in zip(times, times[2:], strict=False)]
+    for values in (gaps, pairs):
+        if len(values) < _LEAST_PAIRS:
+            continue
+        period = sorted(values)[len(values) // 2]
+        found = [
+            at
+            for at, pair in enumerate(pairs)
+            if abs(pair - period) <= 0.05 * period and abs(gaps[at] - gaps[at + 1]) > 0.2 * period
+        ]
+        short = sorted(min(gaps[at], gaps[at + 1]) for at in found)
+        if len(found) >= _LEAST_PAIRS and short[-1] - short[0] <= 0.1 * period:
+            return TwoBeats(period, found)
+    return None
 
 
 def _median(gaps: Collection[float]) -> int:

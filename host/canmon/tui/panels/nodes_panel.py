@@ -151,6 +151,8 @@ def heartbeat_line(row: node_board.NodeStatus, now_us: int, width: int) -> Line:
     age_us, period_us = row.age_us(now_us), row.period_us
     if age_us is None:
         return plain("never heard", BAD) if period_us else ()
+    if row.doubled:
+        return plain(node_board.FROM_TWO_NODES + " LATE" * row.is_late(now_us), BAD)
     if period_us is None:
         return plain(f"none, {age_us / 1e6:.1f} s ago", _DIM)
     cells = 6 if width < MIDDLE else 12 if width < WIDE else 16
@@ -170,14 +172,14 @@ def _boots(row: node_board.NodeStatus, now_us: int, width: int) -> Line:
 
 def _error_line(row: node_board.NodeStatus, now_us: int, width: int) -> Line:
     """Say in words what is wrong with a node, the worst first; empty for nothing."""
-    pieces = []
+    pieces = [("two nodes have this node-ID", BAD)] * row.doubled
     if row.error_code:
         pieces.append((f"{row.error_code:04X}h {describe(row.error_code)}", BAD))
     if row.unrequested_boots:
         pieces.append((f"{row.unrequested_boots} boot-up unasked", WARNING))
     if row.sdo_errors:
         pieces.append((f"SDO {row.sdo_error}", WARNING))
-    if row.late:
+    if row.late and not row.doubled:
         pieces.append((f"{row.late} late", WARNING))
     if row.emcy_count and not row.error_code:
         pieces.append((f"{row.emcy_count} EMCY, gone", _DIM))
@@ -190,8 +192,8 @@ def _carried(row: node_board.NodeStatus, now_us: int, width: int) -> Line:
 
 
 _COLUMNS: Final = (
-    _BoardColumn("NAME", lambda row, now_us, width: plain(row.known_name), most=24),
-    _BoardColumn("MAKER", lambda row, now_us, width: plain(node_board.maker_text(row)), WIDE, 20),
+    _BoardColumn("NAME", lambda row, now_us, width: plain(node_board.name_text(row)), most=30),
+    _BoardColumn("MAKER", lambda row, now_us, width: plain(node_board.maker_text(row)), WIDE, 26),
     _BoardColumn("NMT STATE", _state, kept=True),
     _BoardColumn("HEARTBEAT", heartbeat_line, kept=True),
     _BoardColumn("BOOT-UPS", _boots, WIDE),
@@ -220,7 +222,8 @@ def card_lines(
         stamp: how times are written.
         origin_us: the time of the first frame.
     """
-    where = f"{row.channel} node {row.node}" + f": {row.known_name}" * bool(row.known_name)
+    name = node_board.name_text(row)
+    where = f"{row.channel} node {row.node}" + f": {name}" * bool(name)
     lines = [plain(where, _HEAD)]
     lines += _wrapped("device", node_board.identity_words(row), width)
     for pdo in node_board.pdo_contents(row):

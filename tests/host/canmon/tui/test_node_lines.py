@@ -36,25 +36,25 @@ NOW_US = 365_000
 
 BOARDS = {
     80: """\
-NODE  NAME  NMT STATE                   HEARTBEAT        ERRORS
-5     EPOS  operational                 ███░░░ 5/~10 ms  8210h PDO not processe…
-8           pre-operational -> stopped  none, 0.1 s ago
+NODE  NAME        NMT STATE                   HEARTBEAT        ERRORS
+5     EPOS (EDS)  operational                 ███░░░ 5/~10 ms  8210h PDO not pr…
+8                 pre-operational -> stopped  none, 0.1 s ago
 """,
     120: """\
-NODE  NAME  NMT STATE                   HEARTBEAT              DRIVE              ERRORS
-5     EPOS  operational                 ██████░░░░░░ 5/~10 ms  operation enabled  8210h PDO not processed due to length…
-8           pre-operational -> stopped  none, 0.1 s ago
+NODE  NAME        NMT STATE                   HEARTBEAT              DRIVE              ERRORS
+5     EPOS (EDS)  operational                 ██████░░░░░░ 5/~10 ms  operation enabled  8210h PDO not processed due to …
+8                 pre-operational -> stopped  none, 0.1 s ago
 """,  # noqa: E501 - as wide as the screen
     200: """\
-NODE  NAME  MAKER              NMT STATE                   HEARTBEAT                  BOOT-UPS  DRIVE              TPDOs CARRY                        ERRORS
-5     EPOS  tickrig 00006210h  operational                 ████████░░░░░░░░ 5/~10 ms  2         operation enabled  statusword, position_actual_value  8210h PDO not processed due to length error; 1 bo…
-8                              pre-operational -> stopped  none, 0.1 s ago            1
+NODE  NAME        MAKER                    NMT STATE                   HEARTBEAT                  BOOT-UPS  DRIVE              TPDOs CARRY                        ERRORS
+5     EPOS (EDS)  tickrig 00006210h (EDS)  operational                 ████████░░░░░░░░ 5/~10 ms  2         operation enabled  statusword, position_actual_value  8210h PDO not processed due to length…
+8                                          pre-operational -> stopped  none, 0.1 s ago            1
 """,  # noqa: E501 - as wide as the screen
 }
 CARD = """\
-can0 node 5: EPOS
-  device     CiA 402 drive, vendor tickrig 00000000h, product 00006210h,
-             revision 1.0, serial 1
+can0 node 5: EPOS (EDS)
+  device     EDS: CiA 402 drive, vendor tickrig 00000000h, product 00006210h,
+             revision 1.0
   TPDO1 185h statusword=0x1737[operation enabled] position_actual_value=10 (eds)
   RPDO1 205h controlword, target_velocity (eds)
   RPDO2 305h controlword, target_position (eds)
@@ -148,3 +148,19 @@ def test_several_buses_are_told_apart() -> None:
         made.take(heard, decoder.take(heard))
     lines = texts(board_lines(made.rows(), 1_000_000, 80))
     assert [line[:6] for line in lines[1:]] == ["can0 5", "can1 5"]
+
+
+def test_two_nodes_with_one_node_id_are_marked_until_one_is_gone() -> None:
+    both = sorted([n * 75 for n in range(9)] + [20 + n * 75 for n in range(9)])
+    alone = [both[-1] + 55 + n * 75 for n in range(14)]
+    text = "\n".join(f"{ms / 1e3:.3f} 705#05" for ms in both)
+    (row,) = board(text, eds=False).rows()
+    now_us = both[-1] * 1_000 + 40_000
+    assert texts(board_lines([row], now_us, 80))[1].split() == (
+        ["5", "operational", "from", "two", "nodes", "two", "nodes", "have", "this", "node-ID"]
+    )
+    assert heartbeat_line(row, now_us, 80)[0][1] == BAD
+    assert line_text(heartbeat_line(row, now_us + 100_000, 80)) == "from two nodes LATE"
+    text += "".join(f"\n{ms / 1e3:.3f} 705#05" for ms in alone)
+    (row,) = board(text, eds=False).rows()
+    assert line_text(heartbeat_line(row, alone[-1] * 1_000, 80)).endswith(" 0/~75 ms")

@@ -36,6 +36,26 @@ def test_a_large_log_has_the_same_board(monkeypatch: pytest.MonkeyPatch) -> None
     assert (large.stdout, large.stderr, large.exit_code) == (small.stdout, small.stderr, 0)
 
 
+@pytest.mark.parametrize("size", [0, 1 << 20])
+def test_two_nodes_with_one_node_id_are_marked_and_have_no_period(
+    size: int, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(block_log, "SMALL_BYTES", size)
+    log = tmp_path / "run.log"
+    times = sorted([n * 75 for n in range(9)] + [20 + n * 75 for n in range(9)])
+    beats = [f"({1_000 + ms / 1e3:.6f}) can0 705#05\n" for ms in times]
+    log.write_text("".join(beats), "ascii")
+    (found,) = map(json.loads, nodes(str(log), "--jsonl").stdout.splitlines())
+    assert (found["doubled"], found["heartbeat_ms"], found["late"]) == (True, None, False)
+    assert "from two nodes" in nodes(str(log)).stdout
+    log.write_text("".join(beats[::2]), "ascii")
+    (found,) = map(json.loads, nodes(str(log), "--jsonl").stdout.splitlines())
+    assert (found["doubled"], found["heartbeat_ms"]) == (False, 75)
+    log.write_text("(1.0) can0 705#05\n(2.0) can0 705#00\n(2.01) can0 705#00\n", "ascii")
+    (found,) = map(json.loads, nodes(str(log), "--jsonl").stdout.splitlines())
+    assert found["doubled"]
+
+
 def test_each_node_is_a_json_object() -> None:
     result = nodes(str(TRACE), "--jsonl")
     (found,) = map(json.loads, result.stdout.splitlines())
@@ -59,7 +79,7 @@ def test_standard_input_is_read_to_its_end() -> None:
 
 def test_an_eds_puts_its_node_on_the_board() -> None:
     result = nodes(str(TRACE), "--eds", f"0x7={EPOS}")
-    assert result.stdout.splitlines()[2].split() == ["7", "EPOS", "?", "->", "stopped"]
+    assert result.stdout.splitlines()[2].split() == ["7", "EPOS", "(EDS)", "?", "->", "stopped"]
 
 
 NO_WORD = "is not NODE=FILE with a node-ID 1..127, as 3=drive.eds or 1-3=drive.eds"
