@@ -167,7 +167,7 @@ class Heat(Part):
         self.since_us, self.ambient_c = 0, ambient_c
         self.temperatures: _Temperatures = (ambient_c, ambient_c)
 
-    def later(self, now_us: int, square_a2s: float) -> Heat:
+    def after(self, now_us: int, square_a2s: float) -> Heat:
         """Return what `pass_time` makes of it."""
         found = Heat(self._parameters, self.ambient_c)
         found.temperatures, found.since_us = self.temperatures, self.since_us

@@ -364,7 +364,7 @@ class Servo(Readings):
             square = (i * i + i * current + current * current) / 3 * STEP_S
             squared = squares + square
             if steps == look:  # looks belong to a run: three wake-ups fewer in 40 ms
-                warmer = heat.later(self.now_us + (steps + 1) * STEP_US, squared)
+                warmer = heat.after(self.now_us + (steps + 1) * STEP_US, squared)
                 if warmer.shapes(r) or round(warmer.temperatures[0] * 10) > hottest_dc:
                     break
                 heat, most_a, squared = warmer, self._allowed_a(warmer), 0.0
