@@ -284,13 +284,13 @@ class _Bits(NamedTuple):
 def _each_column(head: str, bits: _Bits, write: Callable[[int], str], unit: str = "") -> _Column:
     """Return a signal whose numbers are written one by one, those of few bits once for all."""
 
-    def told(raw: int) -> str:
+    def shown(raw: int) -> str:
         return write(bits.number(raw))
 
     if bits.length <= _SHORT:
-        table = cells.TextTable(bits.length, told)
+        table = cells.TextTable(bits.length, shown)
         return _Column(head, lambda payloads: [table.cells(bits.of(payloads).view(np.int64))], unit)
-    return _Column(head, lambda payloads: [cells.of_few(bits.of(payloads), told)], unit)
+    return _Column(head, lambda payloads: [cells.of_few(bits.of(payloads), shown)], unit)
 
 
 def _whole_column(
@@ -308,7 +308,7 @@ def _whole_column(
     times, more = scale
     limit = (cells.WHOLE - abs(more)) // max(1, abs(times))
 
-    def told(payloads: _Payloads) -> Sequence[cells.Part]:
+    def shown(payloads: _Payloads) -> Sequence[cells.Part]:
         raw = bits.of(payloads)
         numbers = bits.signed(raw)
         right = _within(numbers, raw, bits, limit)
@@ -319,7 +319,7 @@ def _whole_column(
 
     if limit <= 0 or max(abs(times), abs(more)) >= cells.WHOLE:
         return _each_column(head, bits, write, unit)
-    return _Column(head, told, unit)
+    return _Column(head, shown, unit)
 
 
 def _scaled_column(
@@ -330,7 +330,7 @@ def _scaled_column(
     if exact is None:
         return _each_column(head, bits, write, unit)
 
-    def told(payloads: _Payloads) -> Sequence[cells.Part]:
+    def shown(payloads: _Payloads) -> Sequence[cells.Part]:
         raw = bits.of(payloads)
         numbers = bits.signed(raw)
         parts, right = cells.scaled(numbers, exact)
@@ -341,7 +341,7 @@ def _scaled_column(
             return parts
         return [_mended(parts, right, raw, lambda found: write(bits.number(found)))]
 
-    return _Column(head, told, unit)
+    return _Column(head, shown, unit)
 
 
 def _within(

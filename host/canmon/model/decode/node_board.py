@@ -191,10 +191,10 @@ class NodeStatus:
         """Take a heartbeat, or the answer to a guarding request."""
         self.late += self.is_late(at_us)
         self._heartbeats.take(at_us)
-        self._beat(at_us)
+        self._count_heartbeat(at_us)
         self._report(state)
 
-    def _beat(self, at_us: int) -> None:
+    def _count_heartbeat(self, at_us: int) -> None:
         """Notice a second heartbeat beside the first, and when there is none any more."""
         self._beats_us.append(at_us)
         gaps = [b - a for a, b in pairwise(list(self._beats_us)[-3:])]
