@@ -226,6 +226,10 @@ def frame_bits(frame: CanFrame) -> int:
     return bits + end
 
 
+kept_bits: Final = lru_cache(KEPT_HEADS)(frame_bits)
+"""The same, for frames that come again: a bus and what measures its load count each once."""
+
+
 def _head(key: int) -> tuple[int, _Row, int]:
     """Return the bits of a frame without stuff bits, and row and CRC after the DLC."""
     can_id, extended, remote, length = key >> 6, key >> 5 & 1, key >> 4 & 1, key & 0xF

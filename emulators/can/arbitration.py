@@ -12,6 +12,7 @@ from tickrig.wire.can import CanFrame
 if TYPE_CHECKING:
     from tickrig.emulators.can.end import CanEnd
 
+_CAN_ID_PLACE: Final = 21  # of an 11-bit CAN-ID in the arbitration field
 _NUMBER_BITS: Final = 24
 _NUMBER_MASK: Final = (1 << _NUMBER_BITS) - 1
 _FIRST_NUMBER: Final = -1
@@ -31,7 +32,7 @@ def priority(frame: CanFrame) -> int:
     can_id = frame[0]
     if frame[3]:
         return (can_id >> 18) << 21 | 3 << 19 | (can_id & 0x3_FFFF) << 1 | frame[2]
-    return can_id << 21 | (1 << 20 if frame[2] else 0)
+    return can_id << _CAN_ID_PLACE | (1 << 20 if frame[2] else 0)
 
 
 def first_difference(frames: Sequence[CanFrame]) -> int:
@@ -76,11 +77,6 @@ class CanArbiter(ArbiterFields):
         self._remove(end)
         del self._ends[end.number - _FIRST_NUMBER]
 
-    def enter(self, end: CanEnd, now: int) -> None:
-        """Let a node take part whose queue was empty."""
-        end.held = max(end.held, now)
-        self.push(end)
-
     def put_back(self, ends: Iterable[CanEnd]) -> None:
         """Let nodes take part again, those that still have a frame to send."""
         for end in ends:
@@ -90,7 +86,9 @@ class CanArbiter(ArbiterFields):
     @in_kernel
     def push(self, end: CanEnd) -> None:
         """Let a node take part again, which has a frame to send."""
-        head = priority(end.next) << _NUMBER_BITS | end.number - _FIRST_NUMBER
+        frame = end.next
+        rank = priority(frame) if frame[2] or frame[3] else frame[0] << _CAN_ID_PLACE
+        head = rank << _NUMBER_BITS | end.number - _FIRST_NUMBER
         heappush(self.heads, head)
 
     def take(self) -> list[CanEnd]:

@@ -128,7 +128,7 @@ class CanEnd(EndFields):
         if frames:
             if self._more is not None:
                 frames = self.inbox
-            self._empty()
+            self._first, self._more, self.arrived_us = (), None, NEVER
         return frames
 
     def poll_stamped(self, now_us: int) -> tuple[tuple[int, CanFrame], ...]:
@@ -195,9 +195,6 @@ class CanEnd(EndFields):
         self._more.append((at_us, frame))
         return True
 
-    def _empty(self) -> None:
-        self._first, self._more, self.arrived_us = (), None, NEVER
-
     def pass_all(self) -> None:
         """Disable the filter until the next poll, because the device may change its CAN-IDs."""
         if not self.unfiltered:
@@ -213,7 +210,7 @@ class CanEnd(EndFields):
     def forget(self) -> None:
         """Drop sent and received frames that wait, as a node without power does."""
         self.drop()
-        self._empty()
+        self._first, self._more, self.arrived_us = (), None, NEVER
 
     def open(self, *, on_bus: bool) -> None:
         """Enable or disable sending; disabling drops the waiting frames."""

@@ -55,7 +55,7 @@ from tickrig.emulators.can.transmission_outcomes import (
     TransmissionOutcomes,
 )
 from tickrig.emulators.rig.kernel import in_kernel
-from tickrig.wire.can import INTERFRAME_BITS, CanFrame, ErrorState, Frames, frame_bits
+from tickrig.wire.can import INTERFRAME_BITS, CanFrame, ErrorState, Frames, kept_bits
 from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
@@ -155,10 +155,9 @@ class CanSegment(TransmissionOutcomes):
         if not frames:
             return
         if self._start >= now and not self._stale:
-            if self._winners:
+            if self._winners or not self._announced:
                 self._withdraw()
-            else:
-                self._plan_anew()
+            self._stale = True
         if self._faults.active and (delay_us := self._faults.delay_us(end.number)):
             end.held, self._arbiter.slow = now + delay_us * self.unit, True
         end.enqueue(frames)
@@ -222,7 +221,8 @@ class CanSegment(TransmissionOutcomes):
         arbiter = self._arbiter
         if not arbiter.heads and not self._winners and arbiter.free < now:
             arbiter.free = now
-        arbiter.enter(end, now)
+        end.held = max(end.held, now)
+        arbiter.push(end)
 
     def _withdraw(self) -> None:
         """Withdraw the plan."""
@@ -254,7 +254,9 @@ class CanSegment(TransmissionOutcomes):
             else:
                 bits = self._length(frame)
             if self._on_bus > 1 and not self._faults.active and len(winners) == 1:
-                self._settle(None, bits)
+                self._finish = None
+                self._free = free = self._start + bits * self.bit
+                self._due_us = -((INTERFRAME_BITS * self.bit - free) // self.unit)
             else:
                 self._judge(frame, bits)
         else:
@@ -271,7 +273,7 @@ class CanSegment(TransmissionOutcomes):
     def _length(self, frame: CanFrame) -> int:
         if len(self._lengths) >= _KEPT_LENGTHS:
             self._lengths.clear()
-        bits = frame_bits(frame)
+        bits = kept_bits(frame)
         if not (frame[2] or frame[3]):
             self._lengths[frame[0]] = frame[1], bits
         return bits
@@ -310,7 +312,7 @@ class CanSegment(TransmissionOutcomes):
         else:
             self._settle(self._fail, first_difference(frames) + _ECHO_BITS + _ERROR_BITS)
 
-    def _settle(self, finish: Callable[[], None] | None, bits: int) -> None:
+    def _settle(self, finish: Callable[[], None], bits: int) -> None:
         """Store the outcome of the plan, and its busy time."""
         self._finish = finish
         self._free = free = self._start + bits * self.bit

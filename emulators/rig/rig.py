@@ -278,6 +278,7 @@ class Rig(Copyable):
         attached = [self._attach(station) and not dense for station in stations]
         self.stations, self._woken = stations, tuple(compress(stations, attached))
         self._looked_at = tuple(compress(stations, map(not_, attached)))
+        self._bus: Any = None  # the only one: two layers less than `_wires`
         self._short: tuple[object, ...] = ()  # what the kernel runs from tick to tick, if it can
         self._look_for_bus()
 
@@ -285,7 +286,8 @@ class Rig(Copyable):
         """Run the rig in the kernel if all stations are on one bus, in virtual time."""
         others = self._bridges or self._couplings or self._looked_at
         virtual = self._jumps and type(self._clock) is VirtualClock
-        bus = self._wires.only_bus if kernel and virtual and not others else None
+        self._bus = self._wires.only_bus
+        bus = self._bus if kernel and virtual and not others else None
         lists = self.watchers, self.hosts, self._woken
         parts = (self._timetable, bus, self.event_queue, self._horizon, *lists)
         self._short = () if bus is None else parts
@@ -500,14 +502,19 @@ class Rig(Copyable):
 
     def _go_on(self, until_us: int, host: Host | None) -> int:
         """Advance the wires to the next tick with work or arrival at a host; return the time."""
-        hosts = (*self.hosts,) if host is None else (*self.hosts, host)
+        hosts, bus = (*self.hosts,) if host is None else (*self.hosts, host), self._bus
         while True:
             next_us = self._planned_us
             if hosts:
                 arrived_us: int = min(map(_arrived_us, hosts))
                 if arrived_us < next_us:
                     return max(self.now_us, arrived_us)
-            if not self._wires.advance_until_received(min(next_us - 1, until_us), hosts):
+            limit_us = next_us - 1 if next_us <= until_us else until_us
+            if bus is not None and bus.whole:
+                received = bus.advance_until_received(limit_us)
+            else:
+                received = self._wires.advance_until_received(limit_us, hosts)
+            if not received:
                 return next_us
 
     def _happen(self, next_us: int) -> None:
@@ -535,23 +542,29 @@ class Rig(Copyable):
 
     def _pass_to(self, t_us: int) -> None:
         """Advance through a time without ticks with work."""
-        self._wires.advance(t_us)
+        bus = self._bus
+        (self._wires if bus is None or not bus.whole else bus).advance(t_us)
         self._idle_to(t_us)
 
     def _idle_to(self, t_us: int) -> None:
         if t_us > self.now_us:
-            self._clock.wait_until(t_us)
+            if self._in_real_time:
+                self._clock.wait_until(t_us)
             self.now_us = self._horizon.passed_us = t_us
         self._timetable.open_us = self.now_us + 1
 
     def _run(self, now_us: int) -> None:
-        late_us = self._clock.wait_until(now_us)
+        late_us = self._clock.wait_until(now_us) if self._in_real_time else 0
         self.now_us = self._timetable.open_us = now_us
         if late_us > 0:
             self._note_late(late_us)
         for bridge in self._bridges:
             bridge.take_in(now_us)
-        self._wires.advance_busy(now_us)
+        bus = self._bus
+        if bus is not None and bus.whole:
+            bus.advance(now_us)
+        else:
+            self._wires.advance_busy(now_us)
         self._tick(now_us)
         self._horizon.passed_us = now_us
         if self._couplings:

@@ -31,15 +31,19 @@ class OneThread(Copyable):
     """The thread in which hosts advance the virtual time: two threads would make runs differ.
 
     It is the thread that makes this object; for a twin, the thread that makes the twin.
+
+    Attributes:
+        ident: of the thread.
+        refused: the text, once a second thread has tried it.
     """
 
     def __init__(self) -> None:
-        self._thread, self._refusal = get_ident(), ""
+        self.ident, self.refused = get_ident(), ""
 
     def __setstate__(self, state: object) -> None:
         """Continue in the thread in which it is copied."""
         restore(self, state)
-        self._thread = get_ident()
+        self.ident = get_ident()
 
     def refusal(self, name: str, instead: str) -> str:
         """Return why use is impossible, permanently after a second thread has tried it; else "".
@@ -48,13 +52,13 @@ class OneThread(Copyable):
             name: the used object: a port, a bus.
             instead: alternative for hosts with a second thread.
         """
-        if get_ident() != self._thread and not self._refusal:
-            self._refusal = (
+        if get_ident() != self.ident and not self.refused:
+            self.refused = (
                 f"{name}: a second thread cannot make virtual time pass; {instead}, or run in real"
                 " time"
             )
-            _LOG.error(self._refusal)
-        return self._refusal
+            _LOG.error(self.refused)
+        return self.refused
 
 
 class Looks(Copyable):

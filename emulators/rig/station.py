@@ -155,16 +155,12 @@ class Timetable(TimetableFields):
                 if station.at_us == at_us:
                     station.at_us = NEVER
                     taken.append(station)
-        self._pass_over()
-        return taken
-
-    def _pass_over(self) -> None:
-        """Drop ticks without valid entries."""
-        while self._ticks:
+        while self._ticks:  # drop ticks without valid entries
             at_us = self._ticks[0]
             for station in self._stations[at_us]:
                 if station.at_us == at_us:
                     self.first_us = at_us
-                    return
+                    return taken
             del self._stations[heappop(self._ticks)]
         self.first_us = NEVER
+        return taken

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import deque
-from typing import Final
+from threading import get_ident
+from typing import Final, NoReturn
 
 from tickrig.emulators.can.end import CanEnd
 from tickrig.emulators.rig.rig import Rig
@@ -77,8 +78,12 @@ class CanHost:
 
     def send(self, traffic: Frames, /) -> None:
         """Queue frames; no time passes."""
-        self._check_usable()
-        self._put(self._rig.now_us, traffic)
+        if self._closed or self._thread.ident != get_ident() or self._thread.refused:
+            self._refuse()
+        if self._hears_own:
+            self._put(self._rig.now_us, traffic)
+        else:
+            self._end.send(self._rig.now_us, traffic)
 
     def is_own(self, at_us: int) -> bool:
         """Return whether the frame that ended at a time was sent here; called once for each."""
@@ -120,7 +125,8 @@ class CanHost:
             LinkError: a second thread uses it, or a polling loop would never end.
             LinkTimeout: there is no timeout, and nothing will ever happen.
         """
-        self._check_usable()
+        if self._closed or self._thread.ident != get_ident() or self._thread.refused:
+            self._refuse()
         rig, inbox = self._rig, self._inbox
         deadline_us = NEVER if timeout_us is None else rig.now_us + max(0, timeout_us)
         while not inbox:
@@ -189,8 +195,7 @@ class CanHost:
         if due or all(repeat.due_us == NEVER for repeat in self._repeats):
             self._wake()
 
-    def _check_usable(self) -> None:
+    def _refuse(self) -> NoReturn:
         if self._closed:
             raise LinkClosed("the link was closed")
-        if refusal := self._thread.refusal("bus", _INSTEAD):
-            raise LinkError(refusal)
+        raise LinkError(self._thread.refusal("bus", _INSTEAD))

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections import defaultdict, deque
 from collections.abc import Callable, Iterable, Sequence
 from enum import Enum
-from functools import lru_cache
 from typing import Final
 
 from tickrig.host.canopen.conform.bus.frame_pattern import can_id_of, matches, unlike, wanted_text
 from tickrig.host.canopen.conform.verdict import Direction, FrameLine
 from tickrig.host.links.link import StampedFrames, StampedLink
-from tickrig.wire.can import CanFrame, data_frame, frame_bits
+from tickrig.wire.can import CanFrame, data_frame, frame_bits, kept_bits
 from tickrig.wire.canopen import sdo_frame
 from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID
 from tickrig.wire.instant import NEVER
@@ -153,10 +152,6 @@ _FOREIGN_LOAD: Final = 0.5
 """With more of it by other nodes, a late or missing answer says nothing of the node."""
 
 
-_bits = lru_cache(1_024)(frame_bits)
-"""Most requests are sent more than once, and most answers are the same then."""
-
-
 class _Allowance:
     """What may be sent: the allowed share of the bit rate, in windows of `_WINDOW_US`.
 
@@ -174,7 +169,7 @@ class _Allowance:
 
     def use(self, now_us: int, frame: CanFrame) -> None:
         """Count a frame of the tester, or an answer to one."""
-        self._paid_us = max(self._paid_us, now_us) + _bits(frame) / self._bits_us
+        self._paid_us = max(self._paid_us, now_us) + kept_bits(frame) / self._bits_us
 
     def wait_us(self, now_us: int) -> int:
         """Return how long nothing may be sent, at most `_LONGEST_WAIT_US`."""
