@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import ClassVar, Final, NamedTuple, Protocol
 
-from tickrig.device.physical import SignalType
+from tickrig.device.physical import InputSignal, OutputSignal, SignalType
 from tickrig.device.twin import Copyable
-from tickrig.emulators.rig.emulated import Inputs
+from tickrig.emulators.rig.emulated import HasSignals, Inputs
 from tickrig.emulators.rig.event_queue import EventQueue
 from tickrig.emulators.rig.faults import FaultForm, bind_arguments, spelled
 from tickrig.host.text.names import near
@@ -287,6 +287,159 @@ def _ignore(text: str) -> None:
 def _at(action: Callable[[], None], now_us: int) -> None:
     """Run an action that does not depend on the time."""
     action()
+
+
+# Several devices in one table: their signals; the faults of their wires are `AssemblyFaults`.
+
+
+class Assembly(Copyable):
+    """The physical side of several devices.
+
+    Signals of a single device have their plain name, those of several have the device as prefix:
+    `left_drive/shaft_load_nm`.
+
+    Args:
+        parts: by name, at least one.
+        plain: the device whose signals have their plain names beside those of others.
+    """
+
+    def __init__(self, parts: Mapping[str, HasSignals], plain: str | None = None) -> None:
+        self.parts = dict(parts)
+        self._plain = next(iter(self.parts)) if len(self.parts) == 1 else plain
+        self.inputs = _AssemblyInputs(self)
+
+    @property
+    def tick_us(self) -> int:
+        """The shortest control period."""
+        return min(part.tick_us for part in self.parts.values())
+
+    @property
+    def outputs(self) -> Mapping[str, OutputSignal]:
+        """Physical outputs of all devices."""
+        if len(self.parts) == 1:  # asked in each `get`: a sixth of a run that looks often
+            return next(iter(self.parts.values())).outputs
+        return {
+            full: replace(item, name=full)
+            for name, part in self.parts.items()
+            for item in part.outputs.values()
+            for full in [self.full_name(name, item.name)]
+        }
+
+    def read(self, name: str, /) -> Setting:
+        """Return the present value of an output; KeyError if there is none."""
+        part, rest = self.find(name)
+        if part is None:
+            raise KeyError(name)
+        return part.read(rest)
+
+    def full_name(self, part: str, name: str) -> str:
+        """Return the full name of a signal of a device."""
+        return name if part == self._plain else f"{part}/{name}"
+
+    def find(self, name: str) -> tuple[HasSignals | None, str]:
+        """Return the device that a name belongs to, None if there is none, and the rest."""
+        prefix, slash, rest = name.partition("/")
+        if slash and (part := self.parts.get(prefix)):
+            return part, rest
+        return self.parts.get(self._plain or ""), name
+
+    def tick_us_of(self, name: str) -> int:
+        """Return the control period of the device that a signal belongs to."""
+        part, _ = self.find(name)
+        return part.tick_us if part else self.tick_us
+
+
+class _AssemblyInputs(Copyable):
+    """The `Inputs` of several devices.
+
+    Args:
+        assembly: the devices.
+
+    Attributes:
+        changed: not used: each device has that of its own inputs.
+    """
+
+    def __init__(self, assembly: Assembly) -> None:
+        self._assembly, self.changed = assembly, False
+
+    @property
+    def table(self) -> Mapping[str, InputSignal]:
+        """All inputs by their full names."""
+        return _Table(self._assembly)
+
+    @property
+    def groups(self) -> Mapping[str, tuple[str, ...]]:
+        """Names of several inputs that are set together."""
+        full = self._assembly.full_name
+        return {
+            full(name, group): tuple(full(name, member) for member in members)
+            for name, part in self._assembly.parts.items()
+            for group, members in part.inputs.groups.items()
+        }
+
+    def __getitem__(self, name: str) -> Setting:
+        """Return the present value of an input."""
+        part, rest = self._find(name)
+        return part.inputs[rest]
+
+    def set(self, name: str, value: Setting) -> None:
+        """Set an input; ValueError if it is unknown or does not accept the value."""
+        part, rest = self._find(name)
+        part.inputs.set(rest, value)
+
+    def check(self, name: str, value: Setting) -> Setting:
+        """Return the value that `set` would store, or raise as `set` would."""
+        part, rest = self._find(name)
+        return part.inputs.check(rest, value)
+
+    def names(self, signal_type: SignalType) -> tuple[str, ...]:
+        """Return the names of all inputs of a type."""
+        return tuple(
+            self._assembly.full_name(name, item)
+            for name, part in self._assembly.parts.items()
+            for item in part.inputs.names(signal_type)
+        )
+
+    def find(self, name: str, signal_type: SignalType | None = None) -> InputSignal:
+        """Return the description of an input; ValueError if there is no input of this type."""
+        part, rest = self._assembly.find(name)
+        if part is not None:
+            return part.inputs.find(rest, signal_type)
+        names = self.names(signal_type) if signal_type else self.table
+        wanted = signal_type.value if signal_type else "input"
+        raise ValueError(f"no {wanted} {name!r}; {near(name, names)}")
+
+    def _find(self, name: str) -> tuple[HasSignals, str]:
+        part, rest = self._assembly.find(name)
+        if part is None or rest not in part.inputs.table:
+            raise ValueError(f"no input {name!r}; {near(name, self.table)}")
+        return part, rest
+
+
+class _Table(Mapping[str, InputSignal]):
+    """The descriptions, created on request: nodes have many objects."""
+
+    def __init__(self, assembly: Assembly) -> None:
+        self._assembly = assembly
+
+    def __getitem__(self, name: str) -> InputSignal:
+        part, rest = self._assembly.find(name)
+        if part is None:
+            raise KeyError(name)
+        item = part.inputs.table[rest]
+        return replace(item, name=name.removesuffix(rest) + item.name)
+
+    def __contains__(self, name: object) -> bool:
+        part, rest = self._assembly.find(name) if isinstance(name, str) else (None, "")
+        return part is not None and rest in part.inputs.table
+
+    def __iter__(self) -> Iterator[str]:
+        full = self._assembly.full_name
+        parts = self._assembly.parts.items()
+        return (full(name, item) for name, part in parts for item in part.inputs.table)
+
+    def __len__(self) -> int:
+        return sum(len(part.inputs.table) for part in self._assembly.parts.values())
 
 
 class _FaultRow(NamedTuple):

@@ -21,7 +21,7 @@ from tickrig.emulators.canopen.choices import AUTO, is_bus_node
 from tickrig.emulators.canopen.eds import DeviceDescription, EdsCache
 from tickrig.emulators.canopen.faults import NodeFaults
 from tickrig.emulators.canopen.models import MODELS
-from tickrig.emulators.canopen.node import NODE_INPUTS, Node, Nodes, SecondNodeAlarm
+from tickrig.emulators.canopen.node import NODE_INPUTS, Node, SecondNodeAlarm, side_of
 from tickrig.emulators.canopen.node_spec import LSS, NodeSpec
 from tickrig.emulators.canopen.store_file import StoreFile
 from tickrig.emulators.record.recorder import CandumpFile
@@ -216,7 +216,7 @@ def make_bench(  # noqa: PLR0913 - options, by keyword
         one.station = station
     return CanEmulator(
         _NAME,
-        Nodes(nodes, bodies),
+        side_of(nodes, bodies),
         stations,
         wire,
         couplings=bodies,

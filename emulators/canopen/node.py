@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from typing import ClassVar, Final, Protocol
 
@@ -11,6 +10,7 @@ from tickrig.device.canopen.slave import TICK_US, UNCONFIGURED, Application, Can
 from tickrig.device.horizon import Horizon
 from tickrig.device.physical import InputSignal, OutputSignal, QuantityBank, SignalType
 from tickrig.device.twin import Copyable
+from tickrig.emulators.bench.operator import Assembly
 from tickrig.emulators.can.bus_device import Accepted
 from tickrig.emulators.can.outside.bridge import CountingPort, PortBefore
 from tickrig.emulators.can.wire import CanWire
@@ -247,7 +247,7 @@ class Node(Copyable):
             self._wire.reconnect(self.port)
 
 
-# The physical side of several nodes and bodies in one table.
+# The physical side of nodes and bodies.
 
 
 class _NodePart(Protocol):
@@ -277,74 +277,42 @@ class _NodePart(Protocol):
         ...
 
 
-class Nodes:
-    """All nodes of a bus, with the signals of each.
+class NodeSide:
+    """The physical side of a node, with all objects of its dictionary, or of a body.
+
+    Args:
+        part: the node, or the body.
+    """
+
+    tick_us: Final = TICK_US
+
+    def __init__(self, part: _NodePart) -> None:
+        self.outputs, self.read = part.outputs, part.read
+        self.inputs = _NodeInputs(part)
+
+
+def side_of(nodes: Sequence[Node], bodies: Sequence[_NodePart] = ()) -> Assembly:
+    """Return the physical side of all nodes of a bus, and of bodies.
 
     Signals of a single node have their plain name, `0x6000:1`, `state`; with several nodes the node
     comes first, `5/0x6000:1`, `5/state`, likewise a body, `body/x_m`, unless it is the only part.
-
-    Args:
-        nodes: any number of nodes.
-        bodies: bodies on the nodes, or separate ones.
     """
-
-    def __init__(self, nodes: Sequence[Node], bodies: Sequence[_NodePart] = ()) -> None:
-        self.nodes, self.parts = tuple(nodes), (*nodes, *bodies)
-        self._alone = self.parts[0] if len(nodes) == 1 or len(self.parts) == 1 else None
-        self._by_name: Mapping[str, _NodePart] = {part.name: part for part in self.parts}
-        self.inputs = _NodeInputs(self)
-        self.outputs: Mapping[str, OutputSignal] = {
-            self.full_name(part, item.name): replace(item, name=self.full_name(part, item.name))
-            for part in self.parts
-            for item in part.outputs.values()
-        }
-
-    @property
-    def tick_us(self) -> int:
-        """The control period of all of them."""
-        return TICK_US
-
-    def read(self, name: str, /) -> Setting:
-        """Return the present value of an output; KeyError if there is none."""
-        part, rest = self.find(name)
-        if part is None:
-            raise KeyError(name)
-        return part.read(rest)
-
-    def full_name(self, part: _NodePart, name: str) -> str:
-        """Return the full name of a signal of a part."""
-        return name if part is self._alone else f"{part.name}/{name}"
-
-    def find(self, name: str) -> tuple[_NodePart | None, str]:
-        """Return the part that a name belongs to, and the rest of the name."""
-        prefix, slash, rest = name.partition("/")
-        if slash:
-            return self._by_name.get(prefix), rest
-        return self._alone, name
-
-    @property
-    def lost(self) -> int:
-        """Frames lost because of a full buffer."""
-        return sum(node.port.lost for node in self.nodes)
+    plain = nodes[0].name if len(nodes) == 1 else None
+    return Assembly({part.name: NodeSide(part) for part in (*nodes, *bodies)}, plain)
 
 
 class _NodeInputs:
-    """The `Inputs` of nodes: their physical side and every object of their dictionaries.
+    """The `Inputs` of a node: its physical side and every object of its dictionary.
 
     Attributes:
         table: the inputs by name; a variable may be named with its sub-index too.
         groups: names of several inputs that are set together.
     """
 
-    def __init__(self, nodes: Nodes) -> None:
-        self.changed = False
-        self.table: Mapping[str, InputSignal] = _Table(nodes)
-        self.groups: Mapping[str, tuple[str, ...]] = {
-            nodes.full_name(part, name): tuple(nodes.full_name(part, item) for item in members)
-            for part in nodes.parts
-            for name, members in part.groups.items()
-        }
-        self._nodes = nodes
+    def __init__(self, part: _NodePart) -> None:
+        self._part, self.changed = part, False
+        self.table: Mapping[str, InputSignal] = _Table(part)
+        self.groups = part.groups
 
     def __getitem__(self, name: str) -> Setting:
         """Return the present value of an input."""
@@ -370,18 +338,12 @@ class _NodeInputs:
     def names(self, signal_type: SignalType) -> tuple[str, ...]:
         """Return the names of all inputs of a type; objects are levels and texts."""
         if signal_type in (SignalType.BUTTON, SignalType.FAULT):
-            return tuple(
-                self._nodes.full_name(part, name)
-                for part in self._nodes.parts
-                for name, signal in part.physical.items()
-                if signal.item.type is signal_type
-            )
+            physical = self._part.physical.items()
+            return tuple(name for name, signal in physical if signal.item.type is signal_type)
         return tuple(name for name in self.table if self.table[name].type is signal_type)
 
     def _signal(self, name: str) -> signals.NodeSignal:
-        part, rest = self._nodes.find(name)
-        signal = part.signal(rest) if part else None
-        if signal is None:
+        if (signal := self._part.signal(name)) is None:
             raise ValueError(f"no input {name!r}; {near(name, self.table)}")
         return signal
 
@@ -389,26 +351,22 @@ class _NodeInputs:
 class _Table(Mapping[str, InputSignal]):
     """The descriptions, created on request: nodes have many objects."""
 
-    def __init__(self, nodes: Nodes) -> None:
-        self._nodes = nodes
+    def __init__(self, part: _NodePart) -> None:
+        self._part = part
 
     def __getitem__(self, name: str) -> InputSignal:
-        part, rest = self._nodes.find(name)
-        signal = part.signal(rest) if part else None
-        if part is None or signal is None:
+        if (signal := self._part.signal(name)) is None:
             raise KeyError(name)
-        return replace(signal.item, name=self._nodes.full_name(part, signal.item.name))
+        return signal.item
 
     def __contains__(self, name: object) -> bool:
-        part, rest = self._nodes.find(name) if isinstance(name, str) else (None, "")
-        return part is not None and part.signal(rest) is not None
+        return isinstance(name, str) and self._part.signal(name) is not None
 
     def __iter__(self) -> Iterator[str]:
-        nodes = self._nodes
-        return (nodes.full_name(part, name) for part in nodes.parts for name in part.signal_names())
+        return iter(self._part.signal_names())
 
     def __len__(self) -> int:
-        return sum(len(part.signal_names()) for part in self._nodes.parts)
+        return len(self._part.signal_names())
 
 
 # Detection of duplicate nodes on a bus outside.

@@ -19,7 +19,7 @@ from tickrig.emulators.bench.child import running
 from tickrig.emulators.can.outside.sim_network import SimNetwork
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.models import MODELS, EmulatedModel
-from tickrig.emulators.canopen.node import Node, Nodes
+from tickrig.emulators.canopen.node import Node, side_of
 from tickrig.emulators.commands.picture import new_figure, write_figure
 from tickrig.emulators.rig.emulated import read_signal
 from tickrig.emulators.rig.rig import Rig
@@ -214,7 +214,7 @@ class VirtualStage:
     def __init__(self) -> None:
         self.wire = wire = CanWire(BIT_RATE)
         nodes = [_node(node_id, MODELS[name], wire) for node_id, name in CAST.items()]
-        self._nodes = Nodes(nodes)
+        self._nodes = side_of(nodes)
         self._rig = Rig(*(Station(node, node.port) for node in nodes))
         self.network: canopen.Network = SimNetwork(self._rig, wire.end())
         self.run_to(10_000)  # both have booted

@@ -16,7 +16,7 @@ from tickrig.emulators.canopen import eds
 from tickrig.emulators.canopen.bus_file import joint_drive, node_keys
 from tickrig.emulators.canopen.bus_file.urdf import PRISMATIC, Urdf, UrdfJoint, read_urdf
 from tickrig.emulators.canopen.choices import AUTO
-from tickrig.emulators.canopen.node import Node, Nodes
+from tickrig.emulators.canopen.node import Node, NodeSide
 from tickrig.host.canopen.bus_file.bus_file import BusFile, read_bus_file
 from tickrig.host.canopen.bus_file.bus_values import BusSlave
 from tickrig.host.canopen.bus_file.notes import BusFileNotes
@@ -286,7 +286,7 @@ class _NodeMaker:
         made = make_slave(
             description.make_dictionary(), slave.node_id, None, description.application
         )
-        inputs = Nodes([Node(slave.name, made, CanWire())]).inputs
+        inputs = NodeSide(Node(slave.name, made, CanWire())).inputs
         for name, value in keys.start.items():
             try:
                 inputs.check(name, value)

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from tickrig.device.physical import InputSignal, OutputSignal, SignalType
 from tickrig.device.twin import Copyable
-from tickrig.emulators.bench.operator import AssemblyFaults, FaultOrder, Operator
+from tickrig.emulators.bench.operator import Assembly, AssemblyFaults, FaultOrder, Operator
 from tickrig.emulators.bench.running_emulator import RunningEmulator
 from tickrig.emulators.can.faults import CanFaults
 from tickrig.emulators.canopen.body import BodyOnDrives
-from tickrig.emulators.canopen.node import Nodes
+from tickrig.emulators.canopen.node import NodeSide
 from tickrig.emulators.canopen.store_file import StoreFile
 from tickrig.emulators.record.frames import FrameFormat, hex_text
 from tickrig.emulators.record.recorder import TraceRecorder
@@ -206,165 +206,14 @@ def missing_of(lines: Sequence[WireLine]) -> str:
     return f"{came}; the last {len(lines)} are kept" if before else ""
 
 
-# Several devices in one table: their signals, and the faults of their wires.
-
-
-class _Assembly(Copyable):
-    """The physical side of several devices.
-
-    Signals of a single device have their plain name, those of several have the device as prefix:
-    `left_drive/shaft_load_nm`.
-
-    Args:
-        parts: by name, at least one.
-    """
-
-    def __init__(self, parts: Mapping[str, HasSignals]) -> None:
-        self.parts = dict(parts)
-        self._alone = next(iter(self.parts)) if len(self.parts) == 1 else None
-        self.inputs = _AssemblyInputs(self)
-
-    @property
-    def tick_us(self) -> int:
-        """The shortest control period."""
-        return min(part.tick_us for part in self.parts.values())
-
-    @property
-    def outputs(self) -> Mapping[str, OutputSignal]:
-        """Physical outputs of all devices."""
-        if self._alone is not None:  # asked in each `get`: a sixth of a run that looks often
-            return self.parts[self._alone].outputs
-        return {
-            full: replace(item, name=full)
-            for name, part in self.parts.items()
-            for item in part.outputs.values()
-            for full in [self.full_name(name, item.name)]
-        }
-
-    def read(self, name: str, /) -> Setting:
-        """Return the present value of an output; KeyError if there is none."""
-        part, rest = self.find(name)
-        if part is None:
-            raise KeyError(name)
-        return part.read(rest)
-
-    def full_name(self, part: str, name: str) -> str:
-        """Return the full name of a signal of a device."""
-        return name if self._alone is not None else f"{part}/{name}"
-
-    def find(self, name: str) -> tuple[HasSignals | None, str]:
-        """Return the device that a name belongs to, None if there is none, and the rest."""
-        if self._alone is not None:
-            return self.parts[self._alone], name.removeprefix(f"{self._alone}/")
-        prefix, _, rest = name.partition("/")
-        return self.parts.get(prefix), rest
-
-    def tick_us_of(self, name: str) -> int:
-        """Return the control period of the device that a signal belongs to."""
-        part, _ = self.find(name)
-        return part.tick_us if part else self.tick_us
-
-
-class _AssemblyInputs(Copyable):
-    """The `Inputs` of several devices.
-
-    Args:
-        assembly: the devices.
-
-    Attributes:
-        changed: not used: each device has that of its own inputs.
-    """
-
-    def __init__(self, assembly: _Assembly) -> None:
-        self._assembly, self.changed = assembly, False
-
-    @property
-    def table(self) -> Mapping[str, InputSignal]:
-        """All inputs by their full names."""
-        return _Table(self._assembly)
-
-    @property
-    def groups(self) -> Mapping[str, tuple[str, ...]]:
-        """Names of several inputs that are set together."""
-        full = self._assembly.full_name
-        return {
-            full(name, group): tuple(full(name, member) for member in members)
-            for name, part in self._assembly.parts.items()
-            for group, members in part.inputs.groups.items()
-        }
-
-    def __getitem__(self, name: str) -> Setting:
-        """Return the present value of an input."""
-        part, rest = self._find(name)
-        return part.inputs[rest]
-
-    def set(self, name: str, value: Setting) -> None:
-        """Set an input; ValueError if it is unknown or does not accept the value."""
-        part, rest = self._find(name)
-        part.inputs.set(rest, value)
-
-    def check(self, name: str, value: Setting) -> Setting:
-        """Return the value that `set` would store, or raise as `set` would."""
-        part, rest = self._find(name)
-        return part.inputs.check(rest, value)
-
-    def names(self, signal_type: SignalType) -> tuple[str, ...]:
-        """Return the names of all inputs of a type."""
-        return tuple(
-            self._assembly.full_name(name, item)
-            for name, part in self._assembly.parts.items()
-            for item in part.inputs.names(signal_type)
-        )
-
-    def find(self, name: str, signal_type: SignalType | None = None) -> InputSignal:
-        """Return the description of an input; ValueError if there is no input of this type."""
-        part, rest = self._assembly.find(name)
-        if part is not None:
-            return part.inputs.find(rest, signal_type)
-        names = self.names(signal_type) if signal_type else self.table
-        wanted = signal_type.value if signal_type else "input"
-        raise ValueError(f"no {wanted} {name!r}; {near(name, names)}")
-
-    def _find(self, name: str) -> tuple[HasSignals, str]:
-        part, rest = self._assembly.find(name)
-        if part is None or rest not in part.inputs.table:
-            raise ValueError(f"no input {name!r}; {near(name, self.table)}")
-        return part, rest
-
-
-class _Table(Mapping[str, InputSignal]):
-    """The descriptions, created on request: nodes have many objects."""
-
-    def __init__(self, assembly: _Assembly) -> None:
-        self._assembly = assembly
-
-    def __getitem__(self, name: str) -> InputSignal:
-        part, rest = self._assembly.find(name)
-        if part is None:
-            raise KeyError(name)
-        return replace(part.inputs.table[rest], name=name)
-
-    def __contains__(self, name: object) -> bool:
-        part, rest = self._assembly.find(name) if isinstance(name, str) else (None, "")
-        return part is not None and rest in part.inputs.table
-
-    def __iter__(self) -> Iterator[str]:
-        full = self._assembly.full_name
-        parts = self._assembly.parts.items()
-        return (full(name, item) for name, part in parts for item in part.inputs.table)
-
-    def __len__(self) -> int:
-        return sum(len(part.inputs.table) for part in self._assembly.parts.values())
-
-
 class BenchOperator(Operator):
     """The operator of several devices."""
 
-    _assembly: _Assembly
+    _assembly: Assembly
     _wires: tuple[str, ...]
 
     @classmethod
-    def at(cls, assembly: _Assembly, queue: EventQueue, faults: AssemblyFaults) -> BenchOperator:
+    def at(cls, assembly: Assembly, queue: EventQueue, faults: AssemblyFaults) -> BenchOperator:
         """Return the operator of several devices, with scheduled actions in a queue."""
         hands = cls(assembly.inputs, assembly.tick_us, queue, faults)
         hands._assembly, hands._wires = assembly, faults.wires
@@ -401,10 +250,10 @@ class Parts:
     seed: int = 0
 
     @property
-    def assembly(self) -> _Assembly:
+    def assembly(self) -> Assembly:
         """The physical side of all devices."""
         devices = {name: part for mount in self.mounts for name, part in mount.parts.items()}
-        return _Assembly({**devices, **{body.name: Nodes([], [body]) for body in self.bodies}})
+        return Assembly({**devices, **{body.name: NodeSide(body) for body in self.bodies}})
 
     @property
     def faults(self) -> AssemblyFaults:

@@ -12,7 +12,7 @@ from tickrig.emulators.can.end import CanEnd
 from tickrig.emulators.can.faults import CanFaults
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.faults import NodeFaults
-from tickrig.emulators.canopen.node import Node, Nodes
+from tickrig.emulators.canopen.node import Node, NodeSide
 from tickrig.emulators.record.recorder import TraceRecorder
 from tickrig.emulators.rig.emulated import Emulated, HasSignals
 from tickrig.emulators.rig.faults import FaultyPort
@@ -158,7 +158,7 @@ class BusMount(Copyable):
     @property
     def parts(self) -> Mapping[str, HasSignals]:
         """The physical side of each node."""
-        return {name: Nodes([node]) for name, node in self.nodes.items()}
+        return {name: NodeSide(node) for name, node in self.nodes.items()}
 
     @property
     def wire_entry(self) -> WireEntry:

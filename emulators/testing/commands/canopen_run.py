@@ -23,7 +23,7 @@ from tickrig.emulators.canopen.body import BodyPlan
 from tickrig.emulators.canopen.choices import AUTO
 from tickrig.emulators.canopen.eds import EdsCache, profile_name
 from tickrig.emulators.canopen.faults import NodeFaults
-from tickrig.emulators.canopen.node import Nodes
+from tickrig.emulators.canopen.node import side_of
 from tickrig.emulators.canopen.node_spec import NodeSpec, parse_ids, parse_node
 from tickrig.emulators.canopen.store_file import StoreError, StoreFile
 from tickrig.emulators.commands.run import EmulatorRun, RunOptions, mistakes_in
@@ -152,7 +152,7 @@ class _CanopenRun(EmulatorRun[_CanopenOptions]):
         self._store = self._open_store()
         self._nodes = build.make_nodes(self._described, self._wire, self._store, self._options.sdo)
         self._bodies = [body.put_on(self._nodes)] if body else []
-        device = Nodes(self._nodes, self._bodies)
+        device = side_of(self._nodes, self._bodies)
         self._node_faults = [NodeFaults(node, self._wire) for node in self._nodes]
         self._faults = AssemblyFaults(
             {"can": self._wire.faults},

@@ -14,7 +14,7 @@ from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen import late
 from tickrig.emulators.canopen.choices import AUTO
 from tickrig.emulators.canopen.faults import NodeFaults
-from tickrig.emulators.canopen.node import Node, Nodes
+from tickrig.emulators.canopen.node import Node, NodeSide
 from tickrig.emulators.commands.device_type import ConfiguredDevice, configure, option_names
 from tickrig.emulators.rig.emulated import HasSignals, read_signal
 from tickrig.emulators.rig.faults import FaultForm
@@ -106,7 +106,7 @@ def probe(plan: DevicePlan, seed: int = 0) -> Probe | list[WrongDevice]:
         found.application,
         plan.sdo,
     )
-    node = Nodes([Node(plan.name, slave, CanWire())])
+    node = NodeSide(Node(plan.name, slave, CanWire()))
     title = found.info.product_name or Path(plan.type).name
     if plan.kind is DeviceKind.MODEL:
         title = late.MODELS[plan.type].text

@@ -10,7 +10,7 @@ import pytest
 from tests.emulators.testing.signals.signal_bench import Meter, SignalBench, signals_of
 from tickrig.device.canopen.models.f_palette import make_f_palette
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.canopen.node import Node, Nodes
+from tickrig.emulators.canopen.node import Node, NodeSide
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.emulators.testing.signals.driver import SignalDriver, check_signals
@@ -66,7 +66,7 @@ def test_what_is_no_number_leaves_an_input_as_it_is() -> None:
 def test_objects_of_a_node_are_driven_too() -> None:
     wire = CanWire()
     node = Node("fp", make_f_palette(), wire)
-    devices = {"fp": Nodes([node])}
+    devices = {"fp": NodeSide(node)}
     assert [str(m) for m in check_signals(signals_of({"fp/0x1000": -1}), devices)] == [
         "fp/0x1000: 0x1000 -1 is not in 0..4294967295"
     ]

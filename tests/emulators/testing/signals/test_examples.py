@@ -21,7 +21,7 @@ from tickrig.device.canopen.slave import CanopenSlave
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.eds import read_eds
-from tickrig.emulators.canopen.node import Node, Nodes
+from tickrig.emulators.canopen.node import Node, NodeSide
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.emulators.testing.signals.driver import SignalDriver
@@ -46,7 +46,7 @@ class Example:
         self.text = (RIGS / f"{name}.toml").read_text("utf-8")
         plan, wire = tomllib.loads(self.text), CanWire()
         nodes = {key: Node(key, slave_of(each), wire) for key, each in plan["device"].items()}
-        self.devices = {key: Nodes([node]) for key, node in nodes.items()}
+        self.devices = {key: NodeSide(node) for key, node in nodes.items()}
         driven = {
             f"{key}/{name}": value
             for key, each in plan["device"].items()
@@ -70,7 +70,7 @@ class Watch:
 
     tick_us, due_us = 1_000, NEVER
 
-    def __init__(self, devices: dict[str, Nodes]) -> None:
+    def __init__(self, devices: dict[str, NodeSide]) -> None:
         self.devices, self.current_a = devices, [(0, 0.0)]
 
     def act(self, now_us: int, /) -> None:

@@ -15,7 +15,7 @@ from tickrig.device.canopen.models.f_palette import make_f_palette
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.eds import read_eds
-from tickrig.emulators.canopen.node import Node, Nodes
+from tickrig.emulators.canopen.node import Node, NodeSide
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.testing.signals.driver import SignalDriver
 from tickrig.emulators.testing.signals.formula import CALLED
@@ -26,14 +26,14 @@ PAGE = (ROOT / "docs/reference/bench/signals.md").read_text("utf-8")
 BLOCKS = re.findall(r"^```toml\n(.*?)^```", PAGE, re.DOTALL | re.MULTILINE)
 
 
-def devices() -> dict[str, Nodes]:
+def devices() -> dict[str, NodeSide]:
     board = read_eds(ROOT / "examples/io_module.eds").make_dictionary()
     slaves = {
         "left": make_epos(2),
         "palette": make_f_palette(1),
         "board": make_slave(board, 5, application=Ds401),
     }
-    return {name: Nodes([Node(name, slave, CanWire())]) for name, slave in slaves.items()}
+    return {name: NodeSide(Node(name, slave, CanWire())) for name, slave in slaves.items()}
 
 
 @pytest.mark.parametrize("block", BLOCKS)
