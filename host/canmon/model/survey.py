@@ -122,6 +122,13 @@ class Thinned(Generic[T]):
                 self._step *= 2
         self.count += 1
 
+    def pass_over(self) -> bool:
+        """Count one more that would not be kept; return False, and count nothing, if it would."""
+        if self.count % self._step == 0:
+            return False
+        self.count += 1
+        return True
+
 
 class _Bands:
     """States as the times at which they begin; of many in one span of time the last is kept.

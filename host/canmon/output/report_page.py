@@ -205,7 +205,7 @@ def _notes(survey: Survey, verdict: Verdict, head: ReportHead) -> Iterable[tuple
         yield f"{counted(left, 'signal')} more had no room.", ""
     thinned = [
         f"node {node}: {one.count - len(one.items)} of {one.count} {what}"
-        for (_, node), lane in survey.lanes.items()
+        for (_, node), lane in sorted(survey.lanes.items(), key=lambda one: one[0])
         for what, one in (("EMCYs", lane.emcys), ("SDO transfers", lane.transfers))
         if len(one.items) < one.count
     ]

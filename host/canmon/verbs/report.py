@@ -182,7 +182,8 @@ def _write(outputs: Mapping[str, Path | None], text: str, folder: Path) -> None:
 def _verdict(seen: _Seen, read: _Reading, around: int) -> report_page.Verdict:
     """Return what was found, the first of it with the frames around it."""
     shown = seen.diagnosis.faults[:_MOST_AROUND] if around else ()
-    found = read.around([one.frames[0].number for one in shown if one.frames], around)
+    numbers = [one.frames[0].number for one in shown if one.frames]
+    found = seen.around(numbers, around) if seen.in_columns else read.around(numbers, around)
     decoded = {
         number: (first, [(record, seen.decoder.take(record)) for record in records])
         for number, (first, records) in found.items()
@@ -197,6 +198,7 @@ class _Seen:
         survey: of it.
         decoder: of the survey.
         diagnosis: what is wrong by all rules that need no parameter, and those that were learnt.
+        in_columns: it was read in blocks.
     """
 
     def __init__(
@@ -209,7 +211,7 @@ class _Seen:
         self.decoder = decode_options.decoder_of(objects, dbc)
         names = {node: found.name for node, found in objects.items()}
         self.survey = Survey(self.decoder, names, rates)
-        self.diagnosis = diagnosis.Diagnosis((), (), {}, 0)
+        self.diagnosis, self.in_columns = diagnosis.Diagnosis((), (), {}, 0), False
         self._diagnoser = diagnosis.Diagnoser(rates.nominal, objects, rules=rules)
 
     def by_columns(self, log: BlockLog) -> bool:
@@ -223,6 +225,7 @@ class _Seen:
         if not listening.take_blocks(log, take):
             return False
         self._end(log)
+        self.in_columns = True
         return True
 
     def by_frames(self, source: Source) -> None:
@@ -241,6 +244,10 @@ class _Seen:
             listening.listen(source, take, None)
         self._end(source)
 
+    def around(self, numbers: Sequence[int], frames: int) -> Mapping[int, tuple[int, list[Record]]]:
+        """Return the frames around some, as `excerpts` does, of a log that was read in blocks."""
+        return {number: self._diagnoser.kept.around(number, frames) for number in numbers}
+
     def _end(self, source: AnySource[Any]) -> None:
         self.survey.end()
         self._diagnoser.without_errors = source.without_errors
@@ -249,9 +256,9 @@ class _Seen:
 
 
 class _Reading:
-    """A source that is read twice: once for all of it, and once for the frames around findings.
+    """A source that is read to its end; a bus is recorded into a file first.
 
-    A bus is recorded into a file first.
+    Frame by frame it is read a second time for the frames around findings.
 
     Args:
         words: its SOURCE words.
@@ -320,13 +327,6 @@ class _Reading:
         self.source.close()
 
     def _pieces(self) -> Iterator[Piece]:
-        log = block_log(self._words, self._cut)
-        if log is not None:
-            with closing(log):
-                while not log.ended:
-                    yield from map(column_survey.ColumnPiece, log.poll(0))
-            if not log.no_columns:
-                return
         source = open_source(self._words, self._bus, self._cut)
         with closing(source):
             while not source.ended:

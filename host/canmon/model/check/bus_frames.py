@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from array import array
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Iterator, Sequence
 from importlib.util import find_spec
 from itertools import pairwise
@@ -10,7 +11,14 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from tickrig._lazy import LazyModule
 from tickrig.host.canmon.model.frames import ERROR, EXTENDED, FD, REMOTE, Record, flagged_id
-from tickrig.wire.can import ERROR_CLASS_MASK, EXTENDED_MAX, CanFrame, ErrorFrame, FdFrame
+from tickrig.wire.can import (
+    ERROR_CLASS_MASK,
+    EXTENDED_MAX,
+    STANDARD_MAX,
+    CanFrame,
+    ErrorFrame,
+    FdFrame,
+)
 
 if TYPE_CHECKING:
     import numpy as np
@@ -70,11 +78,13 @@ class BusFrames:
         dlc: bytes of data, for a remote frame its DLC.
         payload: the first 8 bytes as a little-endian number.
         number: places in the log, from 1.
+        sent: 1 for what the recorder sent.
     """
 
     def __init__(self, name: str) -> None:
         self.name = name
         self.at_us, self.ident, self.dlc = array("q"), array("Q"), array("B")
+        self.sent = array("B")
         self.payload, self.number = array("Q"), array("q")
 
     def __len__(self) -> int:
@@ -90,6 +100,7 @@ class BusFrames:
         self.dlc.append(frame.dlc if isinstance(frame, CanFrame) else len(data))
         self.payload.append(int.from_bytes(data[:_DATA_BYTES], "little"))
         self.number.append(number)
+        self.sent.append(record.sent)
 
     def extend(self, frames: Columns, numbers: Any) -> None:
         """Append a block of frames; `numbers` is an array of their places."""
@@ -98,6 +109,7 @@ class BusFrames:
         self.dlc.frombytes(frames.dlc.tobytes())
         self.payload.frombytes(frames.payload.astype("<u8").tobytes())
         self.number.frombytes(numbers.astype("<i8").tobytes())
+        self.sent.frombytes(frames.sent.tobytes())
 
     def frame(self, row: int) -> CanFrame | ErrorFrame:
         """Return a classic frame or an error frame."""
@@ -121,12 +133,18 @@ class BusFrames:
                 rows.setdefault(ident, []).append(row)
             return dict(rows)
         idents = np.frombuffer(self.ident, np.uint64)
-        found, places = np.unique(idents, return_inverse=True)
-        small = places.astype(np.uint16) if len(found) < 1 << 16 else places
-        order = np.argsort(small, kind="stable")
-        ends = np.cumsum(np.bincount(places)).tolist()
+        # Most identifiers are their own number: sorting 64 bits is slow, 16 bits are not.
+        long = np.flatnonzero(idents > STANDARD_MAX)
+        others, places = np.unique(idents[long], return_inverse=True)
+        many = len(others) + STANDARD_MAX + 1 > 1 << 16
+        small = idents.astype(np.uint32 if many else np.uint16)
+        small[long] = places.reshape(-1) + STANDARD_MAX + 1
+        order, counts = np.argsort(small, kind="stable"), np.bincount(small)
+        found = np.flatnonzero(counts)
+        ends = np.cumsum(counts[found]).tolist()
         begins = [0, *ends[:-1]]
-        parts: Any = zip(found.tolist(), begins, ends, strict=True)
+        names = np.concatenate((np.arange(STANDARD_MAX + 1, dtype=np.uint64), others))[found]
+        parts: Any = zip(names.tolist(), begins, ends, strict=True)
         runs: Any = order  # an array is a sequence for all that is done with rows
         return {ident: runs[begin:end] for ident, begin, end in parts}
 
@@ -142,6 +160,12 @@ class BusFrames:
         kinds = {"q": np.int64, "Q": np.uint64, "B": np.uint8}
         found: Any = np.frombuffer(column, kinds[column.typecode])[rows]
         return found  # type: ignore[no-any-return]
+
+    def latest(self, times: array[int], begin: int = 0) -> int:
+        """Return the latest of times, from a row on."""
+        if self.is_large:
+            return int(np.frombuffer(times, np.int64)[begin:].max())
+        return max(times[begin:])
 
     def backward(self) -> list[int]:
         """Return the rows whose time is before that of the row before them."""
@@ -218,6 +242,25 @@ class FrameKeeper:
             bus = self.buses.setdefault(channel, BusFrames(channel))
             bus.extend(frames, rows + (self.frames + 1))
         self.frames += len(columns)
+
+    def around(self, number: int, frames: int) -> tuple[int, list[Record]]:
+        """Return the frames around one, which must not be CAN FD.
+
+        Args:
+            number: its place in the log, from 1.
+            frames: how many before and behind it.
+
+        Returns:
+            The place of the first of them, and the frames in the order of the log.
+        """
+        first, found = max(1, number - frames), list[tuple[int, Record]]()
+        for bus in self.buses.values():
+            begin = bisect_left(bus.number, first)
+            for row in range(begin, bisect_right(bus.number, number + frames)):
+                frame, sent = bus.frame(row), bool(bus.sent[row])
+                record = Record(bus.at_us[row], bus.name, frame, sent)
+                found.append((bus.number[row], record))
+        return first, [record for _, record in sorted(found, key=lambda one: one[0])]
 
     def __iter__(self) -> Iterator[BusFrames]:
         """Give the buses by name."""

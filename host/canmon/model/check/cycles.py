@@ -58,6 +58,9 @@ _NOISY: Final = 0.08
 _TIMES_NOISIER: Final = 4
 _LEAST_NOISY: Final = 2
 _LEAST_QUIET: Final = 0.3
+_LEAST_AT_ONCE: Final = 64
+_FEW_RUNS: Final = 64
+"""More runs are found faster window by window."""
 
 
 class _Level(NamedTuple):
@@ -109,17 +112,17 @@ def rhythm_of(times: Sequence[int]) -> Rhythm | None:
         return None
     gaps = _gaps_of(times)
     windows = _windows(gaps)
-    middles = sorted(middle for middle, _ in windows)
-    period_us = middles[len(middles) // 2]
-    usual = sorted(spread for _, spread in windows)[len(windows) // 4]
+    count = len(windows.middles)
+    period_us = _ranked(windows.middles, count // 2)
+    usual = _ranked(windows.spreads, count // 4)
     if period_us < _SHORTEST_US or usual > max(_CALM * period_us, min(_FLOOR_US, period_us / 4)):
         return None
     levels = _levels(windows, len(gaps), usual)
     if not 0 < len(levels) <= _MOST_LEVELS:
         return None
     main = max(levels, key=lambda one: one.end - one.begin).period_us
-    spreads = sorted(spread for middle, spread in windows if _alike(middle, main, usual))
-    quiet = spreads[len(spreads) // 4] if spreads else usual
+    spreads = windows.spreads_of(main, usual)
+    quiet = _ranked(spreads, len(spreads) // 4) if len(spreads) else usual
     noisy = _noisy(windows, gaps, main, quiet) if len(levels) == 1 else []
     covered = sum(one.end - one.begin for one in levels)
     if covered + sum(end - begin for begin, end, _, _ in noisy) < _ON_LEVEL * len(gaps):
@@ -149,17 +152,50 @@ def _gaps_of(times: Sequence[int]) -> Sequence[int]:
     return found  # type: ignore[no-any-return]
 
 
-def _windows(gaps: Sequence[int]) -> list[tuple[int, int]]:
+class _Windows(NamedTuple):
+    """Each eight gaps: lists, or arrays of numpy.
+
+    Attributes:
+        middles: the medians.
+        spreads: the distances of the quartiles.
+    """
+
+    middles: Sequence[int]
+    spreads: Sequence[int]
+
+    def spreads_of(self, period_us: int, usual: int) -> Sequence[int]:
+        """Return the spreads of the windows with a period."""
+        if not isinstance(self.middles, list):
+            spreads: Any = self.spreads
+            return spreads[_are_alike(self.middles, period_us, usual)]  # type: ignore[no-any-return]
+        pairs = zip(self.middles, self.spreads, strict=True)
+        return [spread for middle, spread in pairs if _alike(middle, period_us, usual)]
+
+    def above(self, limit: float) -> list[int]:
+        """Return the windows with a larger spread."""
+        if isinstance(self.spreads, list):
+            return [at for at, spread in enumerate(self.spreads) if spread > limit]
+        found: list[int] = np.flatnonzero(np.asarray(self.spreads) > limit).tolist()
+        return found
+
+
+def _windows(gaps: Sequence[int]) -> _Windows:
     """Return the median and the distance of the quartiles of each eight gaps."""
     size = min(_WINDOW, len(gaps))
     low, middle, high = size // 4, size // 2, (3 * size) // 4
     if isinstance(gaps, list):
         cut = [sorted(gaps[at : at + size]) for at in range(0, len(gaps) - size + 1, size)]
-        return [(one[middle], one[high] - one[low]) for one in cut]
+        return _Windows([one[middle] for one in cut], [one[high] - one[low] for one in cut])
     whole = len(gaps) // size
-    table = np.sort(np.asarray(gaps[: whole * size]).reshape(whole, size), axis=1)
-    spreads = (table[:, high] - table[:, low]).tolist()
-    return list(zip(table[:, middle].tolist(), spreads, strict=True))
+    table: Any = np.sort(np.asarray(gaps[: whole * size]).reshape(whole, size), axis=1)
+    return _Windows(table[:, middle].copy(), table[:, high] - table[:, low])
+
+
+def _ranked(values: Sequence[int], place: int) -> int:
+    """Return the value that has a place in the order of all."""
+    if isinstance(values, list):
+        return int(sorted(values)[place])
+    return int(np.partition(np.asarray(values), place)[place])
 
 
 def _alike(one: float, other: float, usual: int) -> bool:
@@ -167,24 +203,71 @@ def _alike(one: float, other: float, usual: int) -> bool:
     return abs(one - other) <= max(_SAME * max(one, other), min(_FLOOR_US, other / 4), 2 * usual)
 
 
+def _are_alike(periods: Any, other: float, usual: int) -> Any:
+    """Say of each of an array of periods whether it is as `_alike` says."""
+    least = max(min(_FLOOR_US, other / 4), 2 * usual)
+    return np.abs(periods - other) <= np.maximum(_SAME * np.maximum(periods, other), least)
+
+
 def _is_steady(middle: int, spread: int) -> bool:
     limit = max(_STEADY * middle, min(_FLOOR_US, middle / 3))
     return middle >= _SHORTEST_US and spread <= limit
 
 
-def _levels(windows: Sequence[tuple[int, int]], gaps: int, usual: int) -> list[_Level]:
-    """Return runs of steady windows with the same middle; noisy ones of that middle join them."""
-    runs: list[list[int]] = []  # first window, one behind the last, its middle
-    for at, (middle, spread) in enumerate(windows):
+def _runs(windows: _Windows, usual: int) -> list[list[int]]:
+    """Return runs of steady windows with the same middle; noisy ones of that middle join them.
+
+    Each has its first window, one behind the last, and its middle.
+    """
+    runs: list[list[int]] = []
+    begin = 0 if isinstance(windows.middles, list) else _array_runs(windows, usual, runs)
+    pairs = zip(windows.middles[begin:], windows.spreads[begin:], strict=True)
+    for at, (middle, spread) in enumerate(pairs, begin):
         same = bool(runs) and _alike(middle, runs[-1][2], usual)
         if same and (_is_steady(middle, spread) or at - runs[-1][1] < 1):
             runs[-1][1] = at + 1
         elif not same and _is_steady(middle, spread):
-            runs.append([at, at + 1, middle])
+            runs.append([at, at + 1, int(middle)])
+    return runs
+
+
+def _array_runs(windows: _Windows, usual: int, runs: list[list[int]]) -> int:
+    """Find runs in arrays as long as they are few; return the window that comes next."""
+    middles, spreads = np.asarray(windows.middles), np.asarray(windows.spreads)
+    limits = np.maximum(_STEADY * middles, np.minimum(_FLOOR_US, middles / 3))
+    steady = (middles >= _SHORTEST_US) & (spreads <= limits)
+    begin, size = int(np.argmax(steady)), _LEAST_AT_ONCE
+    if not steady[begin]:
+        return len(middles)
+    runs.append([begin, begin + 1, int(middles[begin])])
+    begin += 1
+    while begin < len(middles) and len(runs) < _FEW_RUNS:
+        run, end = runs[-1], min(begin + size, len(middles))
+        same = _are_alike(middles[begin:end], run[2], usual)
+        others = np.flatnonzero(~same & steady[begin:end])
+        if len(others):
+            end = begin + int(others[0])
+            same = same[: end - begin]
+        belong = np.flatnonzero(same & steady[begin:end])
+        if len(belong):
+            run[1] = begin + int(belong[-1]) + 1
+        if begin <= run[1] < end:  # noisy ones right behind it
+            strange = np.flatnonzero(~same[run[1] - begin :])
+            run[1] = run[1] + int(strange[0]) if len(strange) else end
+        begin, size = end, 4 * size
+        if len(others):
+            runs.append([end, end + 1, int(middles[end])])
+            begin, size = end + 1, _LEAST_AT_ONCE
+    return begin
+
+
+def _levels(windows: _Windows, gaps: int, usual: int) -> list[_Level]:
+    """Return the runs of windows that are no disturbance."""
+    runs, count = _runs(windows, usual), len(windows.middles)
     # A single window between two of the same period is a disturbance, and no level.
     joined: list[list[int]] = []
     for run in runs:
-        lone = run[1] - run[0] < 2 and len(windows) > 2
+        lone = run[1] - run[0] < 2 and count > 2
         if joined and _alike(run[2], joined[-1][2], usual):
             joined[-1][1] = run[1]
         elif not lone:
@@ -192,8 +275,8 @@ def _levels(windows: Sequence[tuple[int, int]], gaps: int, usual: int) -> list[_
     size = min(_WINDOW, gaps)
     levels = []
     for begin, end, _ in joined:
-        middles = sorted(middle for middle, _ in windows[begin:end])
-        levels.append(_Level(begin * size, end * size, middles[len(middles) // 2]))
+        middle = _ranked(windows.middles[begin:end], (end - begin) // 2)
+        levels.append(_Level(begin * size, end * size, middle))
     if levels and levels[-1].end + size > gaps:
         levels[-1] = levels[-1]._replace(end=gaps)
     return levels
@@ -250,37 +333,37 @@ def _outside(gaps: Sequence[int], begin: int, end: int, low: float, high: float)
 
 
 def _noisy(
-    windows: Sequence[tuple[int, int]], gaps: Sequence[int], period: int, quiet: int
+    windows: _Windows, gaps: Sequence[int], period: int, quiet: int
 ) -> list[tuple[int, int, int, int]]:
     """Return the runs of windows with a large jitter, where the others are quiet."""
     limit = max(_NOISY * period, 500, _TIMES_NOISIER * quiet)
-    loud = [spread > limit for _, spread in windows]
-    still = sum(spread <= max(limit / 3, 2 * quiet) for _, spread in windows)
-    if still < _LEAST_QUIET * len(windows) or not any(loud):
+    loud, count = windows.above(limit), len(windows.spreads)
+    still = count - len(windows.above(max(limit / 3, 2 * quiet)))
+    if still < _LEAST_QUIET * count or not loud:
         return []
-    runs: list[list[int]] = []
-    for at, is_loud in enumerate(loud):
-        if is_loud and runs and at - runs[-1][1] <= 1:
-            runs[-1][1] = at + 1
-        elif is_loud:
-            runs.append([at, at + 1])
+    runs: list[list[int]] = []  # first window, one behind the last, how many are loud
+    for at in loud:
+        if runs and at - runs[-1][1] <= 1:
+            runs[-1][1:] = at + 1, runs[-1][2] + 1
+        else:
+            runs.append([at, at + 1, 1])
     long = [
         run
         for run in runs
         if run[1] - run[0] >= _LEAST_NOISY
         and _both_ways(gaps, run[0] * _WINDOW, run[1] * _WINDOW, period, limit)
     ]
-    inside = sum(sum(loud[begin:end]) for begin, end in long)
-    if not long or len(long) > 2 or inside < 0.7 * sum(loud):
+    inside = sum(inner for _, _, inner in long)
+    if not long or len(long) > 2 or inside < 0.7 * len(loud):
         return []
     return [
         (
             begin * _WINDOW,
             end * _WINDOW,
             quiet,
-            sorted(spread for _, spread in windows[begin:end])[(end - begin) // 2],
+            _ranked(windows.spreads[begin:end], (end - begin) // 2),
         )
-        for begin, end in long
+        for begin, end, _ in long
     ]
 
 

@@ -19,8 +19,10 @@
 # 2. Is it CANopen (`is_canopen`)? If not, only what holds for every bus is judged: error frames,
 #    times, load. Nobody knows what the identifiers of other protocols mean.
 # 3. Services (node_events.py): NMT, error control, EMCY and SDO frames, one by one, decoded as
-#    everywhere. They also tell the *cuts*: moments after which frames come in another way because
-#    somebody wanted it, as an NMT command or a write to 1800h. No rhythm is judged across one.
+#    everywhere; of a client that polls a node the first and the last exchange of a row where numpy
+#    finds them (`exchanges`). They also tell the *cuts*: moments after which frames come in
+#    another way because somebody wanted it, as an NMT command or a write to 1800h. No rhythm is
+#    judged across one.
 # 4. Rhythms (cycles.py): all frames of an identifier at once, heartbeats, SYNC and PDOs; with
 #    numpy where a log is large. Where all of a bus is silent, that is one finding, and not one for
 #    each identifier.
@@ -58,10 +60,11 @@ from tickrig.wire.canopen import nmt, sdo_frame
 if TYPE_CHECKING:
     import numpy as np
 
-    from tickrig.host.canmon.model.columns import column_traffic
+    from tickrig.host.canmon.model.columns import column_meanings, column_traffic
     from tickrig.host.canmon.model.columns.columns import Columns
 else:  # an extra
     np = LazyModule("numpy")
+    column_meanings = LazyModule("tickrig.host.canmon.model.columns.column_meanings")
     column_traffic = LazyModule("tickrig.host.canmon.model.columns.column_traffic")
 
 _NO_LOSS: Final = "no-loss"
@@ -104,6 +107,8 @@ _NEAR_US: Final = 100_000
 _KEPT_TEXTS: Final = 3
 _LOST_AFTER: Final = 1.5
 """A heartbeat is lost after so many of its periods, as on the node board."""
+_MOST_STATES: Final = 64
+"""A statusword has no more values."""
 _LOAD_US: Final = 500_000
 _LOAD_STEP_US: Final = 50_000
 _STOPPED: Final = 5
@@ -286,7 +291,7 @@ class _BusJudge:
         self._backward = bus.backward()
         self._times, self._set_back = steady_times(bus, self._backward)
         # A clock that was set back leaves the end of the log before other times in it.
-        last_us = max(self._times[self._set_back[-1] if self._set_back else 0 :])
+        last_us = bus.latest(self._times, self._set_back[-1] if self._set_back else 0)
         self._end_us = max(last_us, end_us)
 
     def faults(self) -> list[BusFault]:
@@ -294,15 +299,11 @@ class _BusJudge:
         bus, rows = self._bus, self._rows
         self._time()
         self._load()
-        decoder = self._decoder = Decoder(self._eds)
-        self._events = events = node_events.BusEvents(bus, self._times, decoder, rows)
         self._canopen = canopen = node_events.is_canopen(bus, rows)
-        for row in _merged(
-            found
-            for ident, found in rows.items()
-            if (node_events.is_event(ident) if canopen else ident & ERROR and ident < FD)
-        ):
-            events.take(row)
+        events = self._walk(self._polled() if canopen and bus.is_large else None)
+        if self._decoder.bus(bus.name).sdo_moved and bus.is_large:
+            events = self._walk(None)
+        decoder, self._events = self._decoder, events
         if not canopen:
             self.unjudged = (
                 dict.fromkeys(RULES.keys() - _ANY_BUS, "no CANopen was heard") | self.unjudged
@@ -320,6 +321,30 @@ class _BusJudge:
             self.unjudged["drive-fault"] = "no statusword of CiA 402 came"
         self._once()
         return self._grouped(events.hits)
+
+    def _walk(self, but: Any) -> node_events.BusEvents:
+        """Look at the frames of services one by one; `but` is an array of rows to leave out."""
+        self._decoder = Decoder(self._eds)
+        events = node_events.BusEvents(self._bus, self._times, self._decoder, self._rows)
+        parts = [
+            found
+            for ident, found in self._rows.items()
+            if (node_events.is_event(ident) if self._canopen else ident & ERROR and ident < FD)
+        ]
+        for row in _merged(parts) if but is None else np.setdiff1d(np.concatenate(parts), but):
+            events.take(int(row))
+        return events
+
+    def _polled(self) -> Any:
+        """Return the rows of SDO exchanges that tell no more than those beside them."""
+        bus = self._bus
+        rows: Any = column_meanings.of_sdo(np.frombuffer(bus.ident, np.uint64))
+        ident: Any = bus.picked(bus.ident, rows)
+        dlc: Any = bus.picked(bus.dlc, rows)
+        words: Any = bus.picked(bus.payload, rows)
+        blocks = column_meanings.block_nodes(ident, words)
+        found = column_meanings.exchanges(ident, dlc, words, blocks)
+        return rows[np.concatenate((found.requests[found.inner], found.answers[found.inner]))]
 
     def _without(self) -> dict[str, str]:
         """Say why rules have nothing to judge."""
@@ -358,7 +383,7 @@ class _BusJudge:
             most_us = max(at_us[row - 1] - at_us[row] for row in rows)
             text = f"the time goes back by {'up to ' * (len(rows) > 1)}{ms_text(most_us)} ms"
             self._hit("time-back", None, text, rows, len(rows))
-        if len(self._bus) > 1 and not rows and at_us[0] == max(at_us):
+        if len(self._bus) > 1 and not rows and at_us[0] == self._bus.latest(at_us):
             self.unjudged |= dict.fromkeys(_TIMED, ONE_TIME)
             self.judged.discard("time-back")
 
@@ -428,7 +453,7 @@ class _BusJudge:
         for ident, rows in self._rows.items():
             if ident > STANDARD_MAX:
                 continue
-            sizes = Counter(_plain(self._bus.picked(self._bus.dlc, rows)))
+            sizes = _counted(self._bus.picked(self._bus.dlc, rows))
             if ident in node_events.PDO_IDS:
                 self._pdo_length(ident, rows, sizes, decoder)
                 continue
@@ -504,7 +529,7 @@ class _BusJudge:
             return []
         if self._bus.is_large:
             gaps = np.diff(np.frombuffer(times, np.int64))
-            limit = max(20_000, 5 * int(np.median(gaps)))
+            limit = max(20_000, 5 * int(np.partition(gaps, len(gaps) // 2)[len(gaps) // 2]))
             found = np.flatnonzero(gaps > limit).tolist()
         else:
             plain = [b - a for a, b in pairwise(times)]
@@ -549,9 +574,9 @@ class _BusJudge:
                     text = f"{name} does not come for {ms_text(end - begin)} ms, its period is"
                     text += f" {ms_text(period)}"
                     self._hit(f"{kind}-missing", ident, text, piece[at : at + 2], count)
-            payload = self._bus.picked(self._bus.payload, piece)
             for at in rhythm.extra:
-                if payload[at] != payload[at - 1] and len(piece) < _SURE_FRAMES:
+                one, other = (self._bus.payload[int(piece[place])] for place in (at, at - 1))
+                if one != other and len(piece) < _SURE_FRAMES:
                     continue  # an event may come in the middle of a period by chance
                 text = f"{name} comes {ms_text(int(times[at]) - int(times[at - 1]))} ms after the"
                 text += f" one before, its period is {ms_text(period)}"
@@ -683,10 +708,10 @@ class _BusJudge:
             runs = [0, *(at for at in range(1, len(words)) if words[at] != words[at - 1])]
             values = [words[at] for at in runs]
         else:
-            table = np.asarray(payload) >> np.uint64(low) & np.uint64(0xFFFF)
+            table = (np.asarray(payload) >> np.uint64(low)).astype(np.uint16)
+            if shift is None and np.count_nonzero(np.bincount(table)) > _MOST_STATES:
+                return False  # sooner than `_is_statusword`
             runs = [0, *(np.flatnonzero(table[1:] != table[:-1]) + 1).tolist()]
-            if len(runs) > len(table) // 4 and shift is None:
-                return False
             values = table[runs].tolist()
         if shift is None and not self._is_statusword(ident, rows, values):
             return False
@@ -704,7 +729,7 @@ class _BusJudge:
         """Say whether TPDO1 begins with a statusword: all of its states are, and one is enabled."""
         if any(self._bus.dlc[row] < 2 for row in rows[: learnt.KEPT_FRAMES]):
             return False
-        if len(set(values)) > 64:
+        if len(set(values)) > _MOST_STATES:
             return False
         states = {value & 0x6F for value in values}
         enabled = {0x21, 0x23, 0x27}
@@ -854,6 +879,17 @@ def _merged(parts: Iterable[Sequence[int]]) -> list[int]:
         rows += _plain(part)
     rows.sort()
     return rows
+
+
+def _counted(values: Any) -> Counter[int]:
+    """Count values of at most 8 bits, in the order in which they appear."""
+    if isinstance(values, list):
+        return Counter(values)
+    counts = np.bincount(values)
+    sizes = np.flatnonzero(counts).tolist()
+    if len(sizes) > 1:
+        sizes.sort(key=lambda size: int(np.argmax(values == size)))
+    return Counter({size: int(counts[size]) for size in sizes})
 
 
 def _plain(values: Any) -> list[int]:

@@ -26,6 +26,7 @@ from tickrig.host.canmon.model.decode.pdos import Field, PdoDecoder
 from tickrig.host.canmon.model.frames import ERROR, EXTENDED, REMOTE, Record, decoded_text
 from tickrig.host.text.page_text import one_line
 from tickrig.wire.can import EXTENDED_MAX, MAX_DATA_BYTES, STANDARD_MAX, CanFrame
+from tickrig.wire.canopen.sdo_frame import REQUEST_COB_ID
 
 if TYPE_CHECKING:
     from cantools.database.can import Message as DbcMessage
@@ -541,7 +542,7 @@ class ColumnNodes:
 
     def _take_bus(self, bus: BusDecoder, frames: Columns) -> None:
         before = bus.changes
-        for row, record in one_by_one(frames, that_matter(bus, frames)):
+        for row, record in one_by_one(frames, that_matter(bus, frames).rows):
             self._board.take(record, self._decoder.take(record))
             if bus.changes != before:
                 self._feed(frames, np.arange(row + 1, len(frames)))
@@ -560,20 +561,145 @@ def one_by_one(frames: Columns, rows: Ints) -> Iterator[tuple[int, Record]]:
         yield from zip(piece.tolist(), records(select(frames, piece)), strict=True)
 
 
-def that_matter(bus: BusDecoder, frames: Columns) -> Ints:
-    """Return the rows of frames that can change what is known of nodes."""
+class Exchanges(NamedTuple):
+    """Expedited SDO transfers, each an answer right behind its request, that teach nothing.
+
+    Attributes:
+        requests: their places.
+        answers: the places of the answers.
+        inner: whether other such exchanges of the node stand right before and right behind: then
+            nobody notices that this one is left out.
+    """
+
+    requests: Ints
+    answers: Ints
+    inner: npt.NDArray[np.bool_]
+
+
+_UPLOADS: Final = 1
+_DOWNLOADS: Final = 2
+
+
+def _commands(*commands: tuple[int, Iterable[int]]) -> npt.NDArray[np.uint8]:
+    table = np.zeros(256, np.uint8)
+    for kind, codes in commands:
+        table[list(codes)] = kind
+    return table
+
+
+_SIZES: Final = (0x02, 0x03, 0x07, 0x0B, 0x0F)
+"""Low bits of an expedited initiate: no size, or 4 to 1 bytes."""
+_REQUESTS: Final = _commands((_UPLOADS, [0x40]), (_DOWNLOADS, [0x20 | one for one in _SIZES]))
+_ANSWERS: Final = _commands((_UPLOADS, [0x40 | one for one in _SIZES]), (_DOWNLOADS, [0x60]))
+_BLOCK_COMMANDS: Final = (0xA0, 0xC0)
+_SPECIFIER: Final = 0xE0
+_WHOLE: Final = 8
+_COMMUNICATION: Final = 0x1
+"""First digit of the objects of which the decoder learns."""
+_STATUSWORD: Final = 0x6041
+"""Index and sub-index, in the order of the frame."""
+
+
+def exchanges(
+    ident: npt.NDArray[Any],
+    dlc: npt.NDArray[np.uint8],
+    payload: npt.NDArray[np.uint64],
+    blocks: npt.NDArray[np.bool_],
+) -> Exchanges:
+    """Return the exchanges among SDO frames of the pre-defined connection set.
+
+    A client that polls a node makes most SDO frames of a log, and only the first and the last of
+    such exchanges in a row tell more than that there is one more. What is read of 1000h to 1FFFh
+    is never left out, nor a statusword that differs from the one before, nor anything of a node
+    with block transfers, whose segments may look like anything.
+
+    Args:
+        ident: identifiers with flags, of SDO frames alone.
+        dlc: bytes of data.
+        payload: data as a little-endian number.
+        blocks: by node-ID, whether it has block transfers, as `block_nodes` says.
+    """
+    nodes = (ident & 0x7F).astype(np.uint8)
+    order = np.argsort(nodes, kind="stable")
+    nodes, words = nodes[order], payload[order]
+    commands, entries = (words & np.uint64(0xFF)).astype(np.uint8), words >> np.uint64(8)
+    entries = (entries & np.uint64(0xFF_FFFF)).astype(np.uint32)
+    whole = (dlc[order] == _WHOLE) & (ident[order] & REMOTE == 0)
+    asks = ident[order] & 0x780 == REQUEST_COB_ID
+    asked = np.where(whole & asks & ~blocks[nodes], _REQUESTS[commands], 0)
+    answered = np.where(whole & ~asks, _ANSWERS[commands], 0)
+    begins = np.flatnonzero(
+        (asked[:-1] != 0)
+        & (asked[:-1] == answered[1:])
+        & (nodes[:-1] == nodes[1:])
+        & (entries[:-1] == entries[1:])
+    )
+    follows = np.diff(begins, prepend=-2) == 2
+    follows[1:] &= nodes[begins[1:]] == nodes[begins[:-1]]
+    follows[:1] = False
+    inner = follows & np.append(follows[1:], False)
+    told = entries[begins] & np.uint32(0xF000) != _COMMUNICATION << 12
+    states = np.flatnonzero(entries[begins] == _STATUSWORD)
+    runs, rows = np.cumsum(~follows)[states], begins[states]
+    told[states] = False
+    told[states[1:]] = (
+        (runs[1:] == runs[:-1])
+        & (words[rows[1:]] == words[rows[:-1]])
+        & (words[rows[1:] + 1] == words[rows[:-1] + 1])
+    )
+    begins = begins[told]
+    return Exchanges(order[begins], order[begins + 1], inner[told])
+
+
+def block_nodes(ident: npt.NDArray[Any], payload: npt.NDArray[np.uint64]) -> npt.NDArray[np.bool_]:
+    """Say of each node-ID whether a block transfer is asked for among SDO frames."""
+    blocks = np.zeros(0x80, np.bool_)
+    asks = np.isin(payload & np.uint64(_SPECIFIER), _BLOCK_COMMANDS)
+    blocks[ident[asks & (ident & 0x780 == REQUEST_COB_ID)] & 0x7F] = True
+    return blocks
+
+
+def of_sdo(ident: npt.NDArray[Any]) -> Ints:
+    """Return the rows of SDO frames of the pre-defined connection set, with 11-bit identifiers."""
+    low = ident ^ ident & REMOTE
+    return np.flatnonzero(((low > 0x580) & (low < 0x600)) | ((low > 0x600) & (low < 0x680)))
+
+
+class Matter(NamedTuple):
+    """Which frames matter.
+
+    Attributes:
+        rows: of frames that can change what is known of nodes.
+        settling: of those that can change what a CAN-ID means.
+    """
+
+    rows: Ints
+    settling: Ints
+
+
+def that_matter(bus: BusDecoder, frames: Columns, but: Ints | None = None) -> Matter:
+    """Find the frames that can change what is known of nodes.
+
+    Args:
+        bus: decodes them.
+        frames: of one bus.
+        but: rows of frames that change nothing that PDOs do: they are not returned.
+    """
     can_ids = (frames.ident & STANDARD_MAX).astype(np.int64)
     can_ids[frames.ident & (EXTENDED | ERROR) != 0] = STANDARD_MAX + 1
     effects = np.zeros(STANDARD_MAX + 2, np.uint8)
     for can_id in np.flatnonzero(np.bincount(can_ids)[: STANDARD_MAX + 1]).tolist():
         effects[can_id] = bus.effect(can_id)
     found = effects[can_ids]
+    if but is not None:
+        found[but] = Effect.NONE
     each = np.flatnonzero(found >= Effect.ALONE)
     latest = np.flatnonzero(found == Effect.LATEST)
-    if not len(latest):
-        return each
     low = frames.payload[each] & np.uint64(0xFF)
-    between = np.searchsorted(each[(found[each] == Effect.EACH) | (low == 0)], latest)
+    settling = each[(found[each] == Effect.EACH) | (low == 0)]
+    if not len(latest):
+        return Matter(each, settling)
+    between = np.searchsorted(settling, latest)
     kinds = can_ids[latest] << 5 | (frames.ident[latest] & REMOTE != 0) << 4 | frames.dlc[latest]
     _, last = np.unique((between << 16 | kinds)[::-1], return_index=True)
-    return np.sort(np.concatenate((each, latest[::-1][last])))
+    return Matter(np.sort(np.concatenate((each, latest[::-1][last]))), settling)

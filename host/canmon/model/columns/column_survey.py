@@ -2,18 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
-from tickrig.host.canmon.model.columns.column_meanings import one_by_one, that_matter
+from tickrig.host.canmon.model.columns.column_meanings import (
+    Exchanges,
+    block_nodes,
+    exchanges,
+    of_sdo,
+    that_matter,
+)
 from tickrig.host.canmon.model.columns.column_traffic import column_bits
-from tickrig.host.canmon.model.columns.columns import Columns, Ints, by_channel, records, select
+from tickrig.host.canmon.model.columns.columns import (
+    Columns,
+    Ints,
+    by_channel,
+    record_at,
+    records,
+    select,
+)
 from tickrig.host.canmon.model.decode.dbc_file import DbcFile
 from tickrig.host.canmon.model.decode.decoder import BusDecoder, Decoder
-from tickrig.host.canmon.model.decode.node_memory import drive_state
+from tickrig.host.canmon.model.decode.node_board import STATUSWORD_NAME
+from tickrig.host.canmon.model.decode.node_memory import NodeMemory, drive_state
 from tickrig.host.canmon.model.decode.pdos import Field, PdoDecoder
 from tickrig.host.canmon.model.frames import ERROR, EXTENDED, Record
 from tickrig.host.canmon.model.survey import SignalName, Survey, TimeBins
@@ -25,6 +39,11 @@ from tickrig.wire.can import EXTENDED_MAX, MAX_DATA_BYTES, STANDARD_MAX
 # since changes come in groups, and the rest as a block again.
 
 _SETTLED: Final = 256
+_PIECE: Final = 1 << 10
+_NO_ROW: Final = -1
+_NODE: Final = 0x7F
+_WRITTEN: Final = 0x60
+"""The command of the answer to a download."""
 _DRIVE_STATES: Final = tuple(drive_state(bits) or "?" for bits in range(0x80))
 _Values = npt.NDArray[np.float64]
 
@@ -42,6 +61,7 @@ class ColumnSurvey:
         self._files = [one for one in decoder.first if isinstance(one, DbcFile)]
         self._named: dict[int, bool] = {}
         self._begun = False
+        self._blocks: dict[str, npt.NDArray[np.bool_]] = {}
 
     def take(self, columns: Columns) -> None:
         """Take a block of frames."""
@@ -52,6 +72,9 @@ class ColumnSurvey:
         survey.last_us = max(survey.last_us, int(columns.at_us.max()))
         for channel, _, frames in by_channel(columns):
             self._count(channel, frames)
+            rows = of_sdo(frames.ident)
+            blocks = block_nodes(frames.ident[rows], frames.payload[rows])
+            self._blocks[channel] = blocks | self._blocks.get(channel, False)
         if not self._begun:  # nodes with an EDS are on the bus of the very first frame
             self._begun = True
             self._each(records(select(columns, np.arange(1))))
@@ -107,8 +130,7 @@ class ColumnSurvey:
     def _take_bus(self, channel: str, bus: BusDecoder, frames: Columns) -> None:
         while len(frames):
             layouts, before, end = _layouts(bus, frames), bus.changes, len(frames)
-            for row, record in one_by_one(frames, that_matter(bus, frames)):
-                self._survey.take(record, self._decoder.take(record))
+            for row in self._matter(channel, bus, frames):
                 if bus.changes != before:
                     end = row + 1
                     break
@@ -116,6 +138,64 @@ class ColumnSurvey:
             each = np.arange(end, min(end + _SETTLED, len(frames)))
             self._each(records(select(frames, each)))
             frames = select(frames, np.arange(end + len(each), len(frames)))
+
+    def _matter(self, channel: str, bus: BusDecoder, frames: Columns) -> Iterator[int]:
+        """Take the frames that change anything; yield the row of each."""
+        polls = self._polls(channel, bus, frames)
+        asked, kept = np.full(len(frames), _NO_ROW), np.zeros(len(frames), np.bool_)
+        quiet = np.concatenate((polls.requests, polls.answers))
+        matter = that_matter(bus, frames, quiet)
+        # A frame that changes what a CAN-ID means ends this pass: never inside an exchange.
+        before, behind = (np.searchsorted(matter.settling, one) for one in polls[:2])
+        alone = polls.inner & (before == behind)
+        asked[polls.answers[alone]] = polls.requests[alone]
+        kept[matter.rows] = kept[quiet] = True
+        kept[polls.requests[alone]] = False
+        rows, states = np.flatnonzero(kept), dict[tuple[int, int], bool]()
+        for begin in range(0, len(rows), _PIECE):
+            piece = rows[begin : begin + _PIECE]
+            requests, idents, words = asked[piece], frames.ident[piece], frames.payload[piece]
+            singles = iter(records(select(frames, piece[requests == _NO_ROW])))
+            parts = (piece, requests, idents, words)
+            for row, request, ident, word in zip(*(one.tolist() for one in parts), strict=True):
+                if request == _NO_ROW:
+                    self._survey.take(record := next(singles), self._decoder.take(record))
+                elif not self._counts(channel, bus.memory(ident & _NODE), ident, word, states):
+                    for place in (request, row):
+                        record = record_at(frames, place)
+                        self._survey.take(record, self._decoder.take(record))
+                yield row
+
+    def _polls(self, channel: str, bus: BusDecoder, frames: Columns) -> Exchanges:
+        """Return the SDO exchanges that teach nothing."""
+        rows = of_sdo(frames.ident[: 0 if bus.sdo_moved else len(frames)])
+        parts = frames.ident[rows], frames.dlc[rows], frames.payload[rows]
+        found = exchanges(*parts, self._blocks[channel])
+        return Exchanges(rows[found.requests], rows[found.answers], found.inner)
+
+    def _counts(
+        self,
+        channel: str,
+        memory: NodeMemory,
+        ident: int,
+        answer: int,
+        states: dict[tuple[int, int], bool],
+    ) -> bool:
+        """Count an exchange by its answer; False if it is to be taken frame by frame.
+
+        `states` remembers which objects are statuswords, of which the node board shows the state.
+        """
+        survey, node, entry = self._survey, ident & _NODE, answer >> 8 & 0xFF_FFFF
+        is_state = states.get((node, entry))
+        if is_state is None:
+            text = memory.describe(entry & 0xFFFF, entry >> 16)
+            is_state = states[node, entry] = text.name == STATUSWORD_NAME
+        if is_state:
+            row = survey.row(channel, node)
+            written = answer & 0xFF == _WRITTEN
+            if written or row is None or row.drive_state != drive_state(answer >> 32):
+                return False
+        return survey.lane(channel, node).transfers.pass_over()
 
     def _take_values(
         self, channel: str, layouts: Mapping[int, PdoDecoder], frames: Columns
@@ -204,18 +284,3 @@ def _add(bins: TimeBins[str], key: str, since_us: Ints, amounts: Ints) -> None:
     sums = np.bincount(places - first, amounts)
     for place in np.flatnonzero(sums).tolist():
         bins.add_at(key, first + place, int(sums[place]))
-
-
-class ColumnPiece:
-    """A block of a log, of which some frames are wanted."""
-
-    def __init__(self, columns: Columns) -> None:
-        self._columns = columns
-
-    def __len__(self) -> int:
-        """Return how many frames there are."""
-        return len(self._columns)
-
-    def cut(self, begin: int, end: int, /) -> list[Record]:
-        """Return some of the frames, by their places."""
-        return records(select(self._columns, np.arange(begin, end)))

@@ -172,6 +172,12 @@ def records(columns: Columns) -> list[Record]:
     ]
 
 
+def record_at(columns: Columns, row: int) -> Record:
+    """Return one frame."""
+    at_us, ident, dlc, payload, sent, channel = (part[row].item() for part in columns.parts)
+    return Record(at_us, columns.channels[channel], _frame(ident, dlc, payload), sent)
+
+
 def _frame(ident: int, dlc: int, payload: int) -> CanFrame | ErrorFrame:
     data = payload.to_bytes(8, "little")
     if ident & ERROR:

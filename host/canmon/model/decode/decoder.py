@@ -90,6 +90,7 @@ Route = Callable[[int, CanFrame], Decoded]
 _SYNC_ID: Final = 0x080
 _TIME_ID: Final = 0x100
 _PDO_IDS: Final = range(0x181, 0x580)
+_SDO_IDS: Final = range(0x581, 0x680)
 _NODE_MASK: Final = 0x7F
 COB_ID_SYNC, COB_ID_TIME, COB_ID_EMCY = 0x1005, 0x1012, 0x1014
 _SDO_SERVERS: Final = range(0x1201, 0x1280)
@@ -126,6 +127,7 @@ class BusDecoder:
 
     Attributes:
         changes: how often what a CAN-ID means may have changed.
+        sdo_moved: a CAN-ID of the SDO frames of the pre-defined connection set got another meaning.
     """
 
     def __init__(
@@ -134,7 +136,7 @@ class BusDecoder:
         files: EdsFiles | None = None,
         channel: str = "",
     ) -> None:
-        self._eds, self.changes = eds, 0
+        self._eds, self.changes, self.sdo_moved = eds, 0, False
         self._files, self._channel = files, channel
         self._memories: dict[int, node_memory.NodeMemory] = {}
         self._channels: dict[tuple[int, int], SdoChannel] = {}
@@ -308,7 +310,7 @@ class BusDecoder:
         for pdo in pdos:
             self.changes += 1
             for can_id in self._pdos.update(pdo, self.memory(pdo.node)):
-                self._routes.pop(can_id, None)
+                self._forget(can_id)
 
     def _learn_cob_ids(self, node: int, index: int) -> None:
         """Learn a CAN-ID that is not that of the pre-defined connection set."""
@@ -339,7 +341,11 @@ class BusDecoder:
     def _configure(self, can_id: int, route: Route) -> None:
         self.changes += 1
         self._configured[can_id] = route
+        self._forget(can_id)
+
+    def _forget(self, can_id: int) -> None:
         self._routes.pop(can_id, None)
+        self.sdo_moved |= can_id in _SDO_IDS
 
 
 def _odd_length(kind: DataType | None, data: bytes, *, sized: bool) -> str:

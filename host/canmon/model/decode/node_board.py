@@ -232,7 +232,7 @@ class NodeStatus:
             self.name = transfer.value
 
 
-_STATUSWORD: Final = "statusword"
+STATUSWORD_NAME: Final = "statusword"
 _ERROR_CONTROL: Final = ("heartbeat", "guard")
 
 
@@ -316,7 +316,7 @@ class NodeBoard:
         status = self._status(channel, node)
         status.present, status.pdos[decoded.kind] = True, decoded
         for signal in decoded.signals:
-            if signal.name == _STATUSWORD and isinstance(signal.value, int):
+            if signal.name == STATUSWORD_NAME and isinstance(signal.value, int):
                 status.drive_state = drive_state(signal.value)
 
     def _transfers(self, record: Record, node: int, decoded: Decoded) -> None:
@@ -325,7 +325,7 @@ class NodeBoard:
             answered = transfer.outcome.answered
             if answered or (channel, node) in self._nodes:
                 self._status(channel, node).transfer(record.at_us, transfer)
-            if transfer.name == _STATUSWORD and isinstance(transfer.value, int):
+            if transfer.name == STATUSWORD_NAME and isinstance(transfer.value, int):
                 self._status(channel, node).drive_state = drive_state(transfer.value)
 
 

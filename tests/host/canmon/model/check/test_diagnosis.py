@@ -6,7 +6,10 @@ from dataclasses import replace
 from functools import cache
 from random import Random
 
+import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from tests.host.canmon.model.check.sound_log import (
     FAULTS,
@@ -18,7 +21,7 @@ from tests.host.canmon.model.check.sound_log import (
     sound,
     without,
 )
-from tickrig.host.canmon.model.check import bus_frames, learnt
+from tickrig.host.canmon.model.check import bus_frames, cycles, learnt
 from tickrig.host.canmon.model.check.diagnosis import RULES, Diagnoser, diagnose
 from tickrig.host.canmon.model.frames import Record
 from tickrig.wire.can import CanFrame
@@ -56,6 +59,27 @@ def test_a_fault_is_found_without_a_rule(name: str, plan: Plan) -> None:
     assert (rule, node) in found
     # A node that does not stop when NMT stops it is another fault.
     assert set(found) <= {(rule, node), ("nmt-state", node)}
+
+
+GAPS = st.one_of(
+    st.just([10_000] * 8),
+    st.just([10_000] * 200),
+    st.just([12_500] * 16),
+    st.lists(st.integers(9_700, 10_300), min_size=1, max_size=20),
+    st.lists(st.integers(0, 25_000), max_size=12),
+    st.sampled_from([[20_000], [5_000, 5_000], [14_000, 6_000], [100]]),
+    st.lists(st.sampled_from([3_000, 10_000, 17_000]), min_size=8, max_size=40),
+)
+
+
+@pytest.mark.parametrize("few", [1, 64])
+@given(parts=st.lists(GAPS, max_size=30))
+def test_a_rhythm_is_the_same_in_lists_and_in_arrays(few: int, parts: list[list[int]]) -> None:
+    times = np.cumsum([0, *(gap for part in parts for gap in part)])
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(cycles, "_FEW_RUNS", few)
+        patch.setattr(cycles, "_LEAST_AT_ONCE", 2)
+        assert cycles.rhythm_of(times) == cycles.rhythm_of(times.tolist())  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("begin", [1, 200, 800])
