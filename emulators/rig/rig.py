@@ -34,8 +34,8 @@
 #
 # With the kernel (`kernel.py`), a rig whose stations are all on one bus, in virtual time, without
 # bridges, couplings and `hosts`, is run in C from tick to tick, for a host that waits on that bus
-# too: `run` is the loop of `_go_on`, `_happen` and `_run` over the same fields. It returns False where an action is due or a
-# plug is pulled, and the loop here goes on.
+# too: `run` is the loop of `_go_on`, `_happen` and `_run` over the same fields. It returns False
+# where an action is due or a plug is pulled, and the loop here goes on.
 #
 # In real time (`_in_real_time`) the rig wakes at every tick, bridges take in before it and give out
 # after it, and lateness is counted; nothing is skipped.
