@@ -227,7 +227,10 @@ def frame_bits(frame: CanFrame) -> int:
 
 
 kept_bits: Final = lru_cache(KEPT_HEADS)(frame_bits)
-"""The same, for frames that come again: a bus and what measures its load count each once."""
+"""The same, for frames that come again: a bus and what measures its load count each once.
+
+Their data must be `bytes`: a slave may send a `bytearray`, which has no hash.
+"""
 
 
 def _head(key: int) -> tuple[int, _Row, int]:

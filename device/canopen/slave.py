@@ -553,10 +553,11 @@ class CanopenSlave(Copyable):
         self.node_id = self.pending_id
         stored = self.nonvolatile.parameters
         for entry in self.dictionary:
-            if entry.index in area:
-                data = stored.get(entry.key)
+            description = entry.description  # its own properties take as long as all else here
+            if description.index in area:
+                data = stored.get(description.key)
                 if data is None:
-                    data = entry.description.power_on_data(self.node_id)
+                    data = description.power_on_data(self.node_id)
                 # `assign`, not `force`: it was not written over the bus, so `written`
                 # does not act.
                 entry.assign(data)

@@ -55,7 +55,7 @@ from tickrig.emulators.can.transmission_outcomes import (
     TransmissionOutcomes,
 )
 from tickrig.emulators.rig.kernel import in_kernel
-from tickrig.wire.can import INTERFRAME_BITS, CanFrame, ErrorState, Frames, kept_bits
+from tickrig.wire.can import INTERFRAME_BITS, CanFrame, ErrorState, Frames, frame_bits, kept_bits
 from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
@@ -138,7 +138,11 @@ class CanSegment(TransmissionOutcomes):
             if self._news:
                 self._notify_changes()
             if self._stale:
-                self._plan()
+                if self._arbiter.heads or self._recovery.active:
+                    self._plan()
+                else:
+                    self._stale, self._start = False, NEVER
+                    self._due_us = NEVER
             if self.received:
                 return True
         return False
@@ -160,7 +164,10 @@ class CanSegment(TransmissionOutcomes):
             self._stale = True
         if self._faults.active and (delay_us := self._faults.delay_us(end.number)):
             end.held, self._arbiter.slow = now + delay_us * self.unit, True
-        end.enqueue(frames)
+        if idle and len(frames) == 1:  # mostly
+            end.next, end.waiting = frames[0], 1
+        else:
+            end.enqueue(frames)
         if idle:
             self._enter(end, now)
 
@@ -273,7 +280,7 @@ class CanSegment(TransmissionOutcomes):
     def _length(self, frame: CanFrame) -> int:
         if len(self._lengths) >= _KEPT_LENGTHS:
             self._lengths.clear()
-        bits = kept_bits(frame)
+        bits = kept_bits(frame) if type(frame[1]) is bytes else frame_bits(frame)
         if not (frame[2] or frame[3]):
             self._lengths[frame[0]] = frame[1], bits
         return bits

@@ -279,6 +279,7 @@ class Rig(Copyable):
         self.stations, self._woken = stations, tuple(compress(stations, attached))
         self._looked_at = tuple(compress(stations, map(not_, attached)))
         self._bus: Any = None  # the only one: two layers less than `_wires`
+        self._is_plain = False  # there are only stations in the timetable
         self._short: tuple[object, ...] = ()  # what the kernel runs from tick to tick, if it can
         self._look_for_bus()
 
@@ -286,7 +287,7 @@ class Rig(Copyable):
         """Run the rig in the kernel if all stations are on one bus, in virtual time."""
         others = self._bridges or self._couplings or self._looked_at
         virtual = self._jumps and type(self._clock) is VirtualClock
-        self._bus = self._wires.only_bus
+        self._bus, self._is_plain = self._wires.only_bus, self._jumps and not others
         bus = self._bus if kernel and virtual and not others else None
         lists = self.watchers, self.hosts, self._woken
         parts = (self._timetable, bus, self.event_queue, self._horizon, *lists)
@@ -423,7 +424,10 @@ class Rig(Copyable):
         if self._short and run(self, self._short, t_us, self._until_us, host):
             return
         self._enter_due()
-        self._foresee(self._until_us)
+        if host is None:
+            self._foresee(self._until_us)
+        else:
+            self._horizon.until_us = 0
         while True:
             if (next_us := self._go_on(t_us, host)) > t_us:
                 self._pass_to(t_us)
@@ -503,8 +507,12 @@ class Rig(Copyable):
     def _go_on(self, until_us: int, host: Host | None) -> int:
         """Advance the wires to the next tick with work or arrival at a host; return the time."""
         hosts, bus = (*self.hosts,) if host is None else (*self.hosts, host), self._bus
+        plain, timetable, queue = self._is_plain, self._timetable, self.event_queue
         while True:
-            next_us = self._planned_us
+            if plain:
+                next_us = max(self.now_us, min(timetable.first_us, queue.due_us))
+            else:
+                next_us = self._planned_us
             if hosts:
                 arrived_us: int = min(map(_arrived_us, hosts))
                 if arrived_us < next_us:
@@ -605,23 +613,20 @@ class Rig(Copyable):
             received = station.port.poll(now_us)
             if received or self._dense or station.device.due_us <= now_us:
                 sent.append((station.port, station.device.tick(now_us, received)))
-        if not (kernel and tick_stations(self._timetable, now_us)):
-            self._tick_woken(now_us)
+        timetable = self._timetable
+        if not (kernel and tick_stations(timetable, now_us)):
+            woken, enter = timetable.take(now_us), timetable.enter
+            timetable.open_us = now_us + 1
+            # What they send nobody has in this tick: one look at each is enough.
+            for station in woken:
+                device, port = station.device, station.port
+                received = port.poll(now_us)
+                if (received or device.due_us <= now_us) and (out := device.tick(now_us, received)):
+                    port.send(now_us, out)
+                if (due_us := device.due_us) < NEVER:
+                    enter(station, due_us)
         for port, traffic in sent:
             port.send(now_us, traffic)
-
-    def _tick_woken(self, now_us: int) -> None:
-        """Run the stations due in the timetable: compute and send."""
-        timetable = self._timetable
-        woken, enter = timetable.take(now_us), timetable.enter
-        timetable.open_us = now_us + 1
-        for station in woken:  # what they send nobody has in this tick: one look at each is enough
-            device, port = station.device, station.port
-            received = port.poll(now_us)
-            if (received or device.due_us <= now_us) and (out := device.tick(now_us, received)):
-                port.send(now_us, out)
-            if (due_us := device.due_us) < NEVER:
-                enter(station, due_us)
 
     def _couple(self, now_us: int) -> None:
         """Run the couplings, and enter devices whose inputs they set."""

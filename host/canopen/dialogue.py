@@ -257,6 +257,10 @@ class Dialogue:
     def start(self, now_us: int, job: QueuedScript) -> None:
         """Run a job when those before it have ended."""
         self._now_us = now_us
+        if self.job is None and not self._jobs:
+            self.job = job
+            self._go_on(None)
+            return
         self._jobs.append(job)
         if self.job is None:
             self._next()

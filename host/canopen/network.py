@@ -176,18 +176,16 @@ class NodeSession:
         """
         ended: list[T | Exception] = []
         job = dialogue.QueuedScript("", script, ended.append, ended.append)
-        self.dialogue.start(self._take(listen(0)), job)
+        now_us, frames = listen(0)
+        for _, frame in frames:
+            self.receive(now_us, frame)
+        self.dialogue.start(now_us, job)
         while not ended:
-            now_us = self._take(listen(self.dialogue.due_us))
+            now_us, frames = listen(self.dialogue.due_us)
+            for _, frame in frames:
+                self.receive(now_us, frame)
             if not ended:
                 self.dialogue.tick(now_us)
         if isinstance(ended[0], Exception):
             raise ended[0]
         return ended[0]
-
-    def _take(self, received: tuple[int, StampedFrames]) -> int:
-        """Take what was received; return the time of it."""
-        now_us, frames = received
-        for _, frame in frames:
-            self.receive(now_us, frame)
-        return now_us

@@ -105,13 +105,14 @@ class _Initiate:
     @classmethod
     def parse(cls, frame: bytes) -> Self:
         """Read the 8 bytes."""
-        command, at = frame[0], index_sub(frame)
+        command, index, sub = frame[0], frame[1] | frame[2] << 8, frame[3]
         indicated = bool(command & SIZE_INDICATED)
         if not command & EXPEDITED:
-            return cls(*at, size=int.from_bytes(frame[4:], "little") if indicated else None)
+            size = int.from_bytes(frame[4:], "little") if indicated else None
+            return cls(index, sub, None, size)
         # 22h: no size is indicated, so all four bytes count as data.
         size = EXPEDITED_BYTES - (command >> 2 & 3) if indicated else EXPEDITED_BYTES
-        return cls(*at, frame[4 : 4 + size], size if indicated else None)
+        return cls(index, sub, frame[4 : 4 + size], size if indicated else None)
 
 
 class DownloadInitiateRequest(_Initiate):

@@ -102,7 +102,7 @@ class Parameters(Part):
         """Call `changed` whenever one of these objects changes."""
         wanted = frozenset(indices)
         for entry in self._dictionary:
-            if entry.index in wanted:
+            if entry.description.index in wanted:
                 entry.watch(changed)
 
 

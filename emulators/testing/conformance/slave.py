@@ -12,7 +12,7 @@ from typing import Final, Protocol, TypeGuard
 from tickrig.host.canopen.conform.bus.exchange import Disturbed, NotAllowed, StepFailed
 from tickrig.host.canopen.conform.check import Stimulus
 from tickrig.host.canopen.conform.conform_run import Crash
-from tickrig.wire.can import STANDARD_MAX, CanFrame, Frames
+from tickrig.wire.can import MAX_DATA_BYTES, STANDARD_MAX, CanFrame, Frames
 from tickrig.wire.errors import FieldError
 
 TICK_US: Final = 1_000
@@ -124,8 +124,17 @@ def checked_frames(sent: object) -> Frames:
     Raises:
         _NoFrames: they cannot.
     """
-    if type(sent) is tuple and all(map(_is_plain, sent)):
-        return sent
+    if type(sent) is tuple:
+        for frame in sent:
+            if type(frame) is not CanFrame or frame.remote or frame.extended:
+                break
+            number, payload, *_ = tuple[object, ...](frame)
+            if type(number) is not int or type(payload) is not bytes or frame.remote_length:
+                break
+            if not 0 <= number <= STANDARD_MAX or len(payload) > MAX_DATA_BYTES:
+                break
+        else:
+            return sent  # 11-bit data frames, which need no further check
     if isinstance(sent, CanFrame | str | bytes) or not isinstance(sent, Iterable):
         raise _NoFrames(f"returned {_short(sent)}, not a list of CanFrame")
     frames = tuple(sent)
@@ -140,14 +149,6 @@ def checked_frames(sent: object) -> Frames:
         except FieldError as error:
             raise _NoFrames(f"returned {_short(frame)}: {error}") from None
     return frames
-
-
-def _is_plain(frame: object) -> bool:
-    """Return whether it is a data frame with an 11-bit CAN-ID, which needs no further check."""
-    if type(frame) is not CanFrame or frame.remote or frame.extended:
-        return False
-    sound = type(frame.can_id) is int and type(frame.data) is bytes and len(frame.data) <= 8
-    return sound and 0 <= frame.can_id <= STANDARD_MAX and not frame.remote_length
 
 
 def _takes(call: object, *given: object) -> bool:

@@ -36,6 +36,8 @@ _QUIET: Final = (
 _CONSUMERS: Final = 0x1016
 _PDOS: Final = (*range(0x1400, 0x1600), *range(0x1800, 0x1A00))
 INHIBIT_TIME, EVENT_TIMER = 3, 5
+_TIMERS: Final = (INHIBIT_TIME, EVENT_TIMER)
+"""These let PDOs be sent, or held back, or missed, by themselves."""
 _TEXTS: Final = range(0x1008, 0x100B)
 _NONE: Final[Mapping[Address, bytes]] = MappingProxyType({})
 _NUMBERS: Final = range(9)
@@ -90,14 +92,16 @@ class KnownState:
     def prepare(self) -> None:
         """Bring what is known into the state in which checks begin."""
         for at, value in self.original.items():
-            if at in _QUIET or (at[0] == _CONSUMERS and at[1]) or _is_timer(at):
+            is_timer = at[1] in _TIMERS and at[0] in _PDOS
+            if is_timer or at in _QUIET or (at[0] == _CONSUMERS and at[1]):
                 self._begin[at] = bytes(len(value))
             elif at == _SYNC_COB_ID:
                 number = int.from_bytes(value, "little") & ~FLAG_30
                 self._begin[at] = number.to_bytes(len(value), "little")
         # What was learnt holds still, but where another value is wanted or a write may have changed
         # it.
-        changed = [at for at in self._begin if at in self.written or self.is_quieted(at)]
+        known = self.original
+        changed = [at for at in known if at in self.written or self._begin[at] != known[at]]
         left = self._write_back(self._begin, changed)
         for at in left:
             self._begin[at] = self.original[at]
@@ -197,13 +201,14 @@ class KnownState:
         return self._differing(target, [at for at in touched if at in target])
 
     def _differing(self, target: Values, addresses: Iterable[Address]) -> list[Address]:
-        return [at for at in addresses if not self._holds(at, target[at])]
-
-    def _holds(self, at: Address, wanted: bytes) -> bool:
-        held = self._read(at)
-        if held is not None and held == self.original.get(at):
-            self.written.discard(at)
-        return held == wanted
+        left = []
+        for at in addresses:
+            held = self._read(at)
+            if held is not None and held == self.original.get(at):
+                self.written.discard(at)
+            if held != target[at]:
+                left.append(at)
+        return left
 
     def _number(self, at: Address, target: Values) -> int | None:
         """Return what an object holds, or should hold if the node does not tell it well.
@@ -252,11 +257,6 @@ class KnownState:
             raise
         self._silent = 0
         return answer
-
-
-def _is_timer(at: Address) -> bool:
-    """Return whether an object lets PDOs be sent, or held back, or missed, by themselves."""
-    return at[0] in _PDOS and at[1] in {INHIBIT_TIME, EVENT_TIMER}
 
 
 _SETTLE_MS: Final = 20

@@ -384,14 +384,19 @@ class Subject:
         asked = _COMMUNICATION <= index < MANUFACTURER
         return "the node has no" if asked else "without an EDS nobody knows of any"
 
-    def restorable(self, level: check.Level) -> Iterator[check.Address]:
-        """Yield objects that a run may change, be it by a reset: read before, written after."""
+    def restorable(self, level: check.Level) -> list[check.Address]:
+        """Return objects that a run may change, be it by a reset: read before, written after."""
         highest = PROFILE if level is check.Level.INTRUSIVE else MANUFACTURER
-        for entry in self.binding.device.entries:
-            inside = _COMMUNICATION <= entry.index < highest and entry.index not in PROGRAMS
-            value = entry.data_type is not DataType.DOMAIN and entry.index not in STORAGE
-            if inside and value and entry.readable and entry.writable:
-                yield entry.index, entry.sub
+        apart = {*PROGRAMS, *STORAGE}
+        return [
+            (entry.index, entry.sub)
+            for entry in self.binding.device.entries
+            if _COMMUNICATION <= entry.index < highest
+            and entry.index not in apart
+            and entry.data_type is not DataType.DOMAIN
+            and entry.readable
+            and entry.writable
+        ]
 
 
 def _takes(step: check.Step) -> Iterator[check.Address]:
@@ -431,22 +436,20 @@ def examine(  # noqa: PLR0913, PLR0917 - all that is known
     features = find_features(binding, client, claims)
     reader = binding.reader  # what it has read is not read again: a sixth of what is read here
     names = _NodeNames(node_id, binding, reader.number, others)
-    entries = binding.device.entries
-    has = frozenset((entry.index, entry.sub) for entry in entries)
-    values = frozenset((e.index, e.sub) for e in entries if e.readable and e.writable)
-    refused = frozenset(at for at in _MANDATORY if reader.number(*at) is None)
+    has, entries = frozenset(binding.entries), binding.entries.items()
+    values = frozenset([at for at, entry in entries if entry.readable and entry.writable])
+    refused = frozenset([at for at in _MANDATORY if reader.number(*at) is None])
     return Subject(binding, features, names, dict(_about(reader)), has, values, refused)
 
 
 def _sizes(device: EdsDevice) -> SizeOf:
     """Take the sizes of the EDS; those of texts from their defaults."""
-    sizes = {(entry.index, entry.sub): len(entry.default) for entry in device.entries}
-    return lambda index, sub: sizes.get((index, sub), 0)
+    return {(entry.index, entry.sub): len(entry.default) for entry in device.entries}.get
 
 
-def _standard_size(index: int, sub: int) -> int:
-    known = standard_object(index)
-    kind = known and known.types.get(sub, known.others)
+def _standard_size(at: check.Address) -> int:
+    known = standard_object(at[0])
+    kind = known and known.types.get(at[1], known.others)
     return kind.size if kind else 0
 
 

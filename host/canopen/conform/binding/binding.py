@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Final, NamedTuple
 
 from tickrig.host.canopen.conform.binding.object_reader import ObjectReader, Upload, probe_device
@@ -68,8 +69,8 @@ def _absent_places(device: EdsDevice, reader: ObjectReader) -> Iterator[_AbsentP
     highest: dict[int, int] = {}
     for entry in device.entries:
         highest[entry.index] = max(entry.sub, highest.get(entry.index, 0))
-    free = tuple((index, 0) for index in _ABSENT_OBJECTS if index not in highest)
-    yield _AbsentPlaces("absent_object", "index free", (), free)
+    free = [(index, 0) for index in _ABSENT_OBJECTS if index not in highest]
+    yield _AbsentPlaces("absent_object", "index free", (), tuple(free))
     counted = ((i, max(highest[i], reader.number(i, 0) or 0) + 1) for i in _COUNTED if i in highest)
     behind = ((i, last + 1) for i, last in highest.items() if last and i not in _GROWING)
     certain, likely = ([at for at in places if at[1] <= _LAST_SUB] for places in (counted, behind))
@@ -226,7 +227,7 @@ def _bind_object(search: _Search, wanted: WantedObject) -> None:
             _unsafe(wanted, free[0]) if free else _not_free(wanted, fitting)
         )
         return
-    for entry in sorted(safe, key=lambda entry: _order(wanted, entry)):
+    for entry in sorted(safe, key=partial(_order, wanted)):
         value = search.reader.read(entry) if entry.readable else None
         if (value is not None or not entry.readable) and len(value or b"") in wanted.lengths:
             search.bound[wanted.name] = BoundObject(entry, value)
@@ -268,12 +269,8 @@ def _order(wanted: WantedObject, entry: EntryDescription) -> tuple[bool | int, .
     if wanted.use is Use.WRITE and entry.index in HARMLESS:
         return (0, HARMLESS.index(entry.index))
     area = 1 if entry.index in COMMUNICATION_AREA else 3 if entry.index in PROFILE_AREA else 2
-    return (area, narrow, entry.signed, -_room(wanted, entry), entry.key)
-
-
-def _room(wanted: WantedObject, entry: EntryDescription) -> int:
-    """Return how much a string that is written is known to hold."""
-    return len(entry.default) if wanted.use is Use.WRITE and entry.data_type in TEXTS else 0
+    is_text = wanted.use is Use.WRITE and entry.data_type in TEXTS
+    return (area, narrow, entry.signed, -len(entry.default) if is_text else 0, entry.key)
 
 
 def _bind_absent(search: _Search, places: _AbsentPlaces) -> None:
@@ -281,12 +278,11 @@ def _bind_absent(search: _Search, places: _AbsentPlaces) -> None:
 
     Else the first at which the node has nothing, else, as it has something everywhere, any.
     """
-    certain, likely = (
-        [place for place in some if _may_write(search, place[0])]
-        for some in (places.certain, places.likely)
-    )
+    certain = [place for place in places.certain if _may_write(search, place[0])]
     there = [place for place in certain if _has_something(search, place)]
-    for place in [*there, *certain, *likely]:
+    for place in [*there, *certain, *places.likely]:
+        if not _may_write(search, place[0]):
+            continue
         if place in there or search.reader.has_nothing(*place):
             search.bound[places.name] = BoundPlace(*place)
             return

@@ -121,7 +121,7 @@ class NodeDescription(NamedTuple):
         value of an empty text.
         """
         rows = tuple(entries)
-        said = (row if row.has_default is bool(row.default) else _as_said(row) for row in rows)
+        said = [row if row.has_default is bool(row.default) else _as_said(row) for row in rows]
         address = {row.sub: row.default for row in rows if row.index == _LSS_ADDRESS}
         identity = {sub: int.from_bytes(address.get(sub, b""), "little") for sub, _ in _IDENTITY}
         claims = EdsClaims(address.keys() >= _LSS_NUMBERS, frozenset(_DUMMIES), identity)

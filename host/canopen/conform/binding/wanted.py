@@ -59,7 +59,7 @@ class EntryFacts(NamedTuple):
 def facts_of(entry: EntryDescription) -> EntryFacts:
     """Find out the facts about an entry."""
     free = entry.index not in COMMUNICATION_AREA or entry.index in HARMLESS
-    return EntryFacts(entry, entry.access.value, int(entry.data_type), free)
+    return EntryFacts(entry, entry.access._value_, int(entry.data_type), free)
 
 
 class WantedObject(NamedTuple):

@@ -161,20 +161,17 @@ class _Allowance:
 
     Attributes:
         slowness: so many times as long as usual may all take.
+        from_us: nothing may be sent before.
     """
 
     def __init__(self, bit_rate: int, max_load: float) -> None:
-        self._bits_us, self._paid_us = bit_rate * max_load / 1e6, 0.0
+        self._bits_us, self.from_us = bit_rate * max_load / 1e6, float(-_WINDOW_US)
         self.slowness = max(1.0, _PLENTY_BIT_S / (bit_rate * max_load))
 
     def use(self, now_us: int, frame: CanFrame) -> None:
         """Count a frame of the tester, or an answer to one."""
-        self._paid_us = max(self._paid_us, now_us) + kept_bits(frame) / self._bits_us
-
-    def wait_us(self, now_us: int) -> int:
-        """Return how long nothing may be sent, at most `_LONGEST_WAIT_US`."""
-        ahead_us = self._paid_us - now_us - _WINDOW_US
-        return min(_LONGEST_WAIT_US, int(ahead_us) + 1) if ahead_us > 0 else 0
+        bits = kept_bits(frame) if type(frame[1]) is bytes else frame_bits(frame)
+        self.from_us = max(self.from_us, now_us - _WINDOW_US) + bits / self._bits_us
 
 
 class _ForeignLoad:
@@ -252,9 +249,9 @@ class BusExchange:
         boots: boot-up messages of the node so far.
         others: node-IDs of others that were on the bus so far; 0 for what is of no node.
         deadline_us: when the check under way has to have ended.
-        transfer: index and sub-index of the last SDO transfer that the node has answered.
+        transfer: the answer of the node to the last SDO request that names an object.
         played: a node-ID that is no other node's: the tester plays it, or gives it to the node.
-        unanswered: objects that the node was asked about and has not answered, the first one first.
+        unanswered: requests that name an object and were not answered, the first one first.
     """
 
     def __init__(  # noqa: PLR0913 - a bus, by keyword
@@ -280,8 +277,8 @@ class BusExchange:
             sdo_frame.RESPONSE_COB_ID + node_id,
         )
         self._origins: dict[tuple[int, bool], tuple[str, bool]] = {}
-        self._multiplexer, self.transfer, self._ready_us = b"", (0, 0), 0
-        self.unanswered: list[tuple[int, int]] = []
+        self._multiplexer, self.transfer, self._ready_us = b"", bytes(sdo_frame.FRAME_BYTES), 0
+        self.unanswered: list[bytes] = []
         self._uploads, self._answered = defaultdict[bytes, int](int), defaultdict[bytes, int](int)
         self._is_silent, self._others_by = True, _NODES
         self.played: int | None = None
@@ -352,7 +349,8 @@ class BusExchange:
         if is_request and self._known_us < self._ready_us:
             self._listen_until(self._ready_us)
             now_us = link.now_us
-        if held_us := self._allowance.wait_us(now_us):
+        if now_us < self._allowance.from_us:
+            held_us = min(_LONGEST_WAIT_US, int(self._allowance.from_us - now_us) + 1)
             self._listen_until(now_us + held_us)
             now_us = link.now_us
             if held_us > _HELD_US and self._allowance.slowness > 1:
@@ -368,7 +366,7 @@ class BusExchange:
             if specifier == sdo_frame.ClientCommand.UPLOAD:
                 self._uploads[self._multiplexer] += 1
             if len(data) >= _MULTIPLEXER.stop and specifier in _BEGINNING:
-                self.unanswered.append(sdo_frame.index_sub(data))
+                self.unanswered.append(data)
         link.send((frame,))
 
     def expect(self, patterns: Sequence[str], within_ms: int) -> str:
@@ -501,7 +499,8 @@ class BusExchange:
             self.evidence.add(at_us - self.start_us, Direction.RECEIVED, frame)
         if own:
             if frame.can_id == self._response:
-                self._take_response(at_us, frame)
+                self._allowance.use(at_us, frame)
+                self._take_response(frame.data)
             elif frame == self._boot_up:
                 self.boots += 1
             return
@@ -520,21 +519,20 @@ class BusExchange:
         self._origins[frame.can_id, frame.extended] = origin
         return origin
 
-    def _take_response(self, at_us: int, frame: CanFrame) -> None:
-        data = frame.data
-        self._allowance.use(at_us, frame)
+    def _take_response(self, data: bytes) -> None:
         self._is_silent, multiplexer = False, data[_MULTIPLEXER]
         if data and data[0] & sdo_frame.SPECIFIER in _ANSWERS:
             self._answered[multiplexer] += 1
         if len(data) < _MULTIPLEXER.stop:
             return
-        at = sdo_frame.index_sub(data)
         if multiplexer == self._multiplexer:
-            self.transfer = at
-        # The node has answered about these objects, or will not answer about them any more.
-        if at in self.unanswered:  # and those asked before it
-            del self.unanswered[: self.unanswered.index(at) + 1]
-        elif data[0] in _NAMING:  # the node names another object
+            self.transfer = data
+        # The node has answered these requests, or will not answer them any more.
+        for number, request in enumerate(self.unanswered, 1):
+            if request[_MULTIPLEXER] == multiplexer:  # and those before it
+                del self.unanswered[:number]
+                return
+        if data[0] in _NAMING:  # the node names another object
             del self.unanswered[:1]
 
 

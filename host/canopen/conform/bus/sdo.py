@@ -20,8 +20,8 @@ from tickrig.wire.canopen.sdo import Abort
 P = ParamSpec("P")
 T = TypeVar("T")
 
-SizeOf = Callable[[int, int], int]
-"""Tells the bytes of an object by index and sub-index, 0 where nobody knows."""
+SizeOf = Callable[[Address], int | None]
+"""Tells the bytes of an object by index and sub-index, 0 or None where nobody knows."""
 
 
 _NUMBER_BYTES: Final = range(1, 5)
@@ -53,7 +53,7 @@ class SdoClient:
         self._exchange, self._node_id = exchange, node_id
         self._session = NodeSession(node_id, self._send, on_misnamed=self._keep_misnamed)
         self.misnamed: dict[str, None] = {}
-        self.size_of: SizeOf = lambda index, sub: 0
+        self.size_of: SizeOf = dict[Address, int]().get
 
     def upload(self, index: int, sub: int) -> bytes:
         """Read an object; a request that is not answered is sent once more.
@@ -64,7 +64,7 @@ class SdoClient:
             SdoMisnamed: it answers, and names another object.
             LinkClosed: the bus is gone.
         """
-        return self._twice(upload, index, sub, self.size_of(index, sub))
+        return self._twice(upload, index, sub, self.size_of((index, sub)) or 0)
 
     def download(self, index: int, sub: int, data: bytes) -> None:
         """Write an object, as `upload` reads one; raises the same."""
@@ -86,14 +86,15 @@ class SdoClient:
 
     def abort(self) -> None:
         """End a transfer that a check left open; stacks look which object the abort names."""
-        frame = Abort(*self._exchange.transfer, sdo_frame.AbortCode.GENERAL).encode()
+        at = sdo_frame.index_sub(self._exchange.transfer)
+        frame = Abort(*at, sdo_frame.AbortCode.GENERAL).encode()
         self._send(sdo_frame.REQUEST_COB_ID + self._node_id, frame)
 
     def run(self, script: Script[T]) -> T:
         """Run a script, and return or raise what it does; LinkClosed if the bus is gone."""
         exchange, talk = self._exchange, self._session.dialogue
-        for at in exchange.unanswered:  # by the check, which talks for itself
-            talk.remember(at)
+        for request in exchange.unanswered:  # by the check, which talks for itself
+            talk.remember(sdo_frame.index_sub(request))
         try:
             return self._session.run(script, exchange.listen)
         finally:
