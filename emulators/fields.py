@@ -16,8 +16,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from tickrig._lazy import LazyModule
 
 if TYPE_CHECKING:
-    import click
-
     from tickrig.host.text import names
 else:  # completion does without
     names = LazyModule("tickrig.host.text.names")
@@ -157,25 +155,3 @@ def named(option: str) -> Iterator[None]:
         yield
     except ValueError as error:
         raise ValueError(f"{option}: {error}") from None
-
-
-def field_of_option(option: click.Option) -> DeviceField:
-    """Return the field of a `click.Option`, which device types of tickrig 0.1 declare.
-
-    Types other than click's numbers and choices become texts.
-    """
-    kinds: dict[str, type[str | int | float]] = {"integer": int, "float": float}
-    kind = bool if option.is_flag else kinds.get(option.type.name.partition(" ")[0], str)
-    default = option.default
-    return DeviceField(
-        name=str(option.name),
-        kind=kind,
-        option=option.opts[0].removeprefix("--"),
-        low=getattr(option.type, "min", None),
-        high=getattr(option.type, "max", None),
-        choices=tuple(getattr(option.type, "choices", ())),
-        unit=option.metavar or "",
-        default=default if isinstance(default, str | int | float | tuple | list) else None,
-        many=option.multiple,
-        help=option.help or "",
-    )

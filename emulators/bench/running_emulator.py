@@ -5,7 +5,7 @@ from __future__ import annotations
 import gc
 import sys
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Final
 
@@ -154,6 +154,34 @@ STATE: Final = "state"
 """The output that is watched by default, if the device has it."""
 
 
+class OutputWatch:
+    """Writes outputs when they have changed: `TIME * NAME VALUE`.
+
+    Args:
+        device: with the outputs.
+        write: receives the lines.
+        names: of the outputs that are watched from the start.
+    """
+
+    def __init__(
+        self, device: HasSignals, write: Callable[[str], None], names: Iterable[str] = ()
+    ) -> None:
+        self._device, self._write = device, write
+        self._shown: dict[str, Setting] = dict.fromkeys(names, "")
+
+    def add(self, *names: str) -> None:
+        """Watch more outputs."""
+        for name in names:
+            self._shown.setdefault(name, "")
+
+    def __call__(self, now_us: int) -> None:
+        """Write what has changed."""
+        for name, shown in self._shown.items():
+            if (value := read_signal(self._device, name)) != shown:
+                self._shown[name] = value
+                self._write(f"{format_time(now_us)} * {name} {value}".rstrip())
+
+
 class Transcript:
     """Writes lines of the wire as the host sees them, actions of the operator, watched outputs.
 
@@ -170,11 +198,10 @@ class Transcript:
         wanted: Callable[[WireLine], bool] = lambda line: True,
     ) -> None:
         self._emulator, self._write, self._wanted = emulator, write, wanted
-        self._shown: dict[str, Setting] = {}
-        self._sending = False
+        self._watch, self._sending = OutputWatch(emulator.device, write), False
         emulator.operator.note = lambda text: self.write(emulator.effective_us, "!", text)
         emulator.log.listeners.append(self._hear)
-        emulator.after_step.append(self._write_changes)
+        emulator.after_step.append(self._watch)
         if STATE in emulator.device.outputs:
             self.watch(emulator.effective_us, STATE)
 
@@ -184,9 +211,8 @@ class Transcript:
 
     def watch(self, now_us: int, *names: str) -> None:
         """Show outputs now and whenever they change."""
-        for name in names:
-            self._shown.setdefault(name, "")
-        self._write_changes(now_us)
+        self._watch.add(*names)
+        self._watch(now_us)
 
     def send(self, now_us: int, data: bytes, shown: bytes) -> None:
         """Send as the host, and show the data at once even if not a complete line."""
@@ -195,28 +221,6 @@ class Transcript:
         self._emulator.send(now_us, data)
         self._sending = False
 
-    def _write_changes(self, now_us: int) -> None:
-        for name, shown in self._shown.items():
-            if (value := read_signal(self._emulator.device, name)) != shown:
-                self._shown[name] = value
-                self.write(now_us, "*", f"{name} {value}")
-
     def _hear(self, line: WireLine) -> None:
         if not self._sending and self._wanted(line):
             self.write(line.at_us, line.mark, escape(line.data))
-
-
-class FrameTranscript(Transcript):
-    """Actions of the operator, watched outputs and missed expectations, without the frames.
-
-    Args:
-        emulator: the emulator to watch.
-        write: receives the lines.
-    """
-
-    def __init__(self, emulator: RunningEmulator, write: Callable[[str], None]) -> None:
-        super().__init__(emulator, write, lambda line: False)
-
-    def send(self, now_us: int, data: bytes, shown: bytes) -> None:
-        """Send a frame; the log shows it when it has passed."""
-        self._emulator.send(now_us, data)

@@ -35,15 +35,6 @@ def priority(frame: CanFrame) -> int:
     return can_id << _CAN_ID_PLACE | (1 << 20 if frame[2] else 0)
 
 
-def first_difference(frames: Sequence[CanFrame]) -> int:
-    """Return the bit, counted without stuff bits, at which frames of one priority first differ."""
-    control = 39 if frames[0].extended else 19
-    if len({frame.dlc for frame in frames}) > 1:
-        return control
-    least, most = (int.from_bytes(pick(f.data for f in frames), "big") for pick in (min, max))
-    return control + 8 * frames[0].dlc - (least ^ most).bit_length()
-
-
 def dominant(frames: Sequence[CanFrame]) -> CanFrame:
     """Return the frame that wins if the other senders give way."""
     return min(frames, key=lambda frame: (frame.dlc, frame.data))

@@ -42,11 +42,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Final
 
 from tickrig.device.twin import Cache, Listeners
-from tickrig.emulators.can.arbitration import dominant, first_difference
+from tickrig.emulators.can.arbitration import dominant
 from tickrig.emulators.can.fault_confinement import ErrorCounters
 from tickrig.emulators.can.faults import CanFaults, FaultVerdict
 from tickrig.emulators.can.transmission_outcomes import (
@@ -65,6 +65,15 @@ _ERROR_BITS: Final = 6 + RECESSIVE_BITS  # an error flag, and what follows it
 _ECHO_BITS: Final = 6  # the error flags of the others, which begin when the first one ends
 _HEADER_BITS: Final = 19  # from start of frame to DLC
 _KEPT_LENGTHS: Final = 8_192
+
+
+def _first_difference(frames: Sequence[CanFrame]) -> int:
+    """Return the bit, counted without stuff bits, at which frames of one priority first differ."""
+    control = 39 if frames[0].extended else 19
+    if len({frame.dlc for frame in frames}) > 1:
+        return control
+    least, most = (int.from_bytes(pick(f.data for f in frames), "big") for pick in (min, max))
+    return control + 8 * frames[0].dlc - (least ^ most).bit_length()
 
 
 class CanSegment(TransmissionOutcomes):
@@ -317,7 +326,7 @@ class CanSegment(TransmissionOutcomes):
         if all(end.controller.state is ErrorState.PASSIVE for end in losers):
             self._settle(self._override, self._length(received))
         else:
-            self._settle(self._fail, first_difference(frames) + _ECHO_BITS + _ERROR_BITS)
+            self._settle(self._fail, _first_difference(frames) + _ECHO_BITS + _ERROR_BITS)
 
     def _settle(self, finish: Callable[[], None], bits: int) -> None:
         """Store the outcome of the plan, and its busy time."""

@@ -21,7 +21,7 @@ from tickrig.emulators.canopen.choices import AUTO, is_bus_node
 from tickrig.emulators.canopen.eds import DeviceDescription, EdsCache
 from tickrig.emulators.canopen.faults import NodeFaults
 from tickrig.emulators.canopen.models import MODELS
-from tickrig.emulators.canopen.node import NODE_INPUTS, Node, SecondNodeAlarm, side_of
+from tickrig.emulators.canopen.node import Node, SecondNodeAlarm, side_of
 from tickrig.emulators.canopen.node_spec import LSS, NodeSpec
 from tickrig.emulators.canopen.store_file import StoreFile
 from tickrig.emulators.record.recorder import CandumpFile
@@ -171,6 +171,10 @@ def _name(node_id: int, found: dict[str, Described]) -> str:
 ANY_ID: Final = 1
 
 
+_NODE_INPUTS: Final = ("power_off", "unplugged", "emergency")
+"""Inputs of every node, besides those of its device."""
+
+
 def describe_rtc(spec: str) -> DeviceDescription:
     """Describe the component of `FILE.py:Class`.
 
@@ -179,7 +183,7 @@ def describe_rtc(spec: str) -> DeviceDescription:
     """
     kind: type[CanopenComponent] = find_class(spec, CanopenComponent)
     for item in kind.physical:
-        if item.name in NODE_INPUTS:
+        if item.name in _NODE_INPUTS:
             raise ValueError(f"{spec}: input {item.name!r} is one that every node has")
     try:
         make_device_rtc(kind, ANY_ID)

@@ -33,14 +33,11 @@ from heapq import heappop, heappush
 from typing import Any, Final
 
 from tickrig.device.canopen.slave import UNCONFIGURED
-from tickrig.device.horizon import Horizon
-from tickrig.device.physical import OutputSignal
 from tickrig.device.twin import Copyable, Listeners
-from tickrig.emulators.can.bus_device import Accepted
 from tickrig.emulators.can.faults import CAN_FAULTS, NARROWED
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.node import Node
-from tickrig.emulators.rig.emulated import Inputs
+from tickrig.emulators.record.recorder import DeviceBefore
 from tickrig.emulators.rig.faults import (
     FaultArgument,
     FaultArguments,
@@ -51,8 +48,7 @@ from tickrig.emulators.rig.faults import (
 )
 from tickrig.emulators.rig.station import Station
 from tickrig.host.text.trace import Mark
-from tickrig.host.text.values import Setting
-from tickrig.wire.can import CanFrame, ErrorState, Frames, data_frame
+from tickrig.wire.can import CanFrame, Frames, data_frame
 from tickrig.wire.canopen import sdo_frame
 from tickrig.wire.canopen.emcy import ErrorRegister
 from tickrig.wire.canopen.nmt import CAN_ID_MASK, ERROR_CONTROL_COB_ID, NmtState
@@ -389,153 +385,144 @@ def _babbles(faults: NodeFaults, fault: ArmedNodeFault) -> Frames:
 # The faults.
 
 
-def _delay(default: str, text: str, low: int = 1_000) -> FaultArgument:
-    return FaultArgument("delay", text, default, "time", low, 3_600_000_000)
+def _time(name: str, default: str, text: str) -> FaultArgument:
+    return FaultArgument(name, text, default, "time", 1_000, 3_600_000_000)
+
+
+def _code(text: str, default: str, low: int, high: int) -> FaultArgument:
+    read = partial(_parse_hex, low, high, f"an {text}")
+    return FaultArgument("code", text, default, f"{low:X}h to {high:X}h", read=read)
+
+
+def _on(
+    frames: NodeFrames,
+    text: str,
+    instead: Callable[[ArmedNodeFault, CanFrame], _Sent] = _lost,
+    *arguments: FaultArgument,
+    **more: Any,
+) -> NodeFaultType:
+    """Return a fault that acts on frames; with the argument `tpdo` on those of one TPDO."""
+    if _TPDO in arguments:
+        more["matches"] = _is_tpdo
+    return NodeFaultType(text, arguments=arguments, frames=frames, instead=instead, **more)
 
 
 _TPDO: Final = FaultArgument("tpdo", "which TPDO", "any", "any or 1 to 512", read=_parse_tpdo)
 _BYTES: Final = FaultArgument("bytes", "how many", "1", "bytes", 1, 8)
-_STATES: Final = ("stopped", "operational", "pre_operational", "initialising")
+_STATE: Final = FaultArgument(
+    "state",
+    "which one",
+    "stopped",
+    choices=("stopped", "operational", "pre_operational", "initialising"),
+)
+_OBJECT: Final = FaultArgument(
+    "object",
+    "which object, and the abort code (08000000h without one)",
+    "any",
+    "INDEX[:SUB][:CODE], any or CODE",
+    read=_parse_target,
+)
+_ACCESS: Final = FaultArgument(
+    "access", "which transfers", "both", choices=("both", "read", "write")
+)
 
 NODE_FAULTS: Final[Mapping[str, NodeFaultType]] = {
-    "sdo_abort": NodeFaultType(
+    "sdo_abort": _on(
+        NodeFrames.FOR_SDO_START,
         "the SDO server aborts transfers of an object, or of all",
-        arguments=(
-            FaultArgument(
-                "object",
-                "which object, and the abort code (08000000h without one)",
-                "any",
-                "INDEX[:SUB][:CODE], any or CODE",
-                read=_parse_target,
-            ),
-            FaultArgument("access", "which transfers", "both", choices=("both", "read", "write")),
-        ),
-        frames=NodeFrames.FOR_SDO_START,
+        _lost,
+        _OBJECT,
+        _ACCESS,
         matches=_is_object,
         abort=_aborted,
     ),
-    "sdo_busy": NodeFaultType(
+    "sdo_busy": _on(
+        NodeFrames.FOR_SDO_START,
         "the SDO server refuses each new transfer: it has no connection free",
-        arguments=(
-            FaultArgument(
-                "code",
-                "abort code",
-                "0x060A0023",
-                "10000h to FFFFFFFFh",
-                read=partial(_parse_hex, 0x1_0000, 0xFFFF_FFFF, "an abort code"),
-            ),
-        ),
-        frames=NodeFrames.FOR_SDO_START,
+        _lost,
+        _code("abort code", "0x060A0023", 0x1_0000, 0xFFFF_FFFF),
         abort=_aborted,
     ),
-    "sdo_mute": NodeFaultType("the SDO server ignores requests", frames=NodeFrames.REQUEST),
-    "sdo_slow": NodeFaultType(
+    "sdo_mute": _on(NodeFrames.REQUEST, "the SDO server ignores requests"),
+    "sdo_slow": _on(
+        NodeFrames.SDO,
         "each SDO answer is late",
-        arguments=(_delay("800ms", "how much later it comes"),),
-        frames=NodeFrames.SDO,
-        instead=_late,
+        _late,
+        _time("delay", "800ms", "how much later it comes"),
     ),
-    "sdo_twice": NodeFaultType(
+    "sdo_twice": _on(
+        NodeFrames.SDO,
         "each SDO answer comes twice",
-        arguments=(_delay("1ms", "how much later it comes again"),),
-        frames=NodeFrames.SDO,
-        instead=_again,
+        _again,
+        _time("delay", "1ms", "how much later it comes again"),
     ),
-    "sdo_wrong_index": NodeFaultType(
+    "sdo_wrong_index": _on(
+        NodeFrames.SDO_INDEX,
         "SDO answers name another object",
-        arguments=(FaultArgument("by", "what is added to the index", "1", low=1, high=0xFFFF),),
-        frames=NodeFrames.SDO_INDEX,
-        instead=_other_index,
+        _other_index,
+        FaultArgument("by", "what is added to the index", "1", low=1, high=0xFFFF),
     ),
-    "sdo_toggle": NodeFaultType(
-        "SDO segments have the wrong toggle bit",
-        frames=NodeFrames.SDO_SEGMENT,
-        instead=_other_toggle,
+    "sdo_toggle": _on(
+        NodeFrames.SDO_SEGMENT, "SDO segments have the wrong toggle bit", _other_toggle
     ),
-    "sdo_crc": NodeFaultType(
+    "sdo_crc": _on(
+        NodeFrames.SDO_END | NodeFrames.FOR_SDO_END,
         "the CRC at the end of a block transfer is wrong, either way",
-        frames=NodeFrames.SDO_END | NodeFrames.FOR_SDO_END,
-        instead=_other_crc,
+        _other_crc,
     ),
-    "heartbeat_mute": NodeFaultType("heartbeats are missing", frames=NodeFrames.HEARTBEAT),
-    "heartbeat_state": NodeFaultType(
-        "heartbeats report another state",
-        arguments=(FaultArgument("state", "which one", "stopped", choices=_STATES),),
-        frames=NodeFrames.HEARTBEAT,
-        instead=_other_state,
+    "heartbeat_mute": _on(NodeFrames.HEARTBEAT, "heartbeats are missing"),
+    "heartbeat_state": _on(
+        NodeFrames.HEARTBEAT, "heartbeats report another state", _other_state, _STATE
     ),
-    "heartbeat_late": NodeFaultType(
+    "heartbeat_late": _on(
+        NodeFrames.HEARTBEAT,
         "heartbeats come late",
-        arguments=(_delay("1s", "how much later they come"),),
-        frames=NodeFrames.HEARTBEAT,
-        instead=_late,
+        _late,
+        _time("delay", "1s", "how much later they come"),
     ),
-    "boot_late": NodeFaultType(
+    "boot_late": _on(
+        NodeFrames.BOOT_UP,
         "the node starts slowly: until its boot-up it neither sends nor receives",
-        arguments=(_delay("3s", "how much later it boots"),),
-        frames=NodeFrames.BOOT_UP,
-        instead=_late,
+        _late,
+        _time("delay", "3s", "how much later it boots"),
         silent=True,
     ),
-    "boots_twice": NodeFaultType(
+    "boots_twice": _on(
+        NodeFrames.BOOT_UP,
         "each boot-up comes twice",
-        arguments=(_delay("10ms", "how much later it comes again"),),
-        frames=NodeFrames.BOOT_UP,
-        instead=_again,
+        _again,
+        _time("delay", "10ms", "how much later it comes again"),
     ),
     "boots_again": NodeFaultType(
         "the node restarts by itself, at once and then each period",
-        arguments=(
-            FaultArgument("period", "from one to the next", "5s", "time", 1_000, 3_600_000_000),
-        ),
+        arguments=(_time("period", "5s", "from one to the next"),),
         by_itself=_restarted,
     ),
-    "pdo_short": NodeFaultType(
-        "TPDOs have bytes too few",
-        arguments=(_BYTES, _TPDO),
-        frames=NodeFrames.PDO,
-        matches=_is_tpdo,
-        instead=_shorter,
-    ),
-    "pdo_long": NodeFaultType(
-        "TPDOs have bytes too many, up to 8",
-        arguments=(_BYTES, _TPDO),
-        frames=NodeFrames.PDO,
-        matches=_is_tpdo,
-        instead=_longer,
-    ),
-    "pdo_mute": NodeFaultType(
-        "TPDOs are missing", arguments=(_TPDO,), frames=NodeFrames.PDO, matches=_is_tpdo
-    ),
-    "pdo_stale": NodeFaultType(
+    "pdo_short": _on(NodeFrames.PDO, "TPDOs have bytes too few", _shorter, _BYTES, _TPDO),
+    "pdo_long": _on(NodeFrames.PDO, "TPDOs have bytes too many, up to 8", _longer, _BYTES, _TPDO),
+    "pdo_mute": _on(NodeFrames.PDO, "TPDOs are missing", _lost, _TPDO),
+    "pdo_stale": _on(
+        NodeFrames.PDO,
         "TPDOs repeat the data of the first one since the fault began",
-        arguments=(_TPDO,),
-        frames=NodeFrames.PDO,
-        matches=_is_tpdo,
-        instead=_stale,
+        _stale,
+        _TPDO,
     ),
     "emcy_storm": NodeFaultType(
         "an EMCY is sent over and over",
         arguments=(
-            FaultArgument(
-                "code",
-                "emergency error code",
-                "0x8110",
-                "0h to FFFFh",
-                read=partial(_parse_hex, 0, 0xFFFF, "an emergency error code"),
-            ),
-            FaultArgument("period", "from one to the next", "10ms", "time", 1_000, 3_600_000_000),
+            _code("emergency error code", "0x8110", 0, 0xFFFF),
+            _time("period", "10ms", "from one to the next"),
         ),
         by_itself=_emergencies,
     ),
-    "id_doubled": NodeFaultType(
+    "id_doubled": _on(
+        NodeFrames.SENT,
         "a second node has this node-ID: it boots, and sends each frame too",
-        arguments=(_delay("1ms", "how much later it sends"),),
-        frames=NodeFrames.SENT,
-        instead=_again,
+        _again,
+        _time("delay", "1ms", "how much later it sends"),
         boots=True,
     ),
-    "sync_lost": NodeFaultType("the node receives no SYNC", frames=NodeFrames.SYNC),
+    "sync_lost": _on(NodeFrames.SYNC, "the node receives no SYNC"),
     "bus_off": NodeFaultType(
         "its CAN controller is bus-off, and does not come back until the fault ends",
         rated=False,
@@ -768,7 +755,7 @@ class NodeFaults(Copyable):
         return NodeFrames.OTHER if can_id in others else NodeFrames.PDO
 
 
-class _FaultyNode(Copyable):
+class _FaultyNode(Copyable, DeviceBefore[Frames]):
     """A node with faults on its frames; a `Device[Frames]` around the node.
 
     Args:
@@ -777,70 +764,13 @@ class _FaultyNode(Copyable):
     """
 
     def __init__(self, device: Any, faults: NodeFaults) -> None:
-        self._device, self._faults = device, faults
-
-    @property
-    def tick_us(self) -> int:
-        """The device's period."""
-        return int(self._device.tick_us)
+        super().__init__(device)
+        self._faults = faults
 
     @property
     def due_us(self) -> int:
         """When the device is due or a fault acts."""
-        return min(int(self._device.due_us), self._faults.due_us)
-
-    @property
-    def horizon(self) -> Horizon | None:
-        """How far the device may compute ahead."""
-        horizon: Horizon | None = self._device.horizon
-        return horizon
-
-    @horizon.setter
-    def horizon(self, horizon: Horizon | None) -> None:
-        self._device.horizon = horizon
-
-    @property
-    def inputs(self) -> Inputs:
-        """The device's inputs."""
-        inputs: Inputs = self._device.inputs
-        return inputs
-
-    @property
-    def outputs(self) -> Mapping[str, OutputSignal]:
-        """The device's outputs."""
-        outputs: Mapping[str, OutputSignal] = self._device.outputs
-        return outputs
-
-    def read(self, name: str, /) -> Setting:
-        """Return an output of the device."""
-        value: Setting = self._device.read(name)
-        return value
-
-    @property
-    def accepts(self) -> Accepted:
-        """CAN-IDs that the device listens to."""
-        accepts: Accepted = self._device.accepts
-        return accepts
-
-    @property
-    def reconfigured_by(self) -> frozenset[int]:
-        """CAN-IDs of the frames that may change `accepts`."""
-        can_ids: frozenset[int] = self._device.reconfigured_by
-        return can_ids
-
-    @property
-    def on_accepts(self) -> list[Callable[[], None]]:
-        """Callback for a change of these two."""
-        listeners: list[Callable[[], None]] = self._device.on_accepts
-        return listeners
-
-    def bus_state(self, state: ErrorState, /) -> None:
-        """Forward a state of the CAN controller."""
-        self._device.bus_state(state)
-
-    def reset(self) -> None:
-        """Reset the device."""
-        self._device.reset()
+        return min(super().due_us, self._faults.due_us)
 
     def tick(self, now_us: int, rx: Frames, /) -> Frames:
         """Tick the device with the received frames after faults; return its frames after faults."""

@@ -37,8 +37,6 @@ _ERROR_STATE_NAMES: Final = {
 }
 _OFF: Final = "Off"
 
-NODE_INPUTS: Final = ("power_off", "unplugged", "emergency")
-"""Outputs of every node, besides those of its device."""
 
 NODE_OUTPUTS: Final = (
     OutputSignal("state", "NMT state, or Off"),

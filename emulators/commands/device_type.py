@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
-from tickrig.emulators.fields import DeviceField, field_of_option, read_config
+from tickrig.emulators.fields import DeviceField, read_config
 from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.rig.emulated import Emulated
 from tickrig.emulators.scenario import Encoder, Sender
@@ -28,6 +28,28 @@ _MEMBERS: Final = ("tick_us", "due_us", "reset", "tick", "inputs", "outputs", "r
 def by_miniterm(link: str, baud: int) -> str:
     """Return how to talk to a text-line device; miniterm comes with pyserial."""
     return f" Talk to it with\n  python -m serial.tools.miniterm --eol LF -e {link} {baud}"
+
+
+def _field_of_option(option: click.Option) -> DeviceField:
+    """Return the field of a `click.Option`, which device types of tickrig 0.1 declare.
+
+    Types other than click's numbers and choices become texts.
+    """
+    kinds: dict[str, type[str | int | float]] = {"integer": int, "float": float}
+    kind = bool if option.is_flag else kinds.get(option.type.name.partition(" ")[0], str)
+    default = option.default
+    return DeviceField(
+        name=str(option.name),
+        kind=kind,
+        option=option.opts[0].removeprefix("--"),
+        low=getattr(option.type, "min", None),
+        high=getattr(option.type, "max", None),
+        choices=tuple(getattr(option.type, "choices", ())),
+        unit=option.metavar or "",
+        default=default if isinstance(default, str | int | float | tuple | list) else None,
+        many=option.multiple,
+        help=option.help or "",
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,7 +94,7 @@ class DeviceType:
 
     def __post_init__(self) -> None:
         """Convert options of click to fields."""
-        object.__setattr__(self, "fields", (*self.fields, *map(field_of_option, self.options)))
+        object.__setattr__(self, "fields", (*self.fields, *map(_field_of_option, self.options)))
 
     def of_options(self, options: Mapping[str, Any], seed: int) -> ConfiguredDevice:
         """Make the device for a command line or a rig file.

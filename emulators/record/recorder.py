@@ -80,43 +80,15 @@ class _Trace(Protocol[_W_contra]):
         """Record the actions on the device before a tick, and its traffic in the tick."""
 
 
-class TracedDevice(Generic[W]):
-    """A recorded device with the same interface as the device itself.
-
-    Recorded are its traffic, changes of its `inputs`, resets, reports of its CAN controller, and
-    calls of its `on_set`, if it has that, as a node for its objects.
+class DeviceBefore(Generic[W]):
+    """A device in place of another, with its interface; subclasses change what passes.
 
     Args:
-        device: the device itself.
-        trace: storage of the ticks.
+        device: the other device.
     """
 
-    def __init__(self, device: Device[W], trace: _Trace[W]) -> None:
+    def __init__(self, device: Device[W]) -> None:
         self._device: Any = device
-        self._trace = trace
-        bank: Inputs | None = getattr(device, "inputs", None)
-        self._bank = bank
-        self._seen: dict[str, Setting] = (
-            {} if bank is None else {item.name: item.initial for item in bank.table.values()}
-        )
-        self._done: list[str] = []
-        self._follow()
-
-    def _follow(self) -> None:
-        """Receive each set value, even an unchanged one."""
-        if hasattr(self._device, "on_set"):
-            self._device.on_set = self._set
-
-    def __reduce_ex__(self, protocol: SupportsIndex, /) -> Any:
-        """Copy only the device if copies are not recorded."""
-        if self._trace.keeps:
-            return super().__reduce_ex__(protocol)
-        return itself, (self._device,)
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        """Continue recording in a copy."""
-        vars(self).update(state)
-        self._follow()
 
     @property
     def tick_us(self) -> int:
@@ -125,9 +97,7 @@ class TracedDevice(Generic[W]):
 
     @property
     def due_us(self) -> int:
-        """When the device is due; at once if a reset must be recorded."""
-        if self._done:
-            return 0  # a tick that is not due changes nothing, and a replay resets where it was
+        """When the device is due."""
         return self._device.due_us  # type: ignore[no-any-return]  # a Device
 
     @property
@@ -175,15 +145,70 @@ class TracedDevice(Generic[W]):
         return getattr(self._device, "on_accepts", [])
 
     def bus_state(self, state: ErrorState, /) -> None:
+        """Forward a report of the CAN controller."""
+        if hasattr(self._device, "bus_state"):
+            self._device.bus_state(state)
+
+    def reset(self) -> None:
+        """Reset the device."""
+        self._device.reset()
+
+
+class TracedDevice(DeviceBefore[W]):
+    """A recorded device with the same interface as the device itself.
+
+    Recorded are its traffic, changes of its `inputs`, resets, reports of its CAN controller, and
+    calls of its `on_set`, if it has that, as a node for its objects.
+
+    Args:
+        device: the device itself.
+        trace: storage of the ticks.
+    """
+
+    def __init__(self, device: Device[W], trace: _Trace[W]) -> None:
+        super().__init__(device)
+        self._trace = trace
+        bank: Inputs | None = getattr(device, "inputs", None)
+        self._bank = bank
+        self._seen: dict[str, Setting] = (
+            {} if bank is None else {item.name: item.initial for item in bank.table.values()}
+        )
+        self._done: list[str] = []
+        self._follow()
+
+    def _follow(self) -> None:
+        """Receive each set value, even an unchanged one."""
+        if hasattr(self._device, "on_set"):
+            self._device.on_set = self._set
+
+    def __reduce_ex__(self, protocol: SupportsIndex, /) -> Any:
+        """Copy only the device if copies are not recorded."""
+        if self._trace.keeps:
+            return super().__reduce_ex__(protocol)
+        return itself, (self._device,)
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Continue recording in a copy."""
+        vars(self).update(state)
+        self._follow()
+
+    @property
+    def due_us(self) -> int:
+        """When the device is due; at once if a reset must be recorded."""
+        if self._done:
+            return 0  # a tick that is not due changes nothing, and a replay resets where it was
+        return self._device.due_us  # type: ignore[no-any-return]  # a Device, asked in each tick
+
+    def bus_state(self, state: ErrorState, /) -> None:
         """Forward a report of the CAN controller; it is recorded with the next tick."""
         if hasattr(self._device, "bus_state"):
             self._done.append(_BUS_STATE[state])
-            self._device.bus_state(state)
+        super().bus_state(state)
 
     def reset(self) -> None:
         """Reset the device; it is recorded with the next tick."""
         self._done.append(RESET)
-        self._device.reset()
+        super().reset()
 
     def tick(self, now_us: int, rx: W, /) -> W:
         """Tick the device and record it."""

@@ -47,6 +47,12 @@ _ROOMY: Final = (80, 24)
 """Columns and lines: minimum for the panel, and size for all of it."""
 
 
+def _too_small(size: tuple[int, int], least: tuple[int, int]) -> Text:
+    """Report that the terminal is too small, in columns and lines."""
+    have, need = (f"{columns} x {lines}" for columns, lines in (size, least))
+    return Text(f"terminal too small: {have}, at least {need}")
+
+
 class RrcPanel(FramedApp):
     """Stick, buttons, faults and lamps of an RRC and its VR2.
 
@@ -188,7 +194,7 @@ class RrcPanel(FramedApp):
             ("wire", panel_text.wire_pane(view, self.query_one("#wire").content_size.height)),
             ("report", panes.report_line(view)),
             ("status", panel_text.status_line(view)),
-            ("tiny", small_panel_text.too_small(self.size, _LEAST)),
+            ("tiny", _too_small(self.size, _LEAST)),
         ):
             if self._shown.get(name) != text:
                 self._shown[name] = text

@@ -53,9 +53,3 @@ def report_line(view: PanelView) -> Text:
         f" keys {sa.speed_up_count} {sa.speed_down_count} {sa.alarm_count}",
         style=DIM,
     )
-
-
-def too_small(size: tuple[int, int], least: tuple[int, int]) -> Text:
-    """Report that the terminal is too small, in columns and lines."""
-    have, need = (f"{columns} x {lines}" for columns, lines in (size, least))
-    return Text(f"terminal too small: {have}, at least {need}")

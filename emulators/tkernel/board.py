@@ -8,7 +8,7 @@ from enum import IntEnum
 from typing import Final, Protocol
 
 from tickrig.device.physical import InputBank, InputSignal, OutputSignal, SignalType
-from tickrig.emulators.tkernel.node_manager import REFUSED, NodeLimits, NodeManager
+from tickrig.emulators.tkernel.node_manager import NodeLimits, NodeManager
 from tickrig.wire.instant import NEVER
 
 _INPUTS: Final = (
@@ -16,11 +16,13 @@ _INPUTS: Final = (
     InputSignal("power_cut", "the supply is off, and everything is lost", SignalType.FAULT),
 )
 
+_REFUSED: Final = ("connectors", "interfaces", "messages", "periods")
+
 _OUTPUTS: Final = (
     OutputSignal("state", "0 without supply, 1 while it boots, 2 while it runs"),
     OutputSignal("boots", "number of boots"),
     OutputSignal("components", "components on it"),
-    *(OutputSignal(f"refused_{what}", f"{what} beyond its limits") for what in REFUSED),
+    *(OutputSignal(f"refused_{what}", f"{what} beyond its limits") for what in _REFUSED),
 )
 
 
@@ -66,7 +68,7 @@ class Board:
         self.manager: NodeManager | None = None
         self.boots, self._changed, self._up_us = 0, True, NEVER
         self._state, self._stack = _BoardState.OFF, ExitStack()
-        self._refused = dict.fromkeys(REFUSED, 0)
+        self._refused = dict.fromkeys(_REFUSED, 0)
 
     @property
     def tick_us(self) -> int:
@@ -131,7 +133,7 @@ class Board:
 
     def _lose(self) -> None:
         """Switch the supply off: the system is lost."""
-        for what in REFUSED:
+        for what in _REFUSED:
             self._refused[what] += self.manager.refused[what] if self.manager else 0
         self._state, self.manager, self._up_us = _BoardState.OFF, None, NEVER
         # Lines before the stack: a power cut says nothing to anybody, and closing doors in

@@ -87,7 +87,6 @@ _NEWER: Final = frozenset({"dataport.buffer.read.policy", "dataport.buffer.read.
 """Properties of connectors that OpenRTM 1.0 does not have."""
 
 _MOST_LOGGED: Final = 100
-REFUSED: Final = ("connectors", "interfaces", "messages", "periods")
 
 _LOG: Final = log_of(__name__)
 

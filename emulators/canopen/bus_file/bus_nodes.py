@@ -10,6 +10,7 @@ from typing import Any, Final, NamedTuple
 
 from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.device.canopen.ds402 import Ds402, indices
+from tickrig.device.canopen.ds402.modes.modes import MODES
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen import eds
@@ -57,6 +58,14 @@ class _BusNode:
     line: int
     description: eds.DeviceDescription
     about: str = ""
+
+
+def _modes_listed(dictionary: Dictionary) -> frozenset[int]:
+    """Return the modes that 6502h of a dictionary lists; all modes if it lists none."""
+    entry = dictionary.find(indices.SUPPORTED_MODES)
+    listed = entry.number if entry else 0
+    known = (number for number in MODES if number > 0)
+    return frozenset(n for n in known if not listed or listed >> n - 1 & 1)
 
 
 class _NodeMaker:
@@ -218,7 +227,7 @@ class _NodeMaker:
         joint: joint_drive.JointDrive,
     ) -> Dictionary:
         """Return the objects of a drive, and warn of those missing in its EDS."""
-        listed = joint_drive.modes_listed(dictionary)
+        listed = _modes_listed(dictionary)
         modes = keys.modes or listed | self._asked_for(slave, listed)
         wanted = modes if keys.modes else modes - listed
         if added := joint_drive.missing(dictionary, wanted):

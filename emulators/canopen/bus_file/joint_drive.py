@@ -13,7 +13,6 @@ from tickrig.device.canopen.dictionary import Dictionary, DictionaryDescription
 from tickrig.device.canopen.ds402 import Ds402, indices
 from tickrig.device.canopen.ds402.automaton import Bounds
 from tickrig.device.canopen.ds402.axis import FAR_DEG
-from tickrig.device.canopen.ds402.modes.modes import MODES
 from tickrig.device.canopen.ds402.settings import Parameters, Settings, read_settings
 from tickrig.device.canopen.models import epos
 from tickrig.device.canopen.slave import CanopenSlave, ServiceMaker
@@ -238,7 +237,6 @@ NAMES: Final = {
 }
 """Abbreviations of the modes of operation (CiA 402), by the number in 6060h."""
 
-NUMBERS: Final = {name: number for number, name in NAMES.items()}
 
 _PROFILE: Final = (indices.PROFILE_ACCELERATION, indices.PROFILE_DECELERATION)
 _ALWAYS: Final = (
@@ -281,14 +279,6 @@ _NEVER_ZERO: Final = frozenset(
     }
 )
 """Objects for which 0 means no motion: a 0 in a file counts as not given."""
-
-
-def modes_listed(dictionary: Dictionary) -> frozenset[int]:
-    """Return the modes that 6502h of a dictionary lists; all modes if it lists none."""
-    entry = dictionary.find(indices.SUPPORTED_MODES)
-    listed = entry.number if entry else 0
-    known = (number for number in MODES if number > 0)
-    return frozenset(n for n in known if not listed or listed >> n - 1 & 1)
 
 
 def complete(

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 from tickrig.device.servo.parameters import PRESETS
-from tickrig.emulators.canopen.bus_file.joint_drive import NUMBERS
+from tickrig.emulators.canopen.bus_file.joint_drive import NAMES
 from tickrig.emulators.canopen.choices import PROFILES
 from tickrig.host.text.document import FileMistake, FilePlace, Item
 from tickrig.host.text.names import near
@@ -71,12 +71,15 @@ def _pair(value: object) -> tuple[float, float]:
     raise ValueError(f"it takes a pair [FROM, TO] with FROM up to TO, not {shown(value)}")
 
 
+_NUMBERS: Final = {name: number for number, name in NAMES.items()}
+
+
 def _modes(value: object) -> frozenset[int]:
     if value == _ALL:
-        return frozenset(NUMBERS.values())
+        return frozenset(_NUMBERS.values())
     if not isinstance(value, list) or not value:
-        raise ValueError(f"it takes {_ALL} or a list of {', '.join(NUMBERS)}, not {shown(value)}")
-    return frozenset(NUMBERS[one_of(*NUMBERS)(each)] for each in value)
+        raise ValueError(f"it takes {_ALL} or a list of {', '.join(_NUMBERS)}, not {shown(value)}")
+    return frozenset(_NUMBERS[one_of(*_NUMBERS)(each)] for each in value)
 
 
 def _settings(value: object) -> dict[str, Setting]:
@@ -170,7 +173,7 @@ KEYS: Final[Mapping[str, Field]] = {
     **JOINT_KEYS,
     "modes": Field(
         _modes,
-        f"`{_ALL}`, a list of {', '.join(f'`{name}`' for name in NUMBERS)}",
+        f"`{_ALL}`, a list of {', '.join(f'`{name}`' for name in _NUMBERS)}",
         "modes of operation; objects that they need and the EDS lacks are added",
         "those of 6502h, and one that `sdo` writes to 6060h",
     ),

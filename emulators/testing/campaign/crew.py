@@ -284,10 +284,3 @@ class LocalWorkers:
         """End all processes."""
         self._crew.close()
         self._threads.shutdown(cancel_futures=True)
-
-
-def cores() -> int:
-    """Return the number of processors for this process."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1

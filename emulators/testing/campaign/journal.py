@@ -13,7 +13,6 @@ from tickrig.emulators.testing.campaign.order import CampaignRefusal, RunVerdict
 from tickrig.host.text.whole_file import write_whole
 
 _VERSION: Final = 1
-SUFFIX: Final = ".journal"
 
 
 class JournalFullError(OSError):

@@ -11,10 +11,9 @@ from typing import Any, Final
 import click
 
 from tickrig.emulators.bench.operator import Operator
-from tickrig.emulators.bench.running_emulator import STATE, RunningEmulator
+from tickrig.emulators.bench.running_emulator import STATE, OutputWatch, RunningEmulator
 from tickrig.emulators.commands.run import EmulatorRun, RunOptions, mistakes_in
 from tickrig.emulators.record.wire_log import WireLine
-from tickrig.emulators.rig.emulated import read_signal
 from tickrig.emulators.rig.event_queue import EventQueue
 from tickrig.emulators.scenario import ScenarioParser, ScenarioPlayer, ScenarioStep
 from tickrig.emulators.serial.pty_port import PtyPort
@@ -28,7 +27,6 @@ from tickrig.emulators.testing.rig_file.plan import RigFileError, RigPlan, bus_t
 from tickrig.emulators.testing.rig_file.reader import read_rig_file
 from tickrig.host.cli.messages import Refused, refuse_path, say
 from tickrig.host.text.trace import Mark
-from tickrig.host.text.values import Setting, format_time
 
 _ALONE: Final = "{wire}: no bus outside; [real.{wire}] with interface and channel joins one."
 _NOWHERE: Final = "-"
@@ -207,7 +205,8 @@ class _BenchRun(EmulatorRun[_BenchOptions]):
         if options.verbose:
             everything = options.verbose > 1
             bench.log.listeners.append(lambda line: _show(line, everything=everything))
-            bench.after_step.append(_StateWatch(bench, click.echo))
+            states = (one for one in bench.device.outputs if one.rpartition("/")[2] == STATE)
+            bench.after_step.append(OutputWatch(bench.device, click.echo, states))
         return None
 
     def _go_on(self, bench: RunningEmulator) -> None:
@@ -289,20 +288,3 @@ def _show(line: WireLine, *, everything: bool) -> None:
     """Show what was done, and what passed if that is wanted too."""
     if everything or line.mark is Mark.PHYSICAL:
         click.echo(line_text(line))
-
-
-class _StateWatch:
-    """Shows the state of each device now and whenever it changes."""
-
-    def __init__(self, bench: RunningEmulator, write: Callable[[str], None]) -> None:
-        self._device, self._write = bench.device, write
-        self._shown: dict[str, Setting] = dict.fromkeys(
-            (name for name in bench.device.outputs if name.rpartition("/")[2] == STATE), ""
-        )
-
-    def __call__(self, now_us: int) -> None:
-        """Show what has changed."""
-        for name, shown in self._shown.items():
-            if (value := read_signal(self._device, name)) != shown:
-                self._shown[name] = value
-                self._write(f"{format_time(now_us)} * {name} {value}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 import shlex
 import sys
 from collections import Counter
@@ -19,8 +20,8 @@ import click
 from click._termui_impl import ProgressBar
 
 from tickrig._lazy import LazyModule
-from tickrig.emulators.testing.campaign.crew import Crew, LocalWorkers, cores
-from tickrig.emulators.testing.campaign.journal import SUFFIX, CampaignJournal, JournalFullError
+from tickrig.emulators.testing.campaign.crew import Crew, LocalWorkers
+from tickrig.emulators.testing.campaign.journal import CampaignJournal, JournalFullError
 from tickrig.emulators.testing.campaign.order import CampaignOrder, CampaignRefusal, Run, RunVerdict
 from tickrig.emulators.testing.campaign.plan import CampaignPlan, Seeds, Shard
 from tickrig.emulators.testing.campaign.table import (
@@ -211,6 +212,16 @@ class _CampaignOptions:
         )
 
 
+_SUFFIX: Final = ".journal"
+
+
+def _cores() -> int:
+    """Return the number of processors for this process."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
 class _CampaignRun:
     """The run of a campaign.
 
@@ -231,7 +242,7 @@ class _CampaignRun:
             raise CampaignRefusal("--timeout 0: no run is over at once; write 60s")
         _check_outputs(options.output_paths)
         self._paths = options.output_paths
-        self._journal_path = Path(f"{self._paths[0]}{SUFFIX}")
+        self._journal_path = Path(f"{self._paths[0]}{_SUFFIX}")
         self._check_old()
 
     def _check_old(self) -> None:
@@ -290,7 +301,7 @@ class _CampaignRun:
 
     def _workers(self, crew: Crew, plan: CampaignPlan) -> _Workers:
         if not self._options.scheduler:
-            return LocalWorkers(crew, plan.collected.digest, self._options.workers or cores())
+            return LocalWorkers(crew, plan.collected.digest, self._options.workers or _cores())
         try:
             return dask_workers.DaskWorkers(self._options.scheduler, plan)
         except ImportError:

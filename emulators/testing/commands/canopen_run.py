@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -13,7 +13,7 @@ import click
 from tickrig.device.canopen.sdo import USUAL, SdoLimits
 from tickrig.device.canopen.slave import UNCONFIGURED
 from tickrig.emulators.bench.operator import AssemblyFaults, Operator
-from tickrig.emulators.bench.running_emulator import FrameTranscript, RunningEmulator
+from tickrig.emulators.bench.running_emulator import RunningEmulator, Transcript
 from tickrig.emulators.can.emulator import CanEmulator
 from tickrig.emulators.can.outside.bridge import CountingPort
 from tickrig.emulators.can.outside.bus_port import port_on
@@ -132,6 +132,22 @@ class _CanopenOptions(RunOptions):
         return not self.scenario or bool(self.bus or self.control)
 
 
+class _FrameTranscript(Transcript):
+    """Actions of the operator, watched outputs and missed expectations, without the frames.
+
+    Args:
+        emulator: the emulator to watch.
+        write: receives the lines.
+    """
+
+    def __init__(self, emulator: RunningEmulator, write: Callable[[str], None]) -> None:
+        super().__init__(emulator, write, lambda line: False)
+
+    def send(self, now_us: int, data: bytes, shown: bytes) -> None:
+        """Send a frame; the log shows it when it has passed."""
+        self._emulator.send(now_us, data)
+
+
 class _CanopenRun(EmulatorRun[_CanopenOptions]):
     """One run; see `_CanopenOptions`."""
 
@@ -239,7 +255,7 @@ class _CanopenRun(EmulatorRun[_CanopenOptions]):
         options = self._options
         if not (options.scenario or options.verbose):
             return None
-        transcript = FrameTranscript(bench, say)
+        transcript = _FrameTranscript(bench, say)
         if options.verbose:
             outputs = bench.device.outputs.items()
             transcript.watch(0, *(name for name, item in outputs if not item.unit))

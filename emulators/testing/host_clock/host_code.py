@@ -13,7 +13,7 @@ from itertools import chain
 from operator import is_
 from pathlib import Path
 from select import select
-from types import FrameType, FunctionType, MethodType, ModuleType
+from types import FunctionType, MethodType, ModuleType
 from typing import Any, Final, NamedTuple
 
 # What is raised where a host deals with time as it cannot in virtual time.
@@ -71,17 +71,6 @@ def is_host(module: str, file: str) -> bool:
 def is_installed(file: str) -> bool:
     """Return whether a file is of an installed package."""
     return any(folder in file for folder in _INSTALLED)
-
-
-def package_of(frame: FrameType) -> str:
-    """Return the name of the running package."""
-    name: str = frame.f_globals.get("__name__") or ""
-    return name.partition(".")[0]
-
-
-def line_of(frame: FrameType) -> str:
-    """Return the running file and line, for people."""
-    return place_of(frame.f_code.co_filename, frame.f_lineno)
 
 
 def place_of(file: str, line: int) -> str:

@@ -84,6 +84,11 @@ def _check_clock() -> None:
             )
 
 
+def _line_of(frame: FrameType) -> str:
+    """Return the running file and line, for people."""
+    return host_code.place_of(frame.f_code.co_filename, frame.f_lineno)
+
+
 class _ClockWaits:
     """Replacements for waiting functions.
 
@@ -136,11 +141,9 @@ class _ClockWaits:
                 _check_clock()
                 return wait(original, *args, **kwargs)
             except _ForEver as error:
-                raise host_code.HostTimeError(
-                    f"{host_code.line_of(frame)}: {name} {error}"
-                ) from None
+                raise host_code.HostTimeError(f"{_line_of(frame)}: {name} {error}") from None
             except host_code.HostTimeError as error:
-                self.refusals.append(f"{host_code.line_of(frame)}: {name}: {error}")
+                self.refusals.append(f"{_line_of(frame)}: {name}: {error}")
                 raise host_code.HostTimeError(self.refusals[-1]) from None
 
         return act
@@ -314,6 +317,12 @@ _WHAT_TO_DO: Final = (
 )
 
 
+def _package_of(frame: FrameType) -> str:
+    """Return the name of the running package."""
+    name: str = frame.f_globals.get("__name__") or ""
+    return name.partition(".")[0]
+
+
 @contextmanager
 def unpatched_time_fails(
     allowed: Collection[str] = (), others: Collection[threading.Thread] | None = None
@@ -341,11 +350,11 @@ def unpatched_time_fails(
         if isinstance(original, patches.Patch) and original.on:  # of `patched_time`, around this
             return original.act(original.original, frame, *args, **kwargs)
         stamped = name in _STAMPS and host_code.is_installed(frame.f_code.co_filename)
-        if stamped or host_code.package_of(frame) in allowed or threading.get_ident() in spared:
+        if stamped or _package_of(frame) in allowed or threading.get_ident() in spared:
             return original(*args, **kwargs)
         alone = threading.get_ident() == owner
         told = f"is called, but {_WHAT_TO_DO}" if alone else _IN_A_THREAD
-        refusals.append(f"{host_code.line_of(frame)}: time.{name} {told}")
+        refusals.append(f"{_line_of(frame)}: time.{name} {told}")
         raise host_code.UnpatchedTimeError(refusals[-1])
 
     own = [

@@ -18,9 +18,6 @@ from typing import ClassVar, Final, NamedTuple
 
 from tickrig._version import __version__
 
-VERSION: Final = 1
-"""Of the JSON form; it changes when a field changes its meaning or goes."""
-
 Value = int | float | str | None
 """A sample: a number, a word such as a state, None where nothing is known."""
 

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TextIO, TypeVar, get_args, get_origin, get_type_hints
 
 from tickrig._lazy import LazyModule
-from tickrig.emulators.testing.report.bench_report import VERSION, BenchReport, TestRecord
+from tickrig.emulators.testing.report.bench_report import BenchReport, TestRecord
 from tickrig.host.text.whole_file import check_file, is_special, write_whole
 
 if TYPE_CHECKING:
@@ -76,9 +76,13 @@ def from_data(kind: type[_T], data: object) -> _T:
     return value
 
 
+_VERSION: Final = 1
+"""Of the JSON form; it changes when a field changes its meaning or goes."""
+
+
 def to_json(report: BenchReport) -> str:
     """Write a report, on one line."""
-    data = {_VERSION_KEY: VERSION, **_values(report)}
+    data = {_VERSION_KEY: _VERSION, **_values(report)}
     return json.dumps(data, separators=(",", ":"), default=_values)
 
 
@@ -196,7 +200,7 @@ def _written_by_us(json_: _Scanner) -> BenchReport | None:
     if json_.mark != "}":
         return None
     json_.skip()
-    if json_.rest.strip(" \t\r\n") or data.pop(_VERSION_KEY, None) != VERSION:
+    if json_.rest.strip(" \t\r\n") or data.pop(_VERSION_KEY, None) != _VERSION:
         return None
     return replace(from_data(BenchReport, data), tests=tuple(tests))
 
@@ -209,8 +213,8 @@ def _any_json(text: str) -> BenchReport:
     if not isinstance(data, dict) or _VERSION_KEY not in data:
         raise ReportError(f"no report: there is no key {_VERSION_KEY!r}")
     version = data.pop(_VERSION_KEY)
-    if version != VERSION:
-        raise ReportError(f"report version {version!r:.20}; this program reads {VERSION}")
+    if version != _VERSION:
+        raise ReportError(f"report version {version!r:.20}; this program reads {_VERSION}")
     return from_data(BenchReport, data)
 
 
