@@ -155,22 +155,27 @@ class Heat(Part):
     Attributes:
         since_us: the instant at which they were computed.
         temperatures: temperatures at that instant.
+        winding_dc: that of the winding, 0.1 degC.
         ambient_c: temperature of the air since then.
         i2t: the overload of the power stage.
     """
 
-    __slots__ = ("_parameters", "_thermal", "ambient_c", "i2t", "since_us", "temperatures")
+    __slots__ = (
+        *("_parameters", "_thermal", "ambient_c", "i2t", "since_us", "temperatures", "winding_dc"),
+    )
 
     def __init__(self, parameters: ServoParameters, ambient_c: float) -> None:
         self._thermal, self.i2t = ThermalModel(parameters.motor), I2t(parameters.stage)
         self._parameters = parameters
         self.since_us, self.ambient_c = 0, ambient_c
         self.temperatures: _Temperatures = (ambient_c, ambient_c)
+        self.winding_dc = round(ambient_c * 10)
 
     def after(self, now_us: int, square_a2s: float) -> Heat:
         """Return what `pass_time` makes of it."""
         found = Heat(self._parameters, self.ambient_c)
-        found.temperatures, found.since_us = self.temperatures, self.since_us
+        found.temperatures, found.winding_dc = self.temperatures, self.winding_dc
+        found.since_us = self.since_us
         found.i2t.filled_a2s, found.i2t.reduced = self.i2t.filled_a2s, self.i2t.reduced
         found.pass_time(now_us, square_a2s)
         return found
@@ -195,14 +200,17 @@ class Heat(Part):
         seconds = (now_us - self.since_us) / 1_000_000
         if seconds:
             self.i2t.pass_time(seconds, square_a2s)
-            self.temperatures = self._after(seconds, square_a2s / seconds)
-            self.since_us = now_us
+            self._warm(self._after(seconds, square_a2s / seconds), now_us)
 
     def rest(self, now_us: int, current_a: float) -> None:
         """Advance the time with a constant current, to exactly the temperatures of `at`."""
         seconds = (now_us - self.since_us) / 1_000_000
         self.i2t.pass_time(seconds, current_a**2 * seconds)
-        self.temperatures, self.since_us = self.at(now_us, current_a), now_us
+        self._warm(self.at(now_us, current_a), now_us)
+
+    def _warm(self, temperatures: _Temperatures, now_us: int) -> None:
+        self.temperatures, self.since_us = temperatures, now_us
+        self.winding_dc = round(temperatures[0] * 10)  # once in 20 ticks: 6 % of a drive's tick
 
     def at(self, now_us: int, current_a: float) -> _Temperatures:
         """Return the temperatures at an instant, the current constant until then."""
@@ -228,15 +236,20 @@ class Heat(Part):
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class ServoSettings(Copyable):
-    """Attributes that call `changed` when set to another value."""
+    """Attributes that call `changed` when set to another value.
+
+    Attributes:
+        supply_mv: the supply of the power stage in millivolts; `supply_v` sets it.
+    """
 
     __slots__ = (
         *("_ambient_c", "_blocked", "_current_limit_a", "_encoder_unplugged", "_load_kg_m2"),
-        *("_load_nm", "_phase_open", "_supply_v"),
+        *("_load_nm", "_phase_open", "_supply_v", "supply_mv"),
     )
 
     def __init__(self, supply_v: float) -> None:
         self._supply_v, self._ambient_c, self._encoder_unplugged = supply_v, 25.0, False
+        self.supply_mv = round(supply_v * 1_000)
         self._load_nm, self._load_kg_m2 = 0.0, 0.0
         self._blocked, self._phase_open, self._current_limit_a = False, False, inf
 
@@ -251,7 +264,7 @@ class ServoSettings(Copyable):
     @supply_v.setter
     def supply_v(self, value: float) -> None:
         if value != self._supply_v:
-            self._supply_v = value
+            self._supply_v, self.supply_mv = value, round(value * 1_000)
             self.changed()
 
     @property
@@ -380,11 +393,6 @@ class Readings(ServoSettings):
         return round(self._plant.current_a * 1_000)
 
     @property
-    def supply_mv(self) -> int:
-        """Supply of the power stage, mV."""
-        return round(self.supply_v * 1_000)
-
-    @property
     def spare_mv(self) -> int:
         """Voltage of the stage above the back-EMF; below 0 a load drives the motor."""
         stage, motor = self.parameters.stage, self.parameters.motor
@@ -395,7 +403,7 @@ class Readings(ServoSettings):
     @property
     def winding_dc(self) -> int:
         """Temperature of the winding, 0.1 degC."""
-        return round(self.winding_c * 10)
+        return round(self.winding_c * 10) if self.resting else self._heat.winding_dc
 
     @property
     def overloaded(self) -> bool:

@@ -365,7 +365,7 @@ class Servo(Readings):
             squared = squares + square
             if steps == look:  # looks belong to a run: three wake-ups fewer in 40 ms
                 warmer = heat.after(self.now_us + (steps + 1) * STEP_US, squared)
-                if warmer.shapes(r) or round(warmer.temperatures[0] * 10) > hottest_dc:
+                if warmer.shapes(r) or warmer.winding_dc > hottest_dc:
                     break
                 heat, most_a, squared = warmer, self._allowed_a(warmer), 0.0
                 look += _SLOW_US // STEP_US

@@ -42,7 +42,7 @@ typedef struct {
 typedef struct {
     PyObject_HEAD
     PyObject *stations, *ticks;
-    us first_us, open_us;
+    us first_us, in_step, open_us;
 } Timetable;
 
 typedef struct {
@@ -107,7 +107,8 @@ static PyMemberDef station_fields[] = {
     NUMBER("tick_us", Station, tick_us), {NULL}};
 static PyMemberDef timetable_fields[] = {
     OBJECT("_stations", Timetable, stations), OBJECT("_ticks", Timetable, ticks),
-    NUMBER("first_us", Timetable, first_us), NUMBER("open_us", Timetable, open_us), {NULL}};
+    NUMBER("first_us", Timetable, first_us), NUMBER("in_step", Timetable, in_step),
+    NUMBER("open_us", Timetable, open_us), {NULL}};
 static PyMemberDef end_fields[] = {
     OBJECT("_accepts", End, accepts), OBJECT("_behind", End, behind),
     OBJECT("_device", End, device), OBJECT("_error_aware", End, error_aware),
@@ -154,7 +155,7 @@ static PyObject *empty_tuple;
 
 #define NAMES(name) static PyObject *s_##name;
 #define EACH_NAME(name) name(advance) name(send) name(poll) name(tick) name(due_us) name(popleft) \
-    name(append) name(_is_sound) name(_notify_changes) name(receivers) name(now_us) name(in_step) \
+    name(append) name(_is_sound) name(_notify_changes) name(receivers) name(now_us) \
     name(passed_us) name(until_us)
 EACH_NAME(NAMES)
 
@@ -1329,11 +1330,10 @@ make_tick(PyObject *rig, PyObject *const *part, us now_us) /* Rig._happen and Ri
     Timetable *table = (Timetable *)part[0];
     Segment *segment = (Segment *)part[1];
     PyObject *horizon = part[3], *watchers = part[4];
-    PyObject *number = PyLong_FromLongLong(now_us), *outer = PyObject_GetAttr(rig, s_in_step);
-    int result = number == NULL || outer == NULL ||
-                         PyObject_SetAttr(rig, s_in_step, Py_True) < 0 ||
-                         PyObject_SetAttr(rig, s_now_us, number) < 0 ? -1 : 0;
-    table->open_us = now_us;
+    PyObject *number = PyLong_FromLongLong(now_us);
+    us outer = table->in_step;
+    int result = number == NULL || PyObject_SetAttr(rig, s_now_us, number) < 0 ? -1 : 0;
+    table->in_step = 1, table->open_us = now_us;
     if (result == 0)
         result = advance(segment, now_us);
     if (result == 0)
@@ -1347,15 +1347,7 @@ make_tick(PyObject *rig, PyObject *const *part, us now_us) /* Rig._happen and Ri
         if (result == 0)
             result = enter_due(part[6], table);
     }
-    if (outer != NULL) {
-        PyObject *type, *value, *trace;
-        PyErr_Fetch(&type, &value, &trace);
-        int restored = PyObject_SetAttr(rig, s_in_step, outer);
-        if (type != NULL)
-            PyErr_Restore(type, value, trace);
-        result = result < 0 || restored < 0 ? -1 : 0;
-        Py_DECREF(outer);
-    }
+    table->in_step = outer;
     Py_XDECREF(number);
     return result;
 }

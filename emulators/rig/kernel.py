@@ -59,7 +59,7 @@ if TYPE_CHECKING or _KERNEL is None:
     class TimetableFields:
         """The fields of a `Timetable`."""
 
-        __slots__ = ("_stations", "_ticks", "first_us", "open_us")
+        __slots__ = ("_stations", "_ticks", "first_us", "in_step", "open_us")
 
     class EndFields:
         """The fields of a `CanEnd`."""

@@ -243,7 +243,6 @@ class Rig(Copyable):
         event_queue: actions between ticks.
         stations: the devices, each on its port.
         acting_us: the time of the running action of the event_queue, else None.
-        in_step: whether a step is running; callbacks in it cannot wait.
         now_us: time since the start of the rig.
         worst_late_us: largest delay of a step.
         late_ticks: number of steps that started more than `_LATE_US` late.
@@ -264,7 +263,6 @@ class Rig(Copyable):
         self._late: deque[tuple[int, int]] = deque(maxlen=LATE_KEPT)
         self.event_queue: EventQueue = event_queue or EventQueue()
         self.acting_us: int | None = None
-        self.in_step = False
         self.hosts: Listeners[Host] = Listeners()
         self.watchers: Listeners[Callable[[int], None]] = Listeners()
         self._bridges, self._couplings, self._dense = tuple(bridges), tuple(couplings), dense
@@ -307,12 +305,13 @@ class Rig(Copyable):
     def __getstate__(self) -> object:
         """Return the initial state of a twin: it has no hosts, and runs in virtual time."""
         begun = {"_bridges": (), "_short": (), "_clock": VirtualClock(), "_jumps": not self._dense}
-        now = {"_in_real_time": False, "acting_us": None, "in_step": False}
+        now = {"_in_real_time": False, "acting_us": None}
         return state_of(self, {**begun, **now})
 
     def __setstate__(self, state: object) -> None:
         """Restore the state of the copied rig; its ports have no devices yet."""
         restore(self, state)
+        self._timetable.in_step = 0
         self._wires.hear_again()
         for station in self.stations:
             self._attach(station)
@@ -384,6 +383,11 @@ class Rig(Copyable):
         b'EV:Initialized'
         """
         return MachineSnapshot(self, *parts)
+
+    @property
+    def in_step(self) -> bool:
+        """Whether a step is running; callbacks in it cannot wait."""
+        return self._timetable.in_step != 0
 
     def move_on(self, wire: Wire) -> None:
         """Advance a wire with the rig; wires with stations are already included.
@@ -527,14 +531,15 @@ class Rig(Copyable):
 
     def _happen(self, next_us: int) -> None:
         """Run the next events: all actions of that time, else its tick."""
-        outer, self.in_step = self.in_step, True
+        timetable = self._timetable
+        outer, timetable.in_step = timetable.in_step, 1
         try:
             if self.event_queue.due_us <= next_us:
                 self._act(next_us)
             else:
                 self._run(next_us)
         finally:
-            self.in_step = outer
+            timetable.in_step = outer
 
     def _act(self, now_us: int) -> None:
         """Run the actions due at `now_us`, before the tick of that time."""

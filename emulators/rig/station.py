@@ -116,12 +116,13 @@ class Timetable(TimetableFields):
     Attributes:
         first_us: the soonest tick with work, `NEVER` if there is none.
         open_us: no tick is entered before this.
+        in_step: 1 while a step of the rig is running, else 0; here for the kernel (2 % of an SDO).
     """
 
     __slots__ = ()
 
     def __init__(self) -> None:
-        self.first_us, self.open_us = NEVER, 1
+        self.first_us, self.open_us, self.in_step = NEVER, 1, 0
         self._ticks: list[int] = []  # a heap
         self._stations: dict[int, list[Station[Any]]] = {}
 

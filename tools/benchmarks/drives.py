@@ -6,7 +6,7 @@ with it. Control and physics of each drive run every millisecond.
 
 from __future__ import annotations
 
-from functools import partial
+from functools import cache, partial
 from math import cos, pi
 from typing import Final
 
@@ -50,9 +50,10 @@ class Master:
         return (SYNC, *(CanFrame(0x300 + number, data) for number in range(1, self.drives + 1)))
 
 
-def stored(cycle_us: int) -> Nonvolatile:
-    """Make what a drive has kept: mode 8, PDOs that go with SYNC, its cycle."""
-    made, kept = epos.dictionary(), Nonvolatile()
+@cache
+def _stored(cycle_us: int) -> dict[int, bytes]:
+    """Return what a drive has kept: mode 8, PDOs that go with SYNC, its cycle."""
+    made, kept = epos.dictionary(), dict[int, bytes]()
     for at, value in (
         ((0x6060, 0), 8),
         ((0x1400, 1), 0x8000_0200),
@@ -60,7 +61,7 @@ def stored(cycle_us: int) -> Nonvolatile:
         ((0x1800, 2), 1),
         ((0x60C2, 1), cycle_us // 1_000),
     ):
-        kept.parameters[made[at].key] = made[at].data_type.encode(value)
+        kept[made[at].key] = made[at].data_type.encode(value)
     return kept
 
 
@@ -68,7 +69,7 @@ def rig(drives: int, cycle_us: int) -> Rig:
     """Put drives and their master onto a bus."""
     wire = CanWire()
     stations = [
-        Station(epos.make_epos(number, stored(cycle_us)), wire.end())
+        Station(epos.make_epos(number, Nonvolatile(dict(_stored(cycle_us)))), wire.end())
         for number in range(1, drives + 1)
     ]
     return Rig(Station(Master(drives, cycle_us), wire.end()), *stations)

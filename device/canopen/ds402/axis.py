@@ -316,7 +316,10 @@ class Axis(Part):
         """Move the zero by a whole range when the motor has left the range."""
         low, high = self.settings.position_range
         unit = self.settings.units.per_position
-        turns = (round((self.motor.counts - self.zero) / unit) - low) // (high - low + 1)
+        position = (self.motor.counts - self.zero) / unit
+        if low <= position <= high:  # mostly, and without `round`: 4 % of a drive's tick
+            return
+        turns = (round(position) - low) // (high - low + 1)
         self.zero += turns * (high - low + 1) * unit
 
     def place_home(self, position: int, counts: int) -> None:

@@ -100,9 +100,8 @@ class Parameters(Part):
 
     def watch(self, indices: Iterable[int], changed: OnEntry) -> None:
         """Call `changed` whenever one of these objects changes."""
-        wanted = frozenset(indices)
-        for entry in self._dictionary:
-            if entry.description.index in wanted:
+        for index in indices:
+            for entry in self._dictionary.object(index):
                 entry.watch(changed)
 
 

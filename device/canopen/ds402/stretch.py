@@ -55,7 +55,10 @@ class Stretch(Part):
         if line is None:
             return 0
         axis, (first, last) = self._axis, self._axis.unwrapped
-        window, hottest_dc = axis.settings.following_error_window, self._drive.bounds.winding_dc
+        window, hottest_dc = (
+            axis.settings.following_error_window,
+            self._drive.supervision.bounds.winding_dc,
+        )
         self._line, self._bounds = line, (first, last, window, axis.standstill, hottest_dc)
         run = servo.run_ahead(line, most, self._bounds)
         if run.steps < _FEWEST:
