@@ -5,14 +5,16 @@ from __future__ import annotations
 import json
 import os
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from errno import EISDIR, ENOENT
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import click
 
+from tickrig._lazy import LazyModule
+from tickrig.host.canmon.conform.conform_source import RIG_FILE
 from tickrig.host.canmon.eds_document import (
     chosen_eds,
     eds_folder_option,
@@ -49,6 +51,13 @@ from tickrig.host.text.values import counted, format_time
 from tickrig.host.text.whole_file import write_whole
 from tickrig.wire.canopen.nmt import ALL_NODES, NmtCommand, NmtState
 
+if TYPE_CHECKING:
+    from tickrig.host.canmon import workspace as workspace_file
+    from tickrig.host.canmon.model.check import learnt
+else:  # for scan with these options alone
+    workspace_file = LazyModule("tickrig.host.canmon.workspace")
+    learnt = LazyModule("tickrig.host.canmon.model.check.learnt")
+
 _NOBODY: Final = 1
 _WAIT_US: Final = 500_000
 
@@ -57,14 +66,18 @@ _WAIT_US: Final = 500_000
 @time_option("--wait", "wait_us", help="Wait for the last answers and heartbeats. [500ms]")
 @click.option("--json", "as_json", is_flag=True, help="Print nodes as JSON, one per line.")
 @click.option("--write", "bus_file", type=PATH, metavar="FILE", help="Write a bus.yml of them.")
+@click.option("--workspace", type=PATH, metavar="FILE", help="Write a workspace for canmon tui.")
+@click.option("--rules", type=PATH, metavar="FILE", help="Write rules for canmon check.")
 @eds_folder_option
-@click.option("--force", is_flag=True, help="Let --write replace FILE.")
+@click.option("--force", is_flag=True, help="Replace files that exist.")
 @click.pass_obj
 def scan(  # noqa: PLR0913, PLR0917 - options
     call: NetCall,
     wait_us: int | None,
     as_json: bool,
     bus_file: Path | None,
+    workspace: Path | None,
+    rules: Path | None,
     eds_folders: tuple[Path, ...],
     force: bool,
 ) -> None:
@@ -77,11 +90,15 @@ def scan(  # noqa: PLR0913, PLR0917 - options
     canmon net can0 scan
     canmon net can0 scan --wait 2s --json
     canmon net can0 scan --write bus.yml --eds-dir eds
+    canmon net can0 scan --workspace bench.toml --rules rules.toml
 
     --write makes a bus.yml for `boot --bus` and `tickrig check`. It takes the EDS of each node, and
-    its name, from --eds-dir; a node without an EDS stands in it as a comment.
+    its name, from --eds-dir; a node without an EDS stands in it as a comment. --workspace makes
+    what `canmon tui -w` opens: the bus, and the EDS of each node. --rules makes what `canmon check
+    LOG FILE` holds: which nodes there are, their identities and their heartbeats (1017h).
     """  # noqa: D301 - click wants the backspace
-    folder = _writing(bus_file, eds_folders, force=force)
+    paths = {"--write": bus_file, "--workspace": workspace, "--rules": rules}
+    folder = _writing(paths, eds_folders, force=force)
     found: list[NodeFound] = []
     with net_session(call) as session:
         scan = NetworkScan(session.bus, wait_us or _WAIT_US)
@@ -95,8 +112,13 @@ def scan(  # noqa: PLR0913, PLR0917 - options
         say("no node answered or sent anything")
         raise click.exceptions.Exit(_NOBODY)
     say(counted(len(found), "node"))
-    if bus_file is not None and folder is not None:
-        _write_bus_file(bus_file, found, folder)
+    if rules is not None:
+        _write_rules(rules, call, found)
+    files = {} if folder is None else _eds_files(found, folder, "not written: " * bool(bus_file))
+    if workspace is not None:
+        _write_workspace(workspace, call, files, eds_folders)
+    if bus_file is not None:
+        _write_bus_file(bus_file, found, files, folder)
 
 
 def _line(node: NodeFound) -> str:
@@ -131,7 +153,7 @@ def _json(node: NodeFound) -> str:
     )
 
 
-# What `scan --write` writes. A bus.yml needs an EDS for each node, so a node without one is a
+# What a scan writes. A bus.yml needs an EDS for each node, so a node without one is a
 # comment. Vendor and product are those of the EDS, which fits by them; the serial number is not
 # checked, because a spare part has another one.
 
@@ -140,29 +162,76 @@ _MOST_LETTERS: Final = 40
 _REVISION: Final = (0x1018, 3)
 
 
-def _writing(path: Path | None, folders: tuple[Path, ...], *, force: bool) -> EdsFolder | None:
-    """Return the folder of EDS files for `--write`; Refused if it cannot be written."""
-    if path is None:
-        if folders or force:
-            raise Refused(f"{'--eds-dir' if folders else '--force'} is for --write FILE")
-        return None
-    if not folders:
+def _writing(
+    paths: Mapping[str, Path | None], folders: tuple[Path, ...], *, force: bool
+) -> EdsFolder | None:
+    """Return the folder of EDS files; Refused if a file cannot be written."""
+    wanted = {option: path for option, path in paths.items() if path is not None}
+    if folders and wanted.keys() <= {"--rules"}:
+        raise Refused("--eds-dir is for --write FILE, or --workspace FILE")
+    if force and not wanted:
+        raise Refused("--force is for --write FILE, --workspace FILE or --rules FILE")
+    if "--write" in wanted and not folders:
         raise Refused("--write: a bus.yml needs the EDS of each node: give --eds-dir DIR")
-    if path.is_dir() or not path.parent.is_dir():
-        wrong, why = (path, EISDIR) if path.is_dir() else (path.parent, ENOENT)
-        refuse_path("--write", OSError(why, os.strerror(why), str(wrong)))
-    if path.exists() and not force:
-        raise Refused(f"--write {path} is there already: choose another name, or give --force")
-    return read_eds_folders(folders)
+    if len({path.resolve() for path in wanted.values()}) < len(wanted):
+        raise Refused(f"{', '.join(wanted)}: one file for two: choose another name")
+    for option, path in wanted.items():
+        if path.is_dir() or not path.parent.is_dir():
+            wrong, why = (path, EISDIR) if path.is_dir() else (path.parent, ENOENT)
+            refuse_path(option, OSError(why, os.strerror(why), str(wrong)))
+        if path.exists() and not force:
+            raise Refused(f"{option} {path} is there already: choose another name, or give --force")
+    return read_eds_folders(folders) if folders else None
 
 
-def _write_bus_file(path: Path, found: list[NodeFound], folder: EdsFolder) -> None:
+def _eds_files(found: list[NodeFound], folder: EdsFolder, without: str) -> dict[int, Path | None]:
+    """Return the EDS of each node; None, and a line that begins with `without`, where none is."""
+    return {node.node_id: _eds_of(node, folder, without) for node in found}
+
+
+def _write_workspace(
+    path: Path, call: NetCall, files: Mapping[int, Path | None], folders: tuple[Path, ...]
+) -> None:
+    """Write a workspace with the bus, the EDS of each node and the folders for others."""
+    is_rig = call.word is not None and call.word.lower().endswith(RIG_FILE)
+    if is_rig:
+        say(one_line(f"{path}: {call.word} is no bus that canmon tui could open: written without"))
+    source = () if call.word is None or is_rig else (call.word,)
+    eds = {node: file for node, file in files.items() if file is not None}
+    setup = workspace_file.MonitorSetup(source=source, options=call.bus, eds=eds, eds_dir=folders)
+    try:
+        workspace = workspace_file.Workspace("", path)
+        setup.write(workspace)
+        workspace.write(over=True)
+    except workspace_file.WorkspaceError as error:
+        raise Refused(one_line(f"--workspace {error}")) from None
+    say(one_line(f"{path}: {counted(len(eds), 'EDS file')} written"))
+
+
+def _write_rules(path: Path, call: NetCall, found: list[NodeFound]) -> None:
+    """Write which nodes there are, their identities and heartbeats, as rules."""
+    nodes = {node.node_id: (node.identity, node.heartbeat_ms) for node in found}
+    head = [
+        "Written by canmon net scan. To hold them: canmon check LOG FILE",
+        "A log tells the identity of a node only where it is read (1018h).",
+    ]
+    name = call.word or str(call.bus.channel or call.bus.interface or "bus")
+    with refusing("--rules"):
+        write_whole(path, learnt.scanned_text(one_line(name), nodes, head))
+    say(one_line(f"{path}: {counted(len(nodes), 'node')} written"))
+
+
+def _write_bus_file(
+    path: Path,
+    found: list[NodeFound],
+    files: Mapping[int, Path | None],
+    folder: EdsFolder | None,
+) -> None:
     """Write the nodes that have an EDS; Refused, and nothing written, if it would have errors."""
     taken = {node.node_id for node in found}
     master = next((one for one in (1, *range(127, 1, -1)) if one not in taken), None)
     if master is None:
         raise Refused("--write: all node-IDs are taken: none is left for the master")
-    files = {node.node_id: _eds_of(node, folder) for node in found}
     if not any(files.values()):
         raise Refused(f"--write {path}: no node has an EDS in {folder}: nothing written")
     lines = [
@@ -187,15 +256,15 @@ def _write_bus_file(path: Path, found: list[NodeFound], folder: EdsFolder) -> No
     say(one_line(f"{path}: {counted(count, 'node')} written"))
 
 
-def _eds_of(node: NodeFound, folder: EdsFolder) -> Path | None:
+def _eds_of(node: NodeFound, folder: EdsFolder, without: str) -> Path | None:
     """Return the EDS of a node; a line says which, or why there is none."""
     identity = node_identity(node.identity[:3]) if node.answers else None
     if identity is None:
-        say(f"node {node.node_id}: not written: it does not tell vendor and product (1018h)")
+        say(f"node {node.node_id}: {without}it does not tell vendor and product (1018h)")
         return None
     choice = folder.choose(node.node_id, identity)
     if choice is None:
-        say(one_line(f"node {node.node_id}: not written: no EDS in {folder} for {identity}"))
+        say(one_line(f"node {node.node_id}: {without}no EDS in {folder} for {identity}"))
         return None
     say(choice.said(node.node_id))
     return choice.path

@@ -141,6 +141,7 @@ class NodeBus:
 
 _NODE_IDS: Final = range(1, 128)
 _DEVICE_TYPE: Final = 0x1000
+_HEARTBEAT_TIME: Final = 0x1017
 _DEVICE_NAME: Final = 0x1008
 _IDENTITY: Final = 0x1018
 
@@ -160,6 +161,7 @@ class NodeFound:
         name: 1008h, empty if it has none.
         state: what it reported last, None if it reported nothing.
         answers: to one question; with two there are two nodes of this node-ID.
+        heartbeat_ms: 1017h, None if it has none.
     """
 
     node_id: int
@@ -168,6 +170,7 @@ class NodeFound:
     name: str = ""
     state: NmtState | None = None
     answers: int = 1
+    heartbeat_ms: int | None = None
 
 
 @dataclass(slots=True)
@@ -232,6 +235,7 @@ class NetworkScan:
             *(node_id, self._types.get(node_id), identity, name),
             state=self.bus.states.get(node_id),
             answers=self._answers[node_id],
+            heartbeat_ms=self._number(node_id, _HEARTBEAT_TIME, 0),
         )
 
     def _number(self, node_id: int, index: int, sub: int) -> int | None:

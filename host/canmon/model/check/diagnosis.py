@@ -11,7 +11,7 @@
 # ===================
 #
 # The checker (checker.py) holds each frame against rules that somebody gave. Here nobody gave
-# any: what is usual is learnt from the log itself, so all frames are kept (34 bytes each) and
+# any: what is usual is learnt from the log itself, so all frames are kept (35 bytes each) and
 # judged at the end. A bus is judged in four steps:
 #
 # 1. Times. A single time that is out of order is a finding and gets that of its neighbour; a

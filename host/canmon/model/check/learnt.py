@@ -44,6 +44,7 @@ _JITTERS: Final = 4
 _LEAST_JITTER_US: Final = 500
 _PERIOD: Final = re.compile(r"([^±+]+)(?:±|\+-)([0-9]{1,3})%")
 _MOST_USUAL: Final = 50
+_HEARTBEAT: Final = 0x700
 KEPT_FRAMES: Final = 1_000
 """So many frames of a finding are kept."""
 
@@ -159,6 +160,7 @@ class LearntBus:
         boot_order: groups of node-IDs.
         bits_per_second: at most; None for any.
         usual: findings that are none.
+        others: CAN-IDs that are not among the frames may come.
     """
 
     frames: Mapping[int, _LearntFrame]
@@ -166,6 +168,7 @@ class LearntBus:
     boot_order: tuple[tuple[int, ...], ...] = ()
     bits_per_second: int | None = None
     usual: frozenset[str] = frozenset()
+    others: bool = False
 
     def is_usual(self, hit: Hit) -> bool:
         """Say whether a finding is usual."""
@@ -242,6 +245,32 @@ def _bus_lines(bus: BusSummary) -> Iterator[str]:
             yield "required = true"
 
 
+def scanned_text(
+    bus: str, nodes: Mapping[int, tuple[Sequence[int | None], int | None]], head: Sequence[str]
+) -> str:
+    """Write what is known of nodes that were asked, as rules.
+
+    Args:
+        bus: its name.
+        nodes: by node-ID, 1018h:01 to 04 and the producer heartbeat time in ms.
+        head: lines of the comment at the beginning.
+    """
+    table = f"learnt.{_key(bus)}"
+    lines = [f"# {one}" for one in head]
+    lines += ["", f"[{table}]", "others = true # CAN-IDs that are not listed may come"]
+    for node, (identity, heartbeat_ms) in sorted(nodes.items()):
+        lines += ["", f"[{table}.node.{node}]"]
+        for name, value in zip(IDENTITY, identity, strict=False):
+            if value is not None:
+                # A spare part has another serial number.
+                lines.append(f"{'# ' * (name == IDENTITY[-1])}{name} = 0x{value:08X}")
+        if heartbeat_ms:
+            lines += ["", f"[{table}.frame.{_HEARTBEAT + node:03X}] # heartbeat of node {node}"]
+            lines += ["lengths = [1]", f'kind = "{CYCLIC}"']
+            lines += [f'period = "{heartbeat_ms}ms±{_TOLERANCE}%"', "required = true"]
+    return "\n".join(lines) + "\n"
+
+
 def _key(text: str) -> str:
     if re.fullmatch(r"[A-Za-z0-9_-]+", text):
         return text
@@ -274,7 +303,8 @@ def parse_learnt(text: str) -> Learnt | None:
 
 
 def _bus(words: Mapping[str, Any], place: str) -> LearntBus:
-    _known(words, ("bits_per_second", "boot_order", "usual", "node", "frame"), place)
+    _known(words, ("bits_per_second", "boot_order", "usual", "others", "node", "frame"), place)
+    others = _truth(words.get("others", False), f"{place}.others")
     most = words.get("bits_per_second")
     if most is not None:
         most = _whole(most, f"{place}.bits_per_second", 1 << 40)
@@ -296,7 +326,7 @@ def _bus(words: Mapping[str, Any], place: str) -> LearntBus:
         for group in _list(words.get("boot_order", []), f"{place}.boot_order")
     )
     usual = frozenset(_texts(words.get("usual", []), f"{place}.usual"))
-    return LearntBus(frames, nodes, order, most, usual)
+    return LearntBus(frames, nodes, order, most, usual, others)
 
 
 def _node(value: object, place: str) -> _LearntNode:
@@ -317,13 +347,18 @@ def _frame(value: object, place: str) -> _LearntFrame:
         for one in _list(words.get("lengths", []), f"{place}.lengths")
     )
     kind, required = words.get("kind", _EVENT), words.get("required", False)
+    required = _truth(required, f"{place}.required")
     if kind not in _KINDS:
         raise ValueError(f"{place}.kind = {kind!r} is none of {', '.join(_KINDS)}")
-    if not isinstance(required, bool):
-        raise ValueError(f"{place}.required = {required!r} is not true or false")
     period = _period(words["period"], f"{place}.period") if "period" in words else None
     jitter = _us(words["jitter"], f"{place}.jitter") if "jitter" in words else None
     return _LearntFrame(lengths, kind, period, jitter, required)
+
+
+def _truth(value: object, place: str) -> bool:
+    if not isinstance(value, bool):
+        raise ValueError(f"{place} = {value!r} is not true or false")
+    return value
 
 
 def _period(value: object, place: str) -> tuple[int, int]:
@@ -413,7 +448,8 @@ def broken(
             text = f"{ident_text(ident)} is missing"
             yield Hit("learnt-frames", node_of(ident), ident, text, (last_row,))
     for ident, frame in sorted(bus.frames.items()):
-        if ident not in learnt.frames and frame.service and node_of(ident) in learnt.nodes:
+        expected = learnt.others or (frame.service and node_of(ident) in learnt.nodes)
+        if ident not in learnt.frames and expected:
             continue  # an EMCY, or SDO: rules of their own
         if ident not in learnt.frames:
             text = f"{ident_text(ident)} is new"

@@ -6,6 +6,7 @@ import json
 import subprocess
 import sys
 from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,15 +14,23 @@ import pytest
 from click.testing import CliRunner, Result
 
 from tests.environment import ROOT
-from tickrig.device import make_epos
+from tickrig.device import make_epos, make_f_palette
+from tickrig.emulators.can.outside.host import CanHost
+from tickrig.emulators.can.wire import CanWire
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.emulators.testing.conformance.conformance import SlaveBench
 from tickrig.host.canmon.cli import main
+from tickrig.host.canmon.conform.conform_source import ConformSource
+from tickrig.host.canmon.model.frames import Record
+from tickrig.host.canmon.model.logs.log_writer import write_log
 from tickrig.host.canmon.net import node_objects, session
 from tickrig.host.canmon.net.group import VERBS
 from tickrig.host.canmon.net.node_objects import NamedObjects
+from tickrig.host.canmon.workspace import MonitorSetup, Workspace
 from tickrig.host.canopen.bus_file.bus_file import read_bus_file
 from tickrig.host.cli.start import load
-from tickrig.wire.can import CanFrame
+from tickrig.wire.can import CanFrame, ErrorFrame
 from tickrig.wire.canopen.eds.eds_writer import write_eds
 from tickrig.wire.canopen.sdo_frame import ClientCommand
 
@@ -125,6 +134,144 @@ def test_a_bus_file_that_is_there_stays_unless_forced(rig: str, tmp_path: Path) 
     assert net(rig, *words, "--force").exit_code == 0
     assert "epos_5:" in bus.read_text()
     assert {path.name for path in tmp_path.iterdir()} == {"bus.yml", "eds", "bench.toml"}
+
+
+def test_a_scan_is_written_as_a_workspace(rig: str, tmp_path: Path) -> None:
+    path, folder = tmp_path / "screen.toml", _eds_folder(tmp_path)
+    result = net(rig, "scan", "--workspace", str(path), "--eds-dir", str(folder))
+    assert result.exit_code == 0, result.output
+    assert "node 16: no EDS in " in result.stderr
+    assert "is no bus that canmon tui could open: written without" in result.stderr
+    setup = MonitorSetup.read(Workspace.read(path))
+    assert setup.source == ()
+    assert [(node, file.resolve()) for node, file in setup.eds.items()] == [
+        (5, (folder / "drive.eds").resolve())
+    ]
+    assert [one.resolve() for one in setup.eds_dir] == [folder.resolve()]
+
+
+POLLED = ("1018h:01", "1018h:02", "1018h:03")
+
+
+class TwoNodes:
+    """A drive and a module on a bus whose frames are kept."""
+
+    def __init__(self) -> None:
+        wire, self.records = CanWire(1_000_000), list[Record]()
+        wire.observers.append(self._take)
+        drive, module = make_epos(5), make_f_palette(16)
+        self.rig = Rig(Station(drive, wire.end()), Station(module, wire.end()))
+        self.source = ConformSource(CanHost(self.rig, wire.end()), "can0", "a bus", virtual=True)
+        self.rig.run_for(1_000_000)
+
+    def _take(self, at_us: int, frame: CanFrame | ErrorFrame) -> None:
+        self.records.append(Record(at_us, "can7", frame))
+
+    def log(self, path: Path) -> str:
+        """Let a master read what the nodes are, for three seconds; write all frames as a log."""
+        self.records.clear()
+        for node in ("5", "16"):
+            assert net("can0", "read", node, *POLLED).exit_code == 0
+        self.rig.run_for(3_000_000)
+        return _log(path, self.records)
+
+
+def _log(path: Path, records: Sequence[Record]) -> str:
+    with closing(write_log(path)) as log:
+        for record in records:
+            log.write(record)
+    return str(path)
+
+
+@pytest.fixture
+def two(monkeypatch: pytest.MonkeyPatch) -> TwoNodes:
+    """A bus of two nodes in virtual time, as can0."""
+    bench = TwoNodes()
+    monkeypatch.setattr(session, "open_conform_source", lambda *words: bench.source)
+    for node, time_ms in (("5", "100"), ("16", "250")):
+        assert net("can0", "write", node, f"1017h=u16:{time_ms}").exit_code == 0
+    return bench
+
+
+def _found(*words: object) -> tuple[int, set[tuple[str, int | None]]]:
+    """Return the exit status of a check, and the rules and nodes of its findings."""
+    result = CliRunner().invoke(main, ["check", *map(str, words), "--jsonl"])
+    findings = [json.loads(line) for line in result.stdout.splitlines()]
+    return result.exit_code, {(one["rule"], one["node"]) for one in findings}
+
+
+def test_a_scan_is_written_as_rules_that_the_next_log_keeps(two: TwoNodes, tmp_path: Path) -> None:
+    rules, screen = tmp_path / "rules.toml", tmp_path / "screen.toml"
+    result = net("can0", "scan", "--rules", str(rules), "--workspace", str(screen))
+    assert result.exit_code == 0, result.output
+    assert result.stderr.splitlines()[-2:] == [
+        f"{rules}: 2 nodes written",
+        f"{screen}: 0 EDS files written",
+    ]
+    assert MonitorSetup.read(Workspace.read(screen)).source == ("can0",)
+    assert rules.read_text("utf-8").splitlines()[3:] == [
+        "[learnt.can0]",
+        "others = true # CAN-IDs that are not listed may come",
+        "",
+        "[learnt.can0.node.5]",
+        "vendor = 0x00000000",
+        "product = 0x00006210",
+        "revision = 0x00010000",
+        "# serial = 0x00000001",
+        "",
+        "[learnt.can0.frame.705] # heartbeat of node 5",
+        "lengths = [1]",
+        'kind = "cyclic"',
+        'period = "100ms±20%"',
+        "required = true",
+        "",
+        "[learnt.can0.node.16]",
+        "vendor = 0x00000000",
+        "product = 0x00000001",
+        "revision = 0x00010000",
+        "# serial = 0x00000001",
+        "",
+        "[learnt.can0.frame.710] # heartbeat of node 16",
+        "lengths = [1]",
+        'kind = "cyclic"',
+        'period = "250ms±20%"',
+        "required = true",
+    ]
+    good = two.log(tmp_path / "good.log")
+    assert _found(good, rules) == (0, set())
+    records = two.records
+    of_module = {0x710, 0x590, 0x610}
+    gone = _log(tmp_path / "gone.log", [one for one in records if _id(one) not in of_module])
+    assert _found(gone, rules) == (1, {("learnt-nodes", 16), ("learnt-frames", 16)})
+    other = [
+        one._replace(frame=CanFrame(_id(one), data.replace(b"\x10\x62", b"\x11\x62")))
+        for one in records
+        if isinstance(one.frame, CanFrame)
+        for data in (one.frame.data,)
+    ]
+    found = _found(_log(tmp_path / "other.log", other), rules)
+    assert found == (1, {("learnt-identity", 5)})
+    new = [*records, records[-1]._replace(frame=CanFrame(0x707, b"\5"))]
+    assert ("learnt-nodes", 7) in _found(_log(tmp_path / "new.log", new), rules)[1]
+    assert net("can0", "write", "5", "1017h=u16:150").exit_code == 0
+    found = _found(two.log(tmp_path / "slow.log"), rules)
+    assert found == (1, {("learnt-period", 5)})
+
+
+def _id(record: Record) -> int:
+    assert isinstance(record.frame, CanFrame)
+    return record.frame.can_id
+
+
+def test_files_of_a_scan_are_not_overwritten(rig: str, tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text("mine")
+    for option in ("--workspace", "--rules"):
+        result = net(rig, "scan", option, str(path))
+        assert (result.exit_code, result.stdout) == (2, "")
+        assert f"{option} {path} is there already: choose another name" in result.stderr
+        assert net(rig, "scan", option, str(path), "--force").exit_code == 0
+        assert "mine" not in path.read_text("utf-8")
 
 
 @pytest.mark.parametrize("there", ["nosuch/bus.yml", "eds"])
@@ -339,8 +486,11 @@ def test_an_eds_of_another_device_is_told(rig: str, tmp_path: Path) -> None:
         (("red", "5"), 2, "No such command 'red'"),
         (("scan", "--write", "b.yml"), 2, "--write: a bus.yml needs the EDS of each node: give"),
         (("scan", "--write", "b.yml", "--eds-dir", "nosuch"), 2, "--eds-dir nosuch: No such file"),
-        (("scan", "--eds-dir", "."), 2, "--eds-dir is for --write FILE"),
-        (("scan", "--force"), 2, "--force is for --write FILE"),
+        (("scan", "--eds-dir", "."), 2, "--eds-dir is for --write FILE, or --workspace FILE"),
+        (("scan", "--rules", "r", "--eds-dir", "."), 2, "--eds-dir is for --write FILE, or"),
+        (("scan", "--force"), 2, "--force is for --write FILE, --workspace FILE or --rules FILE"),
+        (("scan", "--rules", "no/r"), 2, "--rules no: No such file"),
+        (("scan", "--rules", "r", "--workspace", "./r"), 2, "one file for two: choose another"),
         (("scan", "--wait", "x"), 2, "--wait 'x' is not a time"),
         (("scan", "--wait", "5"), 2, "--wait '5' has no unit: write 5s, 5ms or 5us"),
     ],
