@@ -9,6 +9,7 @@ from math import isnan
 from typing import TYPE_CHECKING, Any, Final
 
 import click
+from click.core import ParameterSource
 
 from tickrig._version import __version__
 from tickrig.host.cli.start import load, loading, standard_streams
@@ -56,6 +57,22 @@ def add_options(*options: Decorator) -> Decorator:
         return command
 
     return decorate
+
+
+def refuse_idle(why: str, *names: str) -> None:
+    """Refuse options of the present command that were given and would do nothing.
+
+    Args:
+        why: what they do nothing with, as `--jsonl has its own times`.
+        names: of the parameters.
+    """
+    from tickrig.host.cli.messages import Refused  # noqa: PLC0415 - a TAB needs none
+
+    context = click.get_current_context()
+    for parameter in context.command.params:
+        source = context.get_parameter_source(parameter.name or "")
+        if parameter.name in names and source is ParameterSource.COMMANDLINE:
+            raise Refused(f"{max(parameter.opts, key=len)} does nothing here: {why}")
 
 
 class NumberRange(click.FloatRange):

@@ -778,6 +778,11 @@ def open_live(
     ), opened
 
 
+def is_live(word: str) -> bool:
+    """Say whether a SOURCE word names something that goes on: no log file."""
+    return not isinstance(parse_source(word), FileSpec)
+
+
 def log_path(word: str) -> Path:
     """Return the log file that a word names; Refused if it names none."""
     parsed = parse_source(word)

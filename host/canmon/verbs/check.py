@@ -45,7 +45,7 @@ from tickrig.host.canmon.sources.source import (
 from tickrig.host.canmon.verbs import decode_options
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.messages import Refused, refuse_path, refusing, until_unread
-from tickrig.host.cli.options import PATH, Decorator, add_options
+from tickrig.host.cli.options import PATH, Decorator, add_options, refuse_idle
 from tickrig.host.text.page_text import json_text, one_line
 from tickrig.host.text.toml_reader import read_toml
 from tickrig.host.text.values import counted
@@ -369,6 +369,7 @@ def command(  # noqa: PLR0913 - options
     files = [Path(word) for word in source if word.endswith(_RULE_FILE)]
     known = _read_learnt(files, options, init=init)
     rules = Rules() if known or init else _read_rules(files, options)
+    _refuse_idle(rules, init=init, jsonl=jsonl)
     bus = BusOptions(**{name: options[name] for name in _NAMES})
     bit_rate = _bit_rate(rules, words, bus)
     objects = decode_options.read_eds_files(eds) if any(eds) else {}
@@ -585,6 +586,24 @@ def _fault_json(fault: diagnosis.BusFault) -> str:
         },
         letters=True,
     )
+
+
+_SHOWN_BY: Final = ("around", "most", "report_path", "sarif_path", "jsonl", "stamp")
+"""Options of how findings are shown."""
+
+
+def _refuse_idle(rules: Rules, *, init: bool, jsonl: bool) -> None:
+    """Refuse options that would do nothing."""
+    if init:
+        refuse_idle("--init shows no finding", *_SHOWN_BY)
+    else:
+        refuse_idle("it is for the rules of --init", "output")
+    if jsonl:
+        refuse_idle("--jsonl has its own times, and all findings", "stamp", "most")
+    if not _is_empty(rules):
+        refuse_idle("with rules all findings are shown", "most")
+    if not rules.expressions:
+        refuse_idle("it is for a --rule", "around", "dbc")
 
 
 class _NothingJudged(click.ClickException):

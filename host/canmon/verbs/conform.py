@@ -12,7 +12,7 @@ import click
 from tickrig._lazy import LazyModule
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
 from tickrig.host.cli.messages import until_unread
-from tickrig.host.cli.options import PATH, Decorator, add_options
+from tickrig.host.cli.options import PATH, Decorator, add_options, refuse_idle
 from tickrig.host.cli.start import loading
 
 if TYPE_CHECKING:
@@ -150,6 +150,8 @@ def command(context: click.Context, /, source: str | None, **options: Any) -> No
     bus = BusOptions(**{name: options.pop(name) for name in named})
     options["level"] = _level(options)
     if options["lists"]:
+        others = {one.name or "" for one in context.command.params} - {"only", "eds", "lists"}
+        refuse_idle("--list judges nothing", *others)
         _list(options["only"], options["eds"] if isinstance(options["eds"], Path) else None)
         return
     context.exit(conformance.Conformance(source, bus, options).run())

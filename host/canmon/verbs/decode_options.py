@@ -18,10 +18,10 @@ import click
 from tickrig._lazy import LazyModule
 from tickrig.host.canmon import eds_document
 from tickrig.host.canmon.model.frames import LogTime, parse_log_time
-from tickrig.host.canmon.sources.source import LogCut
+from tickrig.host.canmon.sources.source import BusSpec, FileSpec, LogCut, parse_source
 from tickrig.host.cli.can_options import BusCommand, bus_options, fd_options
 from tickrig.host.cli.messages import Refused, refusing, say
-from tickrig.host.cli.options import PATH, Decorator, add_options
+from tickrig.host.cli.options import PATH, Decorator, add_options, refuse_idle
 
 if TYPE_CHECKING:
     from tickrig.host.canmon import extensions
@@ -193,9 +193,29 @@ def source_command(*options: Decorator) -> Callable[[Callable[..., Any]], click.
     add = add_options(source, *options, strict_option, bus_options, fd_options)
 
     def decorate(function: Callable[..., Any]) -> click.Command:
-        return explained(click.command(cls=BusCommand)(add(function)))
+        @functools.wraps(function)
+        def checked(*, source: Sequence[str], **options: object) -> object:
+            refuse_idle_of_bus(source)
+            return function(source=source, **options)
+
+        return explained(click.command(cls=BusCommand)(add(checked)))
 
     return decorate
+
+
+def refuse_idle_of_bus(source: Sequence[str]) -> None:
+    """Refuse options that open a bus where SOURCE words name none."""
+    words = [word for word in source if not word.endswith(".toml")]
+    parsed = [parse_source(word) for word in words]
+    if not parsed:
+        return
+    if all(isinstance(word, FileSpec) for word in parsed):
+        refuse_idle("a log does not go away", "reopen")
+    if not any(isinstance(word, BusSpec) for word in parsed):
+        refuse_idle(f"{words[0]} is no bus", "reopen" if parsed == [None] else "", *_OPENS)
+
+
+_OPENS: Final = ("interface", "channel", "timing", "bus_kwargs", "fd")
 
 
 def explained(command: click.Command) -> click.Command:

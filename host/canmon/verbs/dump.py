@@ -40,6 +40,7 @@ from tickrig.host.canmon.sources.source import (
     LineSpec,
     LogCut,
     PieceLog,
+    is_live,
     open_any,
     open_source,
     parse_source,
@@ -48,7 +49,7 @@ from tickrig.host.canmon.sources.source import (
 from tickrig.host.canmon.verbs import decode_options
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.messages import Refused, until_unread
-from tickrig.host.cli.options import PATH, add_options
+from tickrig.host.cli.options import PATH, add_options, refuse_idle
 from tickrig.host.cli.start import INTERRUPTED
 from tickrig.host.links.ready import ready
 
@@ -199,6 +200,7 @@ def dump(  # noqa: PLR0913 - options
         raise Refused(
             "a log holds frames alone: a serial port is shown, or goes into --jsonl, --csv"
         )
+    _refuse_idle(source, output, file, raw=raw, filtered=wanted is not None)
     chosen, form, bus = (
         decode_options.read_filter(wanted),
         printer.DumpFormat(output or ""),
@@ -242,6 +244,27 @@ def dump(  # noqa: PLR0913 - options
     report(frames, strict, meaning.messages())
     if not signals.came:
         expect_frames(frames, meaning)
+
+
+_TEXT_ONLY: Final = ("stamp", "extra")
+_DECODES: Final = ("eds", "eds_folders", "dbc")
+
+
+def _refuse_idle(
+    source: Sequence[str], output: str | None, file: Path | None, *, raw: bool, filtered: bool
+) -> None:
+    """Refuse options that would do nothing."""
+    if file is not None:
+        refuse_idle("-l shows nothing", *_TEXT_ONLY, "errors", "raw")
+    elif output:
+        option = "-L" if output == printer.DumpFormat.LOG else f"--{output}"
+        refuse_idle(f"{option} writes all of a frame, with its time", *_TEXT_ONLY)
+        if output == printer.DumpFormat.LOG:
+            refuse_idle("-L writes bytes alone", "errors", "raw")
+    if not filtered and file is None and (raw or output == printer.DumpFormat.LOG):
+        refuse_idle("bytes alone are shown, and no -F asks what they mean", *_DECODES)
+    if source and not any(map(is_live, source)):
+        refuse_idle("a log ends by itself", "quiet_ms")
 
 
 def _pass_pieces(
@@ -334,6 +357,8 @@ def conv(  # noqa: PLR0913 - options
     """  # noqa: D301 - click wants the backspace
     if not source:  # click takes the last word as LOG
         raise click.UsageError("Missing argument 'LOG'.")
+    if wanted is None:
+        refuse_idle("a log holds bytes alone, and no -F asks what they mean", *_DECODES)
     chosen = decode_options.read_filter(wanted)
     decoder = None if chosen is None else decode_options.make_decoder(eds, dbc)
     meaning = FilteredDecoder(decoder, chosen)

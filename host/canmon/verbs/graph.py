@@ -43,17 +43,18 @@ from tickrig.host.canmon.output.listening import (
     span_option,
     take_blocks,
 )
-from tickrig.host.canmon.sources.source import BlockLog, block_log, open_source
+from tickrig.host.canmon.sources.source import BlockLog, block_log, is_live, open_source
 from tickrig.host.canmon.verbs.decode_options import (
     decode_options,
     explained,
     log_time_option,
     make_decoder,
+    refuse_idle_of_bus,
     strict_option,
 )
 from tickrig.host.cli.can_options import BusOptions, bus_options, fd_options
 from tickrig.host.cli.messages import Refused, refusing
-from tickrig.host.cli.options import PATH, time_option
+from tickrig.host.cli.options import PATH, refuse_idle, time_option
 from tickrig.host.cli.start import paint
 from tickrig.host.text.names import closest
 from tickrig.host.text.page_text import one_line
@@ -103,8 +104,11 @@ class _GraphRequest:
         """
         whole = View.of(series)
         origin_us = whole.from_us if first_us is None else first_us
-        from_us = whole.from_us if self.begin is None else self.begin.after(origin_us)
-        to_us = max(whole.to_us, from_us + 1) if self.end is None else self.end.after(origin_us)
+        to_us = whole.to_us if self.end is None else self.end.after(origin_us)
+        from_us = min(whole.from_us, to_us - 1)
+        if self.begin is not None:
+            from_us = self.begin.after(origin_us)
+            to_us = max(to_us, from_us + 1) if self.end is None else to_us
         with refusing():
             at_us = None if self.at is None else self.at.after(origin_us)
             return View(from_us, to_us, self.ranges, at_us, origin_us)
@@ -198,12 +202,16 @@ def command(source: str, signals: Sequence[str], **options: Any) -> None:
         words = [parse_signal(text) for text in signals]
     eds, dbc, strict = (options.pop(name) for name in ("eds", "dbc", "strict"))
     bus = BusOptions(**options)
+    refuse_idle_of_bus([source])
+    slices = all(isinstance(word.source, FrameSlice) for word in words)
+    if words and slices:
+        refuse_idle("slices have no names", "eds", "eds_folders", "dbc")
+    _refuse_idle(source, request, listed=not words)
     if not words:
         _list(source, make_decoder(eds, dbc), bus, request, strict=strict)
         return
     rates = bit_rates_of([source], bus)
-    slices = all(isinstance(word.source, FrameSlice) for word in words)
-    decoder = None if slices and not eds and not dbc else make_decoder(eds, dbc)
+    decoder = None if slices else make_decoder(eds, dbc)
     log = block_log([source]) if slices else None
     collector = Collector(words)
     whole = log is not None and take_blocks(log, collector.take_columns, request.span_us)
@@ -220,6 +228,22 @@ def command(source: str, signals: Sequence[str], **options: Any) -> None:
     report(frames, strict)
     if not shown and (frames.recorded or not frames.live):
         raise click.exceptions.Exit(_NOTHING_SHOWN)
+
+
+_OF_PICTURES: Final = ("title", "size", "ranges", "at")
+_OF_VIEWS: Final = (*_OF_PICTURES, "files", "begin", "end", "window_us")
+
+
+def _refuse_idle(source: str, request: _GraphRequest, *, listed: bool) -> None:
+    """Refuse options that would do nothing."""
+    if listed:
+        refuse_idle("without a SIGNAL the signals are listed", *_OF_VIEWS)
+    if not request.files:
+        refuse_idle("it is of a picture, so it wants -o FILE", "title", "size")
+    elif all(file.suffix.lower() == ".csv" for file in request.files):
+        refuse_idle("a CSV is no picture", *_OF_PICTURES)
+    if not is_live(source):
+        refuse_idle("it is of a bus; a log has --from and --to", "window_us")
 
 
 def _refuse_missing(source: str, collector: Collector) -> None:

@@ -23,6 +23,7 @@ from tickrig.host.canmon.sources.source import log_path
 from tickrig.host.canmon.verbs.decode_options import log_time_option
 from tickrig.host.cli.can_options import BusOptions, bus_options, fd_options
 from tickrig.host.cli.messages import Refused, SourceFailed, refusing, until_unread
+from tickrig.host.cli.options import refuse_idle
 from tickrig.wire.can import CanFrame, ErrorFrame, FdFrame
 from tickrig.wire.errors import FieldError, WireError
 
@@ -200,6 +201,8 @@ def command(log: str, buses: Sequence[str], step: bool, **options: Any) -> None:
     canmon play run.log vcan2=can0 vcan3=can1 --speed 2 --loop forever
     canmon play run.blf can0 --from 3s --to 9s --wait-rx 581
     """  # noqa: D301 - click wants the backspace
+    if step:
+        refuse_idle("--step waits for Enter, not for a time", "speed")
     wait_rx = _can_id(options.pop("wait_rx"))
     words, route = _routes(buses, options["channel"])
     path = log_path(log)

@@ -16,6 +16,7 @@ from tickrig.host.canmon.output.listening import Pace, until_interrupted
 from tickrig.host.canmon.verbs.decode_options import EdsOptions, eds_option, read_eds_files
 from tickrig.host.cli.can_options import BusOptions, bus_and_rest, bus_options, fd_options
 from tickrig.host.cli.messages import Refused, SourceFailed, refusing, until_unread
+from tickrig.host.cli.options import refuse_idle
 from tickrig.host.links.link import LinkClosed
 from tickrig.host.text.values import parse_time_with_unit_us
 from tickrig.wire.can import CanFrame, FdFrame, LogLine, parse_sent
@@ -67,6 +68,8 @@ def command(words: Sequence[str], eds: EdsOptions, **options: Any) -> None:
     if bus is None and "#" not in frames[0] and "pdo" not in frames[0]:
         raise Refused(f"-c {options['channel']} names the bus: leave out {frames[0]}, or -c")
     made = _frames(frames, eds, partial(_read_nodes, bus, BusOptions(**options)))
+    if all("#" in frame for frame in frames):
+        refuse_idle("frames by their bytes have no names", "eds", "eds_folders")
     period_us = _period_us(every, count)
     cyclic = _cyclic(made, period_us, count or (0 if every else 1), fields)
     with (

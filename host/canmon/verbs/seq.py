@@ -30,6 +30,7 @@ from tickrig.host.canmon.output.listening import Pace, until_interrupted
 from tickrig.host.canmon.verbs.decode_options import eds_option, read_eds_files
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_and_rest, bus_options
 from tickrig.host.cli.messages import Refused, refuse_path, until_unread
+from tickrig.host.cli.options import refuse_idle
 from tickrig.host.text.steps import StepError
 from tickrig.wire.can import Frames
 
@@ -99,6 +100,7 @@ def command(context: click.Context, /, words: Sequence[str], **options: Any) -> 
     watch = ConditionDecoder(read_eds_files(eds))
     sequence = _read(file, variables, watch)
     if dry_run:
+        refuse_idle("--dry-run prints the steps, and nothing else", "quiet")
         click.echo("\n".join(outline(sequence.steps)))
         return
     run = SequenceRun(sequence)

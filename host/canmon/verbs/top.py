@@ -12,10 +12,11 @@ import click
 from tickrig.host.canmon.model.top_model import TopModel
 from tickrig.host.canmon.output import listening
 from tickrig.host.canmon.output.printer import FilteredDecoder
-from tickrig.host.canmon.sources.source import BlockLog, LogCut, block_log, open_any
+from tickrig.host.canmon.sources.source import BlockLog, LogCut, block_log, is_live, open_any
 from tickrig.host.canmon.verbs import decode_options
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.messages import until_unread
+from tickrig.host.cli.options import refuse_idle
 
 if TYPE_CHECKING:
     from tickrig.host.canmon.model.frames import AnyRecord
@@ -73,6 +74,8 @@ def command(  # noqa: PLR0913 - options
     if not plain:
         take = lambda records: model.take_decoded(meaning.take(records))  # noqa: E731
     cut = meaning.learning(cut)
+    if not decode and wanted is None and source and not any(map(is_live, source)):
+        refuse_idle("only -d and -F ask what frames mean", "eds", "eds_folders", "dbc")
     log = block_log(source, cut) if plain else None
     snapshot = listening.count_blocks(log, span_us)
     model.press("d" if decode else "")

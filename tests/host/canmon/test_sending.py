@@ -145,6 +145,20 @@ def test_a_replay_begins_at_a_date_and_ends_with_1_where_nothing_is(wire: Wire, 
     assert wire.all() == ["7FF#"]
 
 
+def test_options_that_would_do_nothing_are_refused(wire: Wire, log: str, tmp_path: Path) -> None:
+    steps = tmp_path / "steps.txt"
+    steps.write_text("+10 123#00\n", "ascii")
+    for words, said in (
+        (["send", wire.word, "123#", "--eds", f"5={EDS}"], "--eds does nothing here: frames by"),
+        (["play", log, wire.word, "--step", "--speed", "2"], "--speed does nothing here: --step"),
+        (["seq", wire.word, str(steps), "--dry-run", "-q"], "--quiet does nothing here: --dry-run"),
+        (["conform", "--list", "--json"], "--json does nothing here: --list judges nothing"),
+    ):
+        result = canmon(*words)
+        assert (result.exit_code, said in result.stderr) == (2, True), result.stderr
+    assert wire.all() == []
+
+
 def test_frames_are_played_one_by_one(wire: Wire, log: str) -> None:
     result = canmon("play", log, wire.word, "--step", stdin="\n\n")
     assert wire.all() == ["080#", "705#05"]

@@ -124,7 +124,7 @@ def test_times_of_a_graph_count_from_the_first_frame_or_are_dates(log: str, tmp_
         (["185[0]", "--range", "5"], "--range '5' is not AXIS=LOW..HIGH"),
         (["185[0]", "--from", "x"], "--from 'x' is not a time"),
         (["185[0]", "--from", "9s", "--to", "8s"], "shows nothing"),
-        (["185[0]", "--eds", "x"], "--eds 'x' is not NODE=FILE"),
+        (["5.position", "--eds", "x"], "--eds 'x' is not NODE=FILE"),
     ],
 )
 def test_a_graph_that_cannot_be_is_refused(log: str, words: list[str], said: str) -> None:
