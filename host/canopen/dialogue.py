@@ -2,29 +2,30 @@
 
 # Theory of operation.
 #
-# A script is a generator. It yields steps, is given what came of each, and returns
-# its result; what goes wrong is raised in it. It waits for nothing: a `Dialogue`
-# goes on with it when there is an answer, or when a time has passed.
+# A script is a generator. It yields steps, receives the result of each, and returns its own result;
+# errors are raised in it. It does not block: a `Dialogue` resumes it when an answer arrives or a
+# time has passed.
 #
 # Late answers. An SDO answer names its object, never its question: after a time-out, an answer
-# that comes late looks like the answer to the next question about the same object. All that helps
-# is order: a server answers one question after the other, and CAN keeps the order of its answers.
-# So an answer that names an object is also the proof that no answer to an earlier question can
-# follow. `Unanswered` keeps the objects whose questions may still be answered, in their order.
-# Before the dialogue asks about one of them again it reads another object, a fence (1000h, else
-# 1001h and so on), and waits for its answer. Nothing here depends on how late an answer is.
+# that comes late looks like the answer to the next question about the same object. Only the order
+# helps: a server answers one question after the other, and CAN keeps the order of its answers. So
+# an answer that names an object also proves that no answer to an earlier question can follow.
+# `Unanswered` keeps the objects whose questions may still be answered, in their order. Before the
+# dialogue asks about one of them again it reads another object, a fence (1000h, else 1001h and so
+# on), and waits for its answer. Nothing here depends on how late an answer is.
 #
-# Answers that come twice. CAN repeats a frame whose sender saw its last bit wrong, and a request
-# that is repeated is answered twice. Such a copy is sent right after its original. So the dialogue
-# waits before it asks about the object that was answered last: as long as that answer took, but at
+# Duplicate answers. CAN repeats a frame whose sender saw its last bit wrong, and a request
+# that is repeated is answered twice. Such a copy is sent right after its original. So before the
+# dialogue asks again about the object answered last, it waits: as long as that answer took, but at
 # least `LEAST_COPY_US` and at most `MOST_COPY_US`.
 #
-# Answers that name another object. A dialogue ignores them, unless its holder asks for them: then
-# an answer about an object that nobody has asked about ends the question, if the right answer does
-# not come: within `_MISNAMED_US` if no other question is open, else until the time-out. Ask for
-# them only if no other client uses the server.
+# Answers that name another object. A dialogue ignores them by default. With `on_misnamed`, an
+# answer about an object that was not asked about ends the question if the right answer does not
+# follow: within `_MISNAMED_US` if no other question is open, else until the time-out. Use it only
+# if no other client uses the server.
 #
-# What couples to what. `_unanswered` lasts as long as the dialogue, all else as long as a step:
+# What couples to what. `_unanswered` lasts as long as the dialogue, everything else as long as a
+# step:
 #
 #   _step        what the script waits for; None between scripts
 #   _expected    the object whose answer is awaited: that of the step, or a fence before it
@@ -33,7 +34,7 @@
 #   due_us       the time-out of the step, or the end of a pause, or of the wait for a copy
 #
 # `_expected` differs from the object of the step only while a fence is open. `clear` ends the
-# scripts and keeps `_unanswered`: the questions stay open, whoever asked them.
+# scripts and keeps `_unanswered`: the questions stay open, no matter which script asked them.
 #
 # Where the numbers come from. CiA 301 gives no SDO time-out; 500 ms is our choice. A copy
 # follows its original within the time of the repeated request, so the wait is bounded by the time
@@ -55,7 +56,7 @@ from tickrig.wire.instant import NEVER
 SDO_TIMEOUT_US: Final = 500_000
 
 LEAST_COPY_US: Final = 2_000
-"""How long a copy of an answer may take: an error frame and the frame again, at 125 kbit/s."""
+"""How long a copy of an answer may take: an error frame and the repeated frame at 125 kbit/s."""
 _MOST_COPY_US: Final = 20_000
 _MISNAMED_US: Final = 100_000
 """How long the right answer may follow one that names another object, as a late copy does."""
@@ -64,22 +65,22 @@ Object = tuple[int, int]
 """Index and sub-index."""
 
 _NONE_NAMED: Final = (0, 0)
-"""In the abort of a server that could not read a request."""
+"""What the abort of a server names that could not parse a request."""
 
 FENCES: Final[tuple[Object, ...]] = (
     *((index, 0) for index in (0x1000, 0x1001, 0x1018)),
     *((0x1018, sub) for sub in range(1, 5)),
     *((0x1000, sub) for sub in range(1, 0xFF)),
 )
-"""Objects that may be read at any time; every server answers, and be it with an abort."""
+"""Objects that may be read at any time; every server answers, if only with an abort."""
 
 
-@dataclass(slots=True)  # not frozen: each transfer makes some, and that takes thrice as long
+@dataclass(slots=True)  # not frozen: frozen requests take three times as long to create
 class SdoRequest:
-    """Send an SDO request; gives the response, raises SdoTimeout without one.
+    """Send an SDO request; gives the response, raises SdoTimeout if there is none.
 
     Attributes:
-        goes_on: it belongs to a transfer that the server has begun; else it begins one.
+        goes_on: the request continues a transfer of the server; else it starts one.
     """
 
     request: bytes
@@ -104,7 +105,7 @@ class NmtRequest:
 
 @dataclass(frozen=True, slots=True)
 class AwaitState:
-    """Wait until a heartbeat or boot-up says a state; raises StateTimeout."""
+    """Wait until a heartbeat or boot-up reports a state; raises StateTimeout."""
 
     state: NmtState
     timeout_us: int
@@ -112,7 +113,7 @@ class AwaitState:
 
 @dataclass(frozen=True, slots=True)
 class AwaitReport:
-    """Wait for any heartbeat, or answer to guarding; gives its state, None without one.
+    """Wait for any heartbeat or node guarding response; gives its state, None if there is none.
 
     Attributes:
         timeout_us: how long to wait.
@@ -125,7 +126,7 @@ class AwaitReport:
 
 @dataclass(frozen=True, slots=True)
 class Guard:
-    """Ask for the state by node guarding."""
+    """Request the state by node guarding."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,7 +141,7 @@ Step = SdoRequest | SdoFrame | NmtRequest | AwaitState | AwaitReport | Guard | P
 T = TypeVar("T")
 
 Script = Generator[Step, Any, T]
-"""A script that returns a T; it is sent what its step gives, None if that gives nothing."""
+"""A script that returns a T; it receives the result of each step, None if there is none."""
 
 Answer = sdo.Response | None
 
@@ -149,22 +150,22 @@ Send = Callable[[int, bytes], None]
 
 
 def nothing(*_: object) -> None:
-    """Do nothing: this host guards no node, or no one asks what became of a script."""
+    """Do nothing: this host guards no node, or no caller needs the result of a script."""
 
 
 Misnamed = Callable[[Object, bytes], object]
-"""Takes the object that was asked for, and the answer that names another one."""
+"""Receives the object that was asked for, and the answer that names another one."""
 
 
 class QueuedScript(NamedTuple):
-    """A script, and who is told how it ended.
+    """A script, and the callbacks for its end.
 
     Attributes:
-        what: for people.
+        what: description for messages.
         done: called with its result.
-        failed: called with what it raised.
-        dropped: called if it is forgotten before its end.
-        moves: it may change the NMT state of the node.
+        failed: called with the error that it raised.
+        dropped: called if it is dropped before its end.
+        moves: whether it may change the NMT state of the node.
     """
 
     what: str
@@ -194,9 +195,9 @@ class Unanswered(list[Object]):
     def fence(self, at: Object) -> Object:
         """Return an object whose answer shows that no answer about `at` can follow.
 
-        The latest question serves, so a node that is gone is asked for one fence again and
-        again. If all fences are open, the oldest question is forgotten: a server that answers
-        now has left more than 250 questions unanswered.
+        The latest question is preferred, so a node that is gone gets requests for the same fence.
+        If all fences are open, the oldest question is dropped: a server that answers now has left
+        more than 250 questions unanswered.
         """
         last = self[-1]
         if last in FENCES and last != at:
@@ -209,7 +210,7 @@ class Unanswered(list[Object]):
 
 
 class Dialogue:
-    """What is said with one node; it sends, and never waits.
+    """The dialogue with one node; it sends, and never blocks.
 
     It lasts as long as its holder talks to the node: only the dialogue knows which questions the
     server may still answer.
@@ -223,9 +224,9 @@ class Dialogue:
             ignores such answers.
 
     Attributes:
-        sdo_timeout_us: as given; a new one counts from the next request on.
+        sdo_timeout_us: as given; a new value takes effect with the next request.
         due_us: when a time-out or a pause ends, `NEVER` if there is none.
-        job: what is under way.
+        job: the running job.
     """
 
     def __init__(
@@ -245,17 +246,17 @@ class Dialogue:
         self._jobs: deque[QueuedScript] = deque()
         self._unanswered = Unanswered()
         self._transfer: Object | None = None
-        self._expected: Object | None = None  # about which an answer is waited for, a fence too
+        self._expected: Object | None = None  # the object whose answer is awaited, also for a fence
         self._sent_us = self._settled_us = 0
         self._answer = self._misnamed = b""
 
     @property
     def moves(self) -> bool:
-        """Whether something is under way that may change the NMT state of the node."""
+        """Whether a running job may change the NMT state of the node."""
         return self.job is not None and any(job.moves for job in (self.job, *self._jobs))
 
     def start(self, now_us: int, job: QueuedScript) -> None:
-        """Run a job when those before it have ended."""
+        """Run a job after those before it have ended."""
         self._now_us = now_us
         if self.job is None and not self._jobs:
             self.job = job
@@ -266,12 +267,12 @@ class Dialogue:
             self._next()
 
     def defer(self, span_us: int) -> None:
-        """Let what is under way last so much longer: nobody listened for so long."""
+        """Extend the running step by this time, during which nothing was received."""
         if self.due_us < NEVER:
             self.due_us += span_us
 
     def clear(self) -> None:
-        """Forget all jobs."""
+        """Drop all jobs."""
         if self.job is None:
             return
         dropped = [self.job, *self._jobs]
@@ -282,17 +283,17 @@ class Dialogue:
             job.dropped()
 
     def abort(self, code: sdo_frame.AbortCode) -> None:
-        """Forget all jobs; the node is told that the transfer under way has ended, if one was."""
+        """Drop all jobs; abort the running SDO transfer, if there is one."""
         if self.job is not None and self._transfer is not None:
             self._say(sdo.Abort(*self._transfer, code).encode())
         self.clear()
 
     def remember(self, at: Object) -> None:
-        """Take note that somebody else has asked the server about an object, and got no answer."""
+        """Record that another client asked the server about an object and got no answer."""
         self._unanswered.add(at)
 
     def receive_sdo(self, now_us: int, data: bytes) -> None:
-        """Take a response; the answer to another question, or a copy, is ignored."""
+        """Process a response; ignore the answer to another question, and copies."""
         self._now_us = now_us
         try:
             answer = sdo.parse_response(data)
@@ -318,7 +319,7 @@ class Dialogue:
             self._keep_misnamed(now_us, named, data)
 
     def _keep_misnamed(self, now_us: int, named: Object | None, data: bytes) -> None:
-        """Keep an answer that names another object; it counts if the right one does not follow."""
+        """Keep an answer that names another object; it is used if the right one does not follow."""
         if self._on_misnamed is None or named is None or named in self._unanswered:
             return
         self._misnamed = data
@@ -326,10 +327,10 @@ class Dialogue:
             self.due_us = min(self.due_us, now_us + _MISNAMED_US)
 
     def _end_misnamed(self, step: SdoRequest) -> sdo.Abort | errors.SdoMisnamed:
-        """Return what an answer that names another object says about the one that was asked for.
+        """Return the error for an answer that names another object than the one asked for.
 
-        An abort ends the only open transfer, whatever it names. A value may be that of another
-        object.
+        An abort ends the only open transfer, no matter which object it names. A value may belong to
+        another object.
         """
         at, data, alone = (step.index, step.sub), self._misnamed, len(self._unanswered) == 1
         self._unanswered.clear()
@@ -344,9 +345,9 @@ class Dialogue:
     def _is_answer(
         self, step: SdoRequest, answer: sdo.Response, named: Object | None, data: bytes
     ) -> bool:
-        """Return whether a response can be the answer to a step, and to nothing else.
+        """Return whether a response can only be the answer to a step.
 
-        A segment and an abort of 0000h:00 name no object. While other questions are open they may
+        A segment and an abort of 0000h:00 name no object. While other questions are open, they may
         be answers to those.
         """
         if named is not None and named != _NONE_NAMED:
@@ -357,13 +358,13 @@ class Dialogue:
         return mine and (may_repeat or not step.goes_on or data != self._answer)
 
     def _pass_fence(self, step: SdoRequest, fence: sdo.Response) -> None:
-        """Ask at last what the script asks: all earlier questions are settled."""
+        """Send the request of the script: all earlier questions are settled."""
         if isinstance(fence, sdo.UploadInitiateResponse) and fence.data is None:
             self._say(sdo.Abort(fence.index, fence.sub, sdo_frame.AbortCode.GENERAL).encode())
         self._send_request((step.index, step.sub), step.request)
 
     def receive_state(self, now_us: int, state: NmtState) -> None:
-        """Take what a heartbeat or a boot-up says."""
+        """Process a heartbeat or a boot-up."""
         self._now_us = now_us
         match self._step:
             case AwaitState() as wait if wait.state is state:
@@ -374,7 +375,7 @@ class Dialogue:
                 pass
 
     def tick(self, now_us: int) -> None:
-        """End what lasts too long."""
+        """End what has timed out."""
         self._now_us = now_us
         if now_us < self.due_us:
             return
@@ -398,7 +399,7 @@ class Dialogue:
         self._go_on(None)
 
     def _go_on(self, value: object) -> None:
-        """Give a script what came of its step, and take the steps up to one that waits."""
+        """Resume a script with the result of its step, and take its steps up to one that waits."""
         job = self.job
         assert job is not None
         self._step, self._expected, self.due_us = None, None, NEVER
@@ -416,7 +417,7 @@ class Dialogue:
             self._end(job.failed, error)
 
     def _end(self, callback: Callable[[Any], None], what: object) -> None:
-        """End a job, tell how, and go on with the next unless that began one."""
+        """End a job, call back, and start the next one unless the callback did."""
         self.job = None
         callback(what)
         if self._jobs and self.job is None:
@@ -440,7 +441,7 @@ class Dialogue:
         return self._step is not None
 
     def _request(self, step: SdoRequest) -> None:
-        """Ask what a step asks, or first what has to be asked before; or wait with it."""
+        """Send the request of a step, or first a fence; or wait before it."""
         at = step.index, step.sub
         self._step = step
         if step.goes_on:

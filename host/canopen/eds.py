@@ -10,7 +10,7 @@ from tickrig.wire.canopen.eds.eds_device import EdsDevice, read_device
 from tickrig.wire.canopen.eds.eds_file import EdsError, EdsFile, Finding, decode_text
 
 MOST_BYTES: Final = 32_000_000
-"""A larger file is no EDS."""
+"""The size above which a file is not an EDS."""
 
 
 def read_eds_bytes(path: Path) -> bytes:
@@ -18,7 +18,7 @@ def read_eds_bytes(path: Path) -> bytes:
     with path.open("rb") as file:
         data = file.read(MOST_BYTES + 1)
     if len(data) > MOST_BYTES:
-        raise EdsError([Finding(str(path), "", f"more than {MOST_BYTES:,} bytes: no EDS")])
+        raise EdsError([Finding(str(path), "", f"more than {MOST_BYTES:,} bytes: not an EDS")])
     return data
 
 
@@ -28,11 +28,11 @@ _OTHER_FILES: Final = {
     ".toml": "TOML, not an EDS; for a rig file use: tickrig check",
     ".dbc": "a DBC file, not an EDS; use: canmon dump LOG --dbc",
 }
-"""What users give in place of an EDS, by the ending, and the command that takes it."""
+"""Files that users pass in place of an EDS, by suffix, and the command that accepts them."""
 
 
 def _check_kind(path: Path, data: bytes) -> None:
-    """Raise EdsError if a file is of another kind by its name, and is no EDS by its sections."""
+    """Raise EdsError if a file is of another kind by its name and is not an EDS by its sections."""
     other = _OTHER_FILES.get(path.suffix.lower())
     if other and b"[deviceinfo]" not in data.lower():
         raise EdsError([Finding(str(path), "", f"{other} {path}")])
@@ -51,7 +51,7 @@ def open_eds(path: Path) -> EdsFile:
 
 
 def read_sheet(path: Path) -> tuple[EdsFile, EdsDevice]:
-    """Return the sections of a file and the device that they describe, of unchanged bytes once.
+    """Return the sections of a file and the device they describe; unchanged bytes are parsed once.
 
     Both are shared: read them, but do not add findings to the file.
 
@@ -72,14 +72,14 @@ def sheet_of(name: str, data: bytes) -> tuple[EdsFile, EdsDevice]:
 
 
 def read_sound(path: Path) -> tuple[EdsDevice, tuple[Finding, ...]]:
-    """Read what is sound in such a file, for a host that looks at a device or manages it.
+    """Read the valid parts of such a file, for a host that displays or manages a device.
 
     Returns:
-        The device without the objects that cannot be used, and all that is wrong in the file.
+        The device without its unusable objects, and all findings in the file.
 
     Raises:
         OSError: the file cannot be read.
-        EdsError: it has no object that can be used, or is too large.
+        EdsError: it has no usable object, or is too large.
     """
     file, device = read_sheet(path)
     if not device.entries:

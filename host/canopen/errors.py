@@ -1,18 +1,18 @@
 """Errors of the communication with a node.
 
 SdoFailed
- +-- SdoAborted                 the device or we aborted a transfer
+ +-- SdoAborted                 the device or this host aborted a transfer
  +-- SdoTimeout (TimeoutError)  the device did not answer
  +-- SdoMisnamed                the device answered, and named another object
 StateTimeout (TimeoutError)     a device did not report a state in time
-WrongIdentity                   a device is none of those that its EDS describes
+WrongIdentity                   a device is not the one that its EDS describes
 """
 
 from __future__ import annotations
 
 
 class SdoFailed(Exception):  # noqa: N818 - what the transfer did
-    """An SDO transfer that brought nothing.
+    """An SDO transfer that failed.
 
     Attributes:
         index: of the object.
@@ -28,7 +28,7 @@ class SdoAborted(SdoFailed):
     """A transfer that was aborted.
 
     Attributes:
-        code: an AbortCode, or the number as it came if it is none.
+        code: an AbortCode; an unknown code stays a number.
     """
 
     def __init__(self, index: int, sub: int, code: int) -> None:
@@ -38,10 +38,10 @@ class SdoAborted(SdoFailed):
 
 
 class SdoTimeout(SdoFailed, TimeoutError):  # noqa: N818 - a timeout, as the built-in calls it
-    """A transfer to which nobody answered.
+    """A transfer that the device did not answer.
 
     Attributes:
-        timeout_us: how long an answer was waited for.
+        timeout_us: how long the host waited for an answer.
     """
 
     def __init__(self, index: int, sub: int, timeout_us: int = 0) -> None:
@@ -50,7 +50,7 @@ class SdoTimeout(SdoFailed, TimeoutError):  # noqa: N818 - a timeout, as the bui
 
 
 class SdoMisnamed(SdoFailed):
-    """A transfer to which the device gave an answer that names another object."""
+    """A transfer that the device answered with the name of another object."""
 
     def __init__(self, index: int, sub: int) -> None:
         message = f"{index:04X}h:{sub:02X} was answered with the name of another object"
@@ -62,4 +62,4 @@ class StateTimeout(TimeoutError):  # noqa: N818 - a timeout, as the built-in cal
 
 
 class WrongIdentity(Exception):  # noqa: N818 - what the device has
-    """A device that is none of those that its EDS describes."""
+    """A device whose identity differs from the one that its EDS describes."""

@@ -38,7 +38,7 @@ from tickrig.wire.canopen.nmt import NmtCommand
 from tickrig.wire.canopen.sdo_frame import AbortCode, describe_abort
 from tickrig.wire.errors import FieldError
 
-# Why a gateway does not do what it is asked (CiA 309-3, internal error codes).
+# Why a gateway does not execute a command (CiA 309-3, internal error codes).
 
 
 class _GatewayErrorCode(IntEnum):
@@ -77,11 +77,11 @@ _TEXTS: Final = {
 
 
 class GatewayError(Exception):
-    """A command that is not carried out.
+    """A command that is not executed.
 
     Args:
         code: why.
-        text: the same for people; that of the code if empty.
+        text: the reason in words; the text of the code if empty.
     """
 
     def __init__(self, code: _GatewayErrorCode, text: str = "") -> None:
@@ -99,10 +99,10 @@ class _GatewayRequest(NamedTuple):
     """A command.
 
     Attributes:
-        sequence: number that its answer begins with.
-        numbers: what stands before the verb: nothing, a node, or a net and a node.
+        sequence: number that its answer repeats.
+        numbers: the numbers before the verb: none, a node, or a net and a node.
         verb: in lower case.
-        words: what stands behind the verb; strings without their quotes.
+        words: the words after the verb; strings without their quotes.
     """
 
     sequence: int
@@ -112,7 +112,7 @@ class _GatewayRequest(NamedTuple):
 
 
 def _sequence_of(line: str) -> int:
-    """Return the number in front of a line, 0 if there is none that could be one."""
+    """Return the sequence number of a line, 0 if it has none."""
     found = _SEQUENCE.match(line)
     return int(found[1]) if found and int(found[1]) <= _MAX_NUMBER else 0
 
@@ -121,18 +121,20 @@ def parse_request(line: str) -> _GatewayRequest | None:
     """Read a line; None for an empty one and for a comment.
 
     Raises:
-        GatewayError: it is no command.
+        GatewayError: it is not a command.
     """
     if not line.strip() or line.lstrip().startswith("#"):
         return None
     head = _SEQUENCE.match(line)
     if head is None or int(head[1]) > _MAX_NUMBER:
-        raise GatewayError(_GatewayErrorCode.SYNTAX, "a command begins with its number, as [1]")
+        raise GatewayError(
+            _GatewayErrorCode.SYNTAX, "a command begins with its number, for example [1]"
+        )
     words, numbers = _words(line[head.end() :]), list[int]()
     while words and words[0][:1].isdecimal():
         if len(numbers) == _MOST_NUMBERS:
             raise GatewayError(
-                _GatewayErrorCode.SYNTAX, "before a command stand net and node, no more"
+                _GatewayErrorCode.SYNTAX, "at most net and node may precede a command"
             )
         numbers.append(number(words.pop(0), _MAX_NUMBER, "number"))
     if not words:
@@ -141,7 +143,7 @@ def parse_request(line: str) -> _GatewayRequest | None:
 
 
 def number(word: str, most: int, what: str, least: int = 0) -> int:
-    """Read a decimal or hexadecimal number; GatewayError says what it is of."""
+    """Read a decimal or hexadecimal number; GatewayError names the quantity."""
     try:
         value = int(word, 16) if word[:2].lower() == "0x" else int(word)
     except ValueError:
@@ -152,7 +154,7 @@ def number(word: str, most: int, what: str, least: int = 0) -> int:
 
 
 def _one_of(word: str, words: Collection[str], what: str) -> str:
-    """Return a word of those that are known, in lower case."""
+    """Return one of the known words, in lower case."""
     if (lower := word.lower()) not in words:
         raise GatewayError(_GatewayErrorCode.SYNTAX, f"{what} {word!r}; known: {known(words)}")
     return lower
@@ -163,7 +165,7 @@ def _check_count(request: _GatewayRequest, least: int, most: int | None) -> None
     count = len(request.words)
     if count < least or (most is not None and count > most):
         raise GatewayError(
-            _GatewayErrorCode.SYNTAX, f"{request.verb} with {count} words behind it; see help"
+            _GatewayErrorCode.SYNTAX, f"{request.verb} with {count} arguments; see help"
         )
 
 
@@ -182,7 +184,7 @@ def _words(text: str) -> list[str]:
 
 
 HEX: Final = "hex"
-"""Bytes; of CANopenNode, and what is shown where no type is said."""
+"""Bytes: the type of CANopenNode, and the format if no type is given."""
 
 NUMBERS: Final = {
     "b": DataType.BOOLEAN,
@@ -217,7 +219,7 @@ _UNSHOWN: Final = str.maketrans("", "", "\0\r\n")
 
 
 def _data_type(word: str) -> str:
-    """Return the name of a data type, in lower case; GatewayError if it is none."""
+    """Return the name of a data type, in lower case; GatewayError if it is unknown."""
     return _one_of(word, _NAMES, "data type")
 
 
@@ -226,10 +228,10 @@ def encode(name: str, words: Sequence[str]) -> bytes:
 
     Args:
         name: of `_NAMES`.
-        words: the value as the client has written it; one but for `hex`.
+        words: the value as the client wrote it; a single word except for `hex`.
 
     Raises:
-        GatewayError: it is no value of this type.
+        GatewayError: it is not a value of this type.
     """
     text = " ".join(words)
     try:
@@ -243,15 +245,15 @@ def encode(name: str, words: Sequence[str]) -> bytes:
         return NUMBERS[name].encode(float(word) if name in REALS else _integer(word))
     except (ValueError, FieldError, Error):
         raise GatewayError(
-            _GatewayErrorCode.SYNTAX, f"{text!r} is no value of type {name}"
+            _GatewayErrorCode.SYNTAX, f"{text!r} is not a value of type {name}"
         ) from None
 
 
 def decode(name: str, data: bytes) -> str:
-    """Return what is shown of the bytes of an object; in hexadecimal if they are not of the type.
+    """Return the text for the bytes of an object; hexadecimal if they do not fit the type.
 
     Args:
-        name: of `_NAMES`, empty where the client names none.
+        name: of `_NAMES`, empty if the client names none.
         data: the bytes.
     """
     if name == _STRING:
@@ -307,7 +309,7 @@ def carry_out(bus: NodeBus, request: _GatewayRequest) -> str:
     """Carry out a command of `LSS_VERBS`, and return what is answered.
 
     Raises:
-        GatewayError: it is none, or the slave refuses or does not answer.
+        GatewayError: the command is not valid, or the slave refuses or does not answer.
         LinkClosed: the bus is gone.
     """
     scan_us = SCAN_US
@@ -378,7 +380,7 @@ def _node(lss: LssMaster, request: _GatewayRequest) -> str:
 def _scan(lss: LssMaster, request: _GatewayRequest) -> str:
     _numbers(request, 0, 1)
     if (address := lss.fastscan()) is None:
-        raise GatewayError(_GatewayErrorCode.TIME_OUT, "no slave is without a node-ID")
+        raise GatewayError(_GatewayErrorCode.TIME_OUT, "no slave lacks a node-ID")
     return _text(address)
 
 
@@ -387,7 +389,7 @@ def _all_nodes(lss: LssMaster, request: _GatewayRequest) -> str:
     words = _numbers(request, 0, 3)
     if len(words) == 2:
         raise GatewayError(
-            _GatewayErrorCode.SYNTAX, "with the first node stands 0 or 1: store or not"
+            _GatewayErrorCode.SYNTAX, "the first node is followed by 0 or 1: store or not"
         )
     (node_id, store), said = words[1:] or (2, 1), list[str]()
     with lss.at_work():
@@ -463,10 +465,10 @@ vs: visible string, in double quotes; os, us, d: base64; hex: bytes as 01 AB"""
 
 
 class Gateway:
-    """Answers the lines of one client; its settings are its own.
+    """Answers the lines of one client; each client has its own settings.
 
-    Not emulated: PDO and emergency commands, device commands such as `set heartbeat`, events
-    that nobody asked for, SDO block transfer.
+    Not emulated: PDO and emergency commands, device commands such as `set heartbeat`, unsolicited
+    events, SDO block transfer.
 
     Args:
         bus: the net.
@@ -489,7 +491,7 @@ class Gateway:
         }
 
     def answer(self, line: str) -> str:
-        """Answer a line; what comes has no end of line. Empty for an empty line and a comment."""
+        """Answer a line, given without its end of line; empty for an empty line and a comment."""
         try:
             request = parse_request(line)
             return "" if request is None else _numbered(request, self._carry_out(request))

@@ -1,37 +1,37 @@
-"""One node of a network at the host: requests to it, and its frames."""
+"""One node of a network, as the host sees it: requests to it, and its frames."""
 
 # Theory of operation.
 #
-# A node session. Whoever talks with a node for a while holds a `NodeSession`: the test master for
+# A node session. Code that talks to a node for some time holds a `NodeSession`: the test master for
 # each of its slaves, `canmon net` and the gateway for each node they talk to, the tester
 # for the node under test. It has three parts, which go together because one frame can concern all
 # three:
 #
 # - the `Dialogue`: the scripts that run, and which questions the server may still answer. It must
-#   live as long as the session. A new dialogue would take a late answer to an old question for the
-#   answer to its own.
-# - the NMT state that the node reported last. A boot-up is the report INITIALISING; the node is
-#   Pre-operational after it by itself (CiA 301, 7.3.2.2.2), so the holder decides what to store.
+#   live as long as the session. A new dialogue would mistake a late answer to an old question for
+#   the answer to its own.
+# - the NMT state that the node reported last. A boot-up reports INITIALISING; the node then enters
+#   Pre-operational by itself (CiA 301, 7.3.2.2.2), so the holder decides what to store.
 # - `ErrorControl`, if the holder supervises the node.
 #
-# One frame, one order. `receive` stores the state first and tells the dialogue second: a script
-# that waits for a state may end with this frame, and its holder reads `state` in the callback.
+# One frame, one order. `receive` first stores the state, then passes the frame to the dialogue: a
+# script that waits for a state may end with this frame, and its holder reads `state` in the
+# callback.
 #
-# Time. The session has no clock. A frame comes with the time at which it was on the bus, `tick`
-# with the time of now, and `due_us` says when `tick` has something to do. A holder with nothing
-# else to do calls `run`, which waits by itself; one with many nodes calls `tick` for each that is
-# due.
+# Time. The session has no clock. A frame carries the time at which it was on the bus, `tick` gets
+# the current time, and `due_us` is the time of the next `tick`. A holder with one node calls `run`,
+# which waits by itself; one with many nodes calls `tick` for each that is due.
 #
-# Before a script begins, `run` takes what came before: an answer in the queue of a driver does not
-# belong to this script.
+# Before a script starts, `run` receives all earlier frames: an answer in the queue of a driver does
+# not belong to this script.
 #
-# Error control (CiA 301, 7.2.8.2.2). A node has heartbeat or node guarding, never both; where the
-# holder expects a heartbeat, guarding is off. A node that falls silent is lost once, not again in
-# each period: the next loss needs a sign of life between. Guarding counts requests without an
-# answer that has the other toggle bit: an answer that repeats the toggle bit is the copy of an old
-# one.
+# Error control (CiA 301, 7.2.8.2.2). A node has heartbeat or node guarding, never both; if the
+# holder expects a heartbeat, guarding is off. A node that stops answering is reported lost once,
+# not in each period: the next loss needs a heartbeat or an answer before it. Guarding counts
+# requests without an answer that has the other toggle bit: an answer that repeats the toggle bit is
+# the copy of an old one.
 #
-# Boot-up. A boot procedure is a script, as any other, so that a session runs that of CiA 302-2
+# Boot-up. A boot procedure is a script like any other, so a session can run that of CiA 302-2
 # (`master.boot_slave.SlaveBoot`, also behind `canmon net boot`) or another one.
 
 from __future__ import annotations
@@ -52,11 +52,11 @@ _STATE_BITS: Final = 0x7F
 _TOGGLE: Final = 0x80
 
 _Listen = Callable[[int], tuple[int, StampedFrames]]
-"""Waits for a first frame until a time; returns a time, and all that had arrived by then."""
+"""Waits for a first frame until a time; returns a time, and all frames that had arrived by then."""
 
 
 def state_of(frame: CanFrame) -> NmtState | None:
-    """Return the state that a frame of error control reports; None if it reports none."""
+    """Return the state that an error control frame reports; None if it reports none."""
     try:
         return NmtState(frame.data[0] & _STATE_BITS) if len(frame.data) == 1 else None
     except ValueError:
@@ -64,18 +64,18 @@ def state_of(frame: CanFrame) -> NmtState | None:
 
 
 class ErrorControl:
-    """Finds out that a node is lost: by its heartbeat, or by node guarding.
+    """Detects the loss of a node: by its heartbeat, or by node guarding.
 
     Args:
         heartbeat_us: consumer heartbeat time, 0 for none.
         guard_us: guard time, 0 for none.
-        life_time_factor: so many requests without an answer are too many.
+        life_time_factor: the node is lost after this many requests without an answer.
         request: sends a request of node guarding.
 
     Attributes:
-        due_us: when `tick` has something to do.
+        due_us: when to call `tick` next.
         what: `heartbeat` or `guarding`.
-        silence_us: a node that is silent for so long is lost.
+        silence_us: a node that sends nothing for this time is lost.
     """
 
     def __init__(
@@ -89,16 +89,16 @@ class ErrorControl:
         self.due_us, self._unanswered, self._toggle = NEVER, 0, -1
 
     def stop(self) -> None:
-        """Supervise no more until `begin`, or until the next heartbeat."""
+        """Stop supervision until `begin` or the next heartbeat."""
         self.due_us = NEVER
 
     def begin(self, now_us: int) -> None:
-        """Begin to guard; a heartbeat is supervised from the first that is heard."""
+        """Begin to guard; supervision of a heartbeat starts with the first one."""
         if self._guard_us:
             self.due_us, self._unanswered = now_us + self._guard_us, 0
 
     def hear(self, at_us: int, frame: CanFrame) -> None:
-        """Take a heartbeat or an answer to guarding."""
+        """Process a heartbeat or an answer to guarding."""
         toggle = frame.data[0] & _TOGGLE
         if self._heartbeat_us:
             self.due_us = at_us + self._heartbeat_us
@@ -106,7 +106,7 @@ class ErrorControl:
             self._toggle, self._unanswered = toggle, 0
 
     def tick(self, now_us: int) -> bool:
-        """Do what is due; return True if the node is lost now."""
+        """Do what is due; return True if the node is now lost."""
         if now_us < self.due_us:
             return False
         if self._heartbeat_us:
@@ -122,7 +122,7 @@ class ErrorControl:
 
 
 class NodeSession:
-    """What a host says to one node, and hears of it.
+    """The requests of a host to one node, and the frames of this node.
 
     Args:
         node_id: the node, 1..127.
@@ -134,7 +134,7 @@ class NodeSession:
     Attributes:
         node_id: as given.
         dialogue: the scripts that run.
-        state: what the node reported last, None while it has reported nothing.
+        state: last reported state, None until the first report.
     """
 
     def __init__(
@@ -152,7 +152,7 @@ class NodeSession:
         self._error_control = ERROR_CONTROL_COB_ID + node_id
 
     def receive(self, now_us: int, frame: CanFrame) -> NmtState | None:
-        """Take a frame of the bus; return the state that it reports, None if it reports none."""
+        """Process a frame of the bus; return the state that it reports, None if it reports none."""
         can_id, data, remote, extended, _ = frame
         if remote or extended:
             return None

@@ -6,7 +6,7 @@ from tickrig.wire.instant import NEVER
 
 
 class PeriodicTimer:
-    """Says when a period is over; after a pause once, not for all that were missed.
+    """Reports the end of each period; after a pause once, not for each missed period.
 
     >>> timer = PeriodicTimer(100)
     >>> timer.start(0)
@@ -17,21 +17,21 @@ class PeriodicTimer:
         period_us: the period, 0 for none.
 
     Attributes:
-        due_us: when the next is over; `NEVER` before it was started, and if there is none.
+        due_us: end of the current period; `NEVER` before the start, and without a period.
     """
 
     def __init__(self, period_us: int) -> None:
         self._period_us, self.due_us = period_us, NEVER
 
     def start(self, now_us: int) -> None:
-        """Begin the first period."""
+        """Start the first period."""
         if self._period_us:
             self.due_us = now_us + self._period_us
 
     def advance(self, now_us: int) -> bool:
-        """Begin the next period if one is over; return whether one was.
+        """Start the next period if one has ended; return whether one has.
 
-        The next is over where it would be without a pause.
+        The next period ends when it would have ended without a pause.
         """
         if now_us < self.due_us:
             return False

@@ -1,8 +1,8 @@
 """SDO transfers as scripts: expedited and segmented (CiA 301, SDO protocols).
 
-The client of the canopen library blocks in a thread of its own until the answer is
-there; the server may not block, and runs in virtual time. So this one is ours.
-Not emulated: block transfer, which a server of a device must not insist on.
+The client of the canopen library blocks in its own thread until the answer arrives; this code must
+not block, and runs in virtual time. Therefore tickrig has its own client. Not emulated: block
+transfer, which a server must not require.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ def upload(index: int, sub: int, size: int = 0) -> Script[bytes]:
     Args:
         index: of the object.
         sub: its sub-index.
-        size: of the object in bytes, 0 if nobody knows: so many are taken of an expedited answer
-            that does not say how many of its four bytes are data (CiA 301, 7.2.4.3.5).
+        size: of the object in bytes, 0 if unknown; it applies to an expedited answer that does not
+            indicate how many of its four bytes are data (CiA 301, 7.2.4.3.5).
 
     Raises:
         SdoAborted: the device refuses, or answers something else.
@@ -62,7 +62,7 @@ def upload_number(index: int, sub: int) -> Script[int]:
 
 
 def download_number(index: int, sub: int, value: int, size: int) -> Script[None]:
-    """Write an unsigned number of so many bytes."""
+    """Write an unsigned number of `size` bytes."""
     yield from download(index, sub, value.to_bytes(size, "little"))
 
 
@@ -93,7 +93,7 @@ def _download_segments(index: int, sub: int, data: bytes) -> Script[None]:
 
 
 def _fail(index: int, sub: int, answer: Answer) -> Script[bytes]:
-    """Raise what an answer means that is not the one awaited; abort unless the device did."""
+    """Raise the error of an unexpected answer; abort the transfer unless the device did."""
     if isinstance(answer, sdo.Abort):
         raise SdoAborted(index, sub, answer.code)
     toggled = isinstance(answer, sdo.Segment | sdo.DownloadSegmentResponse)

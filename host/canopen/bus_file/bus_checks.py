@@ -30,10 +30,10 @@ _CLASSES: Final = {
     "Cia402Driver": "canopen_402_driver",
     "BaseDriver": "canopen_base_driver",
 }
-"""The packages of its classes, of which each has one for life cycles, too."""
+"""The packages of the ros2_canopen classes; each also has a lifecycle variant of its class."""
 _MISSING: Final = ("object-missing", "pdo-missing")
 _MOST_OFF: Final = 0.01
-"""How far a scale and its inverse may be from each other: they are rounded."""
+"""The largest relative error of a scale and its inverse; files give both rounded."""
 
 
 STOPS: Final = frozenset(
@@ -44,13 +44,13 @@ STOPS: Final = frozenset(
         *("truncated", "utf-16", "xml"),
     )
 )
-"""Rules for EDS files: dcfgen stops where one of them is broken."""
+"""Rules for EDS files; dcfgen stops if one of them is broken."""
 
 
 def check_node_ids(
     layout: Layout, master: BusMaster | None, slaves: Mapping[str, BusSlave]
 ) -> None:
-    """Note node-IDs that two nodes have."""
+    """Report node-IDs that two nodes share."""
     taken: dict[int, tuple[str, FilePlace]] = {}
     if master is not None and layout.master is not None:
         taken[master.node_id] = MASTER, layout.master.place_of("node_id")
@@ -59,7 +59,7 @@ def check_node_ids(
         place = section.place_of("node_id")
         if slave.node_id in taken:
             who, where = taken[slave.node_id]
-            text = f"node_id: {slave.node_id} is that of {who}, too: {where}"
+            text = f"node_id: {slave.node_id} is also the node-ID of {who}: {where}"
             section.note("node-id-twice", "node_id", text)
         taken.setdefault(slave.node_id, (section.name, place))
 
@@ -67,9 +67,9 @@ def check_node_ids(
 def check_cob_ids(
     notes: BusFileNotes, master: BusMaster | None, slaves: Mapping[str, BusSlave]
 ) -> None:
-    """Note CAN-IDs that two nodes send with, and those that belong to other services.
+    """Report CAN-IDs that two nodes send, and CAN-IDs reserved for other services.
 
-    The master sends what slaves receive; two slaves may receive one message.
+    The master sends what the slaves receive; two slaves may receive the same message.
     """
     senders: dict[int, tuple[str, FilePlace, BusSlave | None]] = {}
     if master is not None and master.sync_period_us:
@@ -85,19 +85,19 @@ def check_cob_ids(
         elif (other := senders.get(can_id)) is not None:
             if _is_double(other[2], slave):
                 continue
-            text = f"{what}: CAN-ID 0x{can_id:03X} is that of {other[0]}, too: {other[1]}"
+            text = f"{what}: CAN-ID 0x{can_id:03X} is also that of {other[0]}: {other[1]}"
             notes.note("cob-id-twice", place, slave.name, text)
         elif transmit:
             senders[can_id] = f"{what} of {slave.name}", place, slave
 
 
 def _is_double(one: BusSlave | None, other: BusSlave) -> bool:
-    """Return whether two nodes have one node-ID, which is told, and so all CAN-IDs."""
+    """Return whether two nodes share a node-ID, which is reported, and thus all CAN-IDs."""
     return one is not None and one is not other and one.node_id == other.node_id
 
 
 def _pdos(slaves: Mapping[str, BusSlave]) -> Iterator[tuple[str, int, FilePlace, BusSlave, bool]]:
-    """Yield the PDOs that are on with 11 bits, TPDOs first: what they are, CAN-ID, place, slave."""
+    """Yield the enabled PDOs with 11-bit CAN-IDs, TPDOs first: name, CAN-ID, place, slave."""
     for transmit in (True, False):
         for slave in slaves.values():
             places = final_places(slave.writes)
@@ -115,12 +115,12 @@ def _sections(layout: Layout) -> list[BusFileSection]:
 
 
 def has_drivers(layout: Layout) -> bool:
-    """Return whether a file is for the container of ros2_canopen, too."""
+    """Return whether the ros2_canopen container also reads the file."""
     return any(key in section for section in _sections(layout) for key in _DRIVER_KEYS)
 
 
 def check_container(notes: BusFileNotes, layout: Layout, slaves: Mapping[str, BusSlave]) -> None:
-    """Note what the container of ros2_canopen refuses, in a file that is for it."""
+    """Report what the ros2_canopen container refuses, if the file is for it."""
     if not has_drivers(layout):
         return
     unmade = layout.slaves.keys() - slaves.keys()
@@ -129,17 +129,17 @@ def check_container(notes: BusFileNotes, layout: Layout, slaves: Mapping[str, Bu
         if missing:
             section.note("no-driver", missing[0], f"no {' and no '.join(missing)}")
         if "node_id" not in section and section.name not in unmade:
-            text = "no node_id, which the container looks for here, not in the EDS"
+            text = "no node_id; the container reads it here, not in the EDS"
             section.note("no-node-id", "node_id", text)
     for section in layout.slaves.values():
         _check_name(section)
     for name, place in layout.hidden.items():
-        text = "the container takes it for a node, too, and finds no driver"
+        text = "the container also takes it for a node, and finds no driver"
         notes.note("hidden", place, name, text)
 
 
 def check_defaults(layout: Layout, node: BusFileSection, found: Iterable[RuleFinding]) -> None:
-    """Note that writes of `defaults` are those of other nodes, if the EDS of one has not them."""
+    """Report writes of `defaults` to objects that the EDS of a node lacks."""
     if layout.defaults is None or all(one.rule.name not in _MISSING for one in found):
         return
     shared = [key for key in ("rpdo", "sdo", "tpdo") if key in layout.defaults]
@@ -149,7 +149,7 @@ def check_defaults(layout: Layout, node: BusFileSection, found: Iterable[RuleFin
 
 
 def check_settings(layout: Layout, slaves: Mapping[str, BusSlave]) -> None:
-    """Note settings that the drivers of ros2_canopen drop without a word, or fail at."""
+    """Report settings that the drivers of ros2_canopen drop silently or fail on."""
     for section in _sections(layout):
         _check_class(section)
         for key, allowed in SETTINGS.items():
@@ -164,7 +164,7 @@ def check_settings(layout: Layout, slaves: Mapping[str, BusSlave]) -> None:
 
 
 def _check_class(section: BusFileSection) -> None:
-    """Note a class that ros2_canopen has not, or not in this package."""
+    """Report a class that ros2_canopen does not have, or not in this package."""
     if not (set(_DRIVER_KEYS) <= section.fields.keys()):
         return
     named, package = (section.text(key) for key in _DRIVER_KEYS)
@@ -177,12 +177,12 @@ def _check_class(section: BusFileSection) -> None:
         text = f"driver: ros2_canopen has no class {shorten(short)!r}; {near(short, known)}"
         section.note("driver-class", "driver", text)
     elif package != own and package in _CLASSES.values():
-        text = f"package: {package} has no {short}: that is in {own}"
+        text = f"package: {package} has no {short}; it is in {own}"
         section.note("driver-class", "package", text)
 
 
 def _check_scale(section: BusFileSection, channel: DriveChannel, what: str) -> None:
-    """Note scales to and from the device that do not cancel out."""
+    """Report scales to and from the device that are not inverse to each other."""
     keys = f"scale_{what}_to_dev", f"scale_{what}_from_dev"
     to_dev, from_dev = (getattr(channel, key) for key in keys)
     if abs(to_dev * from_dev - 1) > _MOST_OFF:
@@ -194,19 +194,19 @@ def _check_scale(section: BusFileSection, channel: DriveChannel, what: str) -> N
 def _check_name(section: BusFileSection) -> None:
     for word in (MASTER, OPTIONS):
         if word in section.name:
-            text = f"{word!r} is in its name: the container takes it for one"
+            text = f"{word!r} is in its name, so the container takes it for one"
             section.notes.note("node-name", section.place, section.name, text)
 
 
-@lru_cache(maxsize=16)  # an EDS that has not changed has the findings of the last check
+@lru_cache(maxsize=16)  # an unchanged EDS has the findings of the last check
 def _findings_of(name: str, data: bytes) -> tuple[tuple[RuleFinding, ...], bool]:
-    """Return what is wrong with an EDS, and whether it is in UTF-8."""
+    """Return the findings in an EDS, and whether it is in UTF-8."""
     document = Document(name, data)
     return tuple(check(document)), document.is_unicode
 
 
 def check_sheets(slaves: Mapping[str, BusSlave]) -> tuple[RuleFinding, ...]:
-    """Return how much `canmon eds check` finds in each EDS, and what of it stops dcfgen."""
+    """Return how many findings `canmon eds check` has in each EDS, and which stop dcfgen."""
     notes = BusFileNotes()
     for sheet in dict.fromkeys(slave.sheet for slave in slaves.values()):
         found, is_unicode = _findings_of(str(sheet), read_eds_bytes(sheet))

@@ -3,19 +3,20 @@
 # How a bus.yml becomes a bus
 # ---------------------------
 # The reference is what dcfgen (Lely) makes of the file, to the byte; tests compare with it. The
-# order of the steps below is that of dcfgen, and most steps depend on it.
+# steps below have the order of dcfgen; most depend on it.
 #
-#   1. `read_yaml`: the tree. Of a key that is there twice the last one counts, as for dcfgen.
+#   1. `read_yaml`: the tree. If a key occurs twice, the last one counts, as for dcfgen.
 #   2. `read_layout`: dcfgen has its nodes at the top, cogen under `nodes`. cogen merges `defaults`
-#      into each node, and they win over what the node says; then it sorts all keys. A file with
-#      `nodes` or `defaults` is one for cogen, and the sections below are those that cogen writes.
-#   3. `Sheets.find`: the EDS or DCF of a node, beside the file first. Without one there is no node.
-#   4. `SlaveReader`: the keys of a node become writes to its objects. Their order is that of
-#      dcfgen, and so are the defaults that dcfgen takes if a key is wrong: later steps still see
-#      the bus that dcfgen would make. `CobIds` is one for all nodes: `auto` counts over the bus.
+#      into each node, where they override the node's own keys; then it sorts all keys. A file with
+#      `nodes` or `defaults` is for cogen, and the steps below read the sections that cogen writes.
+#   3. `Sheets.find`: the EDS or DCF of a node, beside the file first. A node without one is left
+#      out.
+#   4. `SlaveReader`: the keys of a node become writes to its objects. Their order, and the defaults
+#      for wrong keys, are those of dcfgen, so later steps see the bus that dcfgen would make. All
+#      nodes share one `CobIds`: `auto` counts over the whole bus.
 #   5. `_watch_master` needs the master and all writes of the slave: it puts 1016h before them.
 #   6. `pdos_after`: the PDOs as they are after the writes, for the checks of COB-IDs and load.
-#   7. `bus_checks`: what is wrong between nodes, and what the container of ros2_canopen refuses.
+#   7. `bus_checks`: conflicts between nodes, and what the container of ros2_canopen refuses.
 #
 # Findings are noted where they are found, in any order; `BusFileNotes.all` sorts them by line, and
 # leaves out those that follow from a misspelt key in the same line.
@@ -40,7 +41,7 @@ from tickrig.host.text.document import FilePlace
 from tickrig.wire.canopen.eds.eds_device import HIGHEST_NODE_ID
 from tickrig.wire.canopen.eds.object_table import BIT_RATES_KBIT
 
-# The section of the master, and what it makes of the heartbeats of its slaves.
+# The section of the master, and how it handles the heartbeats of its slaves.
 
 _CONSUMER: Final = 0x1016
 _TIME: Final = 0x100
@@ -52,11 +53,11 @@ _FLAGS: Final = {
     "reset_all_nodes": False,
     "stop_all_nodes": False,
 }
-"""Those that dcfgen takes for numbers, with what they are if they are left out."""
+"""Keys that dcfgen takes for numbers, with their defaults."""
 
 
 def _read_options(section: BusFileSection | None) -> BusDefaults:
-    """Read what holds for all nodes."""
+    """Read the section `options`, which holds for all nodes."""
     if section is None:
         return BusDefaults()
     check_keys(section, OPTIONS, open_to_others=True)
@@ -112,7 +113,7 @@ def _bit_rate(section: BusFileSection) -> int:
 def _sync_period(section: BusFileSection) -> int:
     period_us = section.whole("sync_period")
     if 0 < period_us < _SHORTEST_SYNC_US:
-        text = f"sync_period: a SYNC each {period_us} µs; {_SHORTEST_SYNC_US} µs is short already"
+        text = f"sync_period: a SYNC each {period_us} µs; {_SHORTEST_SYNC_US} µs is already short"
         section.note("sync-period", "sync_period", text)
     return period_us
 
@@ -130,7 +131,7 @@ def _error_behavior(section: BusFileSection) -> dict[int, int]:
 
 
 def _watch_master(node: BusFileSection, sheet: Sheet, writes: Writes, master: BusMaster) -> None:
-    """Write the time of the master's heartbeat that a slave shall watch, before all else."""
+    """Write the master's heartbeat time that a slave watches, before all other writes."""
     time_ms = int(master.heartbeat_producer_ms * master.heartbeat_multiplier)
     entries = {sub: sheet.value(_CONSUMER, sub) for sub in sheet.subs(_CONSUMER) if sub}
     watched = node.flag("heartbeat_consumer", default=False) and time_ms > 0
@@ -163,7 +164,7 @@ def _is_unused(value: int) -> bool:
 
 
 _MOST_BYTES: Final = 1 << 20
-"""A larger file is no bus.yml."""
+"""The size above which a file is not read as a bus.yml."""
 _SECTION: Final = re.compile(
     r"^(master|nodes|defaults)[ \t]*:|^[ \t]+(dcf|node_id)[ \t]*:", re.MULTILINE
 )
@@ -176,15 +177,15 @@ _NEEDS_YAML: Final = "a bus.yml needs PyYAML: pip install 'tickrig[bus]'"
 
 @dataclass(frozen=True, slots=True)
 class BusFile:
-    """What a bus.yml says.
+    """The content of a bus.yml.
 
     Attributes:
         path: the file.
-        options: what holds for all nodes.
-        master: None where there is none.
-        slaves: by name, those with an EDS, in the order of dcfgen.
-        findings: all that is wrong, in the order of the lines; with an error in it the rest is
-            what could be read all the same.
+        options: settings of all nodes.
+        master: None if the file has no such section.
+        slaves: the slaves that have an EDS, by name, in the order of dcfgen.
+        findings: all errors and warnings, in the order of the lines; if one is an error, the other
+            attributes hold what could still be read.
     """
 
     path: Path
@@ -195,7 +196,7 @@ class BusFile:
 
     @property
     def errors(self) -> tuple[RuleFinding, ...]:
-        """What dcfgen, cogen or the container of ros2_canopen refuse."""
+        """What dcfgen, cogen or the ros2_canopen container refuses."""
         return self._of(Severity.ERROR)
 
     @property
@@ -208,7 +209,7 @@ class BusFile:
 
 
 def is_bus_file(data: bytes) -> bool:
-    r"""Return whether a file is a bus.yml, a good or a bad one; PyYAML is not needed.
+    r"""Return whether a file is a bus.yml, valid or not; does not need PyYAML.
 
     Args:
         data: the file, or its beginning.
@@ -221,11 +222,11 @@ def is_bus_file(data: bytes) -> bool:
 
 
 def check_of(data: bytes, path: Path) -> str:
-    r"""Say what a file in YAML is, and which command checks it; empty if it is neither of ours.
+    r"""Return what a YAML file is, and which command checks it; empty if it is of neither kind.
 
     Args:
         data: the file, or its beginning.
-        path: of the file.
+        path: path of the file, for the message.
 
     >>> check_of(b"master:\n  node_id: 1\n", Path("bus.yml"))
     'a bus.yml; use: tickrig check bus.yml'
@@ -243,14 +244,14 @@ def read_bus_file(path: Path) -> BusFile:
     """Read a bus.yml and the EDS and DCF files that it names.
 
     Args:
-        path: the file; others are looked for beside it, too.
+        path: the file; its EDS and DCF files are also searched beside it.
 
     Returns:
-        What it says, and all that is wrong with it.
+        The content of the file, and its findings.
 
     Raises:
-        OSError: it cannot be read.
-        ImportError: PyYAML is not installed; the text says how.
+        OSError: the file cannot be read.
+        ImportError: PyYAML is not installed; the message says how to install it.
     """
     with path.open("rb") as file:
         return decode_bus_file(file.read(_MOST_BYTES + 1), path)
@@ -265,13 +266,13 @@ def decode_bus_file(data: bytes, path: Path) -> BusFile:
     notes = BusFileNotes()
     empty = BusFile(path, BusDefaults(), None, {})
     if len(data) > _MOST_BYTES:
-        notes.note("yaml", FilePlace(str(path), 1), "", "more than 1 MB: this is no bus.yml")
+        notes.note("yaml", FilePlace(str(path), 1), "", "more than 1 MB: this is not a bus.yml")
         return replace(empty, findings=notes.all)
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         place = FilePlace(str(path), data.count(b"\n", 0, error.start) + 1)
-        notes.note("yaml", place, "", f"the byte 0x{data[error.start]:02x} is no UTF-8")
+        notes.note("yaml", place, "", f"the byte 0x{data[error.start]:02x} is not UTF-8")
         return replace(empty, findings=notes.all)
     tree, wrong = read_yaml(text, str(path))
     for one in wrong:
@@ -290,7 +291,7 @@ class _Reader:
         self._cob_ids, self._sheets = CobIds(), Sheets(path.parent, self._options.dcf_path)
 
     def read(self) -> BusFile:
-        """Read them all."""
+        """Read all sections."""
         master = None
         if self._layout.master is None:
             rule = "no-master" if bus_checks.has_drivers(self._layout) else "slaves-only"

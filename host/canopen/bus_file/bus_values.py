@@ -12,12 +12,12 @@ from tickrig.wire.canopen.nmt import INVALID
 from tickrig.wire.canopen.pdo import MappedObject
 
 _Extra = Mapping[str, Item]
-"""A mapping `tickrig:` of the file, as it stands there."""
+"""The mapping `tickrig:` of the file, unchanged."""
 
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """What a master checks at boot-up (1F84h to 1F88h); 0 is not checked.
+    """What a master checks at boot-up (1F84h to 1F88h); a value of 0 is not checked.
 
     Attributes:
         device_type: 1000h.
@@ -36,13 +36,13 @@ class Identity:
 
 @dataclass(frozen=True, slots=True)
 class BusWrite:
-    """One entry of a concise DCF: what the master writes at boot-up.
+    """One entry of a concise DCF, which the master writes at boot-up.
 
     Attributes:
         index: 0x0000..0xFFFF.
         sub_index: 0..255.
         data: the bytes, little endian.
-        place: what in the file asks for it.
+        place: where the file asks for it.
     """
 
     index: int
@@ -58,12 +58,12 @@ class BusPdo:
     Attributes:
         number: 1..512.
         transmit: whether the slave sends it.
-        cob_id: with its upper bits; bit 31: it is not there.
+        cob_id: with its upper bits; bit 31 set: the PDO is disabled.
         transmission: type, 0..255.
-        inhibit_time_100us: of a TPDO.
-        event_timer_ms: of a TPDO; of an RPDO its deadline.
+        inhibit_time_100us: of a TPDO, in 100 µs.
+        event_timer_ms: event timer of a TPDO, deadline of an RPDO.
         sync_start: SYNC start value of a TPDO.
-        mapping: what it carries; a data type below 0020h is a dummy.
+        mapping: the mapped objects; an index below 0020h is a dummy.
     """
 
     number: int
@@ -77,24 +77,24 @@ class BusPdo:
 
     @property
     def enabled(self) -> bool:
-        """Whether it is sent or taken."""
+        """Whether the PDO is enabled."""
         return not self.cob_id & INVALID
 
 
 @dataclass(frozen=True, slots=True)
 class DriveChannel:
-    """An axis of a drive as ros2_canopen's 402 driver has it; lengths are its user's units.
+    """An axis of a drive as ros2_canopen's 402 driver has it; lengths are in the user's units.
 
     Attributes:
         name: of the joint.
-        scale_pos_to_dev: device units for a unit of position.
-        scale_pos_from_dev: units of position for a device unit.
-        scale_vel_to_dev: device units for a unit of speed.
-        scale_vel_from_dev: units of speed for a device unit.
-        scale_eff_to_dev: device units for a unit of effort.
-        scale_eff_from_dev: units of effort for a device unit.
-        offset_pos_to_dev: device units that are added.
-        offset_pos_from_dev: units of position that are added.
+        scale_pos_to_dev: device units per unit of position.
+        scale_pos_from_dev: units of position per device unit.
+        scale_vel_to_dev: device units per unit of speed.
+        scale_vel_from_dev: units of speed per device unit.
+        scale_eff_to_dev: device units per unit of effort.
+        scale_eff_from_dev: units of effort per device unit.
+        offset_pos_to_dev: offset added to a position, in device units.
+        offset_pos_from_dev: offset added to a position, in units of position.
     """
 
     name: str
@@ -110,37 +110,38 @@ class DriveChannel:
 
 @dataclass(frozen=True, slots=True)
 class BusSlave:
-    """A slave of the bus, and what its master will expect of it and write to it.
+    """A slave of the bus, with what the master expects of it and writes to it.
 
     Attributes:
         name: of its section.
         node_id: 1..127.
         place: of its section.
         sheet: its EDS or DCF.
-        device: what that says.
-        identity: what the master checks.
+        device: the device that it describes.
+        identity: what the master checks at boot-up.
         writes: concise DCF, in the order in which the master writes it.
-        pdos: all of the dictionary as they are after these writes, RPDOs first.
-        master_pdos: those that the master's own dictionary is given, TPDOs of the slave first.
+        pdos: all PDOs of the dictionary after these writes, RPDOs first.
+        master_pdos: the PDOs that enter the master's own dictionary, TPDOs of the slave first.
         heartbeat_producer_ms: of the slave after the writes, 0 for none.
-        heartbeat_consumer: whether it shall watch the master's heartbeat.
-        heartbeat_multiplier: times the producer time is how long the master waits.
+        heartbeat_consumer: whether the slave watches the master's heartbeat.
+        heartbeat_multiplier: the master waits this many producer times for a heartbeat.
         guard_time_ms: 0 for no guarding.
         life_time_factor: of node guarding.
         emcy_cob_id: with its upper bits.
         boot: the master configures and boots it (1F81h, bit 2).
         mandatory: the master does not start without it (bit 3).
         reset_communication: the master may reset it at boot-up (bit 4).
-        retry_factor: how often guarding is tried.
+        retry_factor: number of attempts of node guarding.
         software_file: firmware, empty for none.
-        software_version: that the master expects (1F55h), 0 for any.
-        restore_configuration: sub-index of 1011h that is restored before the writes, 0 for none.
-        boot_timeout_ms: how long ros2_canopen waits for it, None for its own.
+        software_version: version that the master expects (1F55h), 0 for any.
+        restore_configuration: sub-index of 1011h that the master restores before the writes, 0 for
+            none.
+        boot_timeout_ms: how long ros2_canopen waits for the slave, None for its default.
         driver: class of ros2_canopen, empty for none.
         package: of the driver.
         channels: axes, one for a node without `num_channels`.
-        settings: all else that the file gives the driver, as it stands there.
-        extra: what `tickrig:` says.
+        settings: all other keys that the file gives the driver, unchanged.
+        extra: the mapping `tickrig:`.
     """
 
     name: str
@@ -174,12 +175,12 @@ class BusSlave:
 
     @property
     def num_channels(self) -> int:
-        """How many axes it has."""
+        """Number of axes."""
         return len(self.channels)
 
     @property
     def channel_names(self) -> tuple[str, ...]:
-        """The names of its axes."""
+        """Names of the axes."""
         return tuple(channel.name for channel in self.channels)
 
 
@@ -188,7 +189,7 @@ class BusMaster:
     """The master of the bus.
 
     Attributes:
-        node_id: 1..127; 255 where the file gives none.
+        node_id: 1..127; 255 if the file gives none.
         place: of its section.
         baudrate: kbit/s.
         identity: its own.
@@ -197,21 +198,21 @@ class BusMaster:
         sync_overflow: 1019h.
         heartbeat_producer_ms: 0 for none.
         heartbeat_consumer: whether it watches the slaves.
-        heartbeat_multiplier: times its producer time is how long the slaves wait.
+        heartbeat_multiplier: the slaves wait this many producer times for a heartbeat.
         emcy_inhibit_time_100us: 1015h.
         nmt_inhibit_time_100us: 102Ah.
         error_behavior: 1029h by sub-index.
         time_cob_id: 1012h.
-        start: it goes operational by itself.
-        start_nodes: it starts the slaves.
-        start_all_nodes: all at once.
-        reset_all_nodes: it resets all where a mandatory one is lost.
-        stop_all_nodes: it stops all then.
-        boot_time_ms: how long it waits for the mandatory ones (1F89h), 0 for ever.
-        boot_timeout_ms: how long ros2_canopen waits for all, None for its own.
+        start: the master enters Operational by itself.
+        start_nodes: the master starts the slaves.
+        start_all_nodes: it starts them with one command.
+        reset_all_nodes: it resets all slaves if it loses a mandatory one.
+        stop_all_nodes: it stops all slaves if it loses a mandatory one.
+        boot_time_ms: how long it waits for the mandatory slaves (1F89h), 0 for no limit.
+        boot_timeout_ms: how long ros2_canopen waits for all slaves, None for its default.
         driver: class of ros2_canopen, empty for none.
         package: of the driver.
-        extra: what `tickrig:` says.
+        extra: the mapping `tickrig:`.
     """
 
     node_id: int
@@ -242,13 +243,13 @@ class BusMaster:
 
 @dataclass(frozen=True, slots=True)
 class BusDefaults:
-    """What holds for all nodes that say nothing else.
+    """Settings of all nodes that do not have their own.
 
     Attributes:
-        dcf_path: folder of the files at run time, as the file has it.
-        heartbeat_multiplier: of producer times.
-        retry_factor: of guarding.
-        extra: what `tickrig:` says.
+        dcf_path: folder of the files at run time, as the file gives it.
+        heartbeat_multiplier: factor of producer times.
+        retry_factor: of node guarding.
+        extra: the mapping `tickrig:`.
     """
 
     dcf_path: str = ""

@@ -11,11 +11,11 @@ from tickrig.host.text.names import closest
 from tickrig.wire.canopen.eds.eds_file import shorten
 
 EXTRA: Final = "tickrig"
-"""Of each section: what is for us alone."""
+"""Keys of each section that only this project reads."""
 
 OPTIONS: Final = ("dcf_path", "heartbeat_multiplier", "retry_factor", EXTRA)
 ROS: Final = ("driver", "package", "namespace", "remappings", "diagnostics", "non_transmit_timeout")
-"""What ros2_canopen reads of the master and of nodes."""
+"""Keys of the master and of nodes that ros2_canopen reads."""
 _BOTH: Final = (
     *("node_id", "dcf_path", "vendor_id", "product_code", "revision_number", "serial_number"),
     *("heartbeat_producer", "heartbeat_consumer", "heartbeat_multiplier", "error_behavior"),
@@ -35,7 +35,7 @@ DRIVER: Final = (
     *("effort_mode", "torque_mode", "channel", "switching_state", "homing_timeout_seconds"),
     *("boot_timeout_ms", "sdo_timeout_ms", "enable_lazy_load", "polling", "period"),
 )
-"""What the drivers of ros2_canopen read of a node, and its hardware interfaces."""
+"""Keys of a node that the drivers and hardware interfaces of ros2_canopen read."""
 SLAVE: Final = (
     *(*_BOTH, "dcf", "guard_time", "life_time_factor", "retry_factor", "rpdo", "tpdo", "sdo"),
     *("boot", "mandatory", "reset_communication", "software_file", "software_version"),
@@ -51,19 +51,19 @@ _FLAGS: Final = {
     **dict.fromkeys(("true", "yes", "on", "y"), 1),
     **dict.fromkeys(("false", "no", "off", "n"), 0),
 }
-"""Words that yaml-cpp takes for a flag."""
+"""Words that yaml-cpp reads as a boolean."""
 
 
 class _Allowed(NamedTuple):
-    """What a setting of a driver may be: whole numbers, or without any a flag."""
+    """Allowed values of a driver setting: whole numbers, or a boolean if there are none."""
 
     numbers: Sequence[int]
     said: str
 
     def value_of(self, item: Item) -> int | None:
-        """Return what yaml-cpp makes of a value, None if the driver does not take it.
+        """Return what yaml-cpp makes of a value, None if the driver does not accept it.
 
-        Quotes do not matter to it. A flag is 1 or 0.
+        yaml-cpp ignores quotes. A boolean is 1 or 0.
         """
         if not self.numbers:
             return _FLAGS.get(item.text.lower())
@@ -81,31 +81,31 @@ SETTINGS: Final = {
     "period": _TIME,
     "sdo_timeout_ms": _TIME,
     "homing_timeout_seconds": _TIME,
-    "switching_state": _Allowed(range(2, 7), "a state to go to: 2..6, 5 is Operation enabled"),
+    "switching_state": _Allowed(range(2, 7), "a target state: 2..6, 5 is Operation enabled"),
     "position_mode": _MODE,
     "velocity_mode": _MODE,
     "effort_mode": _MODE,
 }
-"""By key of a node."""
+"""Driver settings, by key of a node."""
 
 
 def check_keys(
     section: BusFileSection, known: Iterable[str], *, open_to_others: bool = False
 ) -> None:
-    """Note the keys that nobody knows.
+    """Report unknown keys.
 
     Args:
-        section: which has them.
+        section: the section that is checked.
         known: all keys that it may have.
-        open_to_others: a driver of the user's may read others: they are noted as such, unless one
-            looks like a slip.
+        open_to_others: a driver of the user may read other keys; they are reported as such, unless
+            one looks like a misspelling.
     """
     known = tuple(known)
     for key in section.fields:
         if key in known:
             continue
         close = closest(shorten(str(key)), known)
-        said = f"{shorten(str(key))!r} is no key that is known"
+        said = f"{shorten(str(key))!r} is not a known key"
         if close:
             section.note("unknown-key", key, f"{said}; did you mean {close[0]!r}?")
         elif open_to_others:

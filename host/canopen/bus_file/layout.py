@@ -17,14 +17,14 @@ _COGEN: Final = (OPTIONS, MASTER, _DEFAULTS, _NODES)
 
 
 class Layout(NamedTuple):
-    """The sections of a file as dcfgen gets them.
+    """The sections of a file as dcfgen reads them.
 
     Attributes:
-        options: None where there are none.
-        master: None where there is none.
+        options: None if the file has none.
+        master: None if the file has none.
         slaves: by name, in the order of dcfgen.
-        hidden: where something begins with a dot, by its name, if dcfgen reads the file as it is.
-        defaults: what cogen gives to all nodes; None where there is nothing.
+        hidden: places of keys that begin with a dot, by name, if dcfgen reads the file directly.
+        defaults: what cogen merges into all nodes; None if the file has none.
     """
 
     options: BusFileSection | None
@@ -37,8 +37,8 @@ class Layout(NamedTuple):
 def read_layout(tree: Item, notes: BusFileNotes) -> Layout:
     """Find the sections of a file.
 
-    What begins with a dot is no node: anchors stand there. As cogen does it, `defaults` count more
-    than what a node says, and all keys are sorted.
+    A key that begins with a dot is not a node: it holds anchors. As in cogen, `defaults` override
+    the keys of a node, and all keys are sorted.
     """
     top = BusFileSection(notes, "", tree, tree.place)
     ends = _optional(top, OPTIONS), _optional(top, MASTER)
@@ -62,10 +62,10 @@ def _optional(top: BusFileSection, key: str) -> BusFileSection | None:
 def _cogen_nodes(top: BusFileSection) -> dict[str, BusFileSection]:
     for key in top.fields:
         if key not in _COGEN and not str(key).startswith("."):
-            text = f"{shorten(str(key))!r} stands beside nodes: it is dropped"
+            text = f"{shorten(str(key))!r} is beside nodes; cogen drops it"
             top.note("section-lost", key, text)
     if _NODES not in top:
-        top.note("no-nodes", _DEFAULTS, "defaults, but no nodes: that they are for")
+        top.note("no-nodes", _DEFAULTS, "defaults, but no nodes to apply them to")
         return {}
     nodes = BusFileSection(top.notes, _NODES, top.fields[_NODES], top.place_of(_NODES))
     defaults = _optional(top, _DEFAULTS)
@@ -77,24 +77,24 @@ def _cogen_nodes(top: BusFileSection) -> dict[str, BusFileSection]:
 
 
 def _named(section: BusFileSection) -> Iterator[str]:
-    """Yield the names of nodes; one that is no text is noted."""
+    """Yield the names of nodes; report names that are not text."""
     for key in section.fields:
         if isinstance(key, str):
             yield key
         else:
-            section.note("kind", key, f"{shorten(str(key))}: the name of a node is a text")
+            section.note("kind", key, f"{shorten(str(key))}: the name of a node must be a text")
 
 
 def _with_defaults(
     notes: BusFileNotes, name: str, item: Item, defaults: BusFileSection | None
 ) -> Item:
-    """Return a node with all that defaults say."""
+    """Return a node with all defaults merged in."""
     if defaults is None or not item.is_mapping:
         return item
     for key, own in item.fields.items():
         usual = defaults.fields.get(key, own)
         if usual is not own:
-            text = f"{shorten(str(key))} is that of defaults: {usual.place}"
+            text = f"{shorten(str(key))} is overridden by defaults: {usual.place}"
             notes.note("defaults-win", item.keys[key], shorten(name), text)
     keys: dict[Key, FilePlace] = {
         **item.keys,
@@ -104,18 +104,18 @@ def _with_defaults(
 
 
 def _sorted(item: Item, done: dict[int, Item]) -> Item:
-    """Return a mapping with sorted keys, also in its mappings, as PyYAML writes it.
+    """Return a mapping with its keys sorted at all levels, as PyYAML writes it.
 
     Args:
-        item: that, or something else.
-        done: those that are sorted by the identity of what they were: an anchor is sorted once.
+        item: the mapping; any other value is returned unchanged.
+        done: sorted mappings by the identity of the original, so that an anchor is sorted once.
     """
     if not item.is_mapping:
         return item
     if (made := done.get(id(item))) is not None:
         return made
     try:
-        keys: list[Any] = sorted(cast(Any, item.fields))  # keys of two kinds raise
+        keys: list[Any] = sorted(cast(Any, item.fields))  # keys of different types raise
     except TypeError:
         keys = list(item.fields)
     fields = {key: _sorted(item.fields[key], done) for key in keys}

@@ -13,25 +13,25 @@ from tickrig.host.text.document import FilePlace, Item, Key
 from tickrig.wire.canopen.eds.eds_file import shorten
 
 RULES: Final = read_rules(Path(__file__).with_name("rules.txt"))
-"""Those for a bus.yml by name, errors first."""
+"""The rules for a bus.yml by name, errors first."""
 
 _HEX: Final = re.compile(r"[0-9A-Fa-f]{1,8}[hH]")
 _QUOTED: Final = re.compile(r"0[xX][0-9A-Fa-f]+")
 _FOLLOWING: Final = frozenset(
     {"direction", "no-value", "not-mappable", "read-only", "value-limits"}
 )
-"""Rules that a wrong key of the same line breaks, too: it was another entry that was meant."""
+"""Rules that a wrong key in the same line also breaks: another key was meant."""
 UNSIGNED8, UNSIGNED16, UNSIGNED32 = 0xFF, 0xFFFF, 0xFFFF_FFFF
 
 
 class BusFileNotes:
-    """All findings of a file, each once."""
+    """All findings of a file, without duplicates."""
 
     def __init__(self) -> None:
         self._found: dict[tuple[str, FilePlace, str], RuleFinding] = {}
 
     def note(self, rule: str, place: FilePlace, where: str, text: str) -> None:
-        """Note what breaks a rule; what several nodes have of one line is noted once.
+        """Record a finding; a finding that several nodes have in the same line is recorded once.
 
         Args:
             rule: its name.
@@ -43,16 +43,16 @@ class BusFileNotes:
         self._found.setdefault((rule, place, text), found)
 
     def __len__(self) -> int:
-        """Return how many there are."""
+        """Return the number of findings."""
         return len(self._found)
 
     def since(self, count: int) -> list[RuleFinding]:
-        """Return those that came after so many."""
+        """Return the findings after the first `count`."""
         return [*self._found.values()][count:]
 
     @property
     def all(self) -> tuple[RuleFinding, ...]:
-        """All of them in the order of the lines, without those of `_FOLLOWING` that follow."""
+        """All findings in line order, without those that follow from another in the same line."""
         found = self._found.values()
         slips = {(one.file, one.line) for one in found if one.rule.name == "unknown-key"}
         told = (
@@ -67,9 +67,9 @@ class BusFileSection:
     """A mapping of the file, read as dcfgen reads it.
 
     Args:
-        notes: take what is wrong.
+        notes: collects the findings.
         name: section and keys, for people.
-        item: the mapping; what is none counts as empty, and is noted.
+        item: the mapping; any other value is reported and counts as empty.
         place: of its key.
     """
 
@@ -77,28 +77,28 @@ class BusFileSection:
         self.notes, self.name, self.place = notes, name, place
         self._item = item
         if not item.is_mapping:
-            text = f"{item} is no mapping"
+            text = f"{item} is not a mapping"
             notes.note("kind", item.place if item.text else place, name, text)
 
     @property
     def fields(self) -> Mapping[Key, Item]:
-        """All that it holds."""
+        """All keys with their values."""
         return self._item.fields
 
     def __contains__(self, key: object) -> bool:
-        """Return whether it has a key."""
+        """Return whether the mapping has a key."""
         return key in self.fields
 
     def place_of(self, key: Key) -> FilePlace:
-        """Return where a key stands, else the section."""
+        """Return the place of a key, or that of the section if the key is missing."""
         return self._item.keys.get(key, self.place)
 
     def note(self, rule: str, key: Key, text: str) -> None:
-        """Note what is wrong with a key."""
+        """Record a finding about a key."""
         self.notes.note(rule, self.place_of(key), self.name, text)
 
     def section(self, key: Key) -> BusFileSection:
-        """Return a mapping in it; it is empty where there is none."""
+        """Return a mapping in it; empty if there is none."""
         place = self.place_of(key)
         item = self.fields.get(key, Item({}, place))
         return BusFileSection(self.notes, f"{self.name}.{key}", item, place)
@@ -109,12 +109,12 @@ class BusFileSection:
         if item is None:
             return []
         if not item.is_list:
-            self.note("kind", key, f"{shorten(str(key))}: {item} is no list")
+            self.note("kind", key, f"{shorten(str(key))}: {item} is not a list")
         name = f"{self.name}.{key}"
         return [BusFileSection(self.notes, name, each, each.place) for each in item.items]
 
     def whole(self, key: Key, default: int = 0, low: int = 0, high: int = UNSIGNED32) -> int:
-        """Return a whole number, the default where there is none or a wrong one."""
+        """Return a whole number; the default if the key is missing or wrong."""
         item = self.fields.get(key)
         if item is None:
             return default
@@ -133,13 +133,13 @@ class BusFileSection:
         return number
 
     def real(self, key: Key, default: float) -> float:
-        """Return a number, with a fraction or without."""
+        """Return a number, whole or fractional."""
         item = self.fields.get(key)
         number = None if item is None else self._number(key, item, fraction=True)
         return default if number is None else float(number)
 
     def flag(self, key: Key, default: bool) -> bool:
-        """Return a flag; any text is true, as for dcfgen."""
+        """Return a boolean; any text counts as true, as for dcfgen."""
         item = self.fields.get(key)
         if item is None:
             return default
@@ -155,12 +155,12 @@ class BusFileSection:
         if item is None:
             return default
         if item.is_list or item.is_mapping or item.value is None:
-            self.note("kind", key, f"{shorten(str(key))}: {item} is no text")
+            self.note("kind", key, f"{shorten(str(key))}: {item} is not a text")
             return default
         return item.value if isinstance(item.value, str) else item.text
 
     def _number(self, key: Key, item: Item, *, fraction: bool = False) -> int | float | None:
-        """Return what int() of Python, or float(), makes of a value; None if that is nothing."""
+        """Return what Python's int() or float() makes of a value; None if it raises."""
         value = item.value
         try:
             if isinstance(value, str):
@@ -170,13 +170,13 @@ class BusFileSection:
         except (ValueError, OverflowError):
             pass
         self.note(
-            "no-number", key, f"{shorten(str(key))}: {item} is no number{_as_number(item.text)}"
+            "no-number", key, f"{shorten(str(key))}: {item} is not a number{_as_number(item.text)}"
         )
         return None
 
 
 def _as_number(text: str) -> str:
-    """Say how a text could be meant as a number: without quotes, or with 0x before it."""
+    """Return how to write a text as a number: without quotes, or with 0x in front."""
     if _HEX.fullmatch(text):
         return f"; did you mean 0x{text[:-1]}?"
     return ": it is a text; without quotes it is one" if _QUOTED.fullmatch(text) else ""

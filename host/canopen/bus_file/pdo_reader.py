@@ -24,19 +24,19 @@ _OTHER_WAY: Final = {
     True: ("event_deadline",),
     False: ("event_timer", "inhibit_time", "sync_start"),
 }
-"""Keys that dcfgen reads of PDOs of the other direction alone, by whether it is a TPDO."""
+"""Keys that dcfgen reads only for PDOs of the other direction, by whether it is a TPDO."""
 _FIRST_FREE: Final = 0x680
 _END_OF_FREE: Final = 0x6E0
 
 
 class CobIds:
-    """The COB-IDs that `auto` gives to PDOs beyond the fourth, one after the other."""
+    """The COB-IDs that `auto` assigns to PDOs beyond the fourth, in ascending order."""
 
     def __init__(self) -> None:
         self._next = _FIRST_FREE
 
     def take(self) -> int | None:
-        """Return the next one, None if all are taken."""
+        """Return the next free COB-ID, None if all are taken."""
         if self._next >= _END_OF_FREE:
             return None
         self._next += 1
@@ -49,8 +49,8 @@ class PdoReader:
     Args:
         node: its section.
         sheet: its EDS.
-        writes: take what is to be written.
-        cob_ids: of the whole bus.
+        writes: collects the writes.
+        cob_ids: the free COB-IDs of the whole bus.
     """
 
     def __init__(self, node: BusFileSection, sheet: Sheet, writes: Writes, cob_ids: CobIds) -> None:
@@ -64,7 +64,7 @@ class PdoReader:
             first: index of the first communication parameter.
 
         Returns:
-            The PDOs that the master's dictionary is given.
+            The PDOs that enter the master's dictionary.
         """
         pdos = {
             index - first + 1: _of_sheet(self._sheet, index) for index in self._sheet.pdos(first)
@@ -83,12 +83,12 @@ class PdoReader:
         return tuple(pdo for pdo in pdos.values() if pdo.enabled and pdo.mapping)
 
     def _configured(self, pdo: BusPdo, index: int, section: BusFileSection) -> BusPdo:
-        """Write what differs from the EDS, in the order of dcfgen: off, parameters, mapping, on."""
+        """Write what differs from the EDS as dcfgen does: disable, parameters, mapping, enable."""
         check_keys(section, PDO)
         for key in _OTHER_WAY[pdo.transmit]:
             if key in section:
                 kind = "a TPDO" if pdo.transmit else "an RPDO"
-                section.note("pdo-key", key, f"{key} of {kind}: dcfgen writes nothing of it")
+                section.note("pdo-key", key, f"{key} of {kind}: dcfgen does not write it")
         place = section.place
         was, pdo = pdo.cob_id, replace(pdo, cob_id=self._cob_id(pdo, section))
         if was != pdo.cob_id | INVALID:
@@ -105,7 +105,7 @@ class PdoReader:
         if section.flag("enabled", default=True):
             self._writes.add(index, 1, pdo.cob_id, place)
         elif pdo.mapping and pdo.transmit:
-            text = "it is off, but not for the master: its EDS maps something into it"
+            text = "the PDO is off, but the master still uses it: its EDS maps objects into it"
             section.note("not-disabled", "enabled", text)
         return pdo
 
@@ -126,7 +126,7 @@ class PdoReader:
         return taken
 
     def _with_parameters(self, pdo: BusPdo, index: int, section: BusFileSection) -> BusPdo:
-        """Take the parameters that the file gives; those of the other direction are not written."""
+        """Read the parameters that the file gives; do not write those of the other direction."""
         kind = section.whole("transmission", pdo.transmission, 0, UNSIGNED8)
         inhibit = section.whole("inhibit_time", pdo.inhibit_time_100us, 0, UNSIGNED16)
         timer = section.whole("event_timer", pdo.event_timer_ms, 0, UNSIGNED16)
@@ -136,7 +136,7 @@ class PdoReader:
         if not pdo.transmit:
             deadline = section.whole("event_deadline", pdo.event_timer_ms, 0, UNSIGNED16)
             if deadline != pdo.event_timer_ms:
-                text = "event_deadline of an RPDO: dcfgen fails at it"
+                text = "event_deadline of an RPDO: dcfgen fails on it"
                 section.note("event-deadline", "event_deadline", text)
             return replace(pdo, transmission=kind)
         if inhibit != pdo.inhibit_time_100us:
@@ -173,9 +173,9 @@ class PdoReader:
         return replace(pdo, mapping=tuple(mapping))
 
     def _mapped(self, entry: BusFileSection, pdo: BusPdo) -> MappedObject | None:
-        """Return what an entry maps, None if it is not there."""
+        """Return what an entry maps, None if it does not exist."""
         if "index" not in entry:
-            entry.note("kind", "index", "an entry of mapping has an index")
+            entry.note("kind", "index", "an entry of mapping needs an index")
             return None
         if (index := entry.whole("index", -1, 0, UNSIGNED16)) < 0:
             return None
@@ -183,7 +183,7 @@ class PdoReader:
         row = self._sheet.row(index, sub)
         what = f"{index:04X}h:{sub:02X}"
         if row is None:
-            text = f"{what} is not there: {self._sheet.beside(index)}"
+            text = f"{what} does not exist: {self._sheet.beside(index)}"
             entry.note("object-missing", "index", text)
             return None
         self._check_mappable(entry, row, what, pdo)
@@ -195,7 +195,7 @@ class PdoReader:
                 f"bits: {bits}, but {what} has {row.data_type.bits}: {where}",
             )
         if not row.data_type.bits:
-            text = f"{what} is a {row.data_type.name}, which no PDO carries"
+            text = f"{what} is a {row.data_type.name}, which cannot be mapped into a PDO"
             entry.note("value-type", "index", text)
             return None
         return MappedObject(index, sub, row.data_type.bits)
@@ -212,12 +212,12 @@ class PdoReader:
 
 
 def _said(pdos: dict[int, BusPdo]) -> str:
-    """Say which numbers there are."""
+    """Return the PDO numbers that exist, for messages."""
     return ", ".join(map(str, list(pdos)[:12])) + (", ..." if len(pdos) > 12 else "") or "none"
 
 
 def _of_sheet(sheet: Sheet, index: int) -> BusPdo:
-    """Return a PDO as it is at power-on."""
+    """Return a PDO with its power-on values."""
     transmit = index >= TPDO
     pdo = BusPdo(index - (TPDO if transmit else RPDO) + 1, transmit, INVALID)
     count, value = sheet.value(index, 0), sheet.value
@@ -240,7 +240,7 @@ def _mapping(sheet: Sheet, index: int) -> Iterator[MappedObject]:
 
 
 def pdos_after(sheet: Sheet, writes: Writes) -> tuple[BusPdo, ...]:
-    """Return all PDOs of a slave as they are after the writes, RPDOs first."""
+    """Return all PDOs of a slave after the writes, RPDOs first."""
     written = writes.values()
 
     def value(index: int, sub: int, default: int = 0) -> int:

@@ -19,12 +19,12 @@ from tickrig.wire.canopen.eds.eds_value import parse_number, plain_numbers
 from tickrig.wire.canopen.eds.object_table import EntryDescription
 
 _FOLDER_WORD: Final = "@BUS_CONFIG_PATH@"
-"""What the build of ros2_canopen replaces by the folder of the installed bus.yml."""
+"""Placeholder that the build of ros2_canopen replaces by the folder of the installed bus.yml."""
 IDENTITY: Final = 0x1018
 UNSET: Final = 255
-"""The node-ID of who has none."""
+"""The node-ID of an unconfigured node."""
 _WRONG: Final = -(1 << 31) - 1
-"""Stands for a node-ID that is no number; what is wrong with it is noted."""
+"""Node-ID of an entry that is not a number; the entry itself is reported."""
 _MOST_PDOS: Final = 0x200
 _SUFFIXES: Final = (".eds", ".dcf", ".xdd", ".xdc")
 
@@ -36,7 +36,7 @@ class Sheet:
         path: the file.
         file: its sections.
         device: what they describe.
-        node_id: that of the node, 0 where only the file gives one.
+        node_id: that of the node, 0 to use the one of the file.
     """
 
     def __init__(self, path: Path, file: EdsFile, device: EdsDevice, node_id: int) -> None:
@@ -47,23 +47,23 @@ class Sheet:
             self._rows.setdefault(row.index, {})[row.sub] = row
 
     def __contains__(self, index: int) -> bool:
-        """Return whether there is an object."""
+        """Return whether an object exists."""
         return index in self._rows
 
     def pdos(self, first: int) -> list[int]:
-        """Return the communication parameters that there are, `first` being that of PDO 1."""
+        """Return the existing communication parameters; `first` is the index for PDO 1."""
         return sorted([index for index in self._rows if first <= index < first + _MOST_PDOS])
 
     def subs(self, index: int) -> dict[int, EntryDescription]:
-        """Return the entries of an object by sub-index; none if it is not there."""
+        """Return the entries of an object by sub-index; empty if the object does not exist."""
         return self._rows.get(index, {})
 
     def row(self, index: int, sub: int) -> EntryDescription | None:
-        """Return an entry, None if it is not there."""
+        """Return an entry, None if it does not exist."""
         return self._rows.get(index, {}).get(sub)
 
     def value(self, index: int, sub: int, default: int = 0) -> int:
-        """Return the power-on value of a number; the default if there is none."""
+        """Return the power-on value of a number; the default if it does not exist."""
         row = self.row(index, sub)
         if row is None or not row.data_type.is_integer:
             return default
@@ -71,11 +71,11 @@ class Sheet:
         return int.from_bytes(data, "little", signed=row.signed)
 
     def beside(self, index: int) -> str:
-        """Say where an object is described that lacks an entry, or that there is no object."""
+        """Return where an object that lacks an entry is described, or that it does not exist."""
         return str(self.place(index)) if index in self else f"{self.path} has no {index:04X}h"
 
     def place(self, index: int, sub: int | None = None) -> FilePlace:
-        """Return the line where an object, or an entry of it, is described."""
+        """Return the line that describes an object or an entry."""
         names = [] if sub is None else [f"{index:04X}sub{sub:X}"]
         for section in (*names, f"{index:04X}"):
             if line := self.file.line(section):
@@ -83,16 +83,16 @@ class Sheet:
         return FilePlace(str(self.path), 0)
 
     def head_number(self, section: str, key: str) -> int:
-        """Return a number of the head, 0 if there is none."""
+        """Return a number of the section DeviceInfo, 0 if it is missing."""
         try:
             return parse_number(plain_numbers(self.file.value(section, key)) or "0")
         except ValueError:
             return 0
 
     def identity(self, key: str, sub: int) -> int:
-        """Return a number of the identity; that of the head counts more, as for dcfgen."""
+        """Return a number of the identity; as in dcfgen, DeviceInfo takes precedence."""
         section = COMMISSIONING if key.startswith("LSS") else "DeviceInfo"
-        if self.file.value(section, key):  # a 0 counts, too: nothing is expected then
+        if self.file.value(section, key):  # a 0 also takes precedence: then nothing is checked
             return self.head_number(section, key)
         return self.value(IDENTITY, sub)
 
@@ -102,17 +102,17 @@ class Sheets:
 
     Args:
         folder: of the bus.yml.
-        dcf_path: of the options, for a node that has none of its own.
+        dcf_path: that of the options, for nodes without their own.
     """
 
     def __init__(self, folder: Path, dcf_path: str) -> None:
         self._folder, self._dcf_path = folder, dcf_path
 
     def find(self, node: BusFileSection) -> Sheet | None:
-        """Return the sheet of a node; None, and a finding, without one.
+        """Return the sheet of a node; record a finding and return None if it has none.
 
-        It is looked for beside the file, as dcfgen does; then in `dcf_path`; then by its name alone
-        beside the file and one folder up, for a `dcf_path` of a container that is not there.
+        The search goes beside the file, as in dcfgen; then in `dcf_path`; then by the bare file
+        name beside the file and one folder up, because a `dcf_path` may exist only in a container.
         """
         name = node.text("dcf")
         if not name:
@@ -131,7 +131,7 @@ class Sheets:
         return None
 
     def _candidates(self, name: str, dcf_path: str) -> Iterator[Path]:
-        """Yield the places where a file may be."""
+        """Yield the paths where a file may be."""
         folder, given = self._folder, Path(self._expanded(name))
         yield folder / given
         if dcf_path:
@@ -144,7 +144,7 @@ class Sheets:
         return os.path.expandvars(text.replace(_FOLDER_WORD, str(self._folder)))
 
     def _not_found(self, name: str, looked: list[Path]) -> str:
-        """Say where a file is not, and which one could be meant."""
+        """Return the folders where a file is missing, and the file that may be meant."""
         where = ", ".join(dict.fromkeys(str(path.parent) for path in looked))
         beside = [path.name for path in self._folder.iterdir() if path.suffix.lower() in _SUFFIXES]
         meant = closest(Path(name).name, sorted(beside))
@@ -154,7 +154,7 @@ class Sheets:
     def _sheet(self, node: BusFileSection, path: Path, *, is_first: bool) -> Sheet | None:
         file, device = read_sheet(path)
         if not is_first:
-            text = f"dcf: it is taken from {_printable(str(path.parent))}"
+            text = f"dcf: using the file in {_printable(str(path.parent))}"
             node.note("file-elsewhere", "dcf", text)
         for one in file.errors:
             where = f"[{shorten(one.section)}] " if one.section else ""
@@ -164,14 +164,14 @@ class Sheets:
 
 
 def _node_id(node: BusFileSection) -> int:
-    """Return the node-ID that the section gives, 0 for none or a wrong one."""
+    """Return the node-ID that the section gives, 0 if it is missing or wrong."""
     number = node.whole("node_id", _WRONG if "node_id" in node else UNSET, _WRONG + 1)
     if number == _WRONG:
         return 0
     if number != UNSET and not 1 <= number <= HIGHEST_NODE_ID:
         node.note("node-id", "node_id", f"node_id: {number} is not in 1..127")
     elif number == UNSET and "node_id" in node:
-        node.note("no-node-id", "node_id", "node_id: 255 is no node: dcfgen leaves it out")
+        node.note("no-node-id", "node_id", "node_id: 255 is not a node: dcfgen leaves it out")
     else:
         return number % UNSET
     return 0
@@ -184,11 +184,11 @@ def _said(name: str, error: OSError | EdsError) -> str:
 
 
 def _printable(text: str) -> str:
-    """Return a path that can be printed in a line."""
+    """Return a path as printable text in one line."""
     return "".join(letter if letter.isprintable() else "?" for letter in text)
 
 
-# The writes of a concise DCF, as dcfgen makes them, held against the EDS.
+# The writes of a concise DCF, as dcfgen makes them, checked against the EDS.
 
 _FLOATS: Final = (DataType.REAL32, DataType.REAL64)
 _ODD_SIZES: Final = (3, 5, 6, 7)
@@ -198,9 +198,9 @@ class Writes:
     """Collects the writes for one slave.
 
     Args:
-        sheet: of the slave.
+        sheet: EDS or DCF of the slave.
         name: of its section.
-        notes: take what the EDS contradicts.
+        notes: collects the contradictions to the EDS.
     """
 
     def __init__(self, sheet: Sheet, name: str, notes: BusFileNotes) -> None:
@@ -209,29 +209,29 @@ class Writes:
 
     @property
     def all(self) -> tuple[BusWrite, ...]:
-        """All of them in their order."""
+        """All writes in their order."""
         return tuple(self._all)
 
     def add(self, index: int, sub: int, value: int, place: FilePlace, said: str = "") -> None:
-        """Add a write; what dcfgen refuses is noted and left out.
+        """Add a write; report and leave out what dcfgen refuses.
 
         Args:
             index: of the object.
             sub: sub-index.
             value: as the file gives it.
-            place: what asks for it.
-            said: the value as it is written there.
+            place: where the file asks for it.
+            said: the value as written there.
         """
         if (write := self._made(index, sub, value, place, said)) is not None:
             self._all.append(write)
 
     def insert(self, index: int, sub: int, value: int, place: FilePlace) -> None:
-        """Put a write before all others."""
+        """Insert a write before all others."""
         if (write := self._made(index, sub, value, place, "")) is not None:
             self._all.insert(0, write)
 
     def values(self) -> dict[int, bytes]:
-        """Return what is written last, by index << 8 | sub-index."""
+        """Return the last written values, by index << 8 | sub-index."""
         return {write.index << 8 | write.sub_index: write.data for write in self._all}
 
     def _made(
@@ -243,7 +243,7 @@ class Writes:
             kind = row.data_type
             self._check_access(row, what, place)
         elif sub or index not in self._sheet:
-            text = f"{what} is not there: {self._sheet.beside(index)}"
+            text = f"{what} does not exist: {self._sheet.beside(index)}"
             self._notes.note("object-missing", place, self._name, text)
             return None
         data = self._data(kind, what, value, place, said or str(value))
@@ -257,18 +257,18 @@ class Writes:
         self, kind: DataType, what: str, value: int, place: FilePlace, said: str
     ) -> bytes | None:
         if kind not in _FLOATS and not kind.is_integer:
-            text = f"{what} is a {kind.name}, of which dcfgen writes none"
+            text = f"{what} is a {kind.name}, which dcfgen does not write"
             self._notes.note("value-type", place, self._name, text)
             return None
         if kind.size in _ODD_SIZES:
-            text = f"{what} is a {kind.name}: dcfgen writes more bytes than it says"
+            text = f"{what} is a {kind.name}: dcfgen writes more bytes than it declares"
             self._notes.note("odd-size", place, self._name, text)
-        if kind is DataType.BOOLEAN:  # a byte for dcfgen, whatever is in it
+        if kind is DataType.BOOLEAN:  # dcfgen writes one byte, whatever the value is
             kind = DataType.UNSIGNED8
         try:
             return kind.encode(float(value) if kind in _FLOATS else value)
         except (ValueError, OverflowError):
-            text = f"{what}: {said} is no {kind.name}"
+            text = f"{what}: {said} is not a valid {kind.name}"
             self._notes.note("value-range", place, self._name, text)
             return None
 
@@ -286,5 +286,5 @@ class Writes:
 
 
 def final_places(writes: Iterable[BusWrite]) -> dict[int, FilePlace]:
-    """Return what asks for the last write to an entry, by index << 8 | sub-index."""
+    """Return the place of the last write to an entry, by index << 8 | sub-index."""
     return {write.index << 8 | write.sub_index: write.place for write in writes}

@@ -24,10 +24,10 @@ class SlaveReader:
 
     Args:
         name: of its section.
-        node: that section.
-        sheet: its EDS.
-        options: of the file.
-        cob_ids: of the whole bus.
+        node: the section.
+        sheet: its EDS or DCF.
+        options: those of the file.
+        cob_ids: the free COB-IDs of the whole bus.
     """
 
     def __init__(
@@ -60,7 +60,7 @@ class SlaveReader:
         )
 
     def _with_error_control(self, slave: BusSlave) -> BusSlave:
-        """Read how each side notices that the other one is lost; write what differs."""
+        """Read how master and slave supervise each other; write what differs from the EDS."""
         node = self._node
         self._changed("time_cob_id", TIME, 0x100)
         heartbeat = self._changed("heartbeat_producer", HEARTBEAT, 0, UNSIGNED16)
@@ -98,7 +98,7 @@ class SlaveReader:
         )
 
     def _identity(self) -> Identity:
-        """Return what is checked; only revision and serial number can be said in the file."""
+        """Return the identity to check; the file can only set revision and serial number."""
         node, sheet = self._node, self._sheet
         for index, sub in ((0x1000, 0), (IDENTITY, 1)):
             if sheet.row(index, sub) is None:
@@ -115,7 +115,7 @@ class SlaveReader:
         )
 
     def _check_head(self) -> None:
-        """Note where the head of the EDS has other numbers than its 1018h."""
+        """Report numbers of DeviceInfo that differ from those in 1018h."""
         sheet = self._sheet
         for sub, key in ((1, "VendorNumber"), (2, "ProductNumber"), (3, "RevisionNumber")):
             head, number = sheet.head_number("DeviceInfo", key), sheet.value(IDENTITY, sub)
@@ -126,7 +126,7 @@ class SlaveReader:
                 self._node.notes.note("identity", place, self._node.name, text)
 
     def _identity_number(self, key: str, head: str, sub: int) -> int:
-        """Return a number that the file may give; without an entry in the EDS none is checked."""
+        """Return a number that the file may set; it is not checked if the EDS lacks the entry."""
         node, sheet = self._node, self._sheet
         in_eds = sheet.identity(head, sub)
         number = node.whole(key, in_eds)
@@ -142,7 +142,7 @@ class SlaveReader:
         return number
 
     def _check_identity_keys(self) -> None:
-        """Note what the master has of the EDS alone."""
+        """Report keys that the master does not read, because it takes the value from the EDS."""
         for key, head, sub in (
             ("vendor_id", "VendorNumber", 1),
             ("product_code", "ProductNumber", 2),
@@ -202,7 +202,7 @@ class SlaveReader:
         for entry in self._node.sections("sdo"):
             check_keys(entry, WRITE)
             if "index" not in entry:
-                entry.note("kind", "index", "an entry of sdo has an index")
+                entry.note("kind", "index", "an entry of sdo needs an index")
                 continue
             if (index := entry.whole("index", -1, 0, UNSIGNED16)) < 0:
                 continue
@@ -219,14 +219,14 @@ class SlaveReader:
 
 
 def read_extra(section: BusFileSection) -> dict[str, Item]:
-    """Return what is for us alone, by key."""
+    """Return the keys that only this project reads."""
     if EXTRA not in section:
         return {}
     return {str(key): item for key, item in section.section(EXTRA).fields.items()}
 
 
 def _read_channels(node: BusFileSection, name: str) -> tuple[DriveChannel, ...]:
-    """Read the axes of a node: their names and scales; without a number there is one."""
+    """Read the axes of a node: their names and scales; without a number there is one axis."""
     count = node.whole("num_channels", 1, 1, _MOST_CHANNELS)
     names = node.fields.get("channel_names")
     own = node.sections("channels")

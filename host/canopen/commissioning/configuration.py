@@ -16,21 +16,21 @@ _Address = tuple[int, int]
 Values = dict[_Address, bytes]
 
 _COMMANDS: Final = (0x1003, 0x1010, 0x1011, *range(0x1F50, 0x1F58))
-"""Error history, store, restore, programs: to write them commands something."""
+"""Error history, store, restore, programs: writing them triggers an action."""
 _CONFIGURED: Final = 0x1020
-"""Verify configuration: date and time are written when all else is."""
+"""Verify configuration: date and time are written last."""
 _COB_ID: Final = 1
 """Sub-index of the communication parameter of a PDO."""
 _TEXTS: Final = (DataType.VISIBLE_STRING, DataType.UNICODE_STRING)
 
 
 def dcf_values(file: EdsFile, device: EdsDevice, node_id: int) -> Values:
-    """Return what a DCF configures: its ParameterValues of objects that can be written.
+    """Return what a DCF configures: the ParameterValues of its writable objects.
 
     Args:
         file: the DCF.
-        device: what it says.
-        node_id: is added where a value is relative to it.
+        device: the device that it describes.
+        node_id: added to values that are relative to it.
     """
     sections = {(index, sub or 0): section for section, index, sub in file.objects()}
     return {
@@ -56,21 +56,21 @@ def default_values(device: EdsDevice, node_id: int) -> Values:
 
 
 def is_parameter(row: EntryDescription) -> bool:
-    """Return whether an entry is set once, and not a value that comes and goes with a process."""
+    """Return whether an entry is a setting, and not a value of the running process."""
     mapped = Access.RPDO in row.access or Access.TPDO in row.access
     kept = row.readable and row.writable and not mapped
     return kept and row.index not in _COMMANDS and row.data_type is not DataType.DOMAIN
 
 
 def same(row: EntryDescription | None, wanted: bytes, found: bytes) -> bool:
-    """Return whether two values mean the same: texts without the zeros at their end."""
+    """Return whether two values mean the same: texts are compared without trailing zeros."""
     if row is not None and row.data_type in _TEXTS:
         return wanted.rstrip(b"\0") == found.rstrip(b"\0")
     return wanted == found
 
 
 def disabled(done: Sequence[Write], left: Sequence[Write]) -> str:
-    """Say which PDO is disabled between two writes, and would be enabled by one that is left."""
+    """Return which PDO the writes so far disable and a remaining write would enable."""
     was = {at: data for at, data in done if at[1] == _COB_ID and _is_pdo(at[0])}
     will = {at: data for at, data in left if at[1] == _COB_ID and _is_pdo(at[0])}
     open_pdos = [at for at in was.keys() & will if _is_off(was[at]) and not _is_off(will[at])]
@@ -90,15 +90,15 @@ def writes(
     number: Callable[[_Address], int],
     writable: Collection[_Address],
 ) -> list[Write]:
-    """Return what to write, one after the other; the date of the configuration comes last.
+    """Return what to write, in order; the date of the configuration comes last.
 
     Args:
-        values: what the node shall hold.
+        values: the wanted values of the node.
         number: reads an object of the node, as an unsigned number.
-        writable: objects that can be written; a step between is left out for others.
+        writable: objects that can be written; intermediate writes to other objects are left out.
 
     Raises:
-        ValueError: a COB-ID, or a number of mapped objects, that is none.
+        ValueError: an invalid COB-ID or number of mapped objects.
     """
     last = {at: data for at, data in values.items() if at[0] == _CONFIGURED}
     first = {at: values[at] for at in sorted(values) if at not in last}

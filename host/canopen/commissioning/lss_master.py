@@ -25,22 +25,22 @@ from tickrig.wire.canopen.lss import (
 )
 
 _ANSWER_US: Final = 500_000
-"""How long an answer to a command is waited for."""
+"""How long the master waits for the answer to a command."""
 SCAN_US: Final = 20_000
-"""How long answers to a question of a fastscan are waited for: several slaves may answer."""
+"""How long it waits for answers to a question of a fastscan: several slaves may answer."""
 _SILENCE_US: Final = 200_000
-"""Answers to a fastscan that failed have come by then."""
+"""Within this time, late answers to a failed fastscan have arrived."""
 _PATIENCE: Final = (1, 2, 4)
-"""A fastscan is tried with so many times its wait."""
+"""A fastscan is tried with these multiples of its wait."""
 _SETTLE_US: Final = 5_000
-"""After what nobody answers, so that slow slaves take it."""
+"""Pause after a command without an answer, so that slow slaves can execute it."""
 MOST_FOUND: Final = 127
 _BITS: Final = range(31, -1, -1)
 
 INDICES: Final = {rate: index for index, rate in BIT_RATES.items()}
-"""Index of the standard table by bit rate in bit/s."""
+"""Index in the standard table by bit rate in bit/s."""
 _SPECIFIC: Final = 0xFF
-"""Error code whose reason is the manufacturer's."""
+"""Error code for a reason that the manufacturer defines."""
 
 _ERRORS: Final = {
     (LssCommand.CONFIGURE_NODE_ID, 1): "node-ID out of range",
@@ -51,11 +51,11 @@ _ERRORS: Final = {
 
 
 class LssFailed(Exception):  # noqa: N818 - what the slave did
-    """A slave refused, did not answer, or several answered where one may.
+    """A slave refused, did not answer, or several answered where only one may.
 
     Attributes:
-        command: that failed, None where it was several.
-        code: with which the slave refused, 0 if it did not.
+        command: the command that failed, None if it was several.
+        code: error code of the slave, 0 if it did not refuse.
     """
 
     def __init__(self, message: str, command: LssCommand | None = None, code: int = 0) -> None:
@@ -64,15 +64,15 @@ class LssFailed(Exception):  # noqa: N818 - what the slave did
 
 
 class LssMaster:
-    """The LSS master of a bus; there may be no other.
+    """The LSS master of a bus; a bus may have only one.
 
     Args:
         bus: the bus.
-        answer_us: how long an answer to a command is waited for.
-        scan_us: how long answers to each of the 133 questions of a fastscan are waited for.
+        answer_us: how long to wait for the answer to a command.
+        scan_us: how long to wait for answers to each of the 133 questions of a fastscan.
 
     Attributes:
-        waiting: all slaves were sent back to waiting, at the end of `at_work`.
+        waiting: whether all slaves are back in state waiting, at the end of `at_work`.
     """
 
     def __init__(self, bus: NodeBus, answer_us: int = _ANSWER_US, scan_us: int = SCAN_US) -> None:
@@ -81,7 +81,7 @@ class LssMaster:
 
     @contextmanager
     def at_work(self) -> Iterator[None]:
-        """Have all slaves wait at the beginning and at the end of the block, however it ends."""
+        """Put all slaves into waiting before and after the block, also after errors."""
         self.switch_all(LssMode.WAITING)
         try:
             yield
@@ -91,12 +91,12 @@ class LssMaster:
                 self.waiting = True
 
     def switch_all(self, mode: LssMode) -> None:
-        """Switch all slaves; nobody answers. A new node-ID counts when they wait again."""
+        """Switch all slaves, without an answer. New node-IDs take effect in state waiting."""
         self._bus.send(LSS_MASTER_COB_ID, message(LssCommand.SWITCH_GLOBAL, mode))
         self._bus.gather(_SETTLE_US)
 
     def select(self, address: LssAddress) -> bool:
-        """Switch the slave with this address to configuration; False if none answers."""
+        """Switch the slave with this address to configuration; return False if none answers."""
         for number, part in enumerate(address[:3]):
             command = LssCommand(LssCommand.SWITCH_VENDOR + number)
             self._bus.send(LSS_MASTER_COB_ID, message(command, part))
@@ -105,9 +105,9 @@ class LssMaster:
         return LssCommand.SWITCHED in (answer[0] for answer in answers)
 
     def fastscan(self) -> LssAddress | None:
-        """Find a slave without a node-ID; it is in configuration then. None if there is none.
+        """Find a slave without a node-ID and switch it to configuration; None if there is none.
 
-        Where answers come too late for their questions it is begun anew, with twice the time.
+        If answers arrive too late for their questions, the scan starts again with twice the time.
 
         Raises:
             LssFailed: slaves answered in a way that fits no address, each time.
@@ -121,7 +121,7 @@ class LssMaster:
                 self._bus.gather(_SILENCE_US)
             else:
                 if found is None and failed is not None:
-                    break  # who had answered is gone
+                    break  # the slave that answered is gone
                 return found
         assert failed is not None
         raise failed
@@ -157,15 +157,15 @@ class LssMaster:
         return self._command(message(LssCommand.INQUIRE_NODE_ID))[1]
 
     def count(self) -> int:
-        """Return how many slaves in configuration answer; 0 if none knows the question.
+        """Return how many slaves in configuration answer; 0 if none supports the question.
 
-        Slaves with the same address are found as one by a fastscan. Their answers are one
-        frame if they are sent at the same moment, and count as one then.
+        A fastscan finds slaves with the same address as one. Their answers are one frame, and count
+        as one, if they are sent at the same moment.
         """
         return len(self._answers_to(message(LssCommand.INQUIRE_NODE_ID)))
 
     def configure_node_id(self, node_id: int) -> None:
-        """Give the slave in configuration a node-ID.
+        """Set the node-ID of the slave in configuration.
 
         Args:
             node_id: 1..127, or 255 for none.
@@ -177,20 +177,20 @@ class LssMaster:
         self._configure(message(LssCommand.CONFIGURE_NODE_ID, node_id))
 
     def configure_bit_rate(self, bit_rate: int) -> None:
-        """Give it a bit rate in bit/s, of `INDICES`; raises as `configure_node_id`."""
+        """Set the bit rate in bit/s, one of `INDICES`; raises as `configure_node_id`."""
         number = STANDARD_TABLE | INDICES[bit_rate] << 8
         self._configure(message(LssCommand.CONFIGURE_BIT_TIMING, number))
 
     def activate_bit_rate(self, delay_ms: int) -> None:
-        """Let all slaves in configuration switch their bit rate after a delay; nobody answers."""
+        """Switch the bit rate of all slaves in configuration after a delay, without an answer."""
         self._bus.send(LSS_MASTER_COB_ID, message(LssCommand.ACTIVATE_BIT_TIMING, delay_ms))
 
     def store(self) -> None:
-        """Have it store both; raises as `configure_node_id`."""
+        """Make the slave store node-ID and bit rate; raises as `configure_node_id`."""
         self._configure(message(LssCommand.STORE))
 
     def _scan(self, request: FastScan, wait_us: int) -> bool:
-        """Return whether somebody answers; late answers of others belong to this question too."""
+        """Return whether a slave answers; late answers of other slaves count too."""
         self._bus.send(LSS_MASTER_COB_ID, request.encode())
         return any(answer[0] == LssCommand.IDENTIFIED for answer in self._gather(wait_us))
 
@@ -219,7 +219,7 @@ class LssMaster:
         return [answer for answer in answers if answer[0] == request[0]]
 
     def _request(self, request: bytes) -> list[bytes]:
-        """Send; return the first answers that come together."""
+        """Send a command; return the first answers that arrive together."""
         bus = self._bus
         bus.gather(0)
         bus.send(LSS_MASTER_COB_ID, request)
@@ -241,7 +241,7 @@ def _answers(frames: Iterable[CanFrame]) -> Iterator[bytes]:
 
 
 def _name(command: LssCommand) -> str:
-    """Write a command for people.
+    """Return the name of a command in words.
 
     >>> _name(LssCommand.CONFIGURE_NODE_ID)
     'configure node-ID'

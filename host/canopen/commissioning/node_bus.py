@@ -28,14 +28,14 @@ _ERROR_CONTROL: Final = range(ERROR_CONTROL_COB_ID + 1, ERROR_CONTROL_COB_ID + 1
 class NodeBus:
     """SDO, NMT and single frames on a bus, from one thread.
 
-    Who ends it in the middle of an SDO transfer, as Ctrl-C does, has the transfer aborted.
+    If you end it in the middle of an SDO transfer, for example by Ctrl-C, it aborts the transfer.
 
     Args:
         link: the bus.
-        timeout_us: how long an SDO response is waited for.
+        timeout_us: how long to wait for an SDO response.
 
     Attributes:
-        states: what each node reported last, by node-ID; a boot-up counts as one.
+        states: last reported state of each node, by node-ID; a boot-up counts as a report.
     """
 
     def __init__(self, link: StampedLink, timeout_us: int = SDO_TIMEOUT_US) -> None:
@@ -53,7 +53,7 @@ class NodeBus:
         self._link.send((data_frame(can_id, data),))
 
     def listen(self, until_us: int) -> tuple[int, StampedFrames]:
-        """Wait for a first frame; return a time, and all that had arrived by then.
+        """Wait for a first frame; return a time, and all frames that had arrived by then.
 
         Raises:
             LinkClosed: the bus is gone.
@@ -65,7 +65,7 @@ class NodeBus:
         return now_us, frames
 
     def gather(self, span_us: int) -> list[CanFrame]:
-        """Let so much time pass; return what came meanwhile."""
+        """Let this much time pass; return the frames that arrive."""
         until_us, found = self.now_us + span_us, list[CanFrame]()
         now_us = self.now_us
         while now_us < until_us:
@@ -74,13 +74,13 @@ class NodeBus:
         return found
 
     def command(self, command: NmtCommand, node_id: int) -> None:
-        """Send an NMT command; to all nodes for node-ID 0."""
+        """Send an NMT command; node-ID 0 addresses all nodes."""
         self.send(NMT_COB_ID, bytes((command, node_id)))
 
     def await_state(
         self, node_id: int, wanted: tuple[NmtState, ...], within_us: int
     ) -> NmtState | None:
-        """Wait until a node reports one of some states; return what it reported last meanwhile."""
+        """Wait until a node reports one of some states; return the last state that it reported."""
         until_us, now_us = self.now_us + within_us, self.now_us
         self.states.pop(node_id, None)
         while self.states.get(node_id) not in wanted and now_us < until_us:
@@ -88,12 +88,12 @@ class NodeBus:
         return self.states.get(node_id)
 
     def run(self, node_id: int, script: Script[T], timeout_us: int = 0) -> T:
-        """Run a script, and return or raise what it does.
+        """Run a script, and return its result or raise its error.
 
         Args:
-            node_id: the node that it speaks with.
-            script: what is said.
-            timeout_us: how long a response is waited for; 0 for as long as usual.
+            node_id: the node that it talks to.
+            script: the script.
+            timeout_us: how long to wait for a response; 0 for the default.
 
         Raises:
             LinkClosed: the bus is gone.
@@ -116,7 +116,7 @@ class NodeBus:
             node_id: the node.
             index: of the object.
             sub: its sub-index.
-            size: of the object in bytes, 0 if nobody knows.
+            size: of the object in bytes, 0 if unknown.
 
         Raises:
             SdoFailed: the node refuses, or does not answer.
@@ -137,7 +137,7 @@ class NodeBus:
             self.states[frame.can_id - ERROR_CONTROL_COB_ID] = state
 
 
-# Which nodes are on a bus: each node-ID is asked for its device type, which changes nothing.
+# Which nodes are on a bus: read the device type of each node-ID, which changes nothing.
 
 _NODE_IDS: Final = range(1, 128)
 _DEVICE_TYPE: Final = 0x1000
@@ -147,20 +147,20 @@ _IDENTITY: Final = 0x1018
 
 _AT_ONCE: Final = 8
 _GAP_US: Final = 10_000
-"""So many nodes are asked at once, then a pause: a slow bus carries other traffic as well."""
+"""Nodes queried at once; a pause follows, because a slow bus also carries other traffic."""
 
 
 @dataclass(frozen=True, slots=True)
 class NodeFound:
-    """A node that answered or was heard.
+    """A node that answered or sent a frame.
 
     Attributes:
         node_id: 1..127.
-        device_type: 1000h, None if it did not say it.
-        identity: 1018h:01 to 04, as far as it has them.
+        device_type: 1000h, None if it did not answer.
+        identity: 1018h:01 to 04, those that it has.
         name: 1008h, empty if it has none.
-        state: what it reported last, None if it reported nothing.
-        answers: to one question; with two there are two nodes of this node-ID.
+        state: last reported state, None if it reported none.
+        answers: number of answers to one question; 2 means that two nodes share this node-ID.
         heartbeat_ms: 1017h, None if it has none.
     """
 
@@ -175,14 +175,14 @@ class NodeFound:
 
 @dataclass(slots=True)
 class NetworkScan:
-    """Asks, and says who is there; nothing on the bus is changed.
+    """Queries all node-IDs and returns the nodes; changes nothing on the bus.
 
     Args:
         bus: the bus.
-        wait_us: how long the last answers, and heartbeats, are waited for.
+        wait_us: how long to wait for the last answers and for heartbeats.
 
     Attributes:
-        unconfigured: LSS slaves without a node-ID have answered.
+        unconfigured: whether LSS slaves without a node-ID answered.
     """
 
     bus: NodeBus
@@ -192,7 +192,7 @@ class NetworkScan:
     _types: dict[int, int] = field(default_factory=dict)
 
     def run(self) -> list[NodeFound]:
-        """Return who answered or was heard, by node-ID; LinkClosed if the bus is gone."""
+        """Return the nodes that answered or sent a frame, by node-ID; LinkClosed without a bus."""
         for first in range(1, 128, _AT_ONCE):
             for node_id in _NODE_IDS[first - 1 : first - 1 + _AT_ONCE]:
                 request = UploadInitiateRequest(_DEVICE_TYPE, 0).encode()
@@ -225,7 +225,7 @@ class NetworkScan:
                     pass
 
     def _identify(self, node_id: int) -> NodeFound:
-        """Ask a node that is there who it is; one that was only heard is not asked."""
+        """Read the identity of a node that answered; skip one that only sent a frame."""
         state = self.bus.states.get(node_id)
         if not self._answers[node_id]:
             return NodeFound(node_id, state=state, answers=0)

@@ -17,7 +17,7 @@ from tickrig.wire.canopen.sdo import Abort
 # SDO block download as a script (CiA 301, SDO block download).
 
 _MOST_IDLE: Final = 20
-"""So many blocks in a row of which nothing came through end the transfer."""
+"""The transfer ends after this many successive blocks without any acknowledged segment."""
 
 Answer = TypeVar("Answer")
 
@@ -26,20 +26,21 @@ _OnProgress = Callable[[int], object]
 
 
 def download_blocks(index: int, sub: int, data: bytes, on_progress: _OnProgress) -> Script[None]:
-    """Write an object in blocks, with CRC if the server can.
+    """Write an object in blocks, with CRC if the server supports it.
 
-    What is lost within a block is sent again from there on. If the last segment of a block or
-    its acknowledgement is lost, CiA 301 has no way to go on: the transfer times out.
+    A segment lost within a block, and those after it, are sent again. If the last segment of a
+    block or its acknowledgement is lost, CiA 301 defines no way to continue: the transfer times
+    out.
 
     Args:
         index: of the object.
         sub: its sub-index.
-        data: what is written.
-        on_progress: is told how far it is.
+        data: the bytes to write.
+        on_progress: called with the progress.
 
     Raises:
-        SdoAborted: the server refuses, or answers something else; `COMMAND_SPECIFIER` from
-            one that does no block transfer.
+        SdoAborted: the server refuses, or answers something else; `COMMAND_SPECIFIER` if it does
+            not support block transfer.
         SdoTimeout: it does not answer.
     """
     request = sdo_frame.BlockDownloadInitiateRequest(index, sub, crc=True, size=len(data)).encode()
@@ -70,7 +71,7 @@ def download_blocks(index: int, sub: int, data: bytes, on_progress: _OnProgress)
 def _send_block(
     index: int, sub: int, data: bytes, first: int, count: int
 ) -> Script[sdo_frame.BlockAcknowledge]:
-    """Send segments; return the receipt of the last of them."""
+    """Send segments; return the acknowledgement of the last one."""
     at = first * sdo_frame.SEGMENT_BYTES
     for seqno in range(1, count):
         yield SdoFrame(bytes((seqno,)) + data[at : at + sdo_frame.SEGMENT_BYTES])
@@ -83,7 +84,7 @@ def _send_block(
 
 
 def _request(request: SdoRequest, kind: type[Answer]) -> Script[Answer]:
-    """Send, and return the answer; what is no such answer ends the transfer."""
+    """Send a request and return its response; any other frame ends the transfer."""
     answer = yield request
     if isinstance(answer, kind):
         return answer
@@ -93,7 +94,7 @@ def _request(request: SdoRequest, kind: type[Answer]) -> Script[Answer]:
 
 
 def _abort(index: int, sub: int, code: sdo_frame.AbortCode) -> Script[NoReturn]:
-    """End the transfer: the server has said what it may not."""
+    """End the transfer: the server sent a response that is not allowed here."""
     yield SdoFrame(Abort(index, sub, code).encode())
     raise SdoAborted(index, sub, code)
 
@@ -103,13 +104,13 @@ COMMANDS: Final = {"stop": 0, "start": 1, "reset": 2, "clear": 3}
 _STATES: Final = {0: "stopped", 1: "running"}
 
 _PATIENCE_US: Final = 60_000_000
-"""How long flash may be busy, and a program may take to stop or start."""
+"""How long flash may be busy, and how long a program may take to stop or start."""
 _ANSWER_US: Final = 10_000_000
 """How long a node that clears its flash may take to answer."""
 
 _LOOKS: Final = 3
 _SILENCE_US: Final = 500_000
-"""What a node answers to segments behind an abort has come by then."""
+"""Within this time, the answers of a node to segments after an abort have arrived."""
 
 _ERRORS: Final = {
     0: "no error",
@@ -122,25 +123,25 @@ _ERRORS: Final = {
     7: "flash secured",
     63: "unspecified error",
 }
-"""Of 1F57h, bits 1 to 7."""
+"""Bits 1 to 7 of 1F57h."""
 
 _AGAIN: Final = (
     sdo_frame.AbortCode.CRC,
     sdo_frame.AbortCode.SEQUENCE_NUMBER,
     sdo_frame.AbortCode.TIMEOUT,
 )
-"""Aborts by which a transfer was disturbed, and not refused."""
+"""Abort codes of a disturbed transfer, as opposed to a refused one."""
 
 _Say = Callable[[str], object]
 
 
 class ProgramFailed(Exception):  # noqa: N818 - what the node did
-    """The node did not do what was wanted; what, is in the text."""
+    """The node did not do what was requested; the message says what."""
 
 
 @dataclass(frozen=True, slots=True)
 class ProgramStatus:
-    """What a node says of a program.
+    """What a node reports about a program.
 
     Attributes:
         control: 1F51h.
@@ -153,7 +154,7 @@ class ProgramStatus:
     flash: int | None
 
     def __str__(self) -> str:
-        """Return it in words."""
+        """Return the status in words."""
         state = _STATES.get(self.control, f"state {self.control}")
         known = "none" if self.identification is None else f"{self.identification:08X}h"
         flash = "not told" if self.flash is None else _flash_text(self.flash)
@@ -166,15 +167,15 @@ class Program:
     Args:
         bus: the bus.
         node_id: the node.
-        number: of the program, 1..254: the sub-index.
-        say: is told what is done.
+        number: number of the program, 1..254, which is the sub-index.
+        say: called with each step in words.
     """
 
     def __init__(self, bus: NodeBus, node_id: int, number: int, say: _Say) -> None:
         self._bus, self._node_id, self._number, self._say = bus, node_id, number, say
 
     def status(self) -> ProgramStatus:
-        """Read what the node says; SdoFailed if it has no 1F51h."""
+        """Read the status of the program; SdoFailed if the node has no 1F51h."""
         control = self._read(boot_slave.CONTROL)
         return ProgramStatus(
             control,
@@ -183,7 +184,7 @@ class Program:
         )
 
     def command(self, command: int) -> None:
-        """Write program control; who stops or starts may reset before it has answered.
+        """Write program control; a node that stops or starts may reset before it answers.
 
         Raises:
             SdoAborted: the node refuses.
@@ -195,37 +196,37 @@ class Program:
                 raise
 
     def stop(self) -> None:
-        """Stop it, unless it is; wait until it is."""
+        """Stop the program unless it is stopped; wait until it is."""
         if self._read(boot_slave.CONTROL) == boot_slave.STOP:
-            self._say("it is stopped already")
+            self._say("it is already stopped")
             return
         self.command(boot_slave.STOP)
         self.await_control(boot_slave.STOP)
         self._say("stopped: the boot loader runs")
 
     def clear(self) -> None:
-        """Clear it, and wait until the flash is ready."""
+        """Clear the program, and wait until the flash is ready."""
         self.command(COMMANDS["clear"])
         self._await_flash(allowed=(0, 1))
         self._say("cleared")
 
     def start(self) -> None:
-        """Start it, and wait until it runs."""
+        """Start the program, and wait until it runs."""
         self.command(COMMANDS["start"])
         self.await_control(COMMANDS["start"])
         self._say("started")
 
     def download(self, data: bytes, on_progress: _OnProgress, tries: int = 3) -> int:
-        """Write it, and wait until the flash is written.
+        """Write the program, and wait until the flash is written.
 
         Args:
             data: the program.
-            on_progress: is told how far it is.
-            tries: a transfer that was disturbed begins anew, so often in all: a client cannot
-                go on in the middle (CiA 301).
+            on_progress: called with the progress.
+            tries: number of attempts; a disturbed transfer starts from the beginning, because a
+                client cannot resume it (CiA 301).
 
         Returns:
-            How often it was begun.
+            The number of attempts made.
 
         Raises:
             SdoFailed: the node refuses, or the last try failed.
@@ -242,13 +243,13 @@ class Program:
                 self._bus.gather(_SILENCE_US)
                 if not self._is_there():
                     raise
-                self._say(f"the transfer broke off ({error}); begun anew, {number + 1} of {tries}")
+                self._say(f"the transfer failed ({error}); starting again, {number + 1} of {tries}")
                 on_progress(0)
         self._await_flash(allowed=(0,))
         return number
 
     def _is_there(self) -> bool:
-        """Return whether the node answers at all; a frame or two may be lost."""
+        """Return whether the node answers at all; one or two frames may be lost."""
         for _ in range(_LOOKS):
             try:
                 self._read(boot_slave.CONTROL)
@@ -266,12 +267,12 @@ class Program:
         except SdoAborted as error:
             if error.code != sdo_frame.AbortCode.COMMAND_SPECIFIER:
                 raise
-            self._say("the node does no block transfer: in segments")
+            self._say("the node does not support block transfer; using segments")
             self._bus.run(self._node_id, download(*at, data), _ANSWER_US)
             on_progress(len(data))
 
     def await_control(self, wanted: int) -> None:
-        """Wait until program control reads so; a node that resets does not answer meanwhile."""
+        """Wait until program control reads this value; a resetting node does not answer."""
         until_us = self._bus.now_us + _PATIENCE_US
         while (control := self._optional(boot_slave.CONTROL)) != wanted:
             if self._bus.now_us >= until_us:
@@ -283,7 +284,7 @@ class Program:
             self._bus.gather(boot_slave.LOOK_US)
 
     def _await_flash(self, allowed: tuple[int, ...]) -> None:
-        """Wait until the flash is ready; an error that is not allowed is raised."""
+        """Wait until the flash is ready; raise an error that is not allowed."""
         until_us = self._bus.now_us + _PATIENCE_US
         while (
             status := self._optional(boot_slave.FLASH_STATUS)
@@ -308,7 +309,7 @@ class Program:
 
 
 def _flash_text(status: int) -> str:
-    """Say what 1F57h means.
+    """Return the meaning of a flash status word (1F57h).
 
     >>> _flash_text(0), _flash_text(1), _flash_text(0x0A)
     ('no error', 'busy', 'flash write error')

@@ -59,7 +59,7 @@ def test_a_mistake_is_told_with_both_places(folder: Path) -> None:
         "bus.yml:6: warning: [read-only] [axis] 6041h:00 cannot be written: epos.eds:"
     )
     assert out[1] == (
-        "bus.yml:7: error: [object-missing] [axis] 9999h:00 is not there: epos.eds has no 9999h;"
+        "bus.yml:7: error: [object-missing] [axis] 9999h:00 does not exist: epos.eds has no 9999h;"
         " fix: write to what is there (dcfgen)"
     )
     assert len(out) == 2

@@ -115,7 +115,7 @@ def test_an_end_in_the_middle_says_so_and_the_same_command_goes_on(
     )
     again = module.net(file, "--expect", ID)
     assert again.exit_code == 0, again.output
-    assert "node 17: it is stopped already" in again.stderr
+    assert "node 17: it is already stopped" in again.stderr
 
 
 def test_a_node_that_dies_in_the_middle_is_told(rig: str, file: str) -> None:

@@ -100,7 +100,7 @@ def test_a_transfer_that_broke_off_begins_anew(durand: bool, rate: float) -> Non
     tries = target.program.download(data, lambda done: None, tries=40)
     assert tries > 1
     assert target.flashed() == data
-    assert target.said[-1].startswith("the transfer broke off (")
+    assert target.said[-1].startswith("the transfer failed (")
 
 
 def test_the_last_try_says_why_it_failed() -> None:
@@ -129,7 +129,7 @@ def test_a_program_runs_when_all_is_done() -> None:
 def test_who_is_stopped_already_is_not_stopped_again() -> None:
     target = stopped()
     target.program.stop()
-    assert target.said[-1] == "it is stopped already"
+    assert target.said[-1] == "it is already stopped"
 
 
 def test_what_does_not_fit_its_state_is_refused() -> None:
@@ -195,7 +195,10 @@ def test_a_node_without_block_transfer_gets_segments() -> None:
     target.program._bus.run = refusing_blocks(target)  # type: ignore[method-assign]
     target.program.download(firmware(300), told.append)
     assert target.flashed() == firmware(300)
-    assert (told, target.said[-1]) == ([300], "the node does no block transfer: in segments")
+    assert (told, target.said[-1]) == (
+        [300],
+        "the node does not support block transfer; using segments",
+    )
 
 
 def refusing_blocks(target: Target) -> Any:

@@ -52,20 +52,23 @@ SESSIONS = {
         ("[9] set sdo_timeout 0", "[9] ERROR:101 #time-out '0' is not 1..65535"),
         ("[10] set sdo_block 1", "[10] ERROR:100 #set 'sdo_block' is not supported"),
         ("[10] set heartbeat 5 100", "[10] ERROR:100 #set 'heartbeat' is not supported"),
-        ("[10] set node", "[10] ERROR:101 #set with 1 words behind it; see help"),
-        ("[10] set", "[10] ERROR:101 #set with 0 words behind it; see help"),
+        ("[10] set node", "[10] ERROR:101 #set with 1 arguments; see help"),
+        ("[10] set", "[10] ERROR:101 #set with 0 arguments; see help"),
         ("[11] info version", "[11] 0x00000000 0x00000000 0.0 0 0 3.0 1.2"),
     ],
     "mistakes": [
-        ("5 r 0x1000 0", "[0] ERROR:101 #a command begins with its number, as [1]"),
-        ("[99999999999] 5 start", "[0] ERROR:101 #a command begins with its number, as [1]"),
-        ("[1]", "[1] ERROR:101 #there is no command"),
-        ("[1] 1 2 3 start", "[1] ERROR:101 #before a command stand net and node, no more"),
+        ("5 r 0x1000 0", "[0] ERROR:101 #a command begins with its number, for example [1]"),
+        (
+            "[99999999999] 5 start",
+            "[0] ERROR:101 #a command begins with its number, for example [1]",
+        ),
+        ("[1]", "[1] ERROR:101 #the command is missing"),
+        ("[1] 1 2 3 start", "[1] ERROR:101 #at most net and node may precede a command"),
         ("[1] 5 jump", "[1] ERROR:100 #'jump' is not supported"),
         ("[1] 5 r 0x10000 0", "[1] ERROR:101 #index '0x10000' is not 0..65535"),
-        ("[1] 5 r 0x1000", "[1] ERROR:101 #r with 1 words behind it; see help"),
-        ("[1] 5 w 0x1017 0 u16 70000", "[1] ERROR:101 #'70000' is no value of type u16"),
-        ("[1] 5 w 0x1017 0 u16 1 2", "[1] ERROR:101 #'1 2' is no value of type u16"),
+        ("[1] 5 r 0x1000", "[1] ERROR:101 #r with 1 arguments; see help"),
+        ("[1] 5 w 0x1017 0 u16 70000", "[1] ERROR:101 #'70000' is not a value of type u16"),
+        ("[1] 5 w 0x1017 0 u16 1 2", "[1] ERROR:101 #'1 2' is not a value of type u16"),
         ('[1] 5 w 0x1008 0 vs "a', "[1] ERROR:101 #a quote is not closed"),
         ("[1] 128 start", "[1] ERROR:107 #node 128 is not 0..127"),
         ("[1] 0 r 0x1000 0", "[1] ERROR:107 #node 0 is not 1..127"),
@@ -128,7 +131,7 @@ def test_lss_gives_nodes_their_ids() -> None:
         ("[11] 9 r 0x1000 0 x32", "[11] 0x00020192"),
         ("[12] lss_get_node", "[12] ERROR:103 #LSS inquire node-ID: no answer within 500 ms"),
         ("[13] lss_switch_sel 1 2 3 4", "[13] ERROR:103 #no slave has this address"),
-        ("[14] _lss_fastscan", "[14] ERROR:103 #no slave is without a node-ID"),
+        ("[14] _lss_fastscan", "[14] ERROR:103 #no slave lacks a node-ID"),
     ]
     gateway = Gateway(bench.bus, 1, "1.2")
     assert [(line, gateway.answer(line)) for line, _ in lines] == lines
@@ -143,7 +146,9 @@ def test_all_nodes_get_theirs_one_after_the_other() -> None:
         "[1] OK",
     ]
     assert gateway.answer("[2] 30 r 0x1000 0 x32") == "[2] 0x00020192"
-    assert gateway.answer("[3] lss_allnodes 20 30").startswith("[3] ERROR:101 #with the first node")
+    assert gateway.answer("[3] lss_allnodes 20 30").startswith(
+        "[3] ERROR:101 #the first node is followed by"
+    )
 
 
 def test_a_bus_that_is_gone_is_an_answer_too(bench: NetBench) -> None:
