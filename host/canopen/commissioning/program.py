@@ -157,7 +157,7 @@ class ProgramStatus:
         """Return the status in words."""
         state = _STATES.get(self.control, f"state {self.control}")
         known = "none" if self.identification is None else f"{self.identification:08X}h"
-        flash = "not told" if self.flash is None else _flash_text(self.flash)
+        flash = "not reported" if self.flash is None else _flash_text(self.flash)
         return f"{state}; identification {known}; flash: {flash}"
 
 
@@ -276,7 +276,7 @@ class Program:
         until_us = self._bus.now_us + _PATIENCE_US
         while (control := self._optional(boot_slave.CONTROL)) != wanted:
             if self._bus.now_us >= until_us:
-                found = "not told" if control is None else _STATES.get(control, f"{control}")
+                found = "not reported" if control is None else _STATES.get(control, f"{control}")
                 raise ProgramFailed(
                     f"the program is not {_STATES[wanted]} after {_PATIENCE_US // 1_000_000} s:"
                     f" 1F51h:{self._number:02X} is {found}"

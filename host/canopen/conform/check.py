@@ -1,7 +1,7 @@
 """Conformance checks: clause, level, requirements and steps.
 
-A step is an action, as `Write` or `Expect`. docs/reference/canopen/conform.md has the notation of
-steps, and `parse_step` reads it. Where the notation has names, as `$heartbeat`, `bind_check` puts
+A step is an action, such as `Write` or `Expect`. docs/reference/canopen/conform.md defines the
+notation of steps, and `parse_step` reads it. `bind_check` replaces names such as `$heartbeat` by
 the numbers of one node.
 """
 
@@ -18,7 +18,7 @@ Address = tuple[int, int]
 """Index and sub-index."""
 
 ANSWER_MS: Final = 1_000
-"""How long a check waits for an answer where it says nothing: CiA 301 gives no time."""
+"""How long a check waits for an answer if it gives no time: CiA 301 defines none."""
 
 # What a step does on the bus.
 
@@ -33,7 +33,7 @@ class Send:
 
 @dataclass(frozen=True, slots=True)
 class Expect:
-    """Wait for the next frame on a CAN-ID; it must match one of the patterns."""
+    """Wait for the next frame with a CAN-ID; it must match one of the patterns."""
 
     patterns: tuple[str, ...]
     within_ms: int = ANSWER_MS
@@ -41,7 +41,7 @@ class Expect:
 
 @dataclass(frozen=True, slots=True)
 class ExpectNone:
-    """Wait; no frame on this CAN-ID may come."""
+    """Wait; no frame with this CAN-ID may come."""
 
     can_id: str
     for_ms: int
@@ -49,7 +49,7 @@ class ExpectNone:
 
 @dataclass(frozen=True, slots=True)
 class Count:
-    """Wait; so many frames that match must come."""
+    """Wait; between `least` and `most` matching frames must come."""
 
     pattern: str
     for_ms: int
@@ -59,7 +59,7 @@ class Count:
 
 @dataclass(frozen=True, slots=True)
 class Period:
-    """Wait; frames that match must come each so many milliseconds."""
+    """Wait; matching frames must come with a period of `each_ms`."""
 
     pattern: str
     each_ms: int
@@ -82,11 +82,11 @@ class Forget:
 
 @dataclass(frozen=True, slots=True)
 class Act:
-    """Move an input of the device, compare an output, or switch the power.
+    """Operate an input of the device, compare an output, or switch the power.
 
     Attributes:
-        words: for the stimulus, as `input`, `6000:01`, `01`.
-        within_ms: a longer act disturbs the check; None allows any time.
+        words: arguments of the stimulus, such as `input`, `6000:01`, `01`.
+        within_ms: if it takes longer, the check is inconclusive; None allows any time.
     """
 
     words: tuple[str, ...]
@@ -95,10 +95,10 @@ class Act:
 
 @dataclass(frozen=True, slots=True)
 class Macro:
-    """Do what takes many frames.
+    """Do an operation of many frames.
 
     Attributes:
-        words: texts, and addresses of objects once they are bound.
+        words: texts, and addresses of objects once the check is bound.
     """
 
     name: str
@@ -124,7 +124,7 @@ class OfObject:
 
 @dataclass(frozen=True, slots=True)
 class Write(OfObject):
-    """Write an object; the node must take the value."""
+    """Write an object; the node must accept the value."""
 
     data: str
 
@@ -139,14 +139,14 @@ class RefuseWrite(OfObject):
 
 @dataclass(frozen=True, slots=True)
 class Read(OfObject):
-    """Read an object; it must hold what the pattern says."""
+    """Read an object; its value must match the pattern."""
 
     data: str
 
 
 @dataclass(frozen=True, slots=True)
 class ReadOther(OfObject):
-    """Read an object; it must not hold this value."""
+    """Read an object; it must not have this value."""
 
     data: str
 
@@ -160,7 +160,7 @@ class RefuseRead(OfObject):
 
 @dataclass(frozen=True, slots=True)
 class Keep(OfObject):
-    """Say that the check changes an object by other means: it is written back at the end."""
+    """Declare that the check changes an object by other means: it is written back at the end."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,7 +184,7 @@ class Hold(OfObject):
 
 @dataclass(frozen=True, slots=True)
 class RefuseRewrite(OfObject):
-    """Read an object and write it back, so many bytes longer; the node must refuse that."""
+    """Read an object and write it back, longer by `grow` bytes; the node must refuse that."""
 
     grow: int
     codes: tuple[str, ...]
@@ -216,8 +216,8 @@ class Step(NamedTuple):
 
     Attributes:
         action: what is done.
-        given: it prepares: if the node does not do it, the check says nothing about the node.
-        at_end: it is done at the end, however the check went, and fails no check.
+        given: it prepares: if the node does not do it, the check is inconclusive.
+        at_end: it is always done at the end, and cannot fail the check.
     """
 
     action: Action
@@ -226,10 +226,10 @@ class Step(NamedTuple):
 
 
 class Level(IntEnum):
-    """What a run may do to the node; a level holds those before it."""
+    """What a run may do to the node; a level includes those before it."""
 
     READ_ONLY = 0
-    """SDO uploads and listening: no download to any object, not even one that must be refused."""
+    """SDO uploads and listening: no download to any object, not even one to be refused."""
     COMMUNICATION = 1
     """Communication objects, refused downloads, NMT, SYNC, PDO, error control; all restored."""
     INTRUSIVE = 2
@@ -237,12 +237,12 @@ class Level(IntEnum):
 
     @property
     def word(self) -> str:
-        """The name on the command line."""
+        """Name of the option on the command line."""
         return self.name.lower().replace("_", "-")
 
 
 STIMULUS: Final = "stimulus"
-"""What a check needs for which somebody moves the inputs of the device."""
+"""Need of a check that operates the inputs of the device."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -250,14 +250,14 @@ class Check:
     """One question to a node.
 
     Attributes:
-        id: of the suite, as `NMT-03`; those made of an object are `OD-2000.00-type`.
-        group: what it belongs to, as `NMT`.
-        title: what conforming means, for people.
-        source: document, version and clause; `practice` where no clause is certain.
-        level: the least that it needs.
+        id: for example `NMT-03`; `OD-2000.00-type` for checks of an object of the EDS.
+        group: for example `NMT`.
+        title: what a conforming node does.
+        source: document, version and clause; `practice` if no clause is certain.
+        level: the lowest level that it needs.
         needs: features without which it is not applicable; `STIMULUS` is one.
-        choice: why the answer is left to the device; empty where the clause decides.
-        steps: what is sent, expected, counted and waited for.
+        choice: why the device may choose the answer; empty if the clause decides.
+        steps: what the tester sends, expects, counts and waits for.
     """
 
     id: str
@@ -270,34 +270,34 @@ class Check:
     choice: str = ""
 
 
-# What a run of the tester was told to do.
+# The options of a run of the tester.
 
 _WILD: Final = re.compile(r"[*?[]")
-"""Begins what is not fixed in a pattern."""
+"""The first character of a pattern part that is not fixed."""
 
 Stimulus = Callable[..., str]
-"""Moves the inputs of the device: takes words as `input 6000:01 01`, returns what it answers.
-
+"""Operates the inputs of the device: takes words such as `input 6000:01 01`, returns the answer.
 Raises ValueError for what it cannot do.
 """
 
 
 @dataclass(frozen=True, slots=True)
 class ConformancePlan:
-    """What was chosen.
+    """The options of a run.
 
     Attributes:
-        level: what may be done to the node.
+        level: what the run may do to the node.
         only: names of groups or checks, with * and ?, in any case; all if empty.
         allow: indices of profile objects (6000h to 9FFFh) that may be written.
-        never: indices of objects that are never written, whatever else is allowed.
-        bit_rate: of the bus in bit/s, None if nobody says it.
+        never: indices of objects that are never written, even if another option allows it.
+        bit_rate: of the bus in bit/s, None if unknown.
         max_load: share of the bit rate that the tester may use, above 0 to 1.
-        seed: of the order in which objects are judged; 0: that of the dictionary.
-        stimulus: moves the inputs of the device, None if nobody can.
-        confirm: is asked before what concerns other nodes or cannot be undone; no says no.
-        longest_s: after so long no further check is begun.
-        resolution_us: of the time stamps of the adapter.
+        seed: seed for the order of the objects; 0 keeps the order of the dictionary.
+        stimulus: operates the inputs of the device, None if there is none.
+        confirm: called before actions that concern other nodes or cannot be undone; returns whether
+            to do them.
+        longest_s: after this time no further check starts.
+        resolution_us: resolution of the adapter's time stamps.
         shared_host: the node may be a process of this machine, and late when this one is.
     """
 
@@ -315,7 +315,7 @@ class ConformancePlan:
     shared_host: bool = False
 
     def chooses(self, check: Check) -> bool:
-        """Return whether a check was chosen: by its level, and by its name or group."""
+        """Return whether a check is selected: by its level, and by its name or group."""
         if check.level > self.level:
             return False
         named = (check.id.upper(), check.group)
@@ -324,11 +324,11 @@ class ConformancePlan:
         )
 
     def may_choose(self, group: str, place: str = "") -> bool:
-        """Return whether a check of a group may be chosen, before it is made.
+        """Return whether a check of a group may be selected, before it is made.
 
         Args:
             group: of the check.
-            place: what follows the group in its id: `1017.00` for those of this object.
+            place: the part of its id after the group: `1017.00` for checks of this object.
         """
         begun = f"{group}-{place}".upper()
         for pattern in map(str.upper, self.only):

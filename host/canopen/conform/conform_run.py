@@ -40,14 +40,14 @@ from tickrig.host.links.link import LinkClosed, StampedLink
 from tickrig.wire.canopen.eds.eds_device import EdsDevice
 from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID
 
-# What a report says of how the run judged: for people, by name.
+# The settings of the run in a report, by name.
 
 
 def _describe_settings(plan: ConformancePlan, others: Collection[int]) -> dict[str, str]:
     """Return bit rate, limits and tolerances of a run.
 
     Args:
-        plan: what was chosen.
+        plan: options of the run.
         others: node-IDs that were on the bus.
     """
     rate = f"{plan.bit_rate} bit/s" if plan.bit_rate else f"{ASSUMED_BIT_RATE} bit/s, assumed"
@@ -57,7 +57,7 @@ def _describe_settings(plan: ConformancePlan, others: Collection[int]) -> dict[s
         "load by the tester": f"at most {plan.max_load:.0%}",
         "other nodes": nodes,
         "resolution of time stamps": f"{plan.resolution_us / MS_US:g} ms",
-        "answers": f"within {ANSWER_MS} ms, where the check says nothing else",
+        "answers": f"within {ANSWER_MS} ms, unless the check says otherwise",
         "periods": f"mean within {PERIOD_TOLERANCE:.0%}",
         "late host": f"{HOST_GAP_US / MS_US:g} ms make a failure inconclusive",
         "longest run": f"{plan.longest_s / 60:g} min, then all is blocked; 2 min more to restore",
@@ -65,15 +65,15 @@ def _describe_settings(plan: ConformancePlan, others: Collection[int]) -> dict[s
     }
 
 
-# A heartbeat that runs though 1017h does not say so: told, and told again when it is gone.
+# A heartbeat that contradicts 1017h: reported at the start, and at the end if it is gone.
 
 _SPARE_MS: Final = 1_000
 _MISSED: Final = 3
-"""So many periods without a heartbeat, and it is gone."""
+"""Periods without a heartbeat after which it counts as gone."""
 
 
 class _StrayHeartbeat:
-    """What was heard of the heartbeat of a node before the run.
+    """The heartbeat of a node before the run.
 
     Args:
         exchange: the bus.
@@ -81,8 +81,8 @@ class _StrayHeartbeat:
 
     Attributes:
         stamps: when heartbeats came before the run, in bus time.
-        finding: that 1017h does not say so, for people; empty if it does.
-        unrestored: that it is gone after the run, for people; empty if it is not.
+        finding: the contradiction to 1017h, in words; empty if there is none.
+        unrestored: the message that it is gone after the run; empty if it is not.
     """
 
     def __init__(self, exchange: BusExchange, node_id: int) -> None:
@@ -93,19 +93,19 @@ class _StrayHeartbeat:
         self.finding = self.unrestored = ""
 
     def hear(self) -> None:
-        """Take what has come so far; answers to node guarding are no heartbeat."""
+        """Read the received heartbeats; responses to node guarding do not count."""
         heard = self._exchange.unread(self._can_id)
         if not any(frame.remote for _, frame in heard):
             self.stamps = [at_us for at_us, frame in heard if matches(self._pattern, str(frame))]
 
     def compare(self, period_ms: int | None) -> None:
-        """Hold what was heard against 1017h, None if the node has none."""
+        """Compare the heartbeat with 1017h; None if the node has no 1017h."""
         self._period_ms = period_ms
         if not period_ms:
             self.finding = f"{self._text()}, but {self._said()}"
 
     def look_again(self) -> None:
-        """Listen after the run: what 1017h does not say, nobody can switch on again."""
+        """Listen after the run: a heartbeat that 1017h does not set cannot be switched on again."""
         each_ms = self._each_ms()
         if not self.finding or not each_ms:
             return
@@ -119,39 +119,39 @@ class _StrayHeartbeat:
 
     def _text(self) -> str:
         each_ms = self._each_ms()
-        return f"heartbeat each {each_ms} ms" if each_ms else "a heartbeat was heard"
+        return f"heartbeat each {each_ms} ms" if each_ms else "a heartbeat was received"
 
     def _said(self) -> str:
         return "the node has no 1017h" if self._period_ms is None else "1017h = 0"
 
 
 _LISTEN_MS: Final = 1_000
-"""So long is only listened at first: who else is on the bus?"""
+"""Listening time at the start: which other nodes are on the bus?"""
 
 _EXAMINE_US: Final = 120_000_000
-"""So long may it take to read the node before the first check."""
+"""The longest time to read the node before the first check."""
 
 _INTEGERS: Final = {1: "u8", 2: "u16", 3: "u24", 4: "u32", 5: "u40", 6: "u48", 7: "u56", 8: "u64"}
 """Types by the size of a value in bytes."""
 
 _MOST_CRASHES: Final = 20
-"""So many ways in which the program of the node crashed are told."""
+"""Number of different crashes of the node's program to report."""
 
 Crash = Callable[[str, list[str]], object]
-"""Takes what the program of the node has raised, in a line, and the lines at which it did."""
+"""Called with the error of the node's program in one line, and the source lines that raised it."""
 
 
 class ConformRun:
-    """Judges one node.
+    """Tests one node.
 
     Args:
-        link: the bus; nobody else may read from this link.
+        link: the bus; no other code may read from this link.
         node_id: of the node, 1..127.
-        plan: what was chosen.
-        device: what the EDS says of the node, None to ask the node itself.
-        claims: what it says beside the objects.
+        plan: options of the run.
+        device: the device of the EDS, None to query the node.
+        claims: what the EDS says besides the objects.
         source: the bus, as the user named it.
-        on_result: called with each result when it is there.
+        on_result: called with each result.
     """
 
     def __init__(  # noqa: PLR0913 - a run, by keyword
@@ -189,25 +189,25 @@ class ConformRun:
         self._absent = False
 
     def disturb(self, reason: str) -> None:
-        """Let the check under way be inconclusive if it fails: the adapter lost frames, or such."""
+        """Make the running check inconclusive if it fails: the adapter lost frames, or similar."""
         self._exchange.disturb(reason)
 
     def crash(self, reason: str, where: Iterable[str] = ()) -> None:
-        """Let the check under way fail: the program of the node has raised, and begins anew.
+        """Make the running check fail: the program of the node raised an error and starts again.
 
         Args:
-            reason: what it raised, in a line.
-            where: the lines of the program at which it did.
+            reason: the error in one line.
+            where: the source lines that raised it.
         """
         if len(self._crashes) < _MOST_CRASHES:
             self._crashes[reason] = None
         self._exchange.crash(reason, where)
 
     def run(self) -> Report:
-        """Judge the node and return the report; whatever happens, what was changed is restored.
+        """Test the node and return the report; in any case, restore what was changed.
 
-        Ctrl-C ends it with a report of what was judged; a second one, while the node is being
-        restored, leaves the node as it is.
+        Ctrl-C ends the run with a report of the checks so far; a second one, while the node is
+        being restored, leaves the node as it is.
         """
         aborted = ""
         try:
@@ -221,7 +221,7 @@ class ConformRun:
         return self._report(aborted)
 
     def _run(self) -> str:
-        """Judge; return why nothing could be, empty if it could."""
+        """Run the checks; return why nothing could be judged, empty if something was."""
         self._exchange.begin(min(_EXAMINE_US, self._longest_us))
         self._exchange.wait(_LISTEN_MS)
         self._stray.hear()
@@ -236,7 +236,7 @@ class ConformRun:
         return ""
 
     def _give_up(self, error: Exception) -> str:
-        """Judge nothing; return why, where no node, or more than one, has the node-ID."""
+        """Return why no check can run, because no node, or more than one, has the node-ID."""
         presence = self._exchange.presence
         crashed = next(iter(self._crashes), "")
         if crashed or presence is Presence.ONE:
@@ -252,8 +252,8 @@ class ConformRun:
         return reason
 
     def _nobody(self) -> str:
-        heard = ", ".join(map(str, sorted(self._exchange.others - {0}))) or "nobody"
-        return f"node {self._node_id} does not answer; heard here: {heard}"
+        heard = ", ".join(map(str, sorted(self._exchange.others - {0}))) or "none"
+        return f"node {self._node_id} does not answer; other nodes: {heard}"
 
     def _examine(self) -> None:
         self._subject = examine(
@@ -269,11 +269,11 @@ class ConformRun:
         self._care.prepare(subject.restorable(self._plan.level), subject.binding.reader.held)
 
     def _object_checks(self) -> list[Check]:
-        """Make the chosen checks of the objects of the EDS; without one there are none."""
+        """Make the selected checks of the objects of the EDS; without an EDS there are none."""
         plan = self._plan
         if self._device is None or not plan.may_choose(OBJECTS):
             return []
-        may_choose = plan.may_choose if not plan.seed else _any  # a seed gives all an order
+        may_choose = plan.may_choose if not plan.seed else _any  # a seed orders all objects
         checks = [
             *object_checks(
                 *(self._device, self._node_id),
@@ -309,7 +309,7 @@ class ConformRun:
         self._on_result(result)
 
     def _restore(self, *, patient: bool) -> None:
-        """Leave the node as it was; the first Ctrl-C of a run does not keep anybody from it."""
+        """Restore the node; the first Ctrl-C of a run does not prevent it."""
         try:
             self._care.restore()
         except KeyboardInterrupt:
@@ -355,7 +355,7 @@ def _any(group: str, place: str) -> bool:
 
 
 def _typed(data: bytes) -> str:
-    """Write a value as `canmon net write` takes it."""
+    """Write a value in the notation of `canmon net write`."""
     if kind := _INTEGERS.get(len(data)):
         return f"{kind}:0x{int.from_bytes(data, 'little'):X}"
     return f"hex:{data.hex().upper()}"

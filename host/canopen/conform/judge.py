@@ -3,42 +3,45 @@
 # Theory of operation.
 #
 # A run listens for a second, reads the node (`subject.examine`), brings it into the state in which
-# all checks begin (`NodeCare.prepare`), judges each check, and restores the node. This file is the
-# part between: one check in, one `Result` out. The order below is what a verdict means, so do not
-# change one part alone.
+# all checks begin (`NodeCare.prepare`), judges each check, and restores the node. This file judges:
+# one check in, one `Result` out. The order below defines what a verdict means, so do not change one
+# part alone.
 #
 # 1. Bind. Names become the numbers of this node. A check that lacks an object, a feature, the level
-#    or a yes is NOT_APPLICABLE. Nothing has been sent for it by then. What it would write must have
-#    been read before, else the check is INCONCLUSIVE: what cannot be written back is not written.
-# 2. Play. `care.begin` notes what may change, `exchange.begin` forgets old frames and starts the
-#    clock of the check. Steps run until one fails; steps `at_end` run after that, and fail nothing.
-# 3. Judge. The first rule that fits decides:
-#      a step must not be done at this level                  NOT_APPLICABLE
-#      the host, the bus or another node disturbed            INCONCLUSIVE
-#      the program of the node raised                         FAIL, whatever else was seen
+#    or a confirmation is NOT_APPLICABLE. Nothing has been sent for it by then. Values that it would
+#    write must have been read before, else the check is INCONCLUSIVE: the tester writes nothing
+#    that it cannot restore.
+# 2. Play. `care.begin` records what may change, `exchange.begin` drops old frames and starts the
+#    clock of the check. Steps run until one fails; steps `at_end` run after that, and cannot fail
+#    the check.
+# 3. Judge. The first rule that applies decides:
+#      the level forbids a step                               NOT_APPLICABLE
+#      the host, the bus or another node interfered           INCONCLUSIVE
+#      the program of the node raised                         FAIL, in any case
 #      a `given` step failed, or an object that CiA 301       NOT_APPLICABLE if the abort code says
 #        lets be constant was not written                       that the node need not take it, else
 #                                                               INCONCLUSIVE
 #      an upload went wrong in a step that only reads, in a   INCONCLUSIVE: group US judges uploads
 #        check that is not about uploads
-#      a disturbance was noted meanwhile                      INCONCLUSIVE
+#      a disturbance was recorded                             INCONCLUSIVE
 #      another node may have sent the LSS answer              INCONCLUSIVE: 7E4h names no node
 #      the node had an error before the run, and was started  INCONCLUSIVE
 #      the clause leaves the answer to the device             IMPLEMENTATION_DEFINED
 #      none of these                                          FAIL
-# 4. Tidy. `care.tidy` writes back and reads again. If the node does not come back, a failure
-#    becomes BLOCKED: the check may have met a node that was already gone.
+# 4. Tidy. `care.tidy` restores the values and reads them again. If the node does not come back, a
+#    failure becomes BLOCKED: the check may have met a node that was already gone.
 # 5. Again. A failure is played a second time. A pass then makes the result INCONCLUSIVE; if the
-#    second go could not be prepared, the first one counts, as it has changed the state of the node.
+#    second attempt could not be prepared, the first one counts, because it changed the state of the
+#    node.
 #
-# What couples to what. The evidence belongs to the exchange, and `exchange.begin` drops it: lines
-# and crashes are taken before `care.tidy`, which begins anew. `boots` is compared across the check,
-# because a node that booted has lost all that was written, not only what the check wrote.
-# `_wanted` is what the last failed step expected; reports show it.
+# Coupling. The evidence belongs to the exchange, and `exchange.begin` drops it: lines and crashes
+# are saved before `care.tidy`, which calls it. `boots` is compared across the check, because a node
+# that booted has lost all written values, not only those of the check. `_wanted` is what the last
+# failed step expected; reports show it.
 #
 # Numbers. Times are bus time since the start of the run, never the clock of this host. A check may
-# last the sum of all its waits and 2 s more (`notation.bind_check`); an answer is awaited for 1 s,
-# as CiA 301 gives no time.
+# last the sum of all its waits and 2 s more (`notation.bind_check`); the wait for an answer is 1 s,
+# because CiA 301 gives no time.
 
 from __future__ import annotations
 
@@ -70,13 +73,13 @@ from tickrig.host.canopen.conform.subject import Subject
 from tickrig.host.canopen.conform.verdict import CheckOutcome, CheckVerdict, FrameLine, Result
 
 _LSS_ANSWER: Final = "7E4#"
-"""Begins what LSS slaves say: it does not tell which one."""
+"""CAN-ID of all LSS slaves: a frame does not tell which one sent it."""
 _HISTORY: Final = (0x1003, 0)
 _PDO_PARAMETERS: Final = (*range(0x1400, 0x1600), *range(0x1800, 0x1A00))
 _EMPTIED: Final = "empty the error history 1003h, which cannot be written back"
 _START: Final = "000#01"
 _UPLOADS: Final = ("UE", "US", "BU", "OD")
-"""Groups whose checks fail where an upload goes wrong; others only look at values by it."""
+"""Groups that judge uploads; the checks of other groups only use them to read values."""
 _UNSEEN: Final = "could not be read back, see the checks of group US"
 _UNPREPARED: Final = "could not be prepared"
 _MAY_BE_CONSTANT: Final = frozenset(
@@ -88,24 +91,24 @@ _NOT_SUPPORTED: Final = frozenset((0x0609_0030, 0x0609_0031, 0x0609_0032, 0x0609
 
 
 def _is_misread(error: StepFailed) -> bool:
-    """Return whether a segment came with another toggle bit, n or c than was wanted."""
+    """Return whether a segment had another toggle bit, n or c than expected."""
     came, *wanted = (frame.partition("#")[2][:2] for frame in (error.got, *error.wanted))
     return _is_segment(came) and came not in wanted and any(map(_is_segment, wanted))
 
 
 def _is_segment(command: str) -> bool:
-    """Return whether a command byte is that of an answer in a segmented upload."""
+    """Return whether a command byte belongs to a response in a segmented upload."""
     return command[:1] in {"0", "1"}
 
 
 def _enables(action: Action) -> bool:
-    """Return whether a step gives a PDO its COB-ID: every device takes its own."""
+    """Return whether a step sets the COB-ID of a PDO: every device accepts its own."""
     index, sub = action.address if isinstance(action, Write) else (0, 0)
     return isinstance(action, Macro) or (index in _PDO_PARAMETERS and sub == 1)
 
 
 def _is_constant(action: Action, error: StepFailed) -> bool:
-    """Return whether the node keeps an object constant that CiA 301 lets be so."""
+    """Return whether the node keeps an object constant that CiA 301 allows to be constant."""
     written = isinstance(action, Write) and action.address[0] in _MAY_BE_CONSTANT
     return written and abort_of(error.got) in _READ_ONLY
 
@@ -116,14 +119,14 @@ def _starts(step: Step) -> bool:
 
 
 class Judge:
-    """Plays checks on a node that is in the state in which each begins.
+    """Plays checks on a node that is in the state in which every check begins.
 
     Args:
-        plan: of the run.
+        plan: options of the run.
         exchange: the bus.
         player: plays steps on it.
-        care: brings the node back after a check.
-        permission: says what may be written.
+        care: restores the node after a check.
+        permission: decides what may be written.
     """
 
     def __init__(
@@ -138,7 +141,7 @@ class Judge:
         self._care, self._permission = care, permission
 
     def result(self, check: Check, subject: Subject) -> Result:
-        """Judge a check; one that failed is done again, and both are told."""
+        """Judge a check; repeat one that failed, and report both attempts."""
         bound = self._bind(check, subject)
         if isinstance(bound, str):
             return Result(check, CheckOutcome(CheckVerdict.NOT_APPLICABLE, bound))
@@ -151,19 +154,19 @@ class Judge:
             return Result(check, first)
         again = self._go(bound)
         if again.reason.startswith(_UNPREPARED) and not self._exchange.disturbances:
-            return Result(check, first)  # the first go has left the node in another state
+            return Result(check, first)  # the first attempt left the node in another state
         if again.verdict is CheckVerdict.PASS:
-            reason = f"passed when it was done again; before: {first.reason}"
+            reason = f"passed at the second attempt; first attempt: {first.reason}"
             again = replace(again, verdict=CheckVerdict.INCONCLUSIVE, reason=reason)
         return Result(check, again, first)
 
     def _bind(self, check: Check, subject: Subject) -> BoundCheck | str:
-        """Return the check with the numbers of the node, or why it cannot be done."""
+        """Return the check with the numbers of the node, or why it cannot be played."""
         for word in sorted(check.needs - subject.features.words):
             if word != STIMULUS:
                 return subject.features.reasons.get(word, f"the node has no {word}")
             if self._plan.stimulus is None:
-                return "needs somebody at the inputs of the device: --stimulus"
+                return "needs a stimulus for the inputs of the device: --stimulus"
         try:
             bound = bind_check(check, subject.names)
             if lacking := subject.missing(bound) or subject.fixed(bound.steps):
@@ -183,7 +186,7 @@ class Judge:
         return bound
 
     def _as_found(self, step: Step) -> Step:
-        """Leave out a value that an object held before the run: the tester has written another."""
+        """Omit a value that an object had before the run: the tester has written another one."""
         action = step.action
         if not isinstance(action, Hold) or action.value is None:
             return step
@@ -193,18 +196,18 @@ class Judge:
         return step._replace(action=replace(action, value=None))
 
     def _unread(self, bound: BoundCheck, subject: Subject) -> str:
-        """Say what a check would write that could not be written back; empty if all can be."""
+        """Return what a check would write that could not be restored; empty if there is nothing."""
         written = bound.changed & subject.has | bound.written & subject.values
         if self._plan.level is Level.READ_ONLY or not (unread := self._care.unread(written)):
             return ""
         places = ", ".join(f"{index:04X}h:{sub:02X}" for index, sub in unread)
-        return f"{places} cannot be read, so that what it holds could not be written back"
+        return f"{places} cannot be read, so its value could not be restored"
 
     def _go(self, bound: BoundCheck) -> CheckOutcome:
-        """Do a check once, and bring the node back."""
+        """Play a check once, and restore the node."""
         self._care.begin(bound)
         if self._care.lost:
-            return CheckOutcome(CheckVerdict.BLOCKED, "the node does not answer any more")
+            return CheckOutcome(CheckVerdict.BLOCKED, "the node no longer answers")
         boots = self._exchange.boots
         self._exchange.begin(bound.within_us, bound.can_ids)
         start_us, begun_us = self._exchange.now_us, self._exchange.start_us
@@ -217,7 +220,7 @@ class Judge:
         lines, end_us = self._lines(), self._exchange.now_us
         unwell = verdict in {CheckVerdict.FAIL, CheckVerdict.INCONCLUSIVE} and not crashed
         if not self._care.tidy(bound, boots) and unwell:
-            verdict, reason = CheckVerdict.BLOCKED, f"{reason}; the node did not come back"
+            verdict, reason = CheckVerdict.BLOCKED, f"{reason}; the node did not answer again"
         times = start_us - begun_us, end_us - begun_us
         return CheckOutcome(verdict, reason, lines, *times, self._wanted)
 
@@ -249,10 +252,10 @@ class Judge:
     def _unprepared(
         self, action: Action, error: StepFailed, reason: str
     ) -> tuple[CheckVerdict, str]:
-        """Return the verdict of a check that the node did not let come to its question.
+        """Return the verdict of a check whose question the node prevented.
 
-        The clause of the check says nothing of what only prepares it.
-        CiA 301 lets many objects be constant, and values be refused that a device does not
+        The clause of the check does not cover its preparation.
+        CiA 301 allows many objects to be constant, and a device to refuse values that it does not
         support.
         """
         if self._exchange.disturbances:
@@ -260,18 +263,18 @@ class Judge:
             return CheckVerdict.INCONCLUSIVE, f"{_UNPREPARED}: {reason}"
         code = abort_of(error.got)
         if code in _READ_ONLY or (code in _NOT_SUPPORTED and not _enables(action)):
-            return CheckVerdict.NOT_APPLICABLE, f"the node need not take this: {reason}"
+            return CheckVerdict.NOT_APPLICABLE, f"the node need not accept this: {reason}"
         return CheckVerdict.INCONCLUSIVE, f"{_UNPREPARED}: {reason}"
 
     def _end(self, bound: BoundCheck) -> None:
-        """Do what is done at the end, however the check went."""
+        """Do the steps that are always done at the end."""
         for step in bound.steps:
             if step.at_end:
                 with suppress(StepFailed, Disturbed, NotAllowed):
                     self._player.play(step)
 
     def _crash(self) -> str:
-        """Return what the program of the node has raised first."""
+        """Return the first error that the program of the node raised."""
         return next(iter(self._exchange.crashes))
 
     def _lines(self) -> tuple[FrameLine, ...]:

@@ -18,7 +18,7 @@ from tickrig.host.canopen.errors import SdoAborted, SdoFailed, SdoMisnamed, SdoT
 from tickrig.wire.can import data_frame
 from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID, FLAG_30, NMT_COB_ID, NmtCommand, NmtState
 
-# The state in which each check begins, and the one in which the node is left.
+# The state in which each check begins, and the state in which the tester leaves the node.
 
 T = TypeVar("T")
 
@@ -32,7 +32,7 @@ _QUIET: Final = (
     (0x1019, 0),
     (0x1029, 1),
 )
-"""Objects that are 0 when a check begins: no SYNC, guarding or heartbeat by itself."""
+"""Objects that are 0 when a check begins: no SYNC, guarding or heartbeat."""
 _CONSUMERS: Final = 0x1016
 _PDOS: Final = (*range(0x1400, 0x1600), *range(0x1800, 0x1A00))
 INHIBIT_TIME, EVENT_TIMER = 3, 5
@@ -41,7 +41,7 @@ _TIMERS: Final = (INHIBIT_TIME, EVENT_TIMER)
 _TEXTS: Final = range(0x1008, 0x100B)
 _NONE: Final[Mapping[Address, bytes]] = MappingProxyType({})
 _NUMBERS: Final = range(9)
-"""So many bytes are a number, not a text."""
+"""A value of at most this size is a number, not a text."""
 
 
 class KnownState:
@@ -52,12 +52,12 @@ class KnownState:
         client: reads and writes the node.
 
     Attributes:
-        original: what objects held before the run.
-        written: what may have changed, and has not been seen to be as before since.
-        all_written: what was written in this run.
-        stored: what was written by checks that store it, so that a reset may bring it back.
-        unrestored: what could not be written back, one a line.
-        repairs: what to write to restore the rest, in this order.
+        original: values of objects before the run.
+        written: objects that may have changed and have not been verified since.
+        all_written: objects written in this run.
+        stored: objects written by checks that store parameters: a reset may bring the values back.
+        unrestored: objects that could not be restored, one per line.
+        repairs: writes that restore the remaining objects, in this order.
     """
 
     def __init__(self, exchange: BusExchange, client: SdoClient) -> None:
@@ -72,15 +72,15 @@ class KnownState:
         self._seen: Values = {}  # what was read since the last check, reset or boot-up
         self._seen_boots = 0
         self._is_reset = False
-        self._moved: dict[str, set[Address]] = {}  # what resets of a kind have changed
+        self._moved: dict[str, set[Address]] = {}  # objects that each kind of reset changed
         self._silent = 0
 
     def learn(self, addresses: Iterable[Address], held: Mapping[Address, bytes] = _NONE) -> None:
-        """Read objects that are not known yet; what cannot be read is not restored.
+        """Read objects that are not known yet; those that cannot be read are not restored.
 
         Args:
             addresses: of the objects.
-            held: what was read of them just now: it is not read again.
+            held: values that were just read; they are not read again.
         """
         for at in addresses:
             if at in self.original:
@@ -90,7 +90,7 @@ class KnownState:
                 self.original[at] = self._begin[at] = self._seen[at] = value
 
     def prepare(self) -> None:
-        """Bring what is known into the state in which checks begin."""
+        """Bring the known objects into the state in which checks begin."""
         for at, value in self.original.items():
             is_timer = at[1] in _TIMERS and at[0] in _PDOS
             if is_timer or at in _QUIET or (at[0] == _CONSUMERS and at[1]):
@@ -107,11 +107,11 @@ class KnownState:
             self._begin[at] = self.original[at]
 
     def is_quieted(self, at: Address) -> bool:
-        """Return whether checks begin with another value than was there before the run."""
+        """Return whether checks begin with another value than the one before the run."""
         return self._begin.get(at) != self.original.get(at)
 
     def write(self, addresses: Collection[Address]) -> None:
-        """Take note of what may change."""
+        """Record objects that may change."""
         self.written.update(addresses)
         self.all_written.update(addresses)
         for at in addresses:
@@ -122,7 +122,7 @@ class KnownState:
         self._seen.clear()
 
     def reset(self) -> None:
-        """Take note that all that was written may have other values, until `tidy_after`."""
+        """Record that all written objects may have other values, until `tidy_after`."""
         self._is_reset = True
 
     def tidy(self, addresses: Iterable[Address]) -> None:
@@ -130,15 +130,15 @@ class KnownState:
         self._write_back(self._begin, [at for at in addresses if at in self._begin])
 
     def tidy_after(self, resets: Collection[str] = (), written: Collection[Address] = ()) -> None:
-        """Bring what resets have changed into the state in which checks begin.
+        """Bring objects that resets changed into the state in which checks begin.
 
-        The first reset of a kind shows which objects it changes. After the next ones only these
-        are read, and what was written since: to read all of them each time was half the
-        processor time of a run.
+        The first reset of a kind shows which objects it changes. After later ones, only these and
+        the objects written since are read: reading all of them each time took half the processor
+        time of a run.
 
         Args:
-            resets: their kinds; empty if it is not known what has happened to the node.
-            written: what may have been written since the last reset.
+            resets: their kinds; empty if it is unknown what happened to the node.
+            written: objects that may have been written since the last reset.
         """
         touched: Iterable[Address] = self._begin
         if resets and self._moved.keys() >= set(resets):
@@ -151,14 +151,14 @@ class KnownState:
         self._is_reset = False
 
     def restore(self) -> None:
-        """Bring all objects into the state before the run, and tell what could not be."""
+        """Restore all objects to their values before the run, and report those that failed."""
         left = self._write_back(self.original, self.original)
         for at in left:
             self.unrestored[self._was(at)] = None
         self._repair(left)
 
     def give_up(self) -> None:
-        """Tell what was written and may not be as it was: the node is gone."""
+        """Report the written objects that may have other values: the node is gone."""
         unsure = self.all_written if self._is_reset else self.written
         left = [at for at in self.original if at in unsure]
         for at in left:
@@ -166,7 +166,7 @@ class KnownState:
         self._repair(left)
 
     def _repair(self, addresses: Iterable[Address]) -> None:
-        """Take note of what a person has to write to restore what is left."""
+        """Record what a person has to write to restore the remaining objects."""
 
         def number(at: Address) -> int | None:
             value = self.original.get(at, b"")
@@ -183,7 +183,7 @@ class KnownState:
     def _write_back(
         self, target: Values, addresses: Iterable[Address], moved: Iterable[set[Address]] = ()
     ) -> list[Address]:
-        """Write what differs, and add it to sets; return what differs still."""
+        """Write the values that differ, and add them to sets; return those that still differ."""
         wrong = self._differing(target, addresses)
         for each in moved:
             each.update(wrong)
@@ -194,7 +194,7 @@ class KnownState:
         for at, value in writes:
             touched[at] = None
             self.write({at})
-            with suppress(SdoAborted, NotAllowed):  # it is reported if it differs still
+            with suppress(SdoAborted, NotAllowed):  # it is reported if it still differs
                 self._patiently(partial(self._client.download, *at, value))
         for at in touched:  # one that could not be written may have changed with the others
             self._seen.pop(at, None)
@@ -211,9 +211,9 @@ class KnownState:
         return left
 
     def _number(self, at: Address, target: Values) -> int | None:
-        """Return what an object holds, or should hold if the node does not tell it well.
+        """Return the value of an object, or the value it should have if it cannot be read.
 
-        None if it is not known what it should hold: then it is not touched.
+        None if neither is known: then the object stays unchanged.
         """
         if at not in target or not is_standard(at, target[at]):
             return None
@@ -240,7 +240,7 @@ class KnownState:
         return value
 
     def _patiently(self, attempt: Callable[[], T]) -> T | None:
-        """Ask the node; None if it gives no answer about this one, SdoTimeout if it is gone."""
+        """Read an object; None if only this one has no answer, SdoTimeout if the node is gone."""
         try:
             answer = attempt()
         except SdoTimeout:
@@ -260,16 +260,16 @@ class KnownState:
 
 
 _SETTLE_MS: Final = 20
-"""So long after an NMT command a node is in its new state."""
+"""Time after an NMT command until a node is in its new state."""
 
 _CARE_US: Final = 60_000_000
-"""So long may it take to write everything back."""
+"""The longest time to restore everything."""
 
 _RETURN_MS: Final = 3_000
-"""So long may a node take to come back after a reset."""
+"""The longest time that a node may take to answer after a reset."""
 
 _GONE_MS: Final = 10_000
-"""So long is waited at the end for a node that was lost, to restore it."""
+"""How long to wait at the end for a lost node, to restore it."""
 
 _PROBE_MS: Final = 50
 HEARTBEAT: Final = (0x1017, 0)
@@ -280,30 +280,30 @@ _STORAGE: Final = frozenset((0x1010, 0x1011))
 _STORE: Final = (0x1010, 1)
 _SAVE: Final = b"save"
 _RESET_COMMUNICATION: Final = f"{NMT_COB_ID:03X}#{NmtCommand.RESET_COMMUNICATION:02X}"
-"""In `BoundCheck.resets`."""
+"""A value of `BoundCheck.resets`."""
 
 _RECOVERY: Final[dict[Level, tuple[NmtCommand | None, ...]]] = {
     Level.READ_ONLY: (None,),
     Level.COMMUNICATION: (NmtCommand.RESET_COMMUNICATION,),
     Level.INTRUSIVE: (NmtCommand.RESET_COMMUNICATION, NmtCommand.RESET_NODE),
 }
-"""What is tried to get a node back that does not answer."""
+"""Attempts to recover a node that does not answer."""
 
 _RESETS: Final = (NmtCommand.RESET_NODE, NmtCommand.RESET_COMMUNICATION)
 _TO_STATE: Final = {NmtState.OPERATIONAL: NmtCommand.START, NmtState.STOPPED: NmtCommand.STOP}
 
 
 class NodeCare:
-    """Cares for one node during a run.
+    """Recovers and restores one node during a run.
 
     Args:
         exchange: the bus.
         client: reads and writes the node.
         node_id: of the node, 1..127.
-        level: of the run; at READ_ONLY nothing is done but reading.
+        level: of the run; READ_ONLY only reads.
 
     Attributes:
-        lost: the node does not answer any more.
+        lost: whether the node no longer answers.
     """
 
     def __init__(
@@ -312,21 +312,21 @@ class NodeCare:
         self._exchange, self._client, self._node_id = exchange, client, node_id
         self._level, self._state = level, KnownState(exchange, client)
         self._nmt_state: NmtState | None = None
-        self._moved = False  # to another NMT state than it was in
+        self._moved = False  # into another NMT state than before
         self._errors = 0
         self._stored = self.lost = False
 
     @property
     def unrestored(self) -> tuple[str, ...]:
-        """What could not be written back, one a line."""
+        """Objects that could not be restored, one per line."""
         return tuple(self._state.unrestored)
 
     def prepare(self, addresses: Iterable[Address], held: Mapping[Address, bytes] = _NONE) -> None:
-        """Learn how the node is, and bring it into the state in which checks begin.
+        """Record the state of the node, and bring it into the state in which checks begin.
 
         Args:
             addresses: of the objects that may change in the run.
-            held: what was read of the node just now.
+            held: values that were just read.
         """
         if self._level is Level.READ_ONLY:
             return
@@ -339,7 +339,7 @@ class NodeCare:
         self._errors = self._client.number(*_ERROR_REGISTER) or 0
 
     def begin(self, bound: BoundCheck) -> None:
-        """Learn what a check may change, if that is not known yet; `lost` if it cannot be."""
+        """Record the values that a check may change, unless known; `lost` if that fails."""
         if self._level is Level.READ_ONLY:
             return
         self._exchange.begin(_CARE_US)
@@ -354,39 +354,39 @@ class NodeCare:
             self._recover()
 
     def unread(self, addresses: Set[Address]) -> list[Address]:
-        """Return which of these could not be read, so that they cannot be written back."""
+        """Return the objects that could not be read, so that they cannot be restored."""
         self._exchange.begin(_CARE_US)
         known = self._state.original
         try:
             self._state.learn(at for at in addresses if at[0] not in _STORAGE)
         except (SdoFailed, StepFailed):
-            return []  # the node is gone, which `begin` will find
+            return []  # the node is gone, which `begin` will detect
         return sorted(at for at in addresses - known.keys() if at[0] not in _STORAGE)
 
     @property
     def repairs(self) -> tuple[Write, ...]:
-        """What to write to restore what could not be, in this order."""
+        """Writes that restore the remaining objects, in this order."""
         return tuple(self._state.repairs)
 
     @property
     def errors(self) -> int:
-        """The bits of the error register that were set before the run, and are still."""
+        """The bits of the error register that were set before the run, and still are."""
         return self._errors
 
     def is_quieted(self, at: Address) -> bool:
-        """Return whether the tester has written another value than was there, to begin checks."""
+        """Return whether the tester has replaced the original value for its checks."""
         return self._state.is_quieted(at)
 
     def held(self, at: Address) -> bytes:
-        """Return what an object held before the run; nothing if that is not known."""
+        """Return the value of an object before the run; nothing if it is unknown."""
         return self._state.original.get(at, b"")
 
     def give_up(self) -> None:
-        """Tell what is not as it was: nobody can write it back."""
+        """Report an object that cannot be restored."""
         self._state.give_up()
 
     def tidy(self, bound: BoundCheck, boots_before: int) -> bool:
-        """Bring the node back after a check; False, and it is lost, if it cannot be."""
+        """Restore the node after a check; return False if that fails: then it is lost."""
         booted, crashed = self._exchange.boots - boots_before, bool(self._exchange.crashes)
         storing = {f"{index:04X}" for index, _ in bound.changed if index in _STORAGE}
         if storing:
@@ -402,7 +402,7 @@ class NodeCare:
         return not self.lost
 
     def restore(self) -> None:
-        """Leave the node as it was before the run, as far as can be."""
+        """Restore the state of the node before the run, as far as possible."""
         if self._level is Level.READ_ONLY:
             return
         self._exchange.begin(_CARE_US)
@@ -412,7 +412,7 @@ class NodeCare:
                 self._state.give_up()
 
     def _put_back(self) -> bool:
-        """Write everything back; False if the node does not answer."""
+        """Restore all values; return False if the node does not answer."""
         try:
             self._client.abort()
             if self._moved:
@@ -427,14 +427,14 @@ class NodeCare:
         return True
 
     def _store(self) -> None:
-        """Store what was there before, in place of what a check has stored."""
+        """Store the previous values, in place of those that a check stored."""
         try:
             self._client.download(*_STORE, _SAVE)
         except (SdoAborted, SdoMisnamed) as error:
             self._state.unrestored[f"what a check stored is still stored: {error}"] = None
 
     def _tidy(self, written: Collection[Address], resets: Collection[str] | None = None) -> None:
-        """Bring the node back; `resets` as `KnownState.tidy_after` takes them, None without any."""
+        """Recover the node; `resets` as `KnownState.tidy_after` takes them, None without any."""
         self._client.abort()
         if self._level is Level.READ_ONLY:
             self._exchange.wait(_SETTLE_MS)
@@ -451,22 +451,22 @@ class NodeCare:
             self._state.tidy_after({_RESET_COMMUNICATION}, written)
 
     def _has_errors(self) -> bool:
-        """Return whether a check left an error behind: those of before the run may have gone."""
+        """Return whether a check left an error behind; earlier errors may have disappeared."""
         number = self._client.number(*_ERROR_REGISTER)
         if number is None:
-            self._probe()  # absent, or is the node gone?
+            self._probe()  # is the object absent, or the node gone?
             return False
         new = number & ~self._errors
         self._errors &= number
         return bool(new)
 
     def _probe(self) -> None:
-        """Raise SdoTimeout if the node is gone; one without 1000h is there."""
+        """Raise SdoTimeout if the node is gone; a node without 1000h is not."""
         with suppress(SdoAborted, SdoMisnamed):
             self._client.upload(*_DEVICE_TYPE)
 
     def _recover(self) -> None:
-        """Try to get a node back that does not answer."""
+        """Try to recover a node that does not answer."""
         for command in _RECOVERY[self._level]:
             self._exchange.begin(_CARE_US)
             if command is not None:
@@ -495,8 +495,8 @@ class NodeCare:
                 return True
 
     def _learn_state(self) -> NmtState | None:
-        """Learn the NMT state from a heartbeat, which is switched on for the purpose."""
-        if HEARTBEAT not in self._state.original:  # it could not be written back
+        """Read the NMT state from a heartbeat, which is switched on for this purpose."""
+        if HEARTBEAT not in self._state.original:  # it could not be restored
             return None
         self._state.write({HEARTBEAT})
         try:

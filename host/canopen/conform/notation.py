@@ -7,7 +7,7 @@ Count(pattern='$heartbeat#05', for_ms=400, least=3, most=5)
 >>> parse_step("refuse write $ro_u8 00 06010002 06010000").action
 RefuseWrite(at='$ro_u8', data='00', codes=('06010002', '06010000'))
 
-Steps written as they are read, for people: what `parse_step` reads, and steps of objects.
+Steps as text: in the notation that `parse_step` reads, and steps of object checks.
 
 >>> step_words(Step(RefuseWrite((0x1000, 0), "00", ("06010002",))))
 'refuse write 1000:00 00 06010002'
@@ -47,18 +47,18 @@ from tickrig.host.canopen.conform.check import (
 )
 from tickrig.wire.canopen.sdo_frame import SPECIFIER, ClientCommand
 
-# Names in place of numbers: what stands for `$heartbeat` or `$rw_u8.new` on this node.
+# Names in place of numbers: the value of `$heartbeat` or `$rw_u8.new` for one node.
 
 NAME: Final = re.compile(r"\$(?:\{([a-z][a-z0-9_]*)\}|([a-z][a-z0-9_]*)(?:\.([a-z]+))?)")
-"""`$name`, `$name.attribute`, or `${name}` where a digit follows."""
+"""`$name`, `$name.attribute`, or `${name}` if a digit follows."""
 _ADDRESS: Final = re.compile(r"([0-9A-F]{4}):([0-9A-F]{2})")
 
 
 class Unbound(Exception):  # noqa: N818 - what the name is
-    """A name for which this node has nothing.
+    """A name for which this node has no object or value.
 
     Attributes:
-        reason: why, for people.
+        reason: why, in words.
     """
 
     def __init__(self, name: str, reason: str) -> None:
@@ -70,14 +70,13 @@ class _Names(Protocol):
     """What stands for the names in checks on one node."""
 
     def text(self, name: str, attribute: str, /) -> str:
-        """Return what stands for `$name.attribute`; the attribute may be empty.
+        """Return the value of `$name.attribute`; the attribute may be empty.
 
-        Of an object: its multiplexer in hex as an SDO carries it; `new` and `other`, two allowed
-        values, `old`, the one before the run, `map`, its mapping entry; all in hex as they go
-        over the bus.
+        For an object: its multiplexer; `new` and `other`, two allowed values; `old`, the value
+        before the run; `map`, its mapping entry. All are in hex, in the byte order of the bus.
 
         Raises:
-            Unbound: the node has nothing of the kind.
+            Unbound: the node has no such object or value.
         """
         ...
 
@@ -104,7 +103,7 @@ def _resolve_address(target: str, names: _Names) -> Address:
     return int(match[1], 16), int(match[2], 16)
 
 
-# What the words of macros say before they are played: what is written, and how long it lasts.
+# What the arguments of macros tell before they are played: what they write, and how long they last.
 
 _DOWNLOADS: Final = frozenset({"segdn", "blkdn"})
 MAP: Final = "map"
@@ -112,15 +111,15 @@ _ENABLE: Final = "enable"
 _REFUSE_SEGMENTS: Final = "refusesegments"
 _FOLLOW: Final = "follow"
 TO_MAPPING: Final = 0x200
-"""A mapping parameter is so far behind its communication parameter."""
+"""Distance of a mapping parameter from its communication parameter."""
 
 _PER_BYTE_US: Final = 2_500
-"""What a byte of a transfer takes at most: two frames for seven, at 30 % of 125 kbit/s."""
+"""The longest time per byte of a transfer: two frames for seven bytes, at 30 % of 125 kbit/s."""
 _TRANSFER_MS: Final = 5_000
 
 
 def written_by(name: str, *words: Any) -> tuple[Address, ...]:
-    """Return what a bound macro writes.
+    """Return the objects that a bound macro writes.
 
     >>> written_by("segdn", (0x2008, 0), "1000"), written_by("segup", (0x2008, 0), "1000")
     (((8200, 0),), ())
@@ -139,12 +138,12 @@ def written_by(name: str, *words: Any) -> tuple[Address, ...]:
 
 
 def longest_ms(name: str, words: Sequence[Any]) -> int:
-    """Return how long a bound macro lasts at most."""
+    """Return the longest duration of a bound macro."""
     return _LONGEST_MS[name](words)
 
 
 def _transfer(words: Sequence[Any]) -> int:
-    """Return how long the pattern takes whose size is the second word."""
+    """Return the duration of a transfer of the pattern whose size is the second word."""
     return _TRANSFER_MS + int(words[1]) * _PER_BYTE_US // 1_000
 
 
@@ -169,17 +168,17 @@ _LONGEST_MS: Final[dict[str, Callable[[Sequence[Any]], int]]] = {
 
 
 _FINALLY: Final = "finally "
-"""Begins a step that is done at the end, however the check went; it fails no check."""
+"""Prefix of a step that is always done at the end; it cannot fail the check."""
 
 _GIVEN: Final = "given "
-"""Begins a step that prepares: if the node does not do it, the check says nothing of the node."""
+"""Prefix of a step that prepares: if the node does not do it, the check is inconclusive."""
 
 
 def parse_step(line: str) -> Step:
-    """Read a line.
+    """Parse a line.
 
     Raises:
-        ValueError: it is none of the notation.
+        ValueError: it is not in the notation.
     """
     if line.startswith(_FINALLY):
         return parse_step(line.removeprefix(_FINALLY))._replace(at_end=True)
@@ -189,7 +188,7 @@ def parse_step(line: str) -> Step:
         match = pattern.fullmatch(line)
         if match is not None:
             return Step(make(*match.groups()))
-    raise ValueError(f"{line!r} is no step; docs/reference/canopen/conform.md has the notation")
+    raise ValueError(f"{line!r} is not a step; docs/reference/canopen/conform.md has the notation")
 
 
 def _expect(patterns: str, within_ms: str | None) -> Expect:
@@ -237,14 +236,14 @@ _LONGEST: Final = 60
 
 
 def step_words(step: Step) -> str:
-    """Write a step, with names or with the numbers of a node."""
+    """Return a step as text, with names or with the numbers of a node."""
     return _FINALLY * step.at_end + _GIVEN * step.given + _words(step.action)
 
 
 def step_head(step: Step) -> str:
-    """Write what a step does, without the codes that are wanted; empty if it is of frames.
+    """Return a step as text, without its expected codes; empty if it is about frames.
 
-    A step of frames that fails says itself which frames were meant.
+    The failure of such a step names the expected frames.
     """
     match step.action:
         case Send() | Expect() | ExpectNone() | Count() | Period() | Wait() | Forget():
@@ -303,16 +302,16 @@ def _word(word: object) -> str:
 
 
 _MARGIN_US: Final = 2_000_000
-"""Beyond the sum of all waits: for what is sent, when the load has to be kept low."""
+"""Time beyond the sum of all waits: for sending, if the load must be kept low."""
 
 _STIMULUS_MS: Final = 60_000
-"""So long may the hand at the inputs take; a person is slow."""
+"""How long the operation of an input may take; a person is slow."""
 
 _LONGEST_TRANSFER_MS: Final = 2_000
-"""So long may an object of a few bytes take."""
+"""How long the transfer of a few bytes may take."""
 
 _BLOCK_ENDS: Final = 1
-"""Bit of a block download request that does not begin it."""
+"""Bit of a block download request that marks later requests."""
 _BEGIN_DOWNLOAD: Final = frozenset(
     command
     for command in range(0x100)
@@ -328,24 +327,24 @@ NMT_TO_ALL: Final = "send NMT commands to all nodes of the bus"
 LSS_TO_ALL: Final = "send LSS requests, which every node of the bus takes"
 SYNC_TO_ALL: Final = "send SYNC, which every node of the bus takes"
 _STORED: Final = "store parameters in the node, in place of those stored before"
-"""What a person is asked."""
+"""Questions to the user."""
 
 
 @dataclass(frozen=True, slots=True)
 class BoundCheck:
-    """A check on one node.
+    """A check for one node.
 
     Attributes:
-        check: as it is written down.
+        check: as written.
         steps: with numbers; an object is its index and sub-index.
-        changed: objects that it writes.
-        used: objects that the node has to have.
-        written: these, and those that the node must refuse to write, or may.
-        questions: what a person is asked before it.
-        can_ids: of the frames that it looks at.
-        within_us: how long it may last at most.
-        resets: how it may reset the node, so that all its values change: frames without the
-            node-ID, and the first word of each act at the device.
+        changed: objects that it changes.
+        used: objects that the node must have.
+        written: these, and objects whose writing the node must or may refuse.
+        questions: questions to the user before it.
+        can_ids: CAN-IDs of the frames that it judges.
+        within_us: its longest duration.
+        resets: how it may reset the node, which changes all its values: frames without the node-ID,
+            and the first word of each stimulus.
     """
 
     check: Check
@@ -384,7 +383,7 @@ def bind_check(check: Check, names: _Names) -> BoundCheck:
 def _bind_step(step: Step, names: _Names) -> Step:
     action = step.action
     if isinstance(action, OfObject) and isinstance(action.at, tuple):
-        return step  # made of an object: all its words are numbers
+        return step  # made from an object: all its arguments are numbers
     bind = _bind_word if isinstance(action, Macro) else _bind_value
     values = [
         _resolve_address(getattr(action, name), names)
@@ -420,7 +419,7 @@ def _bind_word(word: Any, names: _Names) -> Any:
 
 
 def _longest_ms(action: Action) -> int:
-    """Return how long a step lasts at most."""
+    """Return the longest duration of a step."""
     match action:
         case Expect(_, ms) | ExpectNone(_, ms) | Count(_, ms) | Wait(ms):
             return ms
@@ -465,7 +464,7 @@ def _used(action: Action) -> Iterator[Address]:
 
 
 def begins_download(command: int) -> bool:
-    """Return whether a request begins to write the object that it names."""
+    """Return whether a request starts to write the object that it names."""
     return command in _BEGIN_DOWNLOAD
 
 

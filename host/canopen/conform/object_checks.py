@@ -14,8 +14,8 @@ from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
 
 # The SDO abort codes that are accepted for each kind of refusal.
 #
-# Where CiA 301 leaves a choice, the set is that of CiA's own conformance test tool, as its
-# published log shows it (CCT 3.0.3.10, test cases SDO 03 to SDO 10).
+# Where CiA 301 leaves a choice, the codes are those that CiA's own conformance test tool accepts,
+# as its published log shows (CCT 3.0.3.10, test cases SDO 03 to SDO 10).
 
 _READ_ONLY: Final = ("06010002", "06010000", "08000000")
 _WRITE_ONLY: Final = ("06010001", "06010000", "08000000")
@@ -26,10 +26,10 @@ _TOO_SHORT: Final = ("06070013", "06070010", "08000000")
 _TOO_HIGH: Final = ("06090031", "06090030")
 _TOO_LOW: Final = ("06090032", "06090030")
 _NO_VALUE_YET: Final = ("08000024", "08000000", "06090011")
-"""What is described and has no value: an error that has not been, a domain that is empty."""
+"""Objects that may have no value: an error that never occurred, an empty domain."""
 
 
-# Checks of 1000h: a device has the objects of the profile that it says it has.
+# Checks of 1000h: a device must have the objects of the profile that it declares.
 
 _DEVICE_TYPE: Final = 0x1000
 _PROFILE_MASK: Final = 0xFFFF
@@ -40,17 +40,17 @@ _IO_BLOCKS: Final[Mapping[int, tuple[int, ...]]] = {
     18: (0x6401, 0x6400, 0x6402, 0x6403, 0x6404),
     19: (0x6411, 0x6410, 0x6412, 0x6413, 0x6414),
 }
-"""Bits of 1000h of a device of CiA 401, and objects of which there is one if a bit is set."""
+"""Bits of 1000h of a CiA 401 device, and objects of which one must exist if a bit is set."""
 
 _DRIVE_OBJECTS: Final = (0x6040, 0x6041)
 """Controlword and statusword: every drive has them."""
 
 
 def _profile_checks(device: EdsDevice, node_id: int) -> Iterator[check.Check]:
-    """Yield the check of 1000h, if the EDS says what it holds.
+    """Yield the check of 1000h, if the EDS gives its value.
 
     Args:
-        device: what the EDS says.
+        device: the device of the EDS.
         node_id: of the node, 1..127.
     """
     entries = {(entry.index, entry.sub): entry for entry in device.entries}
@@ -68,7 +68,7 @@ def _profile_checks(device: EdsDevice, node_id: int) -> Iterator[check.Check]:
 
 
 def _wanted(number: int, present: set[int]) -> tuple[tuple[int, ...], str]:
-    """Return the objects that a device type asks for, of several the one that is described."""
+    """Return the objects that a device type requires; of alternatives, the described one."""
     match number & _PROFILE_MASK:
         case 401:
             blocks = [objects for bit, objects in _IO_BLOCKS.items() if number >> bit & 1]
@@ -88,7 +88,7 @@ def _reads(
         yield check.Step(check.Hold((index, 0), entry.data_type.name if entry else kind))
 
 
-# Checks of every object that an EDS describes: readable and refused as it is declared.
+# Checks of every object that an EDS describes: readable, and refused as declared.
 
 _GROUP: Final = "OD"
 _ABORTS: Final = "CiA 301 v4.2.0, 7.2.4.3.17, table of SDO abort codes"
@@ -99,21 +99,21 @@ _DEFAULTS: Final = "CiA 306-1, DefaultValue; CiA 301 v4.2.0, 7.5.2"
 _COMMUNICATION_AREA: Final = range(0x1000, 0x2000)
 _PROFILE_AREA: Final = range(0x6000, 0xA000)
 _NEVER_WRITTEN: Final = (0x1010, 0x1011, *range(0x1F50, 0x1F5A))
-"""Store, restore and program download: not even with what must be refused."""
+"""Store, restore and program download: not written, not even to provoke a refusal."""
 
 _ERROR_FIELD: Final = 0x1003
 _CONSTANTS: Final = (0x1000, 0x1018)
-"""Objects that hold what the EDS says wherever the bus cannot write them."""
+"""Objects that have the value of the EDS unless the bus can write them."""
 _PDO_PARAMETERS: Final = (*range(0x1400, 0x1600), *range(0x1800, 0x1A00))
 _IN_USE: Final = (*(0x1005, 0x1006, 0x1012, 0x1014), *range(0x1200, 0x1300), *range(0x1400, 0x1C00))
-"""Objects that CiA 301 keeps from being changed while what they set up exists."""
+"""Objects that CiA 301 protects from changes while the function they configure is enabled."""
 _KEPT: Final = (
     *("06010000", "06010001", "06010002", "06040041", "06040042", "06040043", "06040047"),
     *("06090030", "08000000", "08000021", "08000022"),
 )
-"""Codes of that: a server need not look at the value before."""
+"""Abort codes of this protection: a server need not check the value first."""
 _RESERVED_SUB: Final = 4
-"""Of a PDO parameter: CiA 301 keeps it free, and files describe it."""
+"""Reserved sub-index of a PDO parameter; some files describe it."""
 _SERIAL_NUMBER: Final = (0x1018, 4)
 _DATA_TYPES: Final = range(0x0001, 0x1000)
 _HIGHEST_SUB: Final = 0xFF
@@ -121,7 +121,7 @@ _CONFIGURED: Final = "the node may have been configured: stored, or written sinc
 
 
 class _Maker:
-    """Makes the checks of one node.
+    """Makes the object checks of one node.
 
     Args:
         node_id: of the node, 1..127.
@@ -133,7 +133,7 @@ class _Maker:
         self._node_id, self._allow, self._never = node_id, allow, never
 
     def of_entry(self, entry: EntryDescription, counts: bool) -> Iterator[check.Check]:
-        """Make the checks of one entry; `counts` says whether it is the sub-index 0 of a record."""
+        """Make the checks of one entry; `counts` is whether it is the sub-index 0 of a record."""
         if entry.readable:
             constant = self._power_on(entry) if _is_constant(entry, counts) else None
             yield _holds(entry, constant)
@@ -150,7 +150,7 @@ class _Maker:
                 yield from _of_limits(entry)
 
     def _default(self, entry: EntryDescription) -> Iterator[check.Check]:
-        """Compare what the bus may change with its default, in the communication area."""
+        """Compare writable objects of the communication area with their defaults."""
         value = self._power_on(entry)
         if value is None or not entry.writable or entry.index not in _COMMUNICATION_AREA:
             return
@@ -179,17 +179,17 @@ def object_checks(
 ) -> tuple[check.Check, ...]:
     """Make the checks of all objects, sorted by index and sub-index.
 
-    What is not described is read too: in every object the sub-indices between and behind
-    those described, and FEh and FFh; over all objects together each sub-index up to FFh
-    once; behind every row of objects the index that follows.
+    Undescribed places are read too: in every object the sub-indices between and after the described
+    ones, and FEh and FFh; over all objects together each sub-index up to FFh once; after every row
+    of objects the next index.
 
     Args:
-        device: what the EDS says.
+        device: the device of the EDS.
         node_id: of the node, 1..127; for defaults with $NODEID.
         allow: indices of the profile area, 6000h to 9FFFh, that may be written.
         never: indices that are never written.
-        may_choose: whether a check of this group whose id goes on so is wanted; others may be left
-            out, and the rest is the same.
+        may_choose: whether a check of this group whose id continues with this text may be selected;
+            other checks may be omitted, which does not change the rest.
     """
     maker, checks = _Maker(node_id, allow, never), list[check.Check]()
     entries = sorted(device.entries, key=attrgetter("key"))
@@ -227,7 +227,7 @@ def _check(  # noqa: PLR0913, PLR0917 - a check, by its parts
 
 
 def _holds(entry: EntryDescription, constant: str | None) -> check.Check:
-    """Make the check of what an entry holds."""
+    """Make the check of the value of an entry."""
     action = _hold(entry, constant)
     title = f"holds {entry.data_type.name}"
     if constant is None:
@@ -245,7 +245,7 @@ def _hold(entry: EntryDescription, value: str | None) -> check.Hold:
 def _refused(
     entry: EntryDescription, suffix: str, title: str, grow: int, codes: Sequence[str]
 ) -> check.Check:
-    """Make a check that writes what it has read, so many bytes longer: it must be refused."""
+    """Make a check that writes the read value back, longer by `grow`: the node must refuse."""
     action = check.RefuseRewrite((entry.index, entry.sub), grow, _codes(entry, codes))
     return _check(entry, suffix, title, _ABORTS, action, check.Level.COMMUNICATION)
 
@@ -258,7 +258,7 @@ def _of_sizes(entry: EntryDescription) -> Iterator[check.Check]:
 
 
 def _of_limits(entry: EntryDescription) -> Iterator[check.Check]:
-    """Write the numbers just outside of the limits, as far as the data type has them."""
+    """Write the numbers just outside of the limits, if the data type has them."""
     lowest, highest = entry.data_type.limits
     for suffix, limit, beyond, codes in (
         ("high", entry.high, 1, _TOO_HIGH),
@@ -273,7 +273,7 @@ def _of_limits(entry: EntryDescription) -> Iterator[check.Check]:
 
 
 def _codes(entry: EntryDescription, codes: Sequence[str]) -> tuple[str, ...]:
-    """Return the codes with which a write is refused: those of the value, or of what is in use."""
+    """Return the codes that refuse a write, because of the value or of an object in use."""
     return (*dict.fromkeys([*codes, *(_KEPT if entry.index in _IN_USE else ())]),)
 
 
@@ -303,12 +303,12 @@ def _absent_subs(index: int, rows: list[EntryDescription], share: Collection[int
 
 
 def _absent_objects(indices: Collection[int]) -> check.Check:
-    """Read what is behind each row of objects, and in each area the last."""
+    """Read the index after each row of objects, and the last one of each area."""
     ends = (0x1FFF, 0x5FFF, 0x9FFF, 0xFFFF)
     behind = {index + 1 for index in indices if index < 0xFFFF} | set(ends)
     asked = sorted(behind - set(indices) - set(_DATA_TYPES))
     steps = tuple(check.Step(check.RefuseRead((index, 0), _ABSENT_OBJECT)) for index in asked)
-    title = "objects that are not described are not there"
+    title = "objects that are not described do not exist"
     return check.Check(
         "OD-absent", _GROUP, title, _ABORTS, check.Level.READ_ONLY, frozenset(), steps
     )
@@ -324,6 +324,6 @@ def _is_constant(entry: EntryDescription, counts: bool) -> bool:
 
 
 def _may_have_none(entry: EntryDescription) -> bool:
-    """Return whether an entry may hold nothing: no error yet, an empty domain or string."""
+    """Return whether an entry may have no value: no error yet, an empty domain or string."""
     reserved = entry.index in _PDO_PARAMETERS and entry.sub == _RESERVED_SUB
     return reserved or entry.index == _ERROR_FIELD or not entry.size

@@ -25,10 +25,10 @@ _UPLOADS: Final = frozenset(
 PROFILE: Final = 0x6000
 MANUFACTURER: Final = 0x2000
 PROGRAMS: Final = range(0x1F50, 0x1F5A)
-"""Program download and control: nothing here is for a tester."""
+"""Program download and control: the tester never uses them."""
 SWITCH_GLOBAL, CONFIGURATION = 0x04, 0x01
 _CONFIGURES: Final = (0x11, 0x13, 0x15, 0x17)
-"""LSS services that change a node: node-ID, bit timing, its activation, both stored."""
+"""LSS services that change a node: node-ID, bit timing, its activation, storing."""
 STORAGE: Final = (0x1010, 0x1011)
 _FRAME_BYTES: Final = 8
 
@@ -36,17 +36,18 @@ _Confirm = Callable[[str], bool]
 
 
 class Permission:
-    """Looks at each frame before it is sent.
+    """Checks each frame before it is sent.
 
     Args:
         level: of the run.
         allow: indices of the profile area that may be written.
         node_id: of the node under test.
-        confirm: is asked, once, before each thing that concerns other nodes or is not undone.
+        confirm: called once before each kind of action that concerns other nodes or cannot be
+            undone.
         never: indices that are never written.
 
     Attributes:
-        others: node-IDs that were on the bus.
+        others: node-IDs of other nodes on the bus.
     """
 
     def __init__(
@@ -65,7 +66,7 @@ class Permission:
         self._all_configured = False
 
     def check(self, frame: CanFrame) -> None:
-        """Let a frame pass.
+        """Return if a frame may be sent.
 
         Raises:
             NotAllowed: the level does not allow it.
@@ -74,7 +75,7 @@ class Permission:
         is_request = frame.can_id == self._request and not frame.extended
         if self._level is Level.READ_ONLY:
             if not is_request or frame.remote or not _is_upload(frame.data):
-                raise NotAllowed(f"{frame} is more than reading: --communication")
+                raise NotAllowed(f"{frame} does more than read: --communication")
         elif is_request:
             if self._never:
                 self._check_request(frame.data)
@@ -86,32 +87,32 @@ class Permission:
             self._check_lss(frame.data)
 
     def check_write(self, index: int, *, refused: bool = False) -> None:
-        """Let an object be written, or raise NotAllowed.
+        """Return if an object may be written, else raise NotAllowed.
 
         Args:
             index: of the object.
-            refused: the node must refuse it.
+            refused: whether the node must refuse the write.
         """
         self._check_never(index)
         if index in PROGRAMS:
-            raise NotAllowed(f"{index:04X}h is of program download, which is never written")
+            raise NotAllowed(f"{index:04X}h belongs to program download, which is never written")
         if index >= PROFILE and index not in self._allow:
             raise NotAllowed(f"{index:04X}h may move something: --allow {index:04X}h")
         beyond = index in STORAGE or (MANUFACTURER <= index < PROFILE and not refused)
         if beyond and self._level < Level.INTRUSIVE:
-            raise NotAllowed(f"{index:04X}h would be written with what it takes: --intrusive")
+            raise NotAllowed(f"{index:04X}h would be written with a valid value: --intrusive")
 
     def check_confirmed(self, question: str) -> None:
-        """Ask a person, once; NotAllowed if the answer is no.
+        """Ask the user, once; NotAllowed if the answer is no.
 
-        SYNC is not asked for where nobody else is on the bus.
+        SYNC needs no confirmation if no other node is on the bus.
         """
         if question == SYNC_TO_ALL and not self.others:
             return
         if question not in self._answers:
             self._answers[question] = self._confirm(question)
         if not self._answers[question]:
-            raise NotAllowed(f"would {question}: nobody said yes (--yes)")
+            raise NotAllowed(f"would {question}: not confirmed (--yes)")
 
     def _check_request(self, data: bytes) -> None:
         if len(data) == _FRAME_BYTES and begins_download(data[0]):
@@ -128,12 +129,12 @@ class Permission:
             self.check_confirmed(NMT_TO_ALL)
 
     def _check_lss(self, data: bytes) -> None:
-        """Keep from the other nodes what all take that are in LSS configuration."""
+        """Raise if other nodes would execute LSS commands for all slaves in configuration."""
         if data[:1] == bytes([SWITCH_GLOBAL]):
             self._all_configured = data[1:2] == bytes([CONFIGURATION])
         elif self._all_configured and self.others and data[:1] and data[0] in _CONFIGURES:
             others = ", ".join(map(str, sorted(self.others)))
-            raise Disturbed(f"the other nodes would take LSS {data[0]:02X}h too: {others}")
+            raise Disturbed(f"other nodes would also execute LSS {data[0]:02X}h: {others}")
 
 
 def _is_upload(data: bytes) -> bool:

@@ -30,33 +30,33 @@ from tickrig.wire.canopen.pdo import fields
 from tickrig.wire.canopen.sdo_frame import REQUEST_COB_ID, RESPONSE_COB_ID
 
 _BIT_7: Final = 0x80
-"""Set in no node-ID: they end at 127."""
+"""A bit that no node-ID has: they end at 127."""
 
-# Whether an EDS is of the device that answers, or of another one.
+# Whether an EDS describes the device that answers, or another one.
 
 TOLD: Final = {"device type": (0x1000, 0), "vendor": (0x1018, 1), "product": (0x1018, 2)}
-"""What tells devices apart, as `Subject.about` names it."""
+"""Properties that tell devices apart, as `Subject.about` names them."""
 
 
 def other_device(device: EdsDevice | None, about: Mapping[str, str]) -> str:
-    """Say in what an EDS differs from the node as no EDS of it would; empty if it does not.
+    """Return how an EDS differs from the node if it is of another device; empty if it fits.
 
     Args:
-        device: what the EDS says, None without one; a value that it leaves at 0 says nothing.
-        about: what the node says of itself.
+        device: the device of the EDS, None without one; a value of 0 is not compared.
+        about: properties that the node reports.
     """
     entries = device.entries if device else ()
     values = {(one.index, one.sub): int.from_bytes(one.default, "little") for one in entries}
     said = {name: f"{values[at]:08X}h" for name, at in TOLD.items() if values.get(at)}
     differs = [
-        f"{name} {text} there, {about[name]} here"
+        f"{name} {text} in the EDS, {about[name]} in the node"
         for name, text in said.items()
         if about.get(name, text) != text
     ]
     return f"this EDS is of another device: {', '.join(differs)}" if differs else ""
 
 
-# Values with which an object of a node is written: allowed ones, and such as must be refused.
+# Values that checks write to an object of a node: allowed ones, and ones to be refused.
 
 _PATTERNS: Final = tuple(
     map(
@@ -64,7 +64,7 @@ _PATTERNS: Final = tuple(
         ("A5345678F1E2D3C4", "5AC3877A1E2D3C4B", "694B9621D2A57896", "962D4BE127C3B45A"),
     )
 )
-"""Values no byte of which is another's: what is swapped or cut is seen."""
+"""Values that share no byte: swapped or truncated values are detected."""
 _SAMPLE_TEXTS: Final = (b"conformance", b"tested node")
 _BOOLEANS: Final = (b"\x01", b"\x00")
 _REALS: Final = (1.5, -2.25)
@@ -72,13 +72,13 @@ _FORMATS: Final = {DataType.REAL32: "<f", DataType.REAL64: "<d"}
 
 
 def _sample_value(name: str, attribute: str, bound: BoundObject) -> str:
-    """Return a value in hex as it goes over the bus.
+    """Return a value in hex, in the byte order of the bus.
 
     Args:
         name: in the check, for the message.
-        attribute: `new` or `other`, two allowed values, which it neither holds nor begins with if
-            there are enough; `old`, what it held; `low` and `high`; `below` and
-            `above` them; `map`, its mapping entry; `longmap`, one twice as long.
+        attribute: `new` or `other`, two allowed values, if possible neither the original value nor
+            that at the begin of checks; `old`, the original value; `low` and `high`, its limits;
+            `below` and `above` them; `map`, its mapping entry; `longmap`, one twice as long.
         bound: the object.
 
     Raises:
@@ -132,10 +132,10 @@ def _limit(name: str, entry: EntryDescription, attribute: str) -> bytes:
     try:
         return value.to_bytes(entry.size, "little", signed=entry.signed)
     except OverflowError:
-        raise Unbound(name, f"nothing is {attribute} the limits of {entry.index:04X}h") from None
+        raise Unbound(name, f"no value is {attribute} the limits of {entry.index:04X}h") from None
 
 
-# What the names in checks stand for on one node: its COB-IDs, and what was bound to it.
+# The values of names in checks for one node: its COB-IDs, and the bound objects.
 
 _EMCY_COB_ID: Final = 0x80
 _SYNC_COB_ID: Final = 0x80
@@ -144,9 +144,9 @@ _RPDO2: Final = 0x300
 _TPDO1: Final = 0x180
 _TPDO2: Final = 0x280
 _FREE_CAN_ID: Final = 0x6A2
-"""A CAN-ID that is neither restricted nor of the pre-defined connection set."""
+"""A CAN-ID that is neither restricted nor in the pre-defined connection set."""
 _DRIVE: Final = range(0x603F, 0x6100)
-"""Of CiA 402: modes, states and positions."""
+"""Objects of CiA 402: modes, states and positions."""
 _HIGHEST_NODE_ID: Final = 127
 _HEARTBEAT: Final = (0x1017, 0)
 _BEATS_MS: Final = (100, 90, 110)
@@ -163,7 +163,7 @@ class _NodeNames:
         node_id: of the node, 1..127.
         binding: objects and PDOs by name.
         number: reads the node.
-        others: node-IDs that were heard on the bus.
+        others: node-IDs of other nodes on the bus.
 
     Attributes:
         peer: a node-ID that no node has, None if all are taken.
@@ -183,7 +183,7 @@ class _NodeNames:
         }
 
     def text(self, name: str, attribute: str) -> str:
-        """Return what stands for `$name.attribute`, in hex as it goes over the bus."""
+        """Return the value of `$name.attribute`, in hex, in the byte order of the bus."""
         if not attribute and name in self._texts:
             return self._texts[name]
         bound = self._bound(name)
@@ -194,7 +194,7 @@ class _NodeNames:
         if not attribute:
             return multiplexer((bound.index, bound.sub))
         if not isinstance(bound, BoundObject):
-            raise Unbound(name, f"nothing is there that has a {attribute}")
+            raise Unbound(name, f"nothing with a {attribute} exists")
         return _sample_value(name, attribute, bound)
 
     def address(self, name: str) -> check.Address:
@@ -241,7 +241,7 @@ def _can_id(cob_id: int | None) -> int:
 
 
 def _free_id(node_id: int, others: Collection[int]) -> int | None:
-    """Choose a node-ID that nobody has: for a node that the tester plays."""
+    """Choose a node-ID that no node has, for a node that the tester simulates."""
     free = (n for n in range(_HIGHEST_NODE_ID - 1, 0, -1) if n != node_id and n not in others)
     return next(free, None)
 
@@ -257,7 +257,7 @@ def _peer(peer: int | None) -> dict[str, str]:
 
 
 def _heartbeat_time(binding: Binding, number: _ReadNumber) -> str:
-    """Choose a heartbeat time, in hex, that the node neither has nor begins with."""
+    """Choose a heartbeat time, in hex, other than the original one and the one of the checks."""
     bound = binding.bound.get("heartbeat")
     default = bound.entry.default if isinstance(bound, BoundObject) else b""
     taken = {number(*_HEARTBEAT), int.from_bytes(default, "little")}
@@ -297,11 +297,11 @@ def _pdo_text(name: str, attribute: str, pdo: BoundPdo) -> str:
 
 
 def _first(name: str, attribute: str, pdo: BoundPdo) -> str:
-    """Return the first object that a PDO carries, as `6000:01`, or the zeros behind its byte 0."""
+    """Return the first object that a PDO carries, as `6000:01`, or the zeros after its byte 0."""
     mapped, _ = next(fields(pdo.mapping or (0,)))
     index, sub, bits = mapped.index, mapped.sub, mapped.bits
     if index in _DRIVE:
-        raise Unbound(name, f"{index:04X}h tells what a drive does: nobody can set it")
+        raise Unbound(name, f"{index:04X}h reports what a drive does: it cannot be written")
     texts = {"first": f"{index:04X}:{sub:02X}", "padding": "00" * ((bits + 7) // 8 - 1)}
     return texts[attribute]
 
@@ -313,7 +313,7 @@ def _u32(number: int) -> str:
 _TEXTS: Final = {0x1008: "name", 0x1009: "hardware version", 0x100A: "software version"}
 _IDENTITY: Final = ("vendor", "product", "revision", "serial")
 _MANDATORY: Final = {(0x1000, 0): "UE-01", (0x1001, 0): "UE-02", (0x1018, 0): "UE-05"}
-"""Objects of each node, and the check that fails where one is not there."""
+"""Mandatory objects of each node, and the check that fails if one is missing."""
 _INDICES: Final = {index for index, _ in _MANDATORY}
 _COMMUNICATION: Final = 0x1000
 _READ_ONLY: Final = "06010002"
@@ -321,16 +321,16 @@ _READ_ONLY: Final = "06010002"
 
 @dataclass(frozen=True, slots=True)
 class Subject:
-    """What was found out about the node before the first check.
+    """The node as found before the first check.
 
     Attributes:
         binding: its objects by name.
-        features: what it can do.
-        names: what stands for names in checks.
-        about: what it says of itself, by name, for people.
-        has: its objects by index and sub-index; made once, a tenth of a run.
-        values: those that can be read and written.
-        refused: the mandatory objects that the node does not let be read.
+        features: its capabilities.
+        names: the values of the names in checks.
+        about: properties that it reports, by name, in words.
+        has: its objects by index and sub-index; computed once, because it takes a tenth of a run.
+        values: objects that can be read and written.
+        refused: the mandatory objects that the node refuses to read.
     """
 
     binding: Binding
@@ -342,9 +342,9 @@ class Subject:
     refused: frozenset[check.Address]
 
     def missing(self, bound: BoundCheck) -> str | None:
-        """Return why not all that a check uses can be used: what is not there; None if all is.
+        """Return why not all objects of a check can be used; None if they can.
 
-        Where the node lacks a mandatory object, one check fails, and others do not use it.
+        If the node lacks a mandatory object, one check fails, and the others do not use it.
         """
         for at in sorted(bound.written & self.refused | bound.used):
             judge, where = _MANDATORY.get(at, ""), f"{at[0]:04X}h:{at[1]:02X}"
@@ -355,9 +355,9 @@ class Subject:
         return None
 
     def fixed(self, steps: Collection[check.Step]) -> str | None:
-        """Return why not all that is written takes its value: CiA 301 lets it be constant.
+        """Return why not all written objects accept the value: CiA 301 allows them to be constant.
 
-        None if all does.
+        None if they do.
         """
         for step in steps:
             for at in _takes(step):
@@ -369,7 +369,7 @@ class Subject:
             entry = self.entries.get(step.action.address)
             if entry is not None and not _within(entry, bytes.fromhex(step.action.data)):
                 where = f"{entry.index:04X}h:{entry.sub:02X}"
-                return f"{where} takes only {entry.low} to {entry.high}"
+                return f"{where} accepts only {entry.low} to {entry.high}"
         return None
 
     @property
@@ -378,11 +378,11 @@ class Subject:
         return self.binding.entries
 
     def _where(self, index: int) -> str:
-        """Say who has no such object: without an EDS only those of CiA 301 were asked for."""
+        """Return which object is missing where: without an EDS, only those of CiA 301 were read."""
         if self.binding.known:
             return "the EDS has no"
         asked = _COMMUNICATION <= index < MANUFACTURER
-        return "the node has no" if asked else "without an EDS nobody knows of any"
+        return "the node has no" if asked else "without an EDS there is no known"
 
     def restorable(self, level: check.Level) -> list[check.Address]:
         """Return objects that a run may change, be it by a reset: read before, written after."""
@@ -400,18 +400,18 @@ class Subject:
 
 
 def _takes(step: check.Step) -> Iterator[check.Address]:
-    """Yield what a step writes, and the node shall take, or refuse for what it is."""
+    """Yield the objects that a step writes, and that must accept it or refuse it by their kind."""
     match step.action:
         case check.Write() as action:
             yield action.address
         case check.RefuseWrite(_, _, codes) as action if _READ_ONLY not in codes:
-            yield action.address  # another reason is asked for
+            yield action.address  # the node must refuse for another reason
         case check.Macro(name, words) if name == MAP:
             yield from written_by(name, *words)
 
 
 def _within(entry: EntryDescription, data: bytes) -> bool:
-    """Return whether a value lies within the limits of an object, where it has any."""
+    """Return whether a value lies within the limits of an object, if it has any."""
     if not entry.data_type.is_integer or len(data) != entry.size:
         return True
     value = int.from_bytes(data, "little", signed=entry.signed)
@@ -426,7 +426,7 @@ def examine(  # noqa: PLR0913, PLR0917 - all that is known
     claims: EdsClaims | None,
     others: Collection[int],
 ) -> Subject:
-    """Find out what a node has; it is only read.
+    """Find out what a node has; only read it.
 
     Raises:
         SdoTimeout: it does not answer.

@@ -20,11 +20,11 @@ ORDER: Final = (
     *("UE", "US", "BU", "DE", "DS", "BD", "SG", "NMT", "HB", "NG"),
     *("PC", "PR", "SY", "EM", "IO", "D4", "ST", "LS"),
 )
-"""Groups in the order in which they are judged: what may disturb most comes last."""
+"""Groups in the order in which they run: what may disturb most comes last."""
 
 
 OBJECTS: Final = "OD"
-"""The group of checks that are made of an EDS."""
+"""The group of checks that are made from an EDS."""
 _OF_EACH_OBJECT: Final = "each object of the EDS"
 
 
@@ -53,7 +53,7 @@ def suite_checks() -> list[Check]:
 
 
 def chosen_checks(plan: ConformancePlan) -> Iterator[Check]:
-    """Yield the checks of the suite that a plan chooses; the files of other groups are not read."""
+    """Yield the checks of the suite that a plan selects; the files of other groups are not read."""
     for name in ORDER:
         if plan.may_choose(name):
             yield from filter(plan.chooses, _read_group(name).checks)
@@ -61,7 +61,7 @@ def chosen_checks(plan: ConformancePlan) -> Iterator[Check]:
 
 @cache
 def group_titles() -> Mapping[str, str]:
-    """Return what the groups are about, by name; the last one is that of objects."""
+    """Return the topics of the groups, by name; the last one is that of objects."""
     titles = {name: _head(_text(name).split("\n", 1)[0])[2] for name in ORDER}
     return {**titles, OBJECTS: _OF_EACH_OBJECT}
 
@@ -74,7 +74,7 @@ def parse_group(text: str) -> _Group:
     """Read a file of checks: parted by empty lines; a line that begins with # is a comment.
 
     Raises:
-        ValueError: a line is none of the notation; it says which.
+        ValueError: a line is not in the notation; the message names it.
     """
     blocks = re.split(r"\n\s*\n", re.sub(r"^#.*\n", "", text, flags=re.MULTILINE).strip())
     match = _head(blocks[0])
@@ -84,7 +84,7 @@ def parse_group(text: str) -> _Group:
 def _head(text: str) -> re.Match[str]:
     match = _GROUP.fullmatch(text)
     if match is None:
-        raise ValueError(f"{text!r} is no head like 'group: NMT, what it is about'")
+        raise ValueError(f"{text!r} is not a head like 'group: NMT, what it is about'")
     return match
 
 
@@ -93,7 +93,7 @@ def _checks(group: str, blocks: list[str]) -> Iterator[Check]:
         head, *lines = block.split("\n")
         match = _HEAD.fullmatch(head)
         if match is None:
-            raise ValueError(f"{head!r} is no head like 'NMT-03 what conforming means'")
+            raise ValueError(f"{head!r} is not a head like 'NMT-03 what conforming means'")
         words: dict[str, str] = {}
         steps: list[Step] = []
         for line in lines:

@@ -11,20 +11,20 @@ from tickrig.host.canopen.conform.check import Check, Level
 
 
 class CheckVerdict(StrEnum):
-    """What a check gave."""
+    """The verdict of a check."""
 
     PASS = "pass"
     FAIL = "fail"
     NOT_APPLICABLE = "not applicable"
     IMPLEMENTATION_DEFINED = "implementation-defined"
     INCONCLUSIVE = "inconclusive"
-    """The bus or this host was too slow, lost frames, or another node disturbed it."""
+    """The bus or this host was too slow, lost frames, or another node interfered."""
     BLOCKED = "blocked"
-    """The node did not come back."""
+    """The node did not answer again."""
 
 
 class Direction(StrEnum):
-    """Which way a line of the evidence went."""
+    """The direction of a line of the evidence."""
 
     SENT = ">"
     RECEIVED = "<"
@@ -47,15 +47,16 @@ class FrameLine(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class CheckOutcome:
-    """One go at a check.
+    """One attempt at a check.
 
     Attributes:
-        verdict: what it gave.
-        reason: why, in one line: what came and what was allowed; empty where it passed.
-        evidence: what was on the bus.
+        verdict: its verdict.
+        reason: why, in one line: what came and what was allowed; empty if it passed.
+        evidence: the frames on the bus.
         start_us: bus time since the start of the run.
-        end_us: the same, of its end.
-        wanted: patterns of the frame that should have come, one of them, where it failed by that.
+        end_us: the same for its end.
+        wanted: patterns of the expected frame, of which one must match, if it failed for this
+            reason.
     """
 
     verdict: CheckVerdict
@@ -68,12 +69,12 @@ class CheckOutcome:
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """A check with what came of it.
+    """A check with its result.
 
     Attributes:
         check: the check.
-        outcome: what counts.
-        first: the go before it, where a failure was tried again.
+        outcome: the attempt that counts.
+        first: the attempt before it, if a failure was repeated.
     """
 
     check: Check
@@ -88,17 +89,18 @@ class Report:
     Attributes:
         source: the bus, as the user named it.
         node_id: of the node, 1..127.
-        level: what was allowed.
-        results: in the order in which they were judged.
-        node: what it says of itself (1000h, 1008h to 100Ah, 1018h), by name, for people.
-        settings: adapter, bit rate, tolerances, seed, versions and such, by name, for people.
-        findings: of the EDS, and contradictions between it and the node, one a line.
-        unrestored: what could not be written back, one a line.
-        repairs: what restores it, written in this order: words of `canmon net SOURCE write NODE`.
+        level: what the run was allowed to do.
+        results: in the order of the run.
+        node: properties that the node reports (1000h, 1008h to 100Ah, 1018h), by name, in words.
+        settings: adapter, bit rate, tolerances, seed, versions and so on, by name, in words.
+        findings: of the EDS, and contradictions between it and the node, one per line.
+        unrestored: objects that could not be restored, one per line.
+        repairs: writes that restore them, in this order: arguments of `canmon net SOURCE write
+            NODE`.
         duration_us: of the run, in bus time.
         aborted: why it ended before its end; empty if it did not.
-        doubt: why all of it may say nothing of the node; empty if it does.
-        absent: nothing was judged, as nobody, or more than one node, answers to the node-ID.
+        doubt: why the whole report may say nothing about the node; empty without a doubt.
+        absent: nothing was judged, because no node, or more than one, answers to the node-ID.
     """
 
     source: str
@@ -116,7 +118,7 @@ class Report:
     absent: bool = False
 
     def count(self, verdict: CheckVerdict) -> int:
-        """Return how many checks gave this verdict."""
+        """Return the number of checks with this verdict."""
         return sum(result.outcome.verdict is verdict for result in self.results)
 
     @property
@@ -139,4 +141,4 @@ NOTHING_JUDGED: Final = 5
 BUS_FAILED: Final = 3
 CTRL_C: Final = 130
 INTERRUPTED: Final = "interrupted"
-"""Why a run has ended before its end, if somebody ended it."""
+"""Why a run was ended early, if a person ended it."""

@@ -25,15 +25,15 @@ _COB_ID_BYTES: Final = 4
 
 
 def in_order(values: Mapping[Address, bytes], number: _Number) -> Iterator[Write]:
-    """Yield what to write, one after the other, to bring objects to their values.
+    """Yield the writes, in order, that bring objects to their values.
 
-    A PDO is disabled while its parameters change, its mapping is emptied first; SYNC is
-    stopped, EMCY and SDO servers are disabled while their COB-ID changes.
+    A PDO is disabled while its parameters change, and its mapping is emptied first. SYNC is stopped
+    while its parameters change; EMCY and SDO servers are disabled while their COB-ID changes.
 
     Args:
-        values: what the objects shall hold.
+        values: the wanted values of the objects.
         number: reads an object of the node, as an unsigned number of its size; None if its value
-            was not known, so that it could not be written back.
+            was unknown, so that it could not be restored.
     """
     left = {at: value for at, value in values.items() if is_standard(at, value)}
     odd = {at: value for at, value in values.items() if at not in left}
@@ -48,7 +48,7 @@ def in_order(values: Mapping[Address, bytes], number: _Number) -> Iterator[Write
 
 
 def is_standard(at: Address, value: bytes) -> bool:
-    """Return whether a COB-ID or a number of mapped objects is as long as CiA 301 has it."""
+    """Return whether a COB-ID or a number of mapped objects has the length of CiA 301."""
     return len(value) == (_bytes_of(at) or len(value))
 
 
@@ -100,7 +100,7 @@ def _pdo(pdo: int, left: Values, number: _Number) -> Iterator[Write]:
 
 
 def _sync(left: Values, number: _Number) -> Iterator[Write]:
-    """Stop the producer, write counter and period, and let it run as it shall."""
+    """Stop the producer, write counter and period, and restart it if it is enabled."""
     given, before, cycle = (
         left.pop((_SYNC, 0), None),
         number((_SYNC, 0)),

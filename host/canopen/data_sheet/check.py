@@ -42,12 +42,12 @@ _CHECKS: Final[tuple[Callable[[Document], Iterator[RuleFinding]], ...]] = (
     *(profile_rules.mandatory, profile_rules.communication, profile_rules.profile),
 )
 _UNREADABLE: Final = frozenset({"xml", "no-objects"})
-"""Where one of these is found, what else is missing goes without saying."""
+"""If one of these rules is broken, missing parts are not reported in addition."""
 
 
 def check(document: Document) -> list[RuleFinding]:
     """Return all findings of a file, by line."""
-    if document.findings is None:  # `fix` and its caller ask again: a quarter of their time
+    if document.findings is None:  # `fix` and its caller call this again: a quarter of their time
         document.findings = _check(document)
     return list(document.findings)
 
@@ -60,12 +60,12 @@ def _check(document: Document) -> list[RuleFinding]:
 
 
 def severities(findings: Iterable[RuleFinding]) -> str:
-    """Return how many findings have which severity, as `2 errors, 1 warning, 0 notes`."""
+    """Return the number of findings by severity, as `2 errors, 1 warning, 0 notes`."""
     counts = Counter(one.rule.severity for one in findings)
     return ", ".join(counted(counts[each], each.value) for each in Severity)
 
 
 def failing(findings: Iterable[RuleFinding], *, strict: bool = False) -> list[RuleFinding]:
-    """Return those that make a check fail: errors, and with `strict` warnings."""
+    """Return the findings that make a check fail: errors, and with `strict` warnings."""
     count = (Severity.ERROR, Severity.WARNING) if strict else (Severity.ERROR,)
     return [one for one in findings if one.rule.severity in count]

@@ -1,4 +1,4 @@
-"""An EDS as the bytes of its lines, and as the device that the reader sees in it."""
+"""An EDS as the bytes of its lines, and as the device that the reader makes of it."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ _END: Final = re.compile(r"(\r\n|\r|\n)")
 
 
 class Document:
-    """A file, both ways.
+    """A file as lines and as a device.
 
     Args:
-        name: what findings call it.
+        name: name of the file in findings.
         data: the whole file.
-        encoding: of the file, by its name in Python; empty for that which its bytes show.
+        encoding: Python name of its encoding; empty to detect it from the bytes.
 
     Attributes:
-        name: likewise.
-        data: likewise.
-        encoding: by its name in Python.
-        has_bom: whether a byte order mark stands before it.
-        texts: the lines as they stand there, without their ends.
-        ends: what ends each of them, empty for the last one.
+        name: as given.
+        data: as given.
+        encoding: Python name of the encoding.
+        has_bom: whether the file begins with a byte order mark.
+        texts: the lines, without line ends.
+        ends: the end of each line, empty for the last one.
         file: its sections.
-        device: what they describe.
+        device: the device that they describe.
         rows: the entries of the device by index and sub-index.
-        findings: of `check`, None until it is asked.
+        findings: result of `check`, None before the first call.
     """
 
     def __init__(self, name: str, data: bytes, encoding: str = "") -> None:
@@ -70,11 +70,11 @@ class Document:
 
     @property
     def is_unicode(self) -> bool:
-        """Whether it is UTF-8, of which ASCII is a part, or UTF-16."""
+        """Whether the encoding is UTF-8, which includes ASCII, or UTF-16."""
         return eds_file.encoding_of(self.data) not in eds_file.CODE_PAGES
 
     def letters(self, line: int) -> str:
-        """Say what the first byte beyond ASCII of a line is in the encodings that it may have."""
+        """Return what the first non-ASCII byte of a line means in each possible encoding."""
         byte = next(letter for letter in self.texts[line - 1] if not letter.isascii())
         coded = byte.encode(self.encoding, "surrogateescape")
         pages = dict.fromkeys((self.encoding, *eds_file.CODE_PAGES))
@@ -82,7 +82,7 @@ class Document:
         return f"byte {coded.hex().upper()}h is {', '.join(said)}"
 
     def keyword(self, section: str, key: str) -> EdsLine | None:
-        """Return the line that gives a keyword its value, None without one."""
+        """Return the line that sets a keyword, None if there is none."""
         return self._keywords.get((section, key.lower()))
 
     def subs(self, index: int) -> list[int]:
@@ -90,27 +90,27 @@ class Document:
         return self._subs.get(index, [])
 
     def entries(self, index: int) -> list[EntryDescription]:
-        """Return the entries of an object, by sub-index; none if it is not there."""
+        """Return the entries of an object, by sub-index; empty if it does not exist."""
         return self._entries.get(index, [])
 
     def found(
         self, rule: str, text: str, section: str = "", line: int | str = "", *edits: Edit
     ) -> RuleFinding:
-        """Make a finding.
+        """Create a finding.
 
         Args:
             rule: its name.
             text: what came, and what was allowed.
-            section: where; empty for the file as a whole.
-            line: its number, or the keyword that stands in it; the section's if left out.
-            edits: what mends it.
+            section: its section; empty for the file as a whole.
+            line: its number, or its keyword; by default the line of the section.
+            edits: the edits that fix it.
         """
         number = line if isinstance(line, int) else self.file.line(section, line)
         kept = () if self.file.is_xml else edits
         return RuleFinding(RULES[rule], self.name, number, eds_file.shorten(section), text, kept)
 
     def changes(self, edits: Sequence[Edit]) -> bool:
-        """Return whether edits would leave another file, in letters that its encoding has."""
+        """Return whether edits would change the file, with letters that its encoding has."""
         added = "".join(text for edit in edits for text in edit.lines)
         return self._can_hold(added) and any(
             place is not EditPlace.REPLACE or lines != (self.texts[line - 1],)
@@ -118,7 +118,7 @@ class Document:
         )
 
     def _can_hold(self, text: str) -> bool:
-        """Return whether a text can be written; of a byte without a letter, nobody knows it."""
+        """Return whether a text can be encoded; a byte without a letter cannot."""
         if self.encoding.startswith("utf-16"):
             return True
         try:
@@ -139,25 +139,25 @@ class Document:
         return Edit(number, lines=(f";{self.texts[number - 1]}",))
 
     def add_to(self, section: str, texts: Iterable[str]) -> Edit:
-        """Return the edit that puts lines at the end of a section."""
+        """Return the edit that appends lines to a section."""
         numbers = [line.number for line in self._blocks.get(section, ()) if line.content]
         return Edit(max(numbers, default=0), EditPlace.AFTER, tuple(texts))
 
     def is_again(self, line: EdsLine) -> bool:
-        """Return whether a line stands in a section whose title was there before."""
+        """Return whether a line is in a section whose title occurred before."""
         return line.number not in self._first
 
     @cached_property
     def head_is_lost(self) -> bool:
-        """Whether what stands before the first title seems to have lost its own."""
+        """Whether the lines before the first title seem to have lost their title."""
         return any("[" in line.content for line in self._blocks[""] if not line.title)
 
     def lines_of(self, section: str) -> list[EdsLine]:
-        """Return the keywords of a section, of the first one of that name."""
+        """Return the keywords of a section; of several with this name, those of the first."""
         return [line for line in self._blocks.get(section, ()) if line.is_keyword]
 
     def _read_blocks(self) -> dict[str, list[EdsLine]]:
-        """Return the lines of each section, as far as its first title goes."""
+        """Return the lines of each section, up to the end of its first occurrence."""
         blocks: dict[str, list[EdsLine]] = {}
         block: list[EdsLine] = blocks.setdefault("", [])
         for line in self.file.lines:

@@ -21,10 +21,10 @@ _WRITTEN_AS: Final = {
     **dict.fromkeys("\u2013\u2014", "-"),
     **dict.fromkeys("\u2018\u2019", "'"),
 }
-"""Letters in ASCII that taking their accents away does not give."""
+"""ASCII replacements that removing the accents does not give."""
 _CUT: Final = "truncated"
 _NO_LETTER: Final = re.compile("[\udc80-\udcff]")
-"""Bytes that their encoding has no letter for."""
+"""Bytes that have no letter in their encoding."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,10 +32,10 @@ class _Fixed:
     """A file that was mended.
 
     Attributes:
-        document: as it is now.
-        mended: what was found and is gone, with the lines of the file as it was.
-        left: errors and warnings that are still there, with the lines of the file as it is.
-        origins: the lines of the file before, of each line.
+        document: the fixed document.
+        mended: fixed findings, with their lines in the original file.
+        left: remaining errors and warnings, with their lines in the fixed file.
+        origins: for each line, its line in the original file.
     """
 
     document: Document
@@ -44,19 +44,19 @@ class _Fixed:
     origins: tuple[int, ...]
 
     def before(self, one: RuleFinding) -> RuleFinding:
-        """Return what is left, with the line of the file before."""
+        """Return the remaining findings, with their lines in the original file."""
         return replace(one, line=_origin(self.origins, one.line))
 
 
 def fix(document: Document, *, ascii_only: bool = False) -> _Fixed:
     """Mend a file until nothing changes; lines that no finding names stay to the byte.
 
-    A file that looks truncated stays as it is: mended, it would look whole. What is not Unicode
-    becomes UTF-8.
+    A file that looks truncated stays unchanged: after a fix it would look complete. Other encodings
+    than Unicode become UTF-8.
 
     Args:
         document: the file.
-        ascii_only: whether letters beyond ASCII are written with those of ASCII.
+        ascii_only: whether to replace non-ASCII letters by ASCII ones.
     """
     mended: list[RuleFinding] = []
     origins = list(range(1, len(document.texts) + 1))
@@ -76,7 +76,7 @@ def fix(document: Document, *, ascii_only: bool = False) -> _Fixed:
 
 
 def _beyond_ascii(document: Document) -> Iterator[RuleFinding]:
-    """Find lines with letters beyond ASCII, with the edits that write them in ASCII."""
+    """Find lines with non-ASCII letters, with the edits that replace them."""
     for number, text in enumerate(document.texts, 1):
         if text.isascii():
             continue
@@ -89,7 +89,7 @@ def _beyond_ascii(document: Document) -> Iterator[RuleFinding]:
 
 
 def _in_ascii(letter: str) -> str:
-    """Return a letter in ASCII, `?` if there is nothing like it.
+    """Return a letter in ASCII, `?` if there is no similar one.
 
     >>> [_in_ascii(letter) for letter in "öéß°Ω²✓"]
     ['oe', 'e', 'ss', 'deg', 'Ohm', '2', '?']
@@ -107,7 +107,7 @@ def _origin(origins: Sequence[int], line: int) -> int:
 
 
 class _Plan:
-    """Edits that do not contradict each other."""
+    """Edits without conflicts."""
 
     def __init__(self) -> None:
         self._lines: dict[int, tuple[str, ...]] = {}
@@ -115,7 +115,7 @@ class _Plan:
         self._places: set[EditPlace] = set()
 
     def take(self, edits: tuple[Edit, ...]) -> bool:
-        """Add edits; False, and none of them, where they contradict others."""
+        """Add edits; if they conflict with others, add none and return False."""
         for line, place, lines in edits:
             if place is EditPlace.REPLACE and self._lines.get(line, lines) != lines:
                 return False
@@ -129,14 +129,14 @@ class _Plan:
         return True
 
     def carry_out(self, document: Document, origins: list[int]) -> tuple[Document, list[int]]:
-        """Return the document that comes of it, and where its lines were."""
+        """Return the document after the edits, and the original line of each line."""
         usual = _usual_end(document.ends)
         lines: list[tuple[str, str, int]] = []
         self._add(lines, 0, usual, 1)
         for number, (text, end) in enumerate(zip(document.texts, document.ends, strict=True), 1):
             origin = origins[number - 1]
             if end == "\r" and EditPlace.LINE_ENDS in self._places:
-                end = usual  # noqa: PLW2901 - what it is from here on
+                end = usual  # noqa: PLW2901 - the new encoding of the document
             kept = self._lines.get(number, (text,))
             last = number == len(document.texts)
             if last and number in self._added and kept == ("",):
@@ -166,7 +166,7 @@ class _Plan:
 
 
 def _usual_end(ends: list[str]) -> str:
-    """Return how most lines end; CR alone is no end."""
+    """Return the most frequent line end; CR alone does not count."""
     return "\r\n" if ends.count("\r\n") > ends.count("\n") else "\n"
 
 

@@ -9,14 +9,14 @@ from typing import Final, NamedTuple
 
 
 class Severity(Enum):
-    """How much a finding matters."""
+    """How severe a finding is."""
 
     ERROR = "error"
     """A tool misreads or refuses the file."""
     WARNING = "warning"
-    """Tools differ in what they make of it."""
+    """Tools interpret it differently."""
     NOTE = "note"
-    """Style, or something that may be left out."""
+    """Style, or something optional."""
 
 
 class _EdsRule(NamedTuple):
@@ -25,9 +25,9 @@ class _EdsRule(NamedTuple):
     Attributes:
         name: as findings show it.
         severity: of its findings.
-        clause: the document and clause that it is from; `practice` where none says it.
-        breaks: what goes wrong where it is broken.
-        fix: what to do, in words.
+        clause: the document and clause that requires it; `practice` if there is none.
+        breaks: the consequence of breaking it.
+        fix: what to do.
     """
 
     name: str
@@ -41,8 +41,8 @@ def read_rules(path: Path) -> dict[str, _EdsRule]:
     """Return the rules of a file by name, in its order.
 
     Args:
-        path: a text file with a heading for each severity, as `[error]`, and a rule a line below
-            it: name, clause, what breaks and what to do, with ` | ` between them.
+        path: a text file with a heading for each severity, as `[error]`, followed by one rule per
+            line: name, clause, consequence and fix, separated by ` | `.
     """
     rules: dict[str, _EdsRule] = {}
     severity = Severity.ERROR
@@ -56,7 +56,7 @@ def read_rules(path: Path) -> dict[str, _EdsRule]:
 
 
 class EditPlace(Enum):
-    """What an edit does with a line."""
+    """What an edit does."""
 
     REPLACE = "replace"
     AFTER = "after"
@@ -65,12 +65,13 @@ class EditPlace(Enum):
 
 
 class Edit(NamedTuple):
-    """One change of a file.
+    """One edit of a file.
 
     Attributes:
-        line: its number; 0 stands before the first one.
-        place: whether the line is replaced, or lines are put behind it; or the file as a whole.
-        lines: what stands there then, without line ends.
+        line: its number; 0 is before the first line.
+        place: whether to replace the line, to insert lines after it, or to change the file as a
+            whole.
+        lines: the new lines, without line ends.
     """
 
     line: int
@@ -80,15 +81,15 @@ class Edit(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class RuleFinding:
-    """What breaks a rule.
+    """A violation of a rule.
 
     Attributes:
-        rule: which one.
-        file: what the file is called.
+        rule: the rule.
+        file: name of the file.
         line: its number, 0 for the file as a whole.
-        section: empty outside of one.
+        section: empty outside of sections.
         text: what came, and what was allowed.
-        edits: what mends it; empty where that takes knowledge of the device.
+        edits: the edits that fix it; empty if that takes knowledge of the device.
     """
 
     rule: _EdsRule
@@ -99,7 +100,7 @@ class RuleFinding:
     edits: tuple[Edit, ...] = ()
 
     def __str__(self) -> str:
-        """Say it in one line, as compilers do."""
+        """Return the finding in one line, in the format of compilers."""
         name, severity, clause, _, fix = self.rule
         where = f"[{self.section}] " if self.section else ""
         head = f"{self.file}:{max(self.line, 1)}: {severity.value}: [{name}] "
@@ -107,4 +108,4 @@ class RuleFinding:
 
 
 RULES: Final = read_rules(Path(__file__).with_name("rules.txt"))
-"""Those of `canmon eds check` by name, errors first."""
+"""The rules of `canmon eds check` by name, errors first."""

@@ -1,4 +1,4 @@
-"""The device of a file, for people and programs: head, objects, PDOs."""
+"""The device of a file, for display and for programs: head, objects, PDOs."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tickrig.wire.canopen.eds.eds_value import format_value, parse_number, plain
 from tickrig.wire.canopen.eds.eds_writer import access_type
 from tickrig.wire.canopen.eds.object_table import Access, DeviceInfo, EntryDescription
 
-# How values of an EDS are shown to people.
+# How values of an EDS are displayed.
 
 
 def _access_text(row: EntryDescription) -> str:
@@ -31,7 +31,7 @@ def _access_text(row: EntryDescription) -> str:
 
 
 def _default_text(row: EntryDescription) -> str:
-    """Return the default of an entry as an EDS has it; empty without one."""
+    """Return the default of an entry in EDS notation; empty without one."""
     if not row.has_default:
         return ""
     text = format_value(row.data_type, row.default, relative=row.relative)
@@ -60,7 +60,7 @@ _CAN_ID: Final = 0x1FFF_FFFF
 
 
 def head(document: Document) -> dict[str, Any]:
-    """Return device, identity and what it can do."""
+    """Return device, identity and capabilities."""
     info = document.device.info
     return {
         "vendor": info.vendor_name,
@@ -77,7 +77,7 @@ def head(document: Document) -> dict[str, Any]:
 
 
 def _identity(document: Document, sub: int, key: str) -> str:
-    """Return a number of the identity object; that of the head where it has none."""
+    """Return a number of the identity object; that of DeviceInfo if the object lacks it."""
     text = _hex(document, 0x1018, sub)
     if text or not key:
         return text
@@ -93,7 +93,7 @@ def _hex(document: Document, index: int, sub: int) -> str:
 
 
 def entries(document: Document, index: int | None, sub: int | None) -> list[dict[str, Any]]:
-    """Return the rows of the object table; of one object, or one entry, if they are named."""
+    """Return the rows of the object table, optionally only for one object or entry."""
     return [
         _entry(document, row)
         for key, row in sorted(document.rows.items())
@@ -119,7 +119,7 @@ def _entry(document: Document, row: EntryDescription) -> dict[str, Any]:
 
 
 def pdos(document: Document, node_id: int) -> list[dict[str, Any]]:
-    """Return the PDOs of a node as they are at power-on.
+    """Return the PDOs of a node with their power-on values.
 
     Args:
         document: the file.
@@ -147,7 +147,7 @@ def _pdo(document: Document, name: str, index: int, node_id: int) -> dict[str, A
 
 
 def _mapped(document: Document, index: int) -> Iterator[dict[str, Any]]:
-    """Yield the objects that a PDO carries, from its first bit on."""
+    """Yield the objects that a PDO carries, in bit order."""
     count = document.rows.get((index, 0))
     rows = [row for row in document.entries(index) if row.sub]
     used = int.from_bytes(count.default, "little") if count and count.has_default else len(rows)
@@ -167,7 +167,7 @@ def _mapped(document: Document, index: int) -> Iterator[dict[str, Any]]:
 
 
 def table(rows: list[dict[str, Any]], columns: tuple[str, ...]) -> list[str]:
-    """Return rows as lines in columns, with a head; the last column is as long as it is."""
+    """Return rows as lines in columns, with a head; the last column is not padded."""
     lines = [[str(row[column]) for column in columns] for row in rows]
     all_lines = [list(columns), *lines]
     widths = [max(len(line[at]) for line in all_lines) for at in range(len(columns))]
@@ -177,7 +177,7 @@ def table(rows: list[dict[str, Any]], columns: tuple[str, ...]) -> list[str]:
     ]
 
 
-# What is another device in one file than in another.
+# Differences between the devices of two files.
 
 
 class _Change(NamedTuple):
@@ -185,9 +185,9 @@ class _Change(NamedTuple):
 
     Attributes:
         place: `DeviceInfo`, `2000h` or `2000h:01`.
-        what: the field, or `object` or `entry` of what is in one file only.
-        old: of the first file, empty if it has none.
-        new: of the second file, likewise.
+        what: the field, or `object` or `entry` if it exists in one file only.
+        old: value in the first file, empty if it has none.
+        new: value in the second file, empty if it has none.
     """
 
     place: str
@@ -196,7 +196,7 @@ class _Change(NamedTuple):
     new: str
 
     def __str__(self) -> str:
-        """Say it in one line."""
+        """Return the difference in one line."""
         if self.what in _WHOLE:
             sign, name = ("-", self.old) if self.old else ("+", self.new)
             return f"{sign} {self.place} {name}"
@@ -209,8 +209,8 @@ _WHOLE: Final = ("object", "entry")
 def diff(one: Document, other: Document) -> list[_Change]:
     """Return all differences: device, identity, bit rates, then objects by index.
 
-    The order of sections, the notation of numbers and what no device has (dates, file names,
-    comments) make none.
+    The order of sections, the notation of numbers and what does not concern the device (dates, file
+    names, comments) are ignored.
     """
     return [*_device(one, other), *_objects(one, other)]
 
@@ -232,7 +232,7 @@ def _device(one: Document, other: Document) -> Iterator[_Change]:
 
 
 def _number(document: Document, key: str) -> str:
-    """Return a number of [DeviceInfo] in one notation; 0 is what is not there."""
+    """Return a number of [DeviceInfo] in one notation; 0 counts as missing."""
     text = plain_numbers(document.file.value("DeviceInfo", key))
     try:
         number = parse_number(text or "0")

@@ -12,7 +12,7 @@ class ObjectWrite:
     Attributes:
         index: of the object.
         sub: of the object.
-        data: as it goes over the wire.
+        data: the bytes, little endian.
     """
 
     index: int
@@ -22,31 +22,33 @@ class ObjectWrite:
 
 @dataclass(frozen=True, slots=True)
 class SlaveAssignment:
-    """What the master expects of a slave, and what it does for it (CiA 302-2).
+    """What the master expects of a slave and does for it (CiA 302-2).
 
-    An identity, version, date or time of 0 is not looked at.
+    An identity, version, date or time of 0 is not checked.
 
     Attributes:
         node_id: 1..127.
-        name: what people call it.
-        boots: the master boots and starts it (1F81h, bit 2).
-        mandatory: the network does not start without it (bit 3).
-        reset_communication: it is reset at the start; one that is not is left alone while it is
-            Operational (bit 4).
+        name: its name in messages.
+        boots: whether the master boots and starts it (1F81h, bit 2).
+        mandatory: whether the network must not start without it (bit 3).
+        reset_communication: whether the master resets it at the start; otherwise it leaves the
+            slave alone while it is Operational (bit 4).
         device_type: 1F84h.
         vendor_id: 1F85h.
         product_code: 1F86h.
         revision: 1F87h.
         serial: 1F88h.
-        software_version: 1F55h; it is checked unless 0 (bit 5).
-        program: software to download if its version is another (1F58h, bit 6).
+        software_version: 1F55h; checked unless 0 (bit 5).
+        program: software to download if its version differs (1F58h, bit 6).
         restore_sub: sub-index of 1011h that is written before the configuration (1F8Ah, bit 7).
-        configuration_date: 1F26h; the configuration is skipped if it and the time are 1020h's.
+        configuration_date: 1F26h; the configuration is skipped if date and time equal those in
+            1020h.
         configuration_time: 1F27h.
         writes: 1F22h, in this order.
         heartbeat_us: consumer heartbeat time (1016h), 0 for none.
         guard_us: guard time, 0 for no node guarding (1F81h, bits 16 to 31).
-        life_time_factor: so many guard requests without an answer are too many (bits 8 to 15).
+        life_time_factor: the slave is lost after this many guard requests without an answer (bits 8
+            to 15).
     """
 
     node_id: int
@@ -72,17 +74,18 @@ class SlaveAssignment:
 
 @dataclass(frozen=True, slots=True)
 class MasterPlan:
-    """What the master itself does (CiA 302-2, NMT start-up 1F80h).
+    """The behaviour of the master itself (CiA 302-2, NMT start-up 1F80h).
 
     Attributes:
-        slaves: all that it has.
-        node_id: its own.
-        starts: it becomes Operational by itself (bit 2 is 0).
-        starts_nodes: it starts slaves (bit 3 is 0).
-        starts_all: it starts them when all that are mandatory have booted (bit 1).
-        resets_all: the loss of a mandatory slave resets all nodes (bit 4).
-        stops_all: the loss of a mandatory slave stops all nodes (bit 6).
-        boot_time_us: how long it tries to boot a mandatory slave, 0 for ever (1F89h).
+        slaves: its slaves.
+        node_id: its own node-ID.
+        starts: whether it enters Operational by itself (bit 2 is 0).
+        starts_nodes: whether it starts slaves (bit 3 is 0).
+        starts_all: whether it starts them all at once, after all mandatory ones have booted (bit
+            1).
+        resets_all: whether the loss of a mandatory slave resets all nodes (bit 4).
+        stops_all: whether the loss of a mandatory slave stops all nodes (bit 6).
+        boot_time_us: how long it tries to boot a mandatory slave, 0 for no limit (1F89h).
         heartbeat_us: producer heartbeat time (1017h), 0 for none.
         sync_us: communication cycle period (1006h), 0 for no SYNC.
         sync_overflow: last value of the counter of SYNC, 0 for none (1019h).

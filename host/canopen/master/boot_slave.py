@@ -8,19 +8,19 @@ How the boot-up of a slave ended (CiA 302-2, error status of the boot slave proc
 
 # Theory of operation.
 #
-# The boot procedure is one generator, so that the order of the standard is the order of the lines.
-# It has no clock and no bus: a `NodeSession` runs it, in the test master for each slave at once,
-# behind `canmon net boot` for one. What it needs to know is in `SlaveAssignment`; what it did is
-# told step by step to `on_step`, and how it ended is the `BootOutcome`. It raises nothing.
+# The boot procedure is one generator, so its lines follow the order of the standard. It has no
+# clock and no bus: a `NodeSession` runs it; the test master runs one per slave in parallel, `canmon
+# net boot` runs one. Its parameters are in `SlaveAssignment`; it reports each step to `on_step`,
+# and returns a `BootOutcome`. It raises nothing.
 #
 #   step                          frames to node 5               ends with, if it fails
 #   device type, 4 tries          605#40001000                   B no answer, C another type
 #   identity, what is expected    605#40181001 .. 04             D, M, N, O for 01h to 04h
 #   state, if kept alive          705#R, or waits for 705#       E heartbeat, F guarding
-#     Operational: go to error control, nothing else is done     (L, which is good)
+#     Operational: go to error control, skip the rest            (L, a success)
 #     else reset communication    000#8205, waits for 705#00     E or F
 #   software, if a version        605#40561F01                   G no object, H no leave to update
-#     update, then all from the top                              I
+#     update, then start again                                   I
 #   configuration, unless 1020h   605#40201001, 02               -
 #     holds the expected date
 #     restore, if asked for       605#23111002 "load", a reset   J
@@ -28,18 +28,18 @@ How the boot-up of a slave ended (CiA 302-2, error status of the boot slave proc
 #   error control                 waits for a heartbeat, or      K
 #                                   705#R
 #
-# Rules. `BootTalk` is the only place that ends the procedure: it raises `BootEnded` with the error
-# status, after it has told the step. What is read first after a possible reset gets four tries, the
-# rest gets one: a node that has answered is there. An expected value of 0 is not looked at.
+# Rules. Only `BootTalk` ends the procedure: it reports the step, then raises `BootEnded` with the
+# error status. The first read after a possible reset gets four attempts, others get one: a node
+# that has answered exists. An expected value of 0 is not checked.
 #
-# Coupling. A boot-up message while the procedure runs is an answer to its own reset, or a slave
-# that resets by itself; `NetworkSlave` does not begin a second procedure then. The retry of status
-# B each second, the boot time of 1F89h and the start of the slave are policy of the master, not of
-# this file.
+# Coupling. A boot-up message while the procedure runs is an answer to its own reset, or comes from
+# a slave that resets by itself; `NetworkSlave` does not start a second procedure then. The retry of
+# status B each second, the boot time of 1F89h and the start of the slave are policy of the master,
+# not of this file.
 #
-# Numbers. An answer to guarding is awaited for 100 ms, a boot-up after a reset for 1 s, a heartbeat
-# for the consumer heartbeat time of 1016h. Flash status and program control are looked at each
-# 100 ms, for a minute.
+# Numbers. The procedure waits 100 ms for an answer to guarding, 1 s for a boot-up after a reset,
+# and the consumer heartbeat time of 1016h for a heartbeat. It polls flash status and program
+# control each 100 ms, for a minute.
 
 from __future__ import annotations
 
@@ -77,12 +77,12 @@ class BootStatus(Enum):
 
     @property
     def text(self) -> str:
-        """What it means, in words."""
+        """The meaning of the status, in words."""
         return _TEXTS[self]
 
     @property
     def good(self) -> bool:
-        """Whether the slave is at work: it has booted, or had been Operational all along."""
+        """Whether the slave runs: it has booted, or was Operational before."""
         return self in (BootStatus.BOOTED, BootStatus.WAS_OPERATIONAL)
 
 
@@ -106,22 +106,22 @@ _TEXTS: Final = {
 }
 
 
-# What is said to a slave during its boot-up, and told of it step by step.
+# The requests to a slave during its boot-up, reported step by step.
 
 _TRIES: Final = 4
-"""A slave that may just have been reset is asked so often."""
+"""Number of attempts for a slave that may just have been reset."""
 
 _U32: Final = 4
 
 
 @dataclass(frozen=True, slots=True)
 class BootStep:
-    """One step of a boot-up, for people.
+    """One step of a boot-up, in words.
 
     Attributes:
-        request: what was said to the slave, or waited for.
-        answer: what came.
-        meaning: what follows.
+        request: what the master sent, or waited for.
+        answer: the answer of the slave.
+        meaning: the consequence.
     """
 
     request: str
@@ -129,7 +129,7 @@ class BootStep:
     meaning: str
 
     def __str__(self) -> str:
-        """Return it in a line."""
+        """Return the step in one line."""
         return f"{self.request}: {self.answer}; {self.meaning}"
 
 
@@ -149,7 +149,7 @@ class BootEnded(Exception):  # noqa: N818 - how a boot-up ends, in the middle of
 
 
 class BootTalk:
-    """Reads, writes and waits; each step is told.
+    """Reads, writes and waits; reports each step.
 
     Args:
         on_step: called with each step.
@@ -161,7 +161,7 @@ class BootTalk:
     def report(
         self, what: str, wait_us: int, status: BootStatus, *, boot_up: bool = True
     ) -> Script[NmtState]:
-        """Wait for a boot-up or a state; end the boot-up without one."""
+        """Wait for a boot-up or a state; end the procedure if it does not come."""
         state: NmtState | None = yield AwaitReport(wait_us, boot_up)
         if state is None:
             self.record(what, f"none within {wait_us // 1_000} ms", status.text)
@@ -172,7 +172,7 @@ class BootTalk:
     def read(
         self, index: int, sub: int, name: str, status: BootStatus, tries: int = 1
     ) -> Script[bytes]:
-        """Read an object; end the boot-up if it cannot be read."""
+        """Read an object; end the procedure if it cannot be read."""
         what = f"{index:04X}h:{sub:02X} {name}"
         data = yield from self.attempt(index, sub, what, tries)
         if isinstance(data, SdoFailed):
@@ -181,7 +181,7 @@ class BootTalk:
         return data
 
     def attempt(self, index: int, sub: int, what: str, tries: int) -> Script[bytes | SdoFailed]:
-        """Read an object, once more after a time-out; return what was raised at last."""
+        """Read an object, with one repetition after a time-out; return the last error."""
         for _ in range(tries - 1):
             try:
                 return (yield from upload(index, sub))
@@ -203,21 +203,21 @@ class BootTalk:
         tries: int = 1,
         answered: bool = True,
     ) -> Script[None]:
-        """Write an object; end the boot-up if it is refused, or not answered.
+        """Write an object; end the procedure if the slave refuses or does not answer.
 
         Args:
             write: what to write.
-            status: of the end.
-            what: for the step; object and value unless given.
-            tries: so often, as long as there is no answer.
-            answered: an answer is needed.
+            status: error status if the procedure ends.
+            what: text for the step; by default object and value.
+            tries: number of attempts while there is no answer.
+            answered: whether an answer is required.
         """
         what = what or f"{write.index:04X}h:{write.sub:02X} := {_as_hex(write.data)}"
         try:
             yield from self._download(write, what, tries)
         except SdoFailed as error:
             if isinstance(error, SdoTimeout) and not answered:
-                self.record(what, "no answer", "which need not be; goes on")
+                self.record(what, "no answer", "which is allowed; goes on")
                 return
             self.record(what, str(error), status.text)
             raise BootEnded(status) from error
@@ -228,18 +228,18 @@ class BootTalk:
             try:
                 return (yield from download(write.index, write.sub, write.data))
             except SdoTimeout:
-                self.record(what, "no answer", f"said again, {left} more")
+                self.record(what, "no answer", f"sent again, {left} more")
         return (yield from download(write.index, write.sub, write.data))
 
     def compare(self, what: str, data: bytes, expected: int, status: BootStatus) -> None:
-        """End the boot-up if a number is another than expected; 0 expects nothing."""
+        """End the procedure if a number differs from the expected one; 0 is not checked."""
         if expected and not _is_value(data, expected):
             self.record(what, _as_hex(data), f"not {expected:08X}h: {status.text}")
             raise BootEnded(status)
-        self.record(what, _as_hex(data), "as expected" if expected else "not looked at")
+        self.record(what, _as_hex(data), "as expected" if expected else "not checked")
 
     def record(self, request: str, answer: str, meaning: str) -> None:
-        """Tell a step."""
+        """Report a step."""
         self._on_step(BootStep(request, answer, meaning))
 
 
@@ -252,7 +252,7 @@ _STATES: Final = {
 
 
 def state_text(state: NmtState) -> str:
-    """Return a state as people write it."""
+    """Return the name of a state."""
     return _STATES[state]
 
 
@@ -262,7 +262,7 @@ def _is_value(data: bytes, expected: int) -> bool:
 
 
 def _as_hex(data: bytes) -> str:
-    """Return a value as a number; what is longer than eight bytes as their count."""
+    """Return a value as a number; if it is longer than eight bytes, return its length."""
     return f"{data[::-1].hex().upper()}h" if 0 < len(data) <= 8 else f"{len(data)} bytes"
 
 
@@ -280,7 +280,7 @@ _CLEAR: Final = 3
 
 LOOK_US: Final = 100_000
 _LOOKS: Final = 600
-"""Flash status and program control are looked at so often, for a minute."""
+"""Flash status and program control are polled this often, in total for a minute."""
 
 BUSY: Final = 0x01
 """Bit of the flash status; bits 1 to 7 are an error code."""
@@ -289,11 +289,11 @@ _FAILED: Final = BootStatus.UPDATE_FAILED
 
 
 def _update_program(talk: BootTalk, program: bytes, expected: int) -> Script[None]:
-    """Stop and clear the program, download another, see that it is the right one, start it.
+    """Stop and clear the program, download another, verify it, start it.
 
     Args:
-        talk: with the slave.
-        program: what is downloaded, segmented.
+        talk: the requests to the slave.
+        program: the program, downloaded in segments.
         expected: its identification.
 
     Raises:
@@ -315,7 +315,7 @@ def _control(command: int) -> ObjectWrite:
 
 
 def _stop(talk: BootTalk) -> Script[None]:
-    """Stop the program, unless it says that it is."""
+    """Stop the program, unless it reports that it is stopped."""
     what = "1F51h:01 program control"
     data = yield from talk.attempt(CONTROL, 1, what, 1)
     if data == bytes((STOP,)):
@@ -337,7 +337,7 @@ def _await_flash(talk: BootTalk) -> Script[None]:
             raise BootEnded(_FAILED)
         talk.record(what, "written", "goes on")
         return
-    talk.record(what, f"not written after {_LOOKS} looks", _FAILED.text)
+    talk.record(what, f"not written after {_LOOKS} polls", _FAILED.text)
     raise BootEnded(_FAILED)
 
 
@@ -349,19 +349,19 @@ def _await_start(talk: BootTalk) -> Script[None]:
         if data == bytes((_START,)):
             talk.record("1F51h:01 program control", "started", "booted from the beginning")
             return
-    talk.record("1F51h:01 program control", f"not started after {_LOOKS} looks", _FAILED.text)
+    talk.record("1F51h:01 program control", f"not started after {_LOOKS} polls", _FAILED.text)
     raise BootEnded(_FAILED)
 
 
 _GUARD_ANSWER_US: Final = 100_000
 _BOOT_UP_US: Final = 1_000_000
-"""How long an answer to guarding, and a boot-up after a reset, are waited for."""
+"""How long to wait for an answer to guarding, and for a boot-up after a reset."""
 
 _LOAD: Final = b"load"
 """The signature of 1011h."""
 
 _COMMUNICATION: Final = 2
-"""Sub-index of 1011h for communication parameters alone; a reset communication loads them."""
+"""Sub-index of 1011h for communication parameters only; a reset communication loads them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -370,7 +370,7 @@ class BootOutcome:
 
     Attributes:
         status: the error status.
-        state: what the slave reported last, None if nothing.
+        state: last reported state of the slave, None if it reported none.
     """
 
     status: BootStatus
@@ -380,11 +380,11 @@ class BootOutcome:
 class SlaveBoot:
     """One boot-up of a slave.
 
-    Not done, as Lely's master does not: 1F20h, a DCF as text; the boot-up of a slave that
-    another node configures (1F25h).
+    Not done, as in Lely's master: 1F20h, a DCF as text; the boot-up of a slave that another node
+    configures (1F25h).
 
     Args:
-        slave: what is expected of it.
+        slave: what the master expects of it.
         on_step: called with each step.
     """
 
@@ -393,7 +393,7 @@ class SlaveBoot:
         self._state: NmtState | None = None
 
     def script(self) -> Script[BootOutcome]:
-        """Boot the slave; what goes wrong is in the outcome."""
+        """Boot the slave; errors are in the outcome."""
         try:
             if self._slave.boots:
                 yield from self._boot()
@@ -462,7 +462,7 @@ class SlaveBoot:
         return False
 
     def _is_configured(self) -> Script[bool]:
-        """Return whether the configuration of the slave is of the expected date and time."""
+        """Return whether the configuration of the slave has the expected date and time."""
         date, time = self._slave.configuration_date, self._slave.configuration_time
         if not (date and time):
             return False
@@ -471,7 +471,7 @@ class SlaveBoot:
             data = yield from self._talk.attempt(0x1020, sub, what, tries)
             if isinstance(data, SdoFailed) or not _is_value(data, expected):
                 found = str(data) if isinstance(data, SdoFailed) else _as_hex(data)
-                self._talk.record(what, found, f"not {expected:08X}h: configured anew")
+                self._talk.record(what, found, f"not {expected:08X}h: configuring again")
                 return False
             self._talk.record(what, _as_hex(data), "as expected")
         return True

@@ -21,21 +21,21 @@ from tickrig.host.text.names import known, near
 from tickrig.host.text.values import us_of
 
 _Duration = int | str
-"""Microseconds, or a text as `"100ms"`."""
+"""Microseconds, or a text such as `"100ms"`."""
 
 _STARTED_US: Final = 2_000
-"""By then a command to start has been heard."""
+"""Within this time, a start command has been received."""
 
 
 V = TypeVar("V")
 
 
 class _Named(dict[str, V]):
-    """What has a name; of a name that is none it says which there are.
+    """A mapping by name; for an unknown name, the error lists the known ones.
 
     Args:
-        kind: of what, as `joint`.
-        items: by name.
+        kind: kind of the items, such as `joint`.
+        items: the items by name.
     """
 
     def __init__(self, kind: str, items: Mapping[str, V]) -> None:
@@ -43,19 +43,19 @@ class _Named(dict[str, V]):
         self._kind = kind
 
     def __missing__(self, name: str) -> V:
-        """Raise KeyError with the name that could be meant."""
+        """Raise KeyError with the name that may be meant."""
         raise KeyError(f"no {self._kind} {name!r}; {near(str(name), self)}")
 
 
 class CanopenMaster(Closing):
-    """A master; time passes only in its calls, in which it does due work.
+    """A master; time passes only in its calls, which execute the work that is due.
 
     Args:
-        link: the bus, as `bench.link` or a `CanLink`; the master closes it.
-        plan: what it does, and its slaves.
+        link: the bus, such as `bench.link` or a `CanLink`; the master closes it.
+        plan: its behaviour, and its slaves.
 
     Attributes:
-        nmt: the NMT master that is run.
+        nmt: the NMT master that it runs.
         joints: axes of drives by name.
 
     Raises:
@@ -65,14 +65,14 @@ class CanopenMaster(Closing):
     def __init__(self, link: Link[Any], plan: MasterPlan) -> None:
         if not hasattr(link, "receive_stamped"):
             raise TypeError(f"a master needs a CAN bus, got {type(link).__name__}")
-        self._link = cast(StampedLink, link)  # what has receive_stamped is one
+        self._link = cast(StampedLink, link)  # any object with receive_stamped is a CAN link
         self.nmt = NmtMaster(plan)
         self.joints = _Named[drive_driver.DriveDriver]("joint", {})
         slaves = {slave.assignment.name: slave for slave in self.nmt.slaves.values()}
         self._by_name = _Named("slave", slaves)
 
     def close(self) -> None:
-        """Close the bus; the slaves stay as they are."""
+        """Close the bus; the slaves keep their state."""
         self._link.close()
 
     @property
@@ -89,7 +89,7 @@ class CanopenMaster(Closing):
         return self.nmt.slaves[name]
 
     def attach(self, process_data: ProcessData) -> None:
-        """Let the master exchange process data and drive drives from now on."""
+        """Make the master exchange process data and drive the drives from now on."""
         self.nmt.process_data = process_data
         drivers = [driver for node in process_data.drives for driver in node.drivers]
         self.joints = _Named("joint", {driver.name: driver for driver in drivers})
@@ -98,10 +98,10 @@ class CanopenMaster(Closing):
         """Start the network: let time pass until each slave has booted.
 
         Args:
-            within: for how long at most: microseconds, or a text as `"100ms"`.
+            within: time limit in microseconds, or a text such as `"100ms"`.
 
         Raises:
-            BootFailed: some have not; it says which, and why.
+            BootFailed: some have not; the message says which, and why.
         """
         self.wait_until(self._all_booted, within)
         if failed := [slave for slave in self.nmt.slaves.values() if not slave.good]:
@@ -109,23 +109,23 @@ class CanopenMaster(Closing):
         self.run_for(_STARTED_US)
 
     def run_for(self, duration: _Duration) -> None:
-        """Let time pass: microseconds, or a text as `"100ms"`."""
+        """Let time pass: microseconds, or a text such as `"100ms"`."""
         self.wait_until(lambda: False, duration)
 
     def wait_until(self, done: Callable[[], bool], within: _Duration) -> bool:
-        """Let time pass until something is so.
+        """Let time pass until a condition holds.
 
         Args:
-            done: says whether it is.
-            within: for how long at most: microseconds, or a text as `"100ms"`.
+            done: returns whether it holds.
+            within: time limit in microseconds, or a text such as `"100ms"`.
 
         Returns:
-            False if the time was over first.
+            False if the time limit came first.
 
         Raises:
             LinkClosed: the bus is gone.
             TypeError: a time that is neither a whole number nor a text.
-            ValueError: a text that is no time, or less than nothing.
+            ValueError: a text that is not a time, or a negative time.
         """
         until_us = self.now_us + us_of(within)
         while not done():
@@ -135,24 +135,24 @@ class CanopenMaster(Closing):
         return True
 
     def perform(self, *operations: Operation) -> None:
-        """Run operations of joints, all at once: `master.perform(left.init(), right.init())`.
+        """Run operations of joints in parallel: `master.perform(left.init(), right.init())`.
 
         Raises:
-            DriveFailed: a drive did not do in time what was wanted of it.
+            DriveFailed: a drive did not complete its operation in time.
             LinkClosed: the bus is gone.
         """
         try:
-            self._step(self.now_us)  # so that no time-out counts from when this master last looked
+            self._step(self.now_us)  # so that no time-out counts from the last call of this master
             perform(operations, lambda: self.now_us, self.wait_until)
         finally:
             for operation in operations:
                 operation.close()
 
     def explain(self, name: str | int) -> str:
-        """Return the latest boot-up of a slave, and its losses, line by line.
+        """Return the latest boot-up of a slave and its losses, line by line.
 
-        Of the boot-up it has what was asked and answered, and how it ended. What came before it
-        and after it, a loss and what was heard then, stands there.
+        For the boot-up, the lines give requests, answers and the outcome. Losses and the messages
+        after them are listed in order, before or after the boot-up.
         """
         slave = self.slave(name)
         steps, events = slave.steps, slave.events
@@ -172,7 +172,7 @@ class CanopenMaster(Closing):
         return all(slave.outcome is not None for slave in self.nmt.slaves.values())
 
     def _step(self, until_us: int) -> None:
-        """Wait for what is heard or due; do it."""
+        """Wait for the next frame or the next due time; process it."""
         wait_us = min(self.nmt.due_us, until_us) - self.now_us
         now_us, received = self._link.receive_stamped(max(0, wait_us))
         if sent := self.nmt.tick(now_us, received):
@@ -180,7 +180,7 @@ class CanopenMaster(Closing):
 
 
 class BootFailed(Exception):  # noqa: N818 - what the network did
-    """Slaves that did not boot.
+    """Some slaves did not boot.
 
     Attributes:
         slaves: these.
@@ -202,16 +202,18 @@ def _who(slave: NetworkSlave) -> str:
 
 
 def _verdict(slave: NetworkSlave) -> str:
-    """Say in a line how a boot-up ended."""
+    """Return how a boot-up ended, in one line."""
     who = _who(slave)
     if slave.outcome is None:
-        return f"{who}: not booted" + (", still tried" if slave.booting else "; nothing was heard")
+        return f"{who}: not booted" + (
+            ", still tried" if slave.booting else "; no message received"
+        )
     status = slave.outcome.status
     return f"{who}: {status.value} {status.text}" if status.value else f"{who}: {status.text}"
 
 
 def _failure(slave: NetworkSlave) -> str:
-    """Say in a line why a slave did not boot."""
+    """Return why a slave did not boot, in one line."""
     if not slave.steps:
         return _verdict(slave)
     step = slave.steps[-1][1]
@@ -221,18 +223,18 @@ def _failure(slave: NetworkSlave) -> str:
 # The master that a bus.yml describes, on a bus.
 
 SDO_TIMEOUT_US: Final = 100_000
-"""As Lely's master has it, unless told otherwise."""
+"""The default of Lely's master."""
 
 
 def open_master(
     link: Link[Any], path: Path | str, *, sdo_timeout_us: int = SDO_TIMEOUT_US
 ) -> CanopenMaster:
-    """Return the master of a bus.yml; it has sent nothing yet.
+    """Return the master of a bus.yml; it has not sent anything yet.
 
     Args:
-        link: the bus, as `bench.link`, or `CanLink.open("can0", "socketcan")`.
+        link: the bus, such as `bench.link` or `CanLink.open("can0", "socketcan")`.
         path: the bus.yml.
-        sdo_timeout_us: how long to wait for an SDO response; a loaded machine wants more.
+        sdo_timeout_us: how long to wait for an SDO response; use more on a loaded machine.
 
     Returns:
         A master; close it, or use it in a `with` block.
@@ -240,7 +242,7 @@ def open_master(
     Raises:
         OSError: the file cannot be read, or software that it names.
         ImportError: PyYAML is not installed.
-        ValueError: all that is wrong with the file, each with its line.
+        ValueError: the file has errors; the message has all, each with its line.
         TypeError: a link to a serial line.
     """
     bus = read_bus_file(Path(path))

@@ -10,7 +10,7 @@ from tickrig.host.canopen.master.assignment import MasterPlan, ObjectWrite, Slav
 
 
 def plan_of(bus: BusFile) -> MasterPlan:
-    """Return what the master of a bus.yml does.
+    """Return the behaviour of the master in a bus.yml.
 
     Raises:
         ValueError: it has no master.
@@ -59,7 +59,7 @@ def _assignment(slave: BusSlave, master: BusMaster, folder: Path) -> SlaveAssign
 
 
 def _program(slave: BusSlave, folder: Path) -> bytes:
-    """Return the software of a slave, nothing where it is not compared."""
+    """Return the software of a slave, empty if it is not compared."""
     if not (slave.software_file and slave.software_version):
         return b""
     return (folder / slave.software_file).read_bytes()

@@ -14,29 +14,29 @@ from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID, NmtState
 from tickrig.wire.instant import NEVER
 
 _AGAIN_US: Final = 1_000_000
-"""A slave that does not answer is booted again after so long."""
+"""Interval between boot attempts of a slave that does not answer."""
 
 
 class NetworkSlave:
-    """A slave; it sends what its dialogue says, and never waits.
+    """A slave; it sends the frames of its dialogue, and never blocks.
 
     Args:
-        assignment: what is expected of it.
+        assignment: what the master expects of it.
         send: takes CAN-ID and data.
         guard: takes the CAN-ID of a remote frame.
-        plan: what the master does.
+        plan: behaviour of the master.
         booted: called when a boot-up has ended.
 
     Attributes:
         assignment: as given.
-        session: what is said with it, and heard of it.
-        dialogue: of the session.
+        session: its session.
+        dialogue: dialogue of the session.
         outcome: how its latest boot-up ended, None before that and during one.
         steps: of its latest boot-up, each with its time.
         emergencies: error codes of its EMCYs, the first one first.
         began_us: when its latest boot-up began.
         lost: how often its error control has failed.
-        events: when it was lost, and what was heard of it then, each with its time.
+        events: its losses, and its messages afterwards, each with its time.
     """
 
     def __init__(
@@ -65,28 +65,28 @@ class NetworkSlave:
 
     @property
     def state(self) -> NmtState | None:
-        """What it reported last, or was commanded since; None while nobody knows."""
+        """Last reported state, or the state commanded since; None if unknown."""
         return self.session.state
 
     @property
     def good(self) -> bool:
-        """Whether its latest boot-up went well."""
+        """Whether its latest boot-up succeeded."""
         return self.outcome is not None and self.outcome.status.good
 
     @property
     def due_us(self) -> int:
-        """When `tick` has something to do."""
+        """When to call `tick` next."""
         return min(self.dialogue.due_us, self._again_us, self._control.due_us)
 
     def forget(self) -> None:
-        """Know nothing of it, as after the master's own reset."""
+        """Reset the state to unknown, as after a reset of the master."""
         self.dialogue.clear()
         self.session.state, self.outcome, self.booting = None, None, False
         self._control.stop()
         self._again_us = NEVER
 
     def boot(self, now_us: int) -> None:
-        """Begin a boot-up, unless one is under way."""
+        """Start a boot-up, unless one is running."""
         if not self.booting:
             self.began_us = now_us
             self._boot(now_us)
@@ -99,12 +99,12 @@ class NetworkSlave:
         self.dialogue.start(now_us, QueuedScript("boot-up", script, self._end, self._never))
 
     def expect(self, state: NmtState) -> None:
-        """Take note of a state that was commanded."""
+        """Record a state that was commanded."""
         if self.state is not None:
             self.session.state = state
 
     def receive(self, at_us: int, frame: CanFrame) -> None:
-        """Take a boot-up, a heartbeat, an answer to guarding, or an SDO response."""
+        """Process a boot-up, a heartbeat, an answer to guarding, or an SDO response."""
         if frame.can_id == ERROR_CONTROL_COB_ID + self.assignment.node_id:
             self._now_us = at_us
         returns = bool(self.events) and self.state is None and not self.booting
@@ -120,7 +120,7 @@ class NetworkSlave:
             self._control.hear(at_us, frame)
 
     def tick(self, now_us: int) -> bool:
-        """Do what is due; return True if the slave was lost now."""
+        """Do what is due; return True if the slave is now lost."""
         self._now_us = now_us
         self.dialogue.tick(now_us)
         if now_us >= self._again_us:
@@ -131,17 +131,19 @@ class NetworkSlave:
         return True
 
     def note_loss(self, following: str) -> None:
-        """Take note of its loss, and of what the master does about that."""
+        """Record its loss, and the reaction of the master."""
         within = f"none within {self._control.silence_us // 1_000} ms"
         self._happened(self._control.what, within, f"lost; {following}")
 
     def _return(self, state: NmtState) -> None:
-        """Tell that a lost slave is heard; only a boot-up has it booted anew."""
+        """Record that a lost slave sends again; only a boot-up starts a new boot procedure."""
         if state is NmtState.INITIALISING:
-            self._happened("boot-up", "heard", "booted anew")
+            self._happened("boot-up", "received", "booting again")
         else:
             self._happened(
-                "heartbeat", boot_slave.state_text(state), "heard again, but not booted: no boot-up"
+                "heartbeat",
+                boot_slave.state_text(state),
+                "sends again, but is not booted: no boot-up",
             )
 
     def _happened(self, request: str, answer: str, meaning: str) -> None:
@@ -151,7 +153,7 @@ class NetworkSlave:
         self.steps.append((self._now_us, step))
 
     def _never(self, failure: Exception) -> None:
-        raise AssertionError("a boot-up says in its outcome what went wrong") from failure
+        raise AssertionError("the outcome of a boot-up contains its errors") from failure
 
     def _end(self, outcome: boot_slave.BootOutcome) -> None:
         if outcome.status is boot_slave.BootStatus.NO_ANSWER and self._may_try_again():
@@ -160,11 +162,11 @@ class NetworkSlave:
         self.booting, self.outcome = False, outcome
         if outcome.status.good:
             self.session.state = self.state or NmtState.PRE_OPERATIONAL
-            self._control.begin(self._now_us)  # of heartbeats the boot-up has awaited one
+            self._control.begin(self._now_us)  # the boot procedure already waited for one heartbeat
         self._booted(self)
 
     def _may_try_again(self) -> bool:
-        """Return whether the boot time of a mandatory slave is not over; of others it never is."""
+        """Return whether the boot time of a mandatory slave has not ended; others have no limit."""
         if not self.assignment.mandatory or not self._boot_time_us:
             return True
         return self._now_us - self.began_us < self._boot_time_us

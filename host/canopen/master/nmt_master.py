@@ -18,11 +18,11 @@ from tickrig.wire.canopen import nmt
 from tickrig.wire.canopen.sdo_frame import RESPONSE_COB_ID
 from tickrig.wire.instant import NEVER
 
-# The PDOs of all slaves, and who works on them in periods.
+# The PDOs of all slaves, and the drives that process them in periods.
 
 
 class ProcessData:
-    """Hands frames and SYNCs on to the images and drives of the nodes.
+    """Passes frames and SYNCs to the process images and drives of the nodes.
 
     Args:
         images: by node-ID.
@@ -38,23 +38,23 @@ class ProcessData:
 
     @property
     def due_us(self) -> int:
-        """When `tick` has something to do."""
+        """When to call `tick` next."""
         return min((drive.due_us for drive in self.drives), default=NEVER)
 
     def receive(self, frame: CanFrame) -> None:
-        """Take a data frame; one that is no TPDO of a slave is passed over."""
+        """Process a data frame; ignore frames that are not TPDOs of a slave."""
         if (image := self._by_cob_id.get(frame.can_id)) is not None:
             image.receive(frame.can_id, frame.data)
 
     def sync(self) -> None:
-        """Send what goes with a SYNC."""
+        """Send the RPDOs that belong to a SYNC."""
         for image in self.images.values():
             image.sync()
 
     def tick(self, now_us: int, *, sync: bool) -> None:
-        """Begin the periods that are due; `sync` says that a SYNC was sent just now.
+        """Start the periods that are due; `sync` is whether a SYNC was just sent.
 
-        None begins while slaves boot at the start: ros2_canopen has its drivers wait for them.
+        None starts while slaves boot at the start: in ros2_canopen, the drivers wait for them.
         """
         if not self._began:
             if any(drive.is_awaited(now_us) for drive in self.drives):
@@ -66,30 +66,30 @@ class ProcessData:
 
 _SYNC_COB_ID: Final = 0x080
 _EMCY_COB_ID: Final = 0x080
-"""EMCY of node n is on this plus n."""
+"""CAN-ID base of EMCY; the node-ID is added."""
 
 _NODE_IDS: Final = range(1, 128)
 _FUNCTION: Final = 0x780
-"""The bits of a CAN-ID that are no node-ID."""
+"""The bits of a CAN-ID that are not the node-ID."""
 
 
 class NmtMaster:
-    """Boots and starts slaves as Lely's master does; it has no clock and no bus, it is ticked.
+    """Boots and starts slaves as Lely's master does; without a clock or bus, driven by `tick`.
 
-    Not emulated: flying master, LSS, TIME, the inhibit time of NMT (102Ah), a dictionary of
-    its own that others could read.
+    Not emulated: flying master, LSS, TIME, the inhibit time of NMT (102Ah), an object dictionary
+    that other nodes could read.
 
     Args:
-        plan: what it does, and its slaves.
+        plan: its behaviour, and its slaves.
 
     Attributes:
         plan: as given.
         slaves: by node-ID.
         state: its own NMT state.
-        halted: a mandatory slave could not be booted, so nothing is started any more.
-        strangers: node-IDs that booted and are no slaves: error status A.
-        process_data: takes all other data frames, and works in periods.
-        now_us: the time it was told last.
+        halted: whether a mandatory slave could not be booted, so that nothing is started any more.
+        strangers: node-IDs that booted and are not slaves: error status A.
+        process_data: receives all other data frames, and works in periods.
+        now_us: time of the last `tick`.
     """
 
     def __init__(self, plan: MasterPlan) -> None:
@@ -106,14 +106,14 @@ class NmtMaster:
 
     @property
     def due_us(self) -> int:
-        """When `tick` has something to do."""
+        """When to call `tick` next."""
         if self._out or self.state is nmt.NmtState.INITIALISING:
             return self.now_us
         slaves = min((slave.due_us for slave in self.slaves.values()), default=NEVER)
         return min(slaves, self._heartbeat.due_us, self._sync.due_us, self.process_data.due_us)
 
     def tick(self, now_us: int, rx: StampedFrames, /) -> Frames:
-        """Take what was on the bus by now, do what is due; return what is to be sent."""
+        """Process received frames, do what is due; return the frames to send."""
         self.now_us = now_us
         if self.state is nmt.NmtState.INITIALISING:
             self._start_up()
@@ -131,7 +131,7 @@ class NmtMaster:
         self._out.append(data_frame(can_id, data))
 
     def command(self, command: nmt.NmtCommand, node_id: int = nmt.ALL_NODES) -> None:
-        """Send an NMT command, and expect of the slaves what it commands."""
+        """Send an NMT command, and record the commanded state of the slaves."""
         self.send(nmt.NMT_COB_ID, bytes((command, node_id)))
         for slave in self.slaves.values():
             if node_id in (nmt.ALL_NODES, slave.assignment.node_id) and command in nmt.COMMANDED:
@@ -141,7 +141,7 @@ class NmtMaster:
         self._out.append(CanFrame(can_id, remote=True, remote_length=1))
 
     def _start_up(self) -> None:
-        """Boot oneself, reset the slaves, boot those that are not waited for."""
+        """Boot the master, reset the slaves, boot those that it does not wait for."""
         self.send(nmt.ERROR_CONTROL_COB_ID + self.plan.node_id, bytes((nmt.NmtState.INITIALISING,)))
         self.state = nmt.NmtState.PRE_OPERATIONAL
         self._heartbeat.start(self.now_us)
@@ -154,7 +154,7 @@ class NmtMaster:
         self._go_on()
 
     def _reset_slaves(self) -> None:
-        """Reset all communication; one by one if some slave is to be kept alive."""
+        """Reset all communication; one by one if a slave is to be kept alive."""
         slaves = self.plan.slaves
         kept = {slave.node_id for slave in slaves if not slave.reset_communication}
         if not kept:
@@ -180,7 +180,7 @@ class NmtMaster:
             self.process_data.receive(frame)
 
     def _booted(self, slave: NetworkSlave) -> None:
-        """Start a slave that has booted, and go on if it was waited for."""
+        """Start a slave that has booted, and continue if the master waited for it."""
         assignment, outcome, plan = slave.assignment, slave.outcome, self.plan
         assert outcome is not None
         alone = not plan.starts_all or self.state is nmt.NmtState.OPERATIONAL
@@ -190,7 +190,7 @@ class NmtMaster:
         self._go_on()
 
     def _go_on(self) -> None:
-        """Become Operational when no mandatory slave is waited for any more."""
+        """Enter Operational once no mandatory slave is awaited any more."""
         waits = any(slave.booting and slave.assignment.mandatory for slave in self._slaves())
         if self.halted or waits or self.state is not nmt.NmtState.PRE_OPERATIONAL:
             return
@@ -200,7 +200,7 @@ class NmtMaster:
                 self._start_all()
 
     def _start_all(self) -> None:
-        """Start all at once if none has to be booted, else each that has booted, as Lely does."""
+        """Start all slaves at once if none must be booted, else each booted one, as Lely does."""
         slaves = self._slaves()
         if all(slave.good and not slave.assignment.boots for slave in slaves):
             self.command(nmt.NmtCommand.START)
@@ -214,7 +214,7 @@ class NmtMaster:
                 self.command(nmt.NmtCommand.START, slave.assignment.node_id)
 
     def _lose(self, slave: NetworkSlave) -> None:
-        """Act on the loss of a slave as 1F80h says (CiA 302-2, error handling)."""
+        """React to the loss of a slave as 1F80h says (CiA 302-2, error handling)."""
         mandatory = slave.assignment.mandatory
         if mandatory and self.plan.stops_all:
             slave.note_loss("all nodes are stopped")
@@ -229,7 +229,7 @@ class NmtMaster:
             self.command(nmt.NmtCommand.RESET_NODE, slave.assignment.node_id)
 
     def _produce(self) -> bool:
-        """Send heartbeat and SYNC when they are due, after a pause once; True after a SYNC."""
+        """Send due heartbeat and SYNC, after a pause only once; return True after a SYNC."""
         if self._heartbeat.advance(self.now_us):
             self.send(nmt.ERROR_CONTROL_COB_ID + self.plan.node_id, bytes((self.state,)))
         if self._sync.advance(self.now_us):

@@ -15,22 +15,22 @@ Key = tuple[int, int]
 """Index and sub-index."""
 
 EVENT_DRIVEN: Final = 0xFE
-"""Transmission types from here on: a PDO is sent when an object is written."""
+"""Transmission types from here on: a PDO is sent when one of its objects is written."""
 
 _SYNC_ACYCLIC: Final = 0
 """Sent with the SYNC after an object was written."""
 
 
 class ProcessImage:
-    """Values by index and sub-index; what was never received or written is 0.
+    """Values by index and sub-index; 0 if never received or written.
 
-    An RPDO of the slave goes out when an object in it is written, or with each n-th SYNC if
-    it is synchronous: with 0 for what nobody has written yet, as Lely's master does.
+    An RPDO of the slave is sent when an object in it is written, or with each n-th SYNC if it is
+    synchronous. Objects not written yet are 0, as in Lely's master.
 
-    Not emulated: inhibit times, event timers and deadlines of the master's side.
+    Not emulated: inhibit times, event timers and deadlines on the master's side.
 
     Args:
-        pdos: of the slave, those that are there.
+        pdos: the existing PDOs of the slave.
         send: takes CAN-ID and data.
     """
 
@@ -61,15 +61,15 @@ class ProcessImage:
         return key in self._outputs
 
     def is_fresh(self, key: Key) -> bool:
-        """Whether an object was received or read since it was doubted last."""
+        """Whether an object was received or read since it was marked as outdated."""
         return key in self._seen
 
     def doubt(self, key: Key) -> None:
-        """Take note that an object may be otherwise by now; its value stays."""
+        """Mark the value of an object as outdated; it stays."""
         self._seen.discard(key)
 
     def count(self, key: Key) -> int:
-        """Return how often an object was received or read."""
+        """Return how many times an object was received or read."""
         return self._counts[key]
 
     def read(self, key: Key) -> int:
@@ -77,7 +77,7 @@ class ProcessImage:
         return self._values.get(key, 0)
 
     def write(self, key: Key, bits: int) -> None:
-        """Change an object; send what carries it and is event-driven."""
+        """Change an object; send the event-driven PDOs that carry it."""
         self._values[key] = bits
         for pdo in self._sent:
             if key in keys(pdo):
@@ -87,13 +87,13 @@ class ProcessImage:
                     self._written.add(pdo.number)
 
     def learn(self, key: Key, bits: int) -> None:
-        """Take what was read otherwise, as by SDO."""
+        """Store a value that was read in another way, such as by SDO."""
         self._values[key] = bits
         self._seen.add(key)
         self._counts[key] += 1
 
     def receive(self, can_id: int, data: bytes) -> None:
-        """Take a TPDO; one that is too short is passed over."""
+        """Process a TPDO; ignore one that is too short."""
         pdo = self._received[can_id]
         widths = [mapped.bits for mapped in pdo.mapping]
         if 8 * len(data) < sum(widths):
@@ -103,7 +103,7 @@ class ProcessImage:
             self.learn((mapped.index, mapped.sub), bits)
 
     def sync(self) -> None:
-        """Send what is due with this SYNC."""
+        """Send the PDOs that are due with this SYNC."""
         self._syncs += 1
         for pdo in self._sent:
             if pdo.transmission == _SYNC_ACYCLIC:
@@ -120,5 +120,5 @@ class ProcessImage:
 
 
 def keys(pdo: BusPdo) -> tuple[Key, ...]:
-    """Return what a PDO carries."""
+    """Return the data of a PDO."""
     return tuple((mapped.index, mapped.sub) for mapped in pdo.mapping)

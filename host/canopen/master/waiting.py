@@ -9,12 +9,12 @@ from typing import Any
 
 @dataclass(frozen=True, slots=True)
 class Until:
-    """Wait until something is so.
+    """Wait until a condition holds.
 
     Attributes:
-        done: says whether it is.
-        within_us: for how long at most.
-        complaint: what is raised then, as `DriveFailed`.
+        done: returns whether it holds.
+        within_us: time limit.
+        complaint: message of the `DriveFailed` after this time.
     """
 
     done: Callable[[], bool]
@@ -22,20 +22,20 @@ class Until:
     complaint: str
 
     def __await__(self) -> Generator[Until, None, None]:
-        """Wait; raises DriveFailed if it is not so in time."""
+        """Wait; raises DriveFailed if the condition does not hold in time."""
         yield self
 
 
 Operation = Coroutine[Until, None, Any]
-"""What takes its time: it awaits `Until` and other operations, and `perform` runs it."""
+"""An operation that takes time: it awaits `Until` and other operations; `perform` runs it."""
 
 
 class DriveFailed(Exception):  # noqa: N818 - what the drive did
-    """A drive did not do in time what was wanted of it, or cannot."""
+    """A drive did not complete an operation in time, or cannot do it."""
 
 
 class _Wait:
-    """An operation, and what it waits for now."""
+    """An operation, and the condition that it waits for."""
 
     def __init__(self, operation: Operation, now_us: int) -> None:
         self._operation = operation
@@ -44,15 +44,15 @@ class _Wait:
         self._take(now_us, None)
 
     def due(self, now_us: int) -> bool:
-        """Whether it can go on."""
+        """Whether it can continue."""
         return self.step is not None and (self.step.done() or now_us >= self._deadline_us)
 
     def left_us(self, now_us: int) -> int:
-        """Return for how long it waits at most."""
+        """Return the time limit of its wait."""
         return max(0, self._deadline_us - now_us)
 
     def go_on(self, now_us: int) -> None:
-        """Let it take its next steps; raises what it raises."""
+        """Run its next steps; raises what it raises."""
         step = self.step
         assert step is not None
         self._take(now_us, None if step.done() else DriveFailed(step.complaint))
@@ -74,10 +74,10 @@ def perform(
     now_us: Callable[[], int],
     wait_until: Callable[[Callable[[], bool], int], object],
 ) -> None:
-    """Run operations to their ends, all at once.
+    """Run operations to their ends, in parallel.
 
     Raises:
-        DriveFailed: one did not get what it waited for; the others are left where they are.
+        DriveFailed: a condition did not hold in time; the other operations stop where they are.
     """
     waits = [_Wait(operation, now_us()) for operation in operations]
     while waits := [wait for wait in waits if wait.step is not None]:
@@ -89,7 +89,7 @@ def _wait(
     now_us: Callable[[], int],
     wait_until: Callable[[Callable[[], bool], int], object],
 ) -> None:
-    """Wait until one can go on; let all go on that can."""
+    """Wait until an operation can continue; continue all that can."""
     left_us = min(wait.left_us(now_us()) for wait in waits)
     wait_until(lambda: any(wait.due(now_us()) for wait in waits), left_us)
     for wait in waits:

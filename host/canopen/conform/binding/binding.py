@@ -27,13 +27,13 @@ from tickrig.wire.canopen.eds.eds_device import EdsDevice
 from tickrig.wire.canopen.eds.eds_entry import standard_object
 from tickrig.wire.canopen.eds.object_table import EntryDescription
 
-# Places in the dictionary of a node at which there is nothing.
+# Places in the object dictionary of a node that hold nothing.
 
 _ABSENT_OBJECTS: Final = range(0x5FFF, 0x5EFF, -1)
 _COUNTED: Final = (0x1018, 0x1016, 0x1010, 0x1200)
-"""Of these sub-index 0 tells which sub-index is the highest."""
+"""Types of which sub-index 0 holds the highest sub-index."""
 _GROWING: Final = (0x1003, *range(0x1200, 0x1C00))
-"""In these a node may have more than its EDS describes: errors, COB-IDs, mapped objects."""
+"""Objects that may have more sub-indices than the EDS describes: errors, COB-IDs, mappings."""
 _LAST_SUB: Final = 0xFE
 
 _Place = tuple[int, int]
@@ -41,13 +41,13 @@ _Place = tuple[int, int]
 
 
 class _AbsentPlaces(NamedTuple):
-    """Places of a kind, in the order in which they are tried.
+    """Kinds of unused places, in the order in which they are tried.
 
     Attributes:
         name: in checks, after `$`.
-        what: what the node must have for it, for people.
-        certain: CiA 301 says that there can be nothing.
-        likely: nobody has described anything.
+        what: description of what the node must have, for messages.
+        certain: CiA 301 allows nothing at this place.
+        likely: no description mentions this place.
     """
 
     name: str
@@ -57,11 +57,11 @@ class _AbsentPlaces(NamedTuple):
 
 
 def _absent_places(device: EdsDevice, reader: ObjectReader) -> Iterator[_AbsentPlaces]:
-    """Yield an object, a sub-index behind a record, and one of a variable that are not there.
+    """Yield an unused index, an unused sub-index of a record, and one of a variable.
 
     Args:
-        device: the objects that are there.
-        reader: reads how many sub-indices they have.
+        device: the existing objects.
+        reader: reads the number of their sub-indices.
 
     Raises:
         SdoTimeout: the node does not answer.
@@ -92,11 +92,11 @@ _DEVICE_TYPE: Final = 0x1000
 
 @dataclass(frozen=True, slots=True)
 class BoundObject:
-    """An object of the node that a name stands for.
+    """The object of the node that a name stands for.
 
     Attributes:
         entry: its description.
-        value: what was read of it, None where it cannot be read.
+        value: the bytes that were read, None if it cannot be read.
     """
 
     entry: EntryDescription
@@ -109,12 +109,12 @@ class BoundObject:
 
     @property
     def sub(self) -> int:
-        """Sub-index."""
+        """Sub-index of the object."""
         return self.entry.sub
 
     @property
     def level(self) -> Level:
-        """The least level at which it may be written with a value that the node accepts."""
+        """The lowest level at which a value that the node accepts may be written."""
         inside = self.index in COMMUNICATION_AREA
         return Level.COMMUNICATION if inside else Level.INTRUSIVE
 
@@ -132,14 +132,14 @@ Bound = BoundObject | BoundPdo | BoundPlace
 
 @dataclass(frozen=True, slots=True)
 class Binding:
-    """What each name of `NAMES` stands for, or why it stands for nothing.
+    """The objects that the names of `NAMES` stand for, and the reasons for names without one.
 
     Attributes:
-        device: the objects: of the EDS, or those that answered.
-        bound: by name.
-        reasons: for people, by the names that are not bound.
-        findings: where EDS and node contradict each other, one a line.
-        known: the objects are those of an EDS.
+        device: the objects of the EDS, or those that answered.
+        bound: the objects by name.
+        reasons: in words, by name, for names that are not bound.
+        findings: contradictions between EDS and node, one per line.
+        known: whether the objects come from an EDS.
         entries: the objects by index and sub-index.
         reader: has read them.
     """
@@ -155,7 +155,7 @@ class Binding:
 
 @dataclass(slots=True)
 class _Search:
-    """The search for what the names stand for."""
+    """The search for the objects of the names."""
 
     device: EdsDevice
     reader: ObjectReader
@@ -176,19 +176,20 @@ def bind(
     allow: Collection[int] = (),
     never: Collection[int] = (),
 ) -> Binding:
-    """Find an object or PDO for each name; the node is only read.
+    """Find an object or PDO for each name; only read the node.
 
-    What is written later is of the communication area or of the manufacturer; without an
-    EDS only of the former, as nobody knows what else may be written.
+    Objects that checks write later lie in the communication or manufacturer area; without an EDS
+    only in the former, because it is unknown which others may be written.
 
     Args:
-        device: what its EDS says; None to ask the node which objects of CiA 301 it has.
+        device: the device of its EDS; None to find out from the node which objects of CiA 301 it
+            has.
         upload: reads an object of the node.
-        allow: indices of the profile area, 6000h to 9FFFh, that may be written all the same.
+        allow: indices of the profile area, 6000h to 9FFFh, that may be written nevertheless.
         never: indices that are never written.
 
     Returns:
-        What was found.
+        The bound names.
 
     Raises:
         SdoTimeout: the node does not answer.
@@ -211,13 +212,13 @@ def bind(
 
 
 def _bind_object(search: _Search, wanted: WantedObject) -> None:
-    """Take the best object that fits, may be used so and can be read."""
+    """Take the best object that matches, may be used in this way and can be read."""
     if wanted.at is None:
         fitting = wanted.fitting(search.facts)
     else:
         fitting = [search.entries[wanted.at]] if wanted.at in search.entries else []
     if not fitting:
-        where = "the EDS has no" if search.known else "without an EDS nobody knows of any"
+        where = "the EDS has no" if search.known else "without an EDS there is no known"
         search.reasons[wanted.name] = f"{where} {wanted.what}"
         return
     free = [entry for entry in fitting if wanted.use is not Use.WRITE or _is_free(search, entry)]
@@ -233,23 +234,23 @@ def _bind_object(search: _Search, wanted: WantedObject) -> None:
             search.bound[wanted.name] = BoundObject(entry, value)
             return
     first = f"{safe[0].index:04X}h:{safe[0].sub:02X}"
-    search.reasons[wanted.name] = f"no {wanted.what}: what {first} and its like hold is none"
+    search.reasons[wanted.name] = f"no {wanted.what}: {first} and similar objects have other values"
 
 
 def _unsafe(wanted: WantedObject, entry: EntryDescription) -> str:
     where = f"{entry.index:04X}h"
     if entry.index in PROFILE_AREA:
         return f"{where} is the only {wanted.what}; writing it may move something (--allow {where})"
-    return f"{where} is the only {wanted.what}, and it must not be written"
+    return f"{where} is the only {wanted.what}, and --never forbids to write it"
 
 
 def _not_free(wanted: WantedObject, fitting: list[EntryDescription]) -> str:
     where = f"{fitting[0].index:04X}h"
-    return f"no {wanted.what} takes any value: what {where} and its like hold means something"
+    return f"no {wanted.what} accepts any value: values of {where} have a meaning"
 
 
 def _is_free(search: _Search, entry: EntryDescription) -> bool:
-    """Return whether an object takes any value of its type: in the profile area few do."""
+    """Return whether an object accepts every value of its type: in the profile area few do."""
     if entry.index not in PROFILE_AREA:
         return True
     profile = (search.reader.number(_DEVICE_TYPE, 0) or 0) & 0xFFFF
@@ -257,14 +258,14 @@ def _is_free(search: _Search, entry: EntryDescription) -> bool:
 
 
 def _may_write(search: _Search, index: int) -> bool:
-    """Return whether an object may be written, with a value or to be refused."""
+    """Return whether an object may be written, either with a value or to provoke a refusal."""
     if index in search.never:
         return False
     return index not in PROFILE_AREA or index in search.allow
 
 
 def _order(wanted: WantedObject, entry: EntryDescription) -> tuple[bool | int, ...]:
-    """Sort: what does least harm, then what is simplest."""
+    """Sort key: the least harmful object first, then the simplest."""
     narrow = entry.low is not None or entry.high is not None
     if wanted.use is Use.WRITE and entry.index in HARMLESS:
         return (0, HARMLESS.index(entry.index))
@@ -274,9 +275,9 @@ def _order(wanted: WantedObject, entry: EntryDescription) -> tuple[bool | int, .
 
 
 def _bind_absent(search: _Search, places: _AbsentPlaces) -> None:
-    """Take a place at which there can be nothing and is something: the checks tell it.
+    """Take a place that must be unused but is not: the checks report it.
 
-    Else the first at which the node has nothing, else, as it has something everywhere, any.
+    Otherwise take the first unused place, or, if the node has something everywhere, any place.
     """
     certain = [place for place in places.certain if _may_write(search, place[0])]
     there = [place for place in certain if _has_something(search, place)]
@@ -295,14 +296,14 @@ def _bind_absent(search: _Search, places: _AbsentPlaces) -> None:
 
 
 def _has_something(search: _Search, place: _Place) -> bool:
-    """Read a place at which there should be nothing; what it has is a finding."""
+    """Read a place that should be unused; an answer is a finding."""
     if not isinstance(search.reader.try_read(*place), bytes):
         return False
     why = "is not described" if search.known else "cannot be there"
-    search.findings.append(f"{place[0]:04X}h:{place[1]:02X} {why}, and the node has it")
+    search.findings.append(f"{place[0]:04X}h:{place[1]:02X} {why}, but the node has it")
     return True
 
 
 _ABSENT_NAMES: Final = ("absent_object", "absent_sub", "sub_of_variable")
 NAMES: Final = frozenset({*(wanted.name for wanted in WANTED), *_ABSENT_NAMES, *PDO_NAMES})
-"""All names that `bind` tells about."""
+"""All names that `bind` handles."""

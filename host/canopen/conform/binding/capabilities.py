@@ -41,37 +41,37 @@ _OF_OBJECTS: Final[Mapping[str, tuple[str, ...]]] = {
     "rtr": ("tpdo_remappable",),
     "bits": ("tpdo_bool",),
 }
-"""Features that are there when the objects are to which these names are bound."""
+"""Features that exist if the objects exist to which these names are bound."""
 
 _PROFILES: Final[Mapping[str, tuple[int, tuple[int, ...]]]] = {
     "401": (401, (0x6000, 0x6200, 0x6400, 0x6401, 0x6411)),
     "402": (402, (0x6040, 0x6041)),
 }
-"""The low word of 1000h, and objects of which there must be one."""
+"""The low word of 1000h, and objects of which at least one must exist."""
 
 _LSS: Final = ("lss", "lssident", "unconfigured")
 _IDENTITY: Final = ((1, "VendorNumber"), (2, "ProductNumber"), (3, "RevisionNumber"))
 _DEVICE_TYPE: Final = 0x1000
 _ON_COMMAND: Final = {"store": 0x1010, "restore": 0x1011}
-"""What a node need not do that has the object: bit 0 of its first sub-index tells."""
+"""Optional functions of objects: bit 0 of the first sub-index tells if they are supported."""
 _STORE: Final = 0x1010
 _AUTONOMOUSLY: Final = 2
 _LSS_ADDRESS: Final = 0x1018
 _LSS_NUMBERS: Final = frozenset(range(1, 5))
-"""Its sub-indices that an LSS address needs (CiA 305)."""
+"""The sub-indices that an LSS address needs (CiA 305)."""
 
 
 _DUMMIES: Final = {"dummy5": "dummy0005", "dummy6": "dummy0006"}
-"""Objects of the data types that checks map in place of an object, and what an EDS calls them."""
+"""Dummy objects that checks map in place of an object, and their names in an EDS."""
 
 
 class EdsClaims(NamedTuple):
-    """What an EDS says about a node beside its objects.
+    """What an EDS says about a node besides its objects.
 
     Attributes:
-        lss: it has LSS.
+        lss: whether the node has LSS.
         dummies: features for the dummy objects that may be mapped, of `_DUMMIES`.
-        identity: the first numbers of 1018h, by sub-index, as its head has them.
+        identity: the first numbers of 1018h, by sub-index, from the section DeviceInfo.
     """
 
     lss: bool
@@ -80,7 +80,7 @@ class EdsClaims(NamedTuple):
 
     @classmethod
     def of_file(cls, file: EdsFile) -> EdsClaims:
-        """Read the claims of a file."""
+        """Read the claims of an EDS."""
         info, dummies = (file.sections.get(name, {}) for name in ("DeviceInfo", "DummyUsage"))
         numbers = {sub: _number(info.get(key.lower(), "")) for sub, key in _IDENTITY}
         return cls(
@@ -93,12 +93,12 @@ class EdsClaims(NamedTuple):
 
 
 class NodeDescription(NamedTuple):
-    """What is known about a node before it is asked.
+    """What is known about a node before it is queried.
 
     Attributes:
         device: its objects.
-        claims: what its EDS says beside them.
-        wrong: the errors and warnings of the EDS.
+        claims: what its EDS says besides them.
+        wrong: errors and warnings of the EDS.
     """
 
     device: EdsDevice
@@ -107,7 +107,7 @@ class NodeDescription(NamedTuple):
 
     @classmethod
     def of_file(cls, file: EdsFile) -> NodeDescription:
-        """Read the description in a file."""
+        """Read the description of a node from a file."""
         device = read_device(file)
         return cls(device, EdsClaims.of_file(file), tuple(map(str, (*file.errors, *file.warnings))))
 
@@ -115,10 +115,10 @@ class NodeDescription(NamedTuple):
     def of_table(
         cls, entries: Iterable[EntryDescription], objects: Mapping[int, ObjectDescription]
     ) -> NodeDescription:
-        """Return the description that an EDS of these objects has, without writing the EDS.
+        """Return the description that an EDS of these objects gives, without writing the EDS.
 
-        An EDS has no word for "no default": it gives the power-on value of every number, and no
-        value of an empty text.
+        An EDS cannot express "no default": it gives the power-on value of every number, and no
+        value for an empty text.
         """
         rows = tuple(entries)
         said = [row if row.has_default is bool(row.default) else _as_said(row) for row in rows]
@@ -129,7 +129,7 @@ class NodeDescription(NamedTuple):
 
 
 def _as_said(row: EntryDescription) -> EntryDescription:
-    """Return an entry with the default that its EDS says."""
+    """Return an entry with the default from its EDS."""
     if row.default:
         return row.with_default(row.default, relative=row.relative)
     return EntryDescription(
@@ -142,12 +142,12 @@ def _as_said(row: EntryDescription) -> EntryDescription:
 
 @dataclass(frozen=True, slots=True)
 class NodeFeatures:
-    """What a node can do.
+    """The capabilities of a node.
 
     Attributes:
-        words: as checks need them.
-        reasons: why the others are not among them, for people.
-        findings: where EDS and node contradict each other, one a line.
+        words: the features, as checks name them.
+        reasons: why other features are missing, in words.
+        findings: contradictions between EDS and node, one per line.
     """
 
     words: frozenset[str]
@@ -158,10 +158,10 @@ class NodeFeatures:
 def find_features(
     binding: Binding, client: SdoClient, claims: EdsClaims | None = None
 ) -> NodeFeatures:
-    """Find out what a node can do; the node is only read.
+    """Find out the capabilities of a node; only read the node.
 
-    Whether it has LSS can only be said by its EDS: to try it would change the state of all
-    nodes on the bus. Where no EDS says it, the node counts as one without.
+    Only the EDS can tell whether the node has LSS: a trial would change the state of all nodes on
+    the bus. Without an EDS the node counts as one without LSS.
 
     Args:
         binding: its objects.
@@ -178,15 +178,13 @@ def find_features(
     for word, index in _ON_COMMAND.items():
         said = number(index, 1)
         if said is not None and not said & 1:
-            reasons[word] = f"{index:04X}h:01 says that the node does not do it on command (bit 0)"
+            reasons[word] = f"{index:04X}h:01 says that there is no such command (bit 0)"
     if _has_constant_heartbeat(binding):
-        reasons["guarding"] = "1017h is constant and not 0: heartbeat takes the place of guarding"
+        reasons["guarding"] = "1017h is constant and not 0: heartbeat replaces node guarding"
     findings = [*_profile(binding), *_identity(binding, claims.identity if claims else {})]
     if claims is not None and claims.lss and not _has_lss_address(binding):
-        reasons |= dict.fromkeys(_LSS, "1018h has not the four numbers of an LSS address")
-        findings.append(
-            "the EDS says that it has LSS, and 1018h has not the numbers of its address"
-        )
+        reasons |= dict.fromkeys(_LSS, "1018h lacks the four numbers of an LSS address")
+        findings.append("the EDS says that it has LSS, but 1018h lacks the numbers of its address")
     if claims is None or not claims.lss:
         reasons |= dict.fromkeys(_LSS, _unsaid(claims, "LSS_Supported", "it has LSS"))
     if not _has_block_upload(client):
@@ -196,11 +194,11 @@ def find_features(
 
 
 def _has_block_upload(client: SdoClient) -> bool:
-    """Return whether a node begins a block upload of 1000h, which is then aborted."""
+    """Return whether a node starts a block upload of 1000h; abort the upload then."""
     try:
         return client.run(_try_block_upload())
     except SdoMisnamed:
-        return True  # the checks of the block upload tell what it names
+        return True  # the checks of the block upload judge which object the answer names
     except SdoTimeout:
         return False
 
@@ -228,12 +226,12 @@ def _missing(binding: Binding) -> Iterator[tuple[str, str]]:
 
 def _unsaid(claims: EdsClaims | None, key: str, what: str) -> str:
     if claims is None:
-        return f"without an EDS nobody knows whether {what}"
+        return f"without an EDS it is unknown whether {what}"
     return f"{key} of the EDS does not say that {what}"
 
 
 def _number(text: str) -> int | None:
-    """Read a number of an EDS, None if it is none."""
+    """Read a number of an EDS, None if it is not a number."""
     with suppress(ValueError):
         return parse_number(plain_numbers(text))
     return None
@@ -266,15 +264,15 @@ def _profile(binding: Binding) -> Iterator[str]:
     for wanted, objects in _PROFILES.values():
         if number == wanted and binding.known and not present.intersection(objects):
             names = ", ".join(f"{index:04X}h" for index in objects)
-            yield f"1000h says that it is a device of CiA {wanted}, and it has none of {names}"
+            yield f"1000h says that it is a device of CiA {wanted}, but it has none of {names}"
 
 
 def _identity(binding: Binding, claimed: Mapping[int, int]) -> Iterator[str]:
-    """Compare 1018h with what the head of the EDS says."""
+    """Compare 1018h with the section DeviceInfo of the EDS."""
     for sub, key in _IDENTITY:
         said, bound = claimed.get(sub), binding.bound.get(f"identity_{sub}")
         if said is None or not isinstance(bound, BoundObject) or bound.value is None:
             continue
         held = int.from_bytes(bound.value, "little")
         if held != said:
-            yield f"1018h:{sub:02X} is {held:08X}h, and the EDS has {key}={said:08X}h"
+            yield f"1018h:{sub:02X} is {held:08X}h, but the EDS has {key}={said:08X}h"

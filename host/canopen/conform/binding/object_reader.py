@@ -16,21 +16,21 @@ Upload = Callable[[int, int], bytes]
 """Reads an object by index and sub-index; raises SdoAborted or SdoTimeout."""
 
 PATIENCE: Final = 3
-"""So many requests in a row without an answer: the node is gone."""
+"""After this many requests in a row without an answer, the node is gone."""
 
 _ABSENT: Final = (AbortCode.NO_OBJECT, AbortCode.NO_SUBINDEX)
 _BROKEN: Final = (AbortCode.TOGGLE_BIT, AbortCode.COMMAND_SPECIFIER)
-"""With these an upload ends that went wrong, from whichever side."""
+"""Abort codes of an upload that went wrong, from either side."""
 
 
 class ObjectReader:
-    """Reads what is asked for, and remembers it.
+    """Reads objects and caches their values.
 
     Args:
         upload: reads an object.
 
     Attributes:
-        findings: descriptions that the node contradicts, one a line.
+        findings: descriptions that the node contradicts, one per line.
     """
 
     def __init__(self, upload: Upload) -> None:
@@ -41,11 +41,11 @@ class ObjectReader:
 
     @property
     def held(self) -> dict[tuple[int, int], bytes]:
-        """What was read so far."""
+        """The values read so far."""
         return {at: value for at, value in self._known.items() if isinstance(value, bytes)}
 
     def read(self, entry: object_table.EntryDescription) -> bytes | None:
-        """Return what a described object holds, None where it cannot be read or has another size.
+        """Return the value of a described object, None if it cannot be read or has another size.
 
         Raises:
             SdoTimeout: the node has stopped answering.
@@ -58,7 +58,7 @@ class ObjectReader:
         return answer if isinstance(answer, bytes) and not wrong else None
 
     def number(self, index: int, sub: int) -> int | None:
-        """Return an unsigned number of at most 32 bits, None where there is none.
+        """Return an unsigned number of at most 32 bits, None if there is none.
 
         Raises:
             SdoTimeout: the node has stopped answering.
@@ -67,7 +67,7 @@ class ObjectReader:
         return number_of(answer) if isinstance(answer, bytes) else None
 
     def has_nothing(self, index: int, sub: int) -> bool:
-        """Return whether the node refuses to read a place, with whatever code.
+        """Return whether the node refuses to read a place, with any abort code.
 
         Raises:
             SdoTimeout: the node has stopped answering.
@@ -75,7 +75,7 @@ class ObjectReader:
         return isinstance(self.try_read(index, sub), SdoAborted)
 
     def try_read(self, index: int, sub: int) -> bytes | SdoFailed:
-        """Return what the node answers to an upload.
+        """Return the node's answer to an upload.
 
         Raises:
             SdoTimeout: the node has stopped answering.
@@ -96,20 +96,20 @@ class ObjectReader:
 
 
 def _contradiction(entry: object_table.EntryDescription, answer: bytes | SdoFailed) -> str:
-    """Return how an answer differs from a description, empty if it does not."""
+    """Return how an answer differs from the description, empty if it does not."""
     match answer:
         case SdoAborted() if answer.code in _ABSENT and entry.sub in {0, 1}:
-            return f"is described, and the node does not have it: {describe_abort(answer.code)}"
+            return f"is described, but the node does not have it: {describe_abort(answer.code)}"
         case SdoAborted() if answer.code in _BROKEN:
             return f"cannot be read: {describe_abort(answer.code)}"
         case SdoTimeout():
             return "was not answered"
         case bytes() if entry.size and len(answer) != entry.size:
-            return f"is described as {entry.data_type.name}, and the node sends {len(answer)} bytes"
+            return f"is described as {entry.data_type.name}, but the node sends {len(answer)} bytes"
     return ""
 
 
-# The objects of a node without an EDS: which of CiA 301 it answers for.
+# The objects of a node without an EDS: those of CiA 301 that it answers for.
 
 _U8: Final = DataType.UNSIGNED8
 _U16: Final = DataType.UNSIGNED16
@@ -144,7 +144,7 @@ _ARRAYS: Final[tuple[tuple[int, str, DataType, object_table.Access], ...]] = (
 )
 _ERROR_FIELD: Final = 0x1003
 _SDO_SERVERS: Final = ((0x1200, object_table.RO), (0x1201, object_table.RW))
-"""The default server, which nobody may move, and the first beside it."""
+"""The default server, which must not be changed, and the first additional one."""
 _SDO_COB_IDS: Final = ((1, "client to server"), (2, "server to client"))
 _COMMUNICATION: Final = ((1, "COB-ID", _U32), (2, "Transmission type", _U8))
 _TIMING: Final = ((3, "Inhibit time", _U16), (5, "Event timer", _U16), (6, "SYNC start value", _U8))
@@ -155,7 +155,7 @@ _MAPPED: Final = 8
 
 
 def probe_device(reader: ObjectReader) -> EdsDevice:
-    """Ask a node for the objects of CiA 301; what else it has stays unknown.
+    """Find out which objects of CiA 301 a node has; other objects stay unknown.
 
     Raises:
         SdoTimeout: the node does not answer.

@@ -15,13 +15,13 @@ from tickrig.wire.canopen.pdo import PdoDescription, fields
 RPDOS: Final = range(0x1400, 0x1600)
 _TPDOS: Final = range(0x1800, 0x1A00)
 _MAPPING: Final = 0x200
-"""A mapping parameter is so far behind its communication parameter."""
+"""Distance of a mapping parameter from its communication parameter."""
 
 _LOOKED_AT: Final = 16
 """PDOs of each direction that are read; a node may have 512."""
 
 _MOST_MAPPED: Final = 64
-"""More is said of multiplexed PDOs."""
+"""The highest number of mapped objects; larger numbers mark multiplexed PDOs."""
 
 _COB_ID: Final = 1
 _TYPE: Final = 2
@@ -35,14 +35,14 @@ _CYCLIC: Final = range(1, 241)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BoundPdo(PdoDescription):
-    """A PDO as it was found.
+    """A PDO as it was found in the node.
 
     Attributes:
         index: of its communication parameter, 1400h.. or 1800h...
-        subs: sub-indices that its communication parameter has.
-        remappable: its mapping and its COB-ID may be written.
-        places: how many objects can be mapped.
-        restless: it has an inhibit time, or an event timer, that cannot be switched off.
+        subs: sub-indices of its communication parameter.
+        remappable: whether its mapping and COB-ID may be written.
+        places: number of objects that can be mapped.
+        restless: whether it has an inhibit time or an event timer that cannot be switched off.
     """
 
     index: int
@@ -57,7 +57,7 @@ class BoundPdo(PdoDescription):
         return self.index + _MAPPING
 
     def place(self, address: tuple[int, int]) -> tuple[int, int] | None:
-        """Return how many bytes are before an object that it carries, and how many behind."""
+        """Return the number of bytes before and after an object in the PDO."""
         for mapped, before in fields(self.mapping):
             if (mapped.index, mapped.sub) == address:
                 whole = not before % 8 and not mapped.bits % 8
@@ -66,7 +66,7 @@ class BoundPdo(PdoDescription):
 
 
 class _PdoKind(NamedTuple):
-    """A name in checks, what it stands for in words, and which PDOs are of that kind."""
+    """A name in checks, its meaning in words, and the PDOs of that kind."""
 
     name: str
     what: str
@@ -74,7 +74,7 @@ class _PdoKind(NamedTuple):
 
 
 def _kinds(way: str) -> Iterator[_PdoKind]:
-    """Yield the kinds that both directions have."""
+    """Yield the kinds that exist in both directions."""
     pdo = way.upper()
     yield _PdoKind(way, pdo, lambda pdo: True)
     yield _PdoKind(f"{way}_enabled", f"{pdo} that is enabled", lambda pdo: pdo.enabled)
@@ -109,11 +109,11 @@ CARRIED: Final[dict[str, tuple[int, int]]] = {
     "rpdo_do1": (0x6200, 1),
     "rpdo_ao1": (0x6411, 1),
 }
-"""Names of event-driven PDOs that carry the first input or output of a module of CiA 401."""
+"""Names of event-driven PDOs that carry the first input or output of a CiA 401 module."""
 
 
 def _carrying(way: str) -> Iterator[_PdoKind]:
-    """Yield the kinds that carry an object."""
+    """Yield the kinds of PDOs that carry an object."""
     for name, (index, sub) in CARRIED.items():
         if name.startswith(way):
             what = f"{way.upper()} that is enabled, event-driven and carries {index:04X}h:{sub:02X}"
@@ -148,16 +148,16 @@ def bind_pdos(
 ) -> tuple[dict[str, BoundPdo], dict[str, str]]:
     """Find a PDO of each kind.
 
-    `mapped_rpdo` is one whose objects may all be written; to the others nothing is sent as
-    long as they are mapped as they are.
+    `mapped_rpdo` is an RPDO whose objects may all be written; checks send nothing to the others
+    while they have their original mapping.
 
     Args:
-        device: what its EDS says.
+        device: the device of its EDS.
         reader: reads the node.
         may_write: whether an object may be written.
 
     Returns:
-        What was found, and the reasons why the rest was not, by name.
+        The PDOs that were found, and the reasons for the missing ones, by name.
     """
     bound: dict[str, BoundPdo] = {}
     reasons: dict[str, str] = {}
@@ -184,7 +184,7 @@ def _harmless(may_write: Callable[[int], bool]) -> _PdoKind:
 
 
 def _read(device: EdsDevice, reader: ObjectReader, area: range) -> Iterator[BoundPdo]:
-    """Read the first PDOs of a direction; those that are incomplete or 29-bit are passed over."""
+    """Read the first PDOs of a direction; skip those that are incomplete or 29-bit."""
     subs: dict[int, dict[int, bool]] = {}
     for entry in device.entries:
         subs.setdefault(entry.index, {})[entry.sub] = entry.writable

@@ -12,15 +12,15 @@ from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
 
 COMMUNICATION_AREA: Final = range(0x1000, 0x2000)
 PROFILE_AREA: Final = range(0x6000, 0xA000)
-"""Where a write may move something."""
+"""Areas in which a write may move something."""
 
 GENERIC_IO: Final = 401
-"""The low word of 1000h of a module of CiA 401."""
+"""The low word of 1000h of a CiA 401 module."""
 PLAIN_OUTPUTS: Final = (0x6200, 0x6300, 0x6320, 0x6410, 0x6411, 0x6412)
-"""Outputs of CiA 401 take any value; all else of a profile means something: a mode, a position."""
+"""Outputs of CiA 401 accept every value; other profile objects are modes or positions."""
 
 HARMLESS: Final = (0x1015, 0x1007, 0x100D, 0x100C, 0x1017, 0x1006)
-"""Communication objects that take any value, and that stand for others of their size."""
+"""Communication objects that accept every value, and that stand for others of their size."""
 
 TEXTS: Final = (DataType.VISIBLE_STRING, DataType.OCTET_STRING, DataType.UNICODE_STRING)
 _SIZES: Final = (8, 16, 32, 64)
@@ -33,21 +33,21 @@ _MOST_BYTES: Final = 1 << 32
 
 
 class Use(Enum):
-    """What is done with an object."""
+    """How a check uses an object."""
 
-    READ = "read, or mapped where it is only read"
+    READ = "read, or mapped if it is read-only"
     REFUSED = "written, and the node must refuse it"
     WRITE = "written, and restored"
 
 
 class EntryFacts(NamedTuple):
-    """What decides for which names an entry can stand, found out once for all names.
+    """The facts that decide which names an entry can stand for, computed once for all names.
 
     Attributes:
         entry: the entry.
         access: the bits of its access.
         kind: the number of its data type.
-        free: it takes what its description says, without rules of CiA 301.
+        free: whether it accepts what its description allows, without further rules of CiA 301.
     """
 
     entry: EntryDescription
@@ -63,17 +63,17 @@ def facts_of(entry: EntryDescription) -> EntryFacts:
 
 
 class WantedObject(NamedTuple):
-    """A name and what it stands for.
+    """A name and the objects that it can stand for.
 
     Attributes:
         name: in checks, after `$`.
-        what: for people.
-        use: what is done with it.
-        access: the bits of the access that are asked for: those that count, and their values.
+        what: description for messages.
+        use: how checks use it.
+        access: the required access: a mask of bits, and their values.
         kinds: numbers of the data types; None for any.
-        limited: there must be values of its type on both sides of its limits.
-        at: the only place where it can be, and then nothing else counts.
-        lengths: how many bytes its value may have.
+        limited: its type must have values beyond both limits.
+        at: its only possible place; the other criteria then do not apply.
+        lengths: allowed lengths of its value, in bytes.
     """
 
     name: str
@@ -86,11 +86,12 @@ class WantedObject(NamedTuple):
     lengths: range = range(1, _MOST_BYTES)
 
     def fitting(self, facts: Iterable[EntryFacts]) -> list[EntryDescription]:
-        """Return the entries that are of this kind, in their order.
+        """Return the entries that match, in their order.
 
-        What is written takes what its description says, without rules of CiA 301.
+        An entry to be written accepts what its description allows, without further rules of CiA
+        301.
 
-        One loop without calls: a tenth of a run of one check was here.
+        One loop without calls: calls took a tenth of the time of a single check.
         """
         (mask, wanted), kinds, anyway = self.access, self.kinds, self.use is not Use.WRITE
         found = [
@@ -102,7 +103,7 @@ class WantedObject(NamedTuple):
 
 
 def _is_limited(entry: EntryDescription) -> bool:
-    """Return whether there are values of its type on both sides of its limits."""
+    """Return whether its type has values beyond both limits."""
     if entry.low is None or entry.high is None:
         return False
     lowest, highest = entry.data_type.limits
@@ -120,7 +121,7 @@ _KINDS: Final[Mapping[str, Collection[int] | None]] = {
 
 
 def _read_wanted(text: str) -> Iterator[WantedObject]:
-    """Read `objects.txt`, whose head says what stands in a line."""
+    """Read `objects.txt`; its head describes the format of a line."""
     for line in text.splitlines():
         if line.startswith("#"):
             continue

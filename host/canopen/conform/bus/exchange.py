@@ -15,19 +15,20 @@ from tickrig.wire.canopen import sdo_frame
 from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID
 from tickrig.wire.instant import NEVER
 
-# What ends a check before its end.
+# Errors that end a check early.
 #
 # StepFailed      the node did not do what the step says
 # NotAllowed      the level of the run does not allow what the step does
-# Disturbed       nothing can be said: the host, the bus or another node was in the way
+# Disturbed       no verdict is possible: the host, the bus or another node interfered
 
 
 class StepFailed(Exception):  # noqa: N818 - what the step did
-    """The node did something else, or nothing; the text says what came and what was allowed.
+    """The node did something else, or nothing; the message says what came and what was allowed.
 
     Attributes:
-        got: the frame that came, as candump writes it; empty if none did.
-        wanted: patterns of the frame that should have come, one of them; none if none should.
+        got: the received frame, as candump writes it; empty if there was none.
+        wanted: patterns of the expected frame, of which one must match; empty if no frame was
+            expected.
     """
 
     def __init__(self, text: str, got: str = "", wanted: Iterable[str] = ()) -> None:
@@ -36,30 +37,30 @@ class StepFailed(Exception):  # noqa: N818 - what the step did
 
 
 class NotAllowed(Exception):  # noqa: N818 - what the step is
-    """A step would do what this run must not do; the text says what, and which level may."""
+    """The level of the run forbids a step; the message says what, and which level allows it."""
 
 
 class Disturbed(Exception):  # noqa: N818 - what the check was
-    """A check that cannot be judged; the text says why."""
+    """A check that cannot be judged; the message says why."""
 
 
-# The evidence of a check: what was on the bus, and when.
+# The evidence of a check: the frames on the bus, with their times.
 
 FIRST_LINES: Final = 40
 LAST_LINES: Final = 160
-"""So many lines are kept of a long check."""
+"""Number of lines that are kept of a long check."""
 LEFT_OUT: Final = "lines left out"
-"""Ends the remark in place of the others."""
+"""The end of the remark that replaces the omitted lines."""
 
 
 _Line = tuple[int, Direction, CanFrame | str]
 
 
 class Evidence:
-    """The lines of one go at a check: the first and the last of many.
+    """The lines of one attempt at a check: if there are many, the first and the last ones.
 
-    Frames become text when the lines are asked for: nobody asks for what is said between checks,
-    which is nine tenths of a run.
+    Frames are formatted only when the lines are read: frames between checks, nine tenths of a run,
+    are never formatted.
     """
 
     def __init__(self) -> None:
@@ -76,7 +77,7 @@ class Evidence:
         self._last.append((at_us, direction, what))
 
     def lines(self) -> tuple[FrameLine, ...]:
-        """Return them, with a remark where some were left out."""
+        """Return the lines, with a remark in place of omitted ones."""
         left_out: list[_Line] = []
         if self._left_out:
             remark = f"{self._left_out} {LEFT_OUT}"
@@ -85,21 +86,21 @@ class Evidence:
         return tuple(FrameLine(at_us, way, str(what)) for at_us, way, what in lines)
 
 
-# Whether frames come as often as they should.
+# Whether frames arrive at the expected rate.
 
 MS_US: Final = 1_000
 PERIOD_TOLERANCE: Final = 0.05
-"""By this share may the mean of periods be off: CiA 301 says nothing; crystals are far better."""
+"""Allowed relative error of the mean period: CiA 301 gives none; crystals are far better."""
 
 
 def _off_period(stamps: Sequence[int], each_ms: int, times: int, resolution_us: int) -> str:
-    """Say what is wrong with the mean of periods, or with their number; empty if nothing is.
+    """Return what is wrong with the mean period or the number of periods; empty if nothing is.
 
     Args:
-        stamps: when frames came, in microseconds; of more than are wanted the first count.
-        each_ms: the period that is wanted.
-        times: so many periods are wanted, between one frame more.
-        resolution_us: of the stamps.
+        stamps: when frames came, in microseconds; surplus stamps at the end are ignored.
+        each_ms: the expected period.
+        times: the expected number of periods; this takes one frame more.
+        resolution_us: resolution of the stamps.
 
     >>> _off_period([0, 53_000, 106_000], 50, 2, 0)
     'each 53.0 ms, want 50 ms, 5 % off at most'
@@ -117,13 +118,13 @@ def _off_period(stamps: Sequence[int], each_ms: int, times: int, resolution_us: 
     return ""
 
 
-# How many nodes answer to one node-ID, by the answers to what they are asked.
+# How many nodes answer to one node-ID, determined from the answers to their requests.
 
 _LEAST: Final = 3
-"""So many objects that were asked for say something."""
+"""Number of requested objects from which the count is significant."""
 _ANSWERS: Final = (sdo_frame.ServerCommand.UPLOAD, sdo_frame.ServerCommand.ABORT)
 _MULTIPLEXER: Final = slice(1, 4)
-"""Of an SDO frame."""
+"""The bytes of an SDO frame that hold index and sub-index."""
 
 
 class Presence(Enum):
@@ -137,19 +138,19 @@ class Presence(Enum):
 # How much of the bus the tester may use, and how much others use.
 
 ASSUMED_BIT_RATE: Final = 125_000
-"""In bit/s, where nobody says it: slow, so that the limit holds on any faster bus."""
+"""Bit rate if none is given, in bit/s: low, so that the load limit holds on any faster bus."""
 
 _WINDOW_US: Final = 100_000
-"""The load is limited over so long."""
+"""Window over which the load is limited."""
 
 _LONGEST_WAIT_US: Final = 1_000_000
-"""A node that floods the bus with answers does not keep the tester from sending."""
+"""A node that floods the bus with answers does not stop the tester from sending."""
 
 _PLENTY_BIT_S: Final = 12_500
-"""With less for the tester, in bit/s, all takes longer: so may a check."""
+"""With a smaller share than this, in bit/s, everything takes longer, so a check may too."""
 
 _FOREIGN_LOAD: Final = 0.5
-"""With more of it by other nodes, a late or missing answer says nothing of the node."""
+"""With a higher load by other nodes, a late or missing answer says nothing about the node."""
 
 
 class _Allowance:
@@ -157,7 +158,7 @@ class _Allowance:
 
     Args:
         bit_rate: of the bus in bit/s.
-        max_load: share of it, above 0 to 1.
+        max_load: allowed share of it, above 0 to 1.
 
     Attributes:
         slowness: so many times as long as usual may all take.
@@ -186,7 +187,7 @@ class _ForeignLoad:
         self._window = self._bits = 0
 
     def add(self, at_us: int, frame: CanFrame) -> bool:
-        """Count a frame; True if the bus is loaded too much to judge."""
+        """Count a frame; return True if the bus is too loaded to judge the node."""
         window = at_us // _WINDOW_US
         if window != self._window:
             self._window, self._bits = window, 0
@@ -195,21 +196,21 @@ class _ForeignLoad:
 
 
 _SLICE_US: Final = 20_000
-"""So long a wait at most: a host that was stopped meanwhile sees that it lasted longer."""
+"""The longest single wait: if the host was stopped, a wait that lasts longer shows it."""
 
 HOST_GAP_US: Final = 10_000
-"""By so much a wait, or what is between two waits, may last too long before the host is late."""
+"""How much longer a wait, or the time between two, may last before the host counts as late."""
 
 _HELD_US: Final = 20_000
-"""A frame that is sent so much later than its check wants it may change what the node does."""
+"""A frame sent later than this may change what the node does, so the check is inconclusive."""
 _PAUSE_US: Final = 10_000
-"""So long nothing is asked behind an SDO request that has no answer: a server may take one frame
-at a time, and CiA 301 does not say how fast it is ready for the next one."""
+"""Pause after an SDO request that has no answer: a server may accept one frame at a time, and
+CiA 301 does not say how soon it is ready for the next one."""
 _UNANSWERED: Final = (sdo_frame.ClientCommand.ABORT, sdo_frame.BLOCK_ENDED)
 _TOO_LOW: Final = "your --max-load is too low for this check"
 
 _NODE_ID_MASK: Final = 0x7F
-"""These bits of a CAN-ID are the node-ID, in the pre-defined connection set."""
+"""The node-ID bits of a CAN-ID, in the pre-defined connection set."""
 
 _HEARTBEATS: Final[tuple[range, ...]] = (range(0x701, 0x780),)
 _NODES: Final[tuple[range, ...]] = (range(0x081, 0x100), range(0x181, 0x680), range(0x701, 0x780))
@@ -221,31 +222,31 @@ _BEGINNING: Final = (
     sdo_frame.ClientCommand.BLOCK_UPLOAD,
     sdo_frame.ClientCommand.BLOCK_DOWNLOAD,
 )
-"""Requests that name an object; some others of a block look like them, and do no harm."""
+"""Requests that name an object; some block segments look like them, which does no harm."""
 
 _NAMING: Final = frozenset((*range(0x40, 0x50), 0x60, 0x80, 0xA0, 0xA4, 0xC0, 0xC2, 0xC4, 0xC6))
-"""Commands of answers that name an object; segments of a block look like them, and do no harm."""
+"""Commands of answers that name an object; block segments look like them, which does no harm."""
 
 _UNREAD_FRAMES: Final = 2_000
-"""So many frames of a CAN-ID are kept unread; a node that floods the bus loses the oldest."""
+"""Unread frames kept per CAN-ID; if a node floods the bus, the oldest are lost."""
 
 
 class BusExchange:
     """The bus as a check sees it: frames are text, and stay unread, per CAN-ID, until taken.
 
     Args:
-        link: the bus; its time stamps are what is judged.
+        link: the bus; checks judge its time stamps.
         node_id: of the node under test, 1..127.
         bit_rate: of the bus in bit/s.
         max_load: share of it that may be used, above 0 to 1.
-        permit: looks at each frame before it is sent; raises NotAllowed.
-        resolution_us: of the time stamps; a frame may be so much late.
+        permit: checks each frame before it is sent; raises NotAllowed.
+        resolution_us: of the time stamps; a frame may be late by this time.
         shared_host: the node may be a process of this machine.
 
     Attributes:
-        evidence: of the check under way.
-        disturbances: why the check under way cannot fail, each once.
-        crashes: why the check under way has failed whatever it saw, each once.
+        evidence: of the running check.
+        disturbances: reasons why the running check cannot fail, without duplicates.
+        crashes: reasons why the running check fails in any case, without duplicates.
         boots: boot-up messages of the node so far.
         others: node-IDs of others that were on the bus so far; 0 for what is of no node.
         deadline_us: when the check under way has to have ended.
@@ -294,11 +295,11 @@ class BusExchange:
         return self._link.now_us
 
     def begin(self, within_us: int, watched: frozenset[str] = frozenset()) -> None:
-        """Begin a check, or what is done between checks: forget all frames before.
+        """Begin a check, or the work between checks: forget all frames before.
 
         Args:
             within_us: how long it may last.
-            watched: CAN-IDs of which frames are kept, beside those of the node.
+            watched: CAN-IDs whose frames are kept, besides those of the node.
         """
         self.deadline_us = NEVER
         self._listen(self.now_us)
@@ -319,31 +320,31 @@ class BusExchange:
         return Presence.TWO if many else Presence.ONE
 
     def end_listening(self) -> None:
-        """From now on the node may send anything anywhere: others are told by their heartbeat."""
+        """From now on the node may send with any CAN-ID: only heartbeats reveal other nodes."""
         self._others_by = _HEARTBEATS
 
     def remark(self, text: str) -> None:
-        """Add a line of our own to the evidence."""
+        """Add a remark of the tester to the evidence."""
         self.evidence.add(self.now_us - self.start_us, Direction.REMARK, text)
 
     def disturb(self, reason: str) -> None:
-        """Let the check under way be inconclusive instead of failed."""
+        """Make the running check inconclusive instead of failed."""
         if reason not in self.disturbances:
             self.disturbances[reason] = None
             self.remark(reason)
 
     def crash(self, reason: str, where: Iterable[str] = ()) -> None:
-        """Let the check under way fail: the program of the node has crashed, and begins anew."""
+        """Make the running check fail: the program of the node crashed and starts again."""
         self.crashes[reason] = None
         for line in (reason, *where):
             self.remark(line)
 
     def send(self, frame: CanFrame) -> None:
-        """Send a frame, when the load allows it; NotAllowed if the level does not."""
+        """Send a frame as soon as the load allows it; NotAllowed if the level does not."""
         self._permit(frame)
         link, is_request = self._link, frame.can_id == self._request
         now_us = link.now_us
-        if now_us > self._known_us:  # never in virtual time: half of all looks at the bus
+        if now_us > self._known_us:  # never in virtual time: this is half of all polls of the bus
             self._listen(now_us)
             now_us = link.now_us
         if is_request and self._known_us < self._ready_us:
@@ -376,7 +377,7 @@ class BusExchange:
             The frame.
 
         Raises:
-            StepFailed: none came in time, or another one.
+            StepFailed: no frame came in time, or another one.
         """
         queue = self._unread[can_id_of(patterns[0])]
         until_us = self.now_us + within_ms * MS_US + self.resolution_us
@@ -395,7 +396,7 @@ class BusExchange:
         return got
 
     def none(self, can_id: str, for_ms: int) -> None:
-        """Wait; StepFailed if a frame on the CAN-ID comes, or is unread."""
+        """Wait; StepFailed if a frame with the CAN-ID comes or is unread."""
         until_us = self.now_us + for_ms * MS_US
         self._listen_until(until_us)
         unread = self._unread[can_id]
@@ -403,13 +404,13 @@ class BusExchange:
             raise StepFailed(f"unexpected {unread[0][1]}, want none on {can_id} for {for_ms} ms")
 
     def count(self, pattern: str, for_ms: int, least: int, most: int) -> None:
-        """Wait; StepFailed unless so many frames that match come meanwhile."""
+        """Wait; StepFailed unless between `least` and `most` matching frames come."""
         got = len(self.collect(pattern, for_ms))
         if not least <= got <= most:
             raise StepFailed(f"{got} x {pattern} in {for_ms} ms, want {least}..{most}")
 
     def period(self, pattern: str, each_ms: int, times: int) -> None:
-        """Wait; StepFailed unless frames that match come each so many milliseconds.
+        """Wait; StepFailed unless matching frames come with a period of `each_ms`.
 
         Args:
             pattern: of the frames.
@@ -429,7 +430,7 @@ class BusExchange:
             raise StepFailed(f"{pattern} {wrong}")
 
     def collect(self, pattern: str, for_ms: int) -> list[int]:
-        """Wait; return the times of the frames that match and come meanwhile."""
+        """Wait; return the times of the matching frames that come."""
         unread = self._unread[can_id_of(pattern)]
         unread.clear()
         until_us = self.now_us + for_ms * MS_US
@@ -439,17 +440,17 @@ class BusExchange:
         return times
 
     def forget(self, can_id: str) -> None:
-        """Forget the frames of a CAN-ID that have come."""
+        """Drop the frames of a CAN-ID that have come."""
         self._listen(self.now_us)
         self._unread[can_id].clear()
 
     def forget_all(self) -> None:
-        """Forget all frames that have come."""
+        """Drop all frames that have come."""
         self._listen(self.now_us)
         self._unread.clear()
 
     def excuse(self) -> None:
-        """Let what lasted since the last look be no lateness of this host: a person was asked."""
+        """Do not count the time since the last poll as lateness of the host: a person was asked."""
         self._busy_us = self.now_us
 
     def wait(self, for_ms: int) -> None:
@@ -457,7 +458,7 @@ class BusExchange:
         self._listen_until(self.now_us + for_ms * MS_US)
 
     def unread(self, can_id: str) -> deque[tuple[int, CanFrame]]:
-        """Return the frames of a CAN-ID, with their times, that nobody has taken."""
+        """Return the unread frames of a CAN-ID, with their times."""
         return self._unread[can_id]
 
     def _listen_until(self, until_us: int) -> None:
@@ -465,20 +466,20 @@ class BusExchange:
             self._listen(until_us)
 
     def listen(self, until_us: int) -> tuple[int, StampedFrames]:
-        """Wait for a first frame; return a time, and all that had arrived by then."""
+        """Wait for a first frame; return a time, and all frames that had arrived by then."""
         if until_us <= self._known_us == self._link.now_us:
-            return self._known_us, ()  # in virtual time; a look costs as much as a request
+            return self._known_us, ()  # in virtual time; a poll costs as much as a request
         received = self._listen(until_us)
         while not received and self._known_us < until_us:
             received = self._listen(until_us)
         return self._known_us, received
 
     def _listen(self, until_us: int) -> StampedFrames:
-        """Take what arrives, at most until a time, and see whether the host was late."""
+        """Receive frames, at most until a time, and detect whether the host was late."""
         link = self._link
         before_us = link.now_us
         if before_us > self.deadline_us:
-            raise StepFailed("the node kept the check going beyond its time")
+            raise StepFailed("the node kept the check running beyond its time")
         wait_us = max(0, min(until_us - before_us, _SLICE_US))
         self._known_us, received = link.receive_stamped(wait_us)
         after_us = link.now_us
@@ -512,7 +513,7 @@ class BusExchange:
             self.disturb("other nodes load the bus too much")
 
     def _origin(self, frame: CanFrame) -> tuple[str, bool]:
-        """Return the CAN-ID of a frame in text, and whether it is of the node; once for each."""
+        """Return the CAN-ID of a frame in text, and whether the node sent it; cached."""
         can_id = can_id_of(str(frame))
         own = frame.can_id & _NODE_ID_MASK == self._node_id and not frame.extended
         origin = can_id, own and can_id not in self._reserved

@@ -1,6 +1,7 @@
 """Frames in text, and patterns that they match.
 
-What came and what was wanted, in words: SDO answers are told apart by what they say.
+The difference between a frame and the expected patterns, in words; SDO answers differ by their
+meaning.
 
 >>> unlike("585#6000160100000000", ["585#8000160141000406", "585#8000160142000406"])
 'got OK (60h), want abort 0604 0041h or 0604 0042h'
@@ -32,7 +33,7 @@ def can_id_of(pattern: str) -> str:
 
 
 def matches(pattern: str, text: str) -> bool:
-    """Compare frames; a dot stands for any digit, [..] for one of some, * for any rest.
+    """Match a frame; a dot stands for any digit, [..] for one of some, * for any rest.
 
     >>> matches("585#4F011000........", "585#4F01100003000000"), matches("185#*", "185#0100")
     (True, True)
@@ -51,11 +52,11 @@ _VALUE: Final = re.compile(r"5[89A-F][0-9A-F]#4[0-9A-F]([0-9A-F]{6})[0-9A-F]{8}"
 _WANTED_VALUE: Final = re.compile(r"(5.*?#4(?:[0-9A-F]|\[\w+\])[0-9A-F]{6})([0-9A-F]+)\.*")
 _ANY_OBJECT: Final = "......"
 _DIGITS: Final = 8
-"""Of the data behind index and sub-index."""
+"""Digits of the data after index and sub-index."""
 
 
 def unlike(got: str, wanted: Sequence[str]) -> str:
-    """Say in what a frame differs from those that were wanted.
+    """Return in what a frame differs from those that were expected.
 
     Args:
         got: a frame as candump writes it.
@@ -75,7 +76,7 @@ def unlike(got: str, wanted: Sequence[str]) -> str:
 
 
 def abort_of(got: str) -> int | None:
-    """Return the abort code in a frame, None if it is no SDO abort.
+    """Return the abort code of a frame, None if it is not an SDO abort.
 
     >>> f"{abort_of('585#8000100002000106'):08X}", abort_of("705#00")
     ('06010002', None)
@@ -85,7 +86,7 @@ def abort_of(got: str) -> int | None:
 
 
 def wanted_text(wanted: Sequence[str]) -> str:
-    """Write what may come, of aborts their codes.
+    """Return the expected frames in words; aborts by their codes.
 
     >>> wanted_text(["585#8000100002000106"]), wanted_text(["705#00", "705#7F"])
     ('abort 0601 0002h', '705#00 or 705#7F')
@@ -97,7 +98,7 @@ def wanted_text(wanted: Sequence[str]) -> str:
 
 
 def codes_text(codes: Iterable[str]) -> str:
-    """Write abort codes as CiA 301 does.
+    """Write abort codes in the notation of CiA 301.
 
     >>> codes_text(["06010002", "06010000", "08000000"])
     '0601 0002h, 0601 0000h or 0800 0000h'
@@ -107,7 +108,7 @@ def codes_text(codes: Iterable[str]) -> str:
 
 
 def _values(got: str, wanted: str) -> tuple[str, str] | None:
-    """Return the data of two answers to an upload that differ in nothing else."""
+    """Return the data of two upload answers that differ in nothing else."""
     match = _WANTED_VALUE.fullmatch(wanted)
     if match is None or _VALUE.fullmatch(got) is None:
         return None
@@ -138,5 +139,5 @@ def _place(name: str) -> str:
 
 
 def _code(data: str) -> str:
-    """Return a code that is in a frame, the lowest byte first, with the highest first."""
+    """Return a code with the highest byte first; a frame has the lowest byte first."""
     return bytes.fromhex(data)[::-1].hex().upper()

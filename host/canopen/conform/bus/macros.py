@@ -14,11 +14,11 @@ from tickrig.host.canopen.conform.notation import TO_MAPPING
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.sdo_frame import SEGMENT_BYTES, AbortCode
 
-# A drive that follows its target position, from where it is.
+# A drive that moves from where it is to its target position.
 
 _POLL_MS: Final = 20
 _NOISE: Final = 1
-"""By so many counts the position of a drive that stands may differ."""
+"""Position tolerance of a drive that stands, in counts."""
 _POSITION_BYTES: Final = 4
 """Positions are INTEGER32 (CiA 402-2, 607Ah and 6064h)."""
 
@@ -26,19 +26,19 @@ _POSITION_BYTES: Final = 4
 def follow(  # noqa: PLR0913, PLR0917 - the words of the macro
     sdo: SdoFrames, target: Address, actual: Address, step: str, tolerance: str, within_ms: str
 ) -> None:
-    """Set a target beside the actual position, and wait until the drive is there.
+    """Set a target near the actual position, and wait until the drive reaches it.
 
     Args:
         sdo: the drive.
         target: 607Ah.
         actual: 6064h.
-        step: from the actual position, in counts; small, so that no drive sees a jump.
-        tolerance: by so many counts it may be beside the target.
-        within_ms: so long may it take, and so long may the drive turn before.
+        step: distance from the actual position, in counts; small, so that no drive makes a jump.
+        tolerance: allowed distance from the target, in counts.
+        within_ms: how long the move may take, and how long the drive may move before it.
 
     Raises:
-        StepFailed: it is not there in time.
-        Disturbed: it turns all the time, as something else moves it.
+        StepFailed: the drive does not reach it in time.
+        Disturbed: the drive moves all the time, because something else moves it.
     """
     wanted = _rest(sdo, actual, int(within_ms)) + int(step)
     sdo.write(target, (wanted & 0xFFFF_FFFF).to_bytes(_POSITION_BYTES, "little"))
@@ -52,7 +52,7 @@ def follow(  # noqa: PLR0913, PLR0917 - the words of the macro
 
 
 def _rest(sdo: SdoFrames, actual: Address, within_ms: int) -> int:
-    """Wait until the drive stands; return where."""
+    """Wait until the drive stands; return its position."""
     before = _position(sdo, actual)
     for _ in range(0, within_ms, _POLL_MS):
         sdo.exchange.wait(_POLL_MS)
@@ -68,13 +68,13 @@ def _position(sdo: SdoFrames, at: Address) -> int:
 
 
 _MOST_BYTES: Final = 20_000
-"""A transfer that brings more than this failed: a node that never ends one is found out."""
+"""A transfer of more bytes than this fails, so that an endless one is detected."""
 
 _STATE_MS: Final = 20
-"""So long after an NMT command a node is in its new state."""
+"""Time after an NMT command until a node is in its new state."""
 
 _TOO_LONG: Final = ("12000706", "10000706", "05000405")
-"""Codes with which a download is refused that is longer than the object can hold."""
+"""Codes that refuse a download longer than the object can hold."""
 
 _SCAN_MS: Final = 10
 _FOUND: Final = "7E4#4F00000000000000"
@@ -97,7 +97,7 @@ def sync(sdo: SdoFrames, can_id: str, count: str) -> None:
 
 
 def _sync_period(sdo: SdoFrames, can_id: str, tpdo: str, period: str) -> None:
-    """SYNC until the first TPDO, then one TPDO must come with every n-th SYNC."""
+    """Send SYNCs until the first TPDO; then a TPDO must come with every n-th SYNC."""
     every, seen = int(period), sdo.exchange.unread(tpdo)
     for number in range(1, every + 1):
         _sync_and_wait(sdo, can_id)
@@ -126,22 +126,22 @@ def _sync_and_wait(sdo: SdoFrames, can_id: str) -> None:
 
 
 def _wait_for(sdo: SdoFrames, seen: Sized) -> None:
-    """Wait for a TPDO that is late: CiA 301 does not say how soon it has to follow the SYNC."""
+    """Wait for a late TPDO: CiA 301 does not say how soon it must follow the SYNC."""
     for _ in range(_LATE_MS // _PDO_MS):
         if not seen:
             sdo.exchange.wait(_PDO_MS)
 
 
 _PDO_MS: Final = 5
-"""So long after a SYNC its TPDO is waited for, where none has to come."""
+"""How long to wait for a TPDO after a SYNC that need not bring one."""
 _LATE_MS: Final = 100
-"""So long, where one has to come."""
+"""How long to wait for a TPDO after a SYNC that must bring one."""
 _FEW: Final = 10
-"""Of so many SYNCs each is waited for: which of them brings the first TPDO is not known."""
+"""SYNCs after which to wait for a TPDO: it is not known which one brings the first."""
 
 
 def _download_segmented(sdo: SdoFrames, at: Address, size: str) -> None:
-    """Write the pattern in segments."""
+    """Write the test pattern in segments."""
     data = _pattern(int(size))
     sdo.say(bytes([0x21, *_mux(at)]) + len(data).to_bytes(4, "little"))
     sdo.answer(f"60{multiplexer(at)}00000000")
@@ -149,9 +149,9 @@ def _download_segmented(sdo: SdoFrames, at: Address, size: str) -> None:
 
 
 def room(sdo: SdoFrames, at: Address, size: str) -> None:
-    """Begin to write so many bytes, and end it; NotAllowed where the object has no room for them.
+    """Start a download of this size, and finish it; NotAllowed if the object is too short.
 
-    How much a string holds is in no EDS.
+    An EDS does not give the length that a string can hold.
     """
     sdo.say(bytes([0x21, *_mux(at)]) + int(size).to_bytes(4, "little"))
     mux = multiplexer(at)
@@ -162,12 +162,12 @@ def room(sdo: SdoFrames, at: Address, size: str) -> None:
 
 
 def _upload_pattern(sdo: SdoFrames, at: Address, size: str) -> None:
-    """Read in segments; it must be the pattern."""
+    """Read in segments; the data must be the pattern."""
     _compare(_upload_segmented(sdo, at), _pattern(int(size)))
 
 
 def _upload_segmented(sdo: SdoFrames, at: Address) -> bytes:
-    """Read in segments whatever is there, with alternating toggle; return it."""
+    """Read in segments with alternating toggle bit; return the data."""
     sdo.say(bytes([0x40, *_mux(at), *bytes(4)]))
     size = int.from_bytes(sdo.answer(f"41{multiplexer(at)}........")[4:], "little")
     data, toggle, last = b"", 0, False
@@ -178,7 +178,7 @@ def _upload_segmented(sdo: SdoFrames, at: Address) -> bytes:
         data += segment[1 : 8 - (segment[0] >> 1 & 7)]
         toggle ^= 0x10
         if len(data) > _MOST_BYTES:
-            raise StepFailed(f"{len(data)} bytes, and still no last segment")
+            raise StepFailed(f"{len(data)} bytes, without a last segment")
     if len(data) != size:
         raise StepFailed(f"{len(data)} bytes came, {size} were indicated")
     return data
@@ -205,22 +205,22 @@ def _download_block(sdo: SdoFrames, at: Address, size: str) -> None:
 
 
 def _upload_block_pattern(sdo: SdoFrames, at: Address, size: str, block: str) -> None:
-    """Read in blocks with CRC; it must be the pattern."""
+    """Read in blocks with CRC; the data must be the pattern."""
     _compare(_upload_block(sdo, at, block), _pattern(int(size)))
 
 
 def _upload_same(sdo: SdoFrames, at: Address, block: str = "127", crc: str = "") -> None:
-    """Read in blocks, and in segments; it must be the same."""
+    """Read in blocks, and in segments; the data must be the same."""
     _compare(_upload_block(sdo, at, block, crc), _upload_segmented(sdo, at))
 
 
 def _upload_block(sdo: SdoFrames, at: Address, block: str, crc: str = "") -> bytes:
-    """Read in blocks whatever is there; return it.
+    """Read in blocks; return the data.
 
     Args:
         sdo: the server.
         at: the object.
-        block: segments of a block; `1,2`: of the first, and of each that follows.
+        block: segments of a block; `1,2`: of the first block, and of each later one.
         crc: `without-crc`, or nothing.
     """
     most, following = int(block.split(",", maxsplit=1)[0]), int(block.rsplit(",", maxsplit=1)[-1])
@@ -236,7 +236,7 @@ def _upload_block(sdo: SdoFrames, at: Address, block: str, crc: str = "") -> byt
         last = bool(segment[0] & 0x80)
         data += segment[1:]
         if len(data) > _MOST_BYTES:
-            raise StepFailed(f"{len(data)} bytes, and still no last segment")
+            raise StepFailed(f"{len(data)} bytes, without a last segment")
         if last or number == most:
             sdo.say(bytes([0xA2, number, following, *bytes(5)]))
             number, most = 0, following
@@ -252,7 +252,7 @@ def _upload_block(sdo: SdoFrames, at: Address, block: str, crc: str = "") -> byt
 
 
 def _remap(sdo: SdoFrames, pdo: Address, on: str, kind: str, *entries: str) -> None:
-    """Map objects by the procedure of CiA 301, and give the PDO its type and COB-ID."""
+    """Map objects by the procedure of CiA 301, and set type and COB-ID of the PDO."""
     head, body, cob_id = pdo[0], pdo[0] + TO_MAPPING, bytes.fromhex(on)
     off = cob_id[:3] + bytes([cob_id[3] | 0x80])
     sdo.write((head, 1), off)
@@ -265,7 +265,7 @@ def _remap(sdo: SdoFrames, pdo: Address, on: str, kind: str, *entries: str) -> N
 
 
 def enable(sdo: SdoFrames, pdo: Address, on: str, *entries: str) -> None:
-    """Enable a PDO; objects are mapped before if it has none, as it may be refused without."""
+    """Enable a PDO; if it has no mapping, map objects first, because it may be refused without."""
     head, body, cob_id = pdo[0], pdo[0] + TO_MAPPING, bytes.fromhex(on)
     sdo.write((head, 1), cob_id[:3] + bytes([cob_id[3] | 0x80]))
     if not sdo.read_data((body, 0), 1)[0]:
@@ -276,7 +276,7 @@ def enable(sdo: SdoFrames, pdo: Address, on: str, *entries: str) -> None:
 
 
 def _refuse_segments(sdo: SdoFrames, at: Address, size: str, *codes: str) -> None:
-    """Write so many bytes in segments; it is refused at once, or when they have come."""
+    """Write `size` bytes in segments; the node must refuse at once, or at the end."""
     mux = multiplexer(at)
     aborts = [f"80{mux}{bytes.fromhex(code)[::-1].hex().upper()}" for code in codes]
     sdo.say(bytes([0x21, *_mux(at)]) + int(size).to_bytes(4, "little"))
@@ -288,13 +288,13 @@ def _refuse_segments(sdo: SdoFrames, at: Address, size: str, *codes: str) -> Non
 
 
 def guard(sdo: SdoFrames, can_id: str, *words: str) -> None:
-    """Guard a node: it tells the states in turn, and its toggle bit alternates.
+    """Guard a node: it reports the states in turn, with an alternating toggle bit.
 
     Args:
-        sdo: for its bus.
+        sdo: the server, for its bus.
         can_id: of error control.
-        words: states in hex, each asked for once, as `=7F` where the toggle bit is 0; a word
-            with # is a frame that is sent before.
+        words: states in hex, each requested once; `=7F` expects a toggle bit of 0; a word with # is
+            a frame that is sent before.
     """
     toggle: int | None = None
     for word in words:
@@ -357,10 +357,10 @@ def _compare(got: bytes, wanted: bytes) -> None:
 
 
 def _lss_store(sdo: SdoFrames) -> None:
-    """Store the configuration of LSS; NotAllowed if the node answers that it stores none."""
+    """Store the LSS configuration; NotAllowed if the node answers that it cannot store."""
     sdo.exchange.send(CanFrame.parse(_STORE_LSS))
     if sdo.exchange.expect([_LSS_STORED, _LSS_STORES_NOTHING], ANSWER_MS) == _LSS_STORES_NOTHING:
-        raise NotAllowed("the node stores no LSS configuration: error code 1")
+        raise NotAllowed("the node does not store the LSS configuration: error code 1")
 
 
 MACROS: Final[dict[str, Callable[..., object]]] = {

@@ -15,7 +15,7 @@ from tickrig.wire.can import data_frame
 from tickrig.wire.canopen import sdo_frame
 from tickrig.wire.canopen.sdo import Abort
 
-# Reads and writes objects of the node under test, beside its checks.
+# Reads and writes objects of the node under test, apart from its checks.
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -25,28 +25,28 @@ SizeOf = Callable[[Address], int | None]
 
 
 _NUMBER_BYTES: Final = range(1, 5)
-"""No number that the tester asks for is longer; a node may send anything."""
+"""The longest number that the tester requests; a node may send anything."""
 _MOST_MISNAMED: Final = 20
-"""So many answers that name another object are kept."""
+"""Number of answers that name another object to keep."""
 
 
 def number_of(data: bytes) -> int | None:
-    """Return an unsigned number of at most 32 bits, None if the bytes are none."""
+    """Return an unsigned number of at most 32 bits, None if the bytes are not one."""
     return int.from_bytes(data, "little") if len(data) in _NUMBER_BYTES else None
 
 
 class SdoClient:
-    """The client of the default SDO server of a node, which does nothing else meanwhile.
+    """The client of the default SDO server of a node; it does nothing else at the same time.
 
-    Frames that are no answers of the node are passed over.
+    It ignores frames that are not answers of the node.
 
     Args:
         exchange: the bus.
         node_id: of the node, 1..127.
 
     Attributes:
-        misnamed: answers that name another object than the one that was asked for, one a line.
-        size_of: so many bytes are taken of what the node sends without saying how many.
+        misnamed: answers that name another object than the requested one, one per line.
+        size_of: the number of bytes of an answer that does not indicate its size.
     """
 
     def __init__(self, exchange: BusExchange, node_id: int) -> None:
@@ -56,7 +56,7 @@ class SdoClient:
         self.size_of: SizeOf = dict[Address, int]().get
 
     def upload(self, index: int, sub: int) -> bytes:
-        """Read an object; a request that is not answered is sent once more.
+        """Read an object; repeat an unanswered request once.
 
         Raises:
             SdoAborted: the node refuses.
@@ -91,7 +91,7 @@ class SdoClient:
         self._send(sdo_frame.REQUEST_COB_ID + self._node_id, frame)
 
     def run(self, script: Script[T]) -> T:
-        """Run a script, and return or raise what it does; LinkClosed if the bus is gone."""
+        """Run a script, and return its result or raise its error; LinkClosed if the bus is gone."""
         exchange, talk = self._exchange, self._session.dialogue
         for request in exchange.unanswered:  # by the check, which talks for itself
             talk.remember(sdo_frame.index_sub(request))
@@ -144,19 +144,19 @@ class SdoFrames:
         return bytes.fromhex(self.exchange.expect(wanted, ANSWER_MS)[4:])
 
     def write(self, at: Address, data: bytes) -> None:
-        """Write an object; StepFailed if that is not confirmed."""
+        """Write an object; StepFailed if the node does not confirm it."""
         self.download(at, data)
         self.answer(f"60{multiplexer(at)}00000000")
         if len(data) > sdo_frame.EXPEDITED_BYTES:
             self.download_segments(data)
 
     def refuse_write(self, at: Address, data: bytes, codes: Sequence[str]) -> None:
-        """Write an object; StepFailed unless it is refused with one of the codes."""
+        """Write an object; StepFailed unless the node refuses with one of the codes."""
         self.download(at, data)
         self.answer(*_aborts(at, codes))
 
     def read(self, at: Address, data: str) -> None:
-        """Read an object; StepFailed unless it holds what the pattern says."""
+        """Read an object; StepFailed unless its value matches the pattern."""
         size = len(data) // 2
         self.say(bytes([_UPLOAD, *bytes.fromhex(multiplexer(at)), *bytes(4)]))
         if 1 <= size <= sdo_frame.EXPEDITED_BYTES:
@@ -174,22 +174,22 @@ class SdoFrames:
             self.answer(f"{head:02X}{part:.<14}")
 
     def read_other(self, at: Address, data: str) -> None:
-        """Read an object of at most 4 bytes; StepFailed if it holds what it must not."""
+        """Read an object of at most 4 bytes; StepFailed if it has this value."""
         if self.read_data(at, len(data) // 2) == bytes.fromhex(data):
             raise StepFailed(f"{at[0]:04X}h:{at[1]:02X} is still {data}")
 
     def read_data(self, at: Address, size: int) -> bytes:
-        """Read an object of 1 to 4 bytes, whatever it holds."""
+        """Read an object of 1 to 4 bytes, with any value."""
         self.say(bytes([_UPLOAD, *bytes.fromhex(multiplexer(at)), *bytes(4)]))
         return self.answer(f"{_uploaded(size)}{multiplexer(at)}........")[4 : 4 + size]
 
     def refuse_read(self, at: Address, codes: Sequence[str]) -> None:
-        """Read an object; StepFailed unless it is refused with one of the codes."""
+        """Read an object; StepFailed unless the node refuses with one of the codes."""
         self.say(bytes([_UPLOAD, *bytes.fromhex(multiplexer(at)), *bytes(4)]))
         self.answer(*_aborts(at, codes))
 
     def download(self, at: Address, data: bytes) -> None:
-        """Send the request to write an object: expedited, or how many bytes will come."""
+        """Send the request to write an object: expedited, or with the number of bytes to follow."""
         mux = bytes.fromhex(multiplexer(at))
         if 1 <= len(data) <= sdo_frame.EXPEDITED_BYTES:
             self.say(bytes([_sized(_DOWNLOAD, len(data)), *mux]) + data.ljust(4, b"\0"))
@@ -197,7 +197,7 @@ class SdoFrames:
             self.say(bytes([0x21, *mux]) + len(data).to_bytes(4, "little"))
 
     def download_segments(self, data: bytes) -> None:
-        """Send the segments of a download that was begun, each when the one before is confirmed."""
+        """Send the segments of a started download, each after the one before is confirmed."""
         for number, start in enumerate(range(0, len(data), sdo_frame.SEGMENT_BYTES)):
             part, toggle = data[start : start + sdo_frame.SEGMENT_BYTES], (number & 1) << 4
             last = start + sdo_frame.SEGMENT_BYTES >= len(data)
@@ -226,7 +226,7 @@ def _aborts(at: Address, codes: Sequence[str]) -> list[str]:
 
 
 def _uploaded(size: int) -> str:
-    """Return a pattern: a server may leave out how many bytes are data (CiA 301, 7.2.4.3.5)."""
+    """Return a pattern: a server may omit the number of data bytes (CiA 301, 7.2.4.3.5)."""
     return f"4[2{_sized(_UPLOADED, size) & 0xF:X}]"
 
 

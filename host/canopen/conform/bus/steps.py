@@ -32,8 +32,8 @@ class StepPlayer:
     Args:
         exchange: the bus.
         node_id: of the node, 1..127.
-        stimulus: moves the inputs of the device, None if nobody can.
-        client: reads and writes objects where a check does not look at the frames.
+        stimulus: operates the inputs of the device, None if there is none.
+        client: reads and writes objects when a check does not judge the frames.
     """
 
     def __init__(
@@ -43,7 +43,7 @@ class StepPlayer:
         self._sdo = SdoFrames(exchange, node_id)
 
     def play(self, step: check.Step) -> None:
-        """Do one step; StepFailed if the node does not do as it says."""
+        """Do one step; StepFailed if the node does not react as it says."""
         action, bus = step.action, self._exchange
         match action:
             case check.OfObject():
@@ -86,12 +86,12 @@ class StepPlayer:
             case check.ReadOther(_, data):
                 sdo.read_other(at, data)
             case check.Keep():
-                pass  # what it names is written back at the end
+                pass  # the object that it names is written back at the end
             case _:
                 raise AssertionError(action)
 
     def _act_within(self, within_ms: int, *words: str) -> None:
-        """Act; Disturbed if that took longer than what is looked at then."""
+        """Run the stimulus; Disturbed if it took longer than the check allows."""
         start_us = self._exchange.now_us
         self._act(*words)
         took_ms = (self._exchange.now_us - start_us) // MS_US
@@ -100,7 +100,7 @@ class StepPlayer:
             raise Disturbed(f"{text} took {took_ms} ms, which is more than {within_ms} ms")
 
     def _act(self, verb: str, *words: str) -> None:
-        """Let somebody move the inputs, or compare the outputs, of the device."""
+        """Operate the inputs of the device, or compare its outputs."""
         if verb == "power-cycle":
             self._act("power", "off")
             self._exchange.wait(_POWER_OFF_MS)
@@ -119,25 +119,25 @@ class StepPlayer:
 
     def _stimulate(self, *words: str) -> str:
         if self._stimulus is None:
-            raise Disturbed("nobody is at the inputs")
+            raise Disturbed("there is no stimulus for the inputs")
         self._exchange.remark(" ".join(words))
         try:
             return self._stimulus(*words)
         except ValueError as error:
-            raise NotAllowed(f"nobody can do {' '.join(words)}: {error}") from error
+            raise NotAllowed(f"the stimulus cannot do {' '.join(words)}: {error}") from error
         finally:
             self._exchange.excuse()
 
 
 def _value(text: str) -> float | str:
-    """Read a number, however it is written; what is none stays a text."""
+    """Read a number in any notation; return other texts unchanged."""
     try:
         return float(text)
     except ValueError:
         return text
 
 
-# The steps that only checks of objects have: what an object holds, and writing it back wrongly.
+# The steps that only object checks have: read a value, and write it back with a wrong size.
 
 
 class Client(Protocol):
@@ -152,10 +152,10 @@ class Client(Protocol):
 
 
 def play_of_object(client: Client, action: check.Hold | check.RefuseRewrite) -> None:
-    """Do what only checks of objects do.
+    """Do a step of an object check.
 
     Raises:
-        StepFailed: the node does not do as the step says.
+        StepFailed: the node does not react as the step says.
     """
     try:
         if isinstance(action, check.Hold):
@@ -196,7 +196,7 @@ def _rewrite(client: Client, index: int, sub: int, grow: int, codes: Sequence[st
     try:
         data = client.upload(index, sub)
     except SdoAborted:
-        return  # it holds nothing that could be written; what it should hold is another check
+        return  # its value cannot be written; which value it should have is another check
     data = data[:grow] if grow < 0 else data + bytes(grow)
     try:
         client.download(index, sub, data)
@@ -205,4 +205,4 @@ def _rewrite(client: Client, index: int, sub: int, grow: int, codes: Sequence[st
             text = f"{len(data)} bytes refused with {describe_abort(error.code)}, want {wanted}"
             raise StepFailed(text) from error
     else:
-        raise StepFailed(f"{len(data)} bytes were taken, want {wanted}")
+        raise StepFailed(f"{len(data)} bytes were accepted, want {wanted}")

@@ -1,6 +1,6 @@
 """Known failures, which separate new ones.
 
-A baseline is a text file: the id of a check a line, what follows a `#` is for people.
+A baseline is a text file with the id of one check per line; `#` starts a comment.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from tickrig.host.text.page_text import one_line
 _HEAD: Final = "# known failures of a conformance run (canmon conform --baseline)"
 _MOST_BYTES: Final = 10_000_000
 _LONGEST: Final = 80
-"""Characters of an id; those of the suite have at most half of it."""
+"""The longest id; those of the suite are at most half as long."""
 
 
 @dataclass(frozen=True, slots=True)
 class Baseline:
-    """What is known to fail.
+    """The known failures.
 
     Attributes:
         known: ids of checks.
@@ -34,24 +34,24 @@ class Baseline:
 
         Raises:
             OSError: it cannot be read.
-            ValueError: it is no baseline; the text says which line and why.
+            ValueError: it is not a baseline; the message names the line and the reason.
         """
         with path.open("rb") as file:
             data = file.read(_MOST_BYTES + 1)
         if len(data) > _MOST_BYTES:
-            raise ValueError(f"{path} has more than {_MOST_BYTES} bytes: it is no baseline")
+            raise ValueError(f"{path} has more than {_MOST_BYTES} bytes: not a baseline")
         try:
             lines = data.decode("utf-8-sig").splitlines()
         except UnicodeDecodeError as error:
-            raise ValueError(f"{path} is no text: byte {error.start} is no UTF-8") from None
+            raise ValueError(f"{path} is not a text: byte {error.start} is not UTF-8") from None
         return cls(frozenset(filter(None, (_id(path, *each) for each in enumerate(lines, 1)))))
 
     def knows(self, result: verdict.Result) -> bool:
-        """Return whether it is a failure that is known."""
+        """Return whether a result is a known failure."""
         return result.outcome.verdict is verdict.CheckVerdict.FAIL and result.check.id in self.known
 
     def new(self, report: verdict.Report) -> list[verdict.Result]:
-        """Return the failures that are not known."""
+        """Return the new failures."""
         failed = (
             result
             for result in report.results
@@ -60,7 +60,7 @@ class Baseline:
         return [result for result in failed if not self.knows(result)]
 
     def mended(self, report: verdict.Report) -> list[str]:
-        """Return the ids that were known to fail and pass now."""
+        """Return the ids of known failures that pass now."""
         passed = {
             one.check.id
             for one in report.results
@@ -69,7 +69,7 @@ class Baseline:
         return sorted(self.known & passed)
 
     def exit_status(self, report: verdict.Report) -> int:
-        """Return the exit status of a run: that of the report, where known failures are none."""
+        """Return the exit status of a run, in which known failures do not count."""
         if self.new(report):
             return verdict.FAILED
         if (
@@ -85,7 +85,7 @@ class Baseline:
         )
 
     def ends_with(self, report: verdict.Report) -> int:
-        """Return the exit status of the command: of a run that was ended, why it was."""
+        """Return the exit status of the command; of a run that was ended, by the reason."""
         if report.aborted and not report.absent:
             return verdict.CTRL_C if report.aborted == verdict.INTERRUPTED else verdict.BUS_FAILED
         return self.exit_status(report)
@@ -108,5 +108,5 @@ def _id(path: Path, number: int, line: str) -> str:
     name = line.partition("#")[0].strip()
     if len(name) > _LONGEST or len(name.split()) > 1 or not name.isascii():
         shown = one_line(name)
-        raise ValueError(f"{path}, line {number}: {shown[:_LONGEST]!r} is no id of a check")
+        raise ValueError(f"{path}, line {number}: {shown[:_LONGEST]!r} is not the id of a check")
     return name

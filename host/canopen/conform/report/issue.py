@@ -1,7 +1,7 @@
 """Failures as a page in Markdown that the maintainer of a stack can file: clause, frames, script.
 
-A script is a sequence for `canmon seq`: what the tester sent in the check, at its times and after
-the answers that it had, and at the end the frame that the text wants.
+A script is a sequence for `canmon seq`: what the tester sent in the check, at the same times and
+after the same answers, and at the end the frame that the standard requires.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID
 from tickrig.wire.canopen.sdo_frame import REQUEST_COB_ID, RESPONSE_COB_ID
 
 _LEAST_WAIT_US: Final = 2_000
-"""Frames that were sent with less between them follow each other at once."""
+"""Frames with a shorter pause are sent without a pause."""
 _MULTIPLEXER_END: Final = len("585#60171000")
-"""Up to here an answer to an SDO request is compared: command, index and sub-index."""
+"""The compared part of an SDO response: command, index and sub-index."""
 _UNEXPECTED: Final = re.compile(r"unexpected (\S+),")
 _CLASS: Final = re.compile(r"\[[0-9A-F]+\]")
 _GROUP: Final = re.compile(r"\(.*\)")
@@ -31,12 +31,12 @@ _GROUP: Final = re.compile(r"\(.*\)")
 def issue_text(
     report: verdict.Report, baseline: Baseline = NONE_KNOWN, show: ShowFrames = plain_frames
 ) -> str:
-    """Return the page: of each failure what the text says, what came, its frames and a script.
+    """Return the page: for each failure the requirement, the answer, the frames and a script.
 
     Args:
         report: the run.
-        baseline: failures that are known; they are left out.
-        show: writes frames.
+        baseline: known failures; they are omitted.
+        show: formats frames.
     """
     failed = [
         result
@@ -70,7 +70,7 @@ def _failure(report: verdict.Report, result: verdict.Result, show: ShowFrames) -
 
 
 def _sequence(outcome: verdict.CheckOutcome, node_id: int) -> list[str]:
-    """Return the lines of a sequence that does what a check did up to where it failed.
+    """Return the lines of a sequence that repeats a check up to its failure.
 
     Args:
         outcome: of the check.
@@ -81,7 +81,7 @@ def _sequence(outcome: verdict.CheckOutcome, node_id: int) -> list[str]:
     lines = _step("send", f"000#80{node_id:02X}") + _step("wait", "20ms")
     evidence = list(outcome.evidence)
     if evidence and outcome.wanted and evidence[-1].direction is verdict.Direction.RECEIVED:
-        del evidence[-1]  # what came in place of what is expected below
+        del evidence[-1]  # received in place of the frame expected below
     last_us, asked = evidence[0].at_us if evidence else 0, False
     for line in evidence:
         match line.direction:
@@ -104,7 +104,7 @@ def _sequence(outcome: verdict.CheckOutcome, node_id: int) -> list[str]:
 
 
 def _end(outcome: verdict.CheckOutcome) -> list[str]:
-    """Return the step that tells whether the failure is there."""
+    """Return the step that shows whether the failure still exists."""
     if outcome.wanted:
         return _step("expect", _merged(outcome.wanted), within="1s")
     reason = one_line(outcome.reason)
@@ -114,7 +114,7 @@ def _end(outcome: verdict.CheckOutcome) -> list[str]:
 
 
 def _merged(patterns: Sequence[str]) -> str:
-    """Return one pattern of `canmon seq` for several of a check.
+    """Return one `canmon seq` pattern for several patterns of a check.
 
     >>> _merged(["585#80......01000405", "585#80......00000008"])
     '585#80??????0?000?0?'

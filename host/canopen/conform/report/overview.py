@@ -1,4 +1,4 @@
-"""A report by groups and by clauses, and in what order people look at its checks.
+"""A report by groups and by clauses, and the order in which it lists checks.
 
 The frames of a check, as `canmon dump` shows them.
 
@@ -28,23 +28,23 @@ from tickrig.host.text.page_text import one_line
 from tickrig.wire.can import CanFrame
 from tickrig.wire.errors import WireError
 
-# What to look at where a check failed: the place in a firmware where such a fault sits.
+# Where to look if a check failed: the part of a firmware that has such faults.
 
 _HINTS: Final[Mapping[str, str]] = {
     "NMT": "the table of NMT states: which command leads where, and what it resets",
     "HB": "objects 1016h and 1017h, and the timers behind them",
     "NG": "objects 100Ch and 100Dh, the toggle bit, and the answer to the remote frame",
-    "UE": "the upload of the SDO server: its abort codes, and the size that it tells",
+    "UE": "the upload of the SDO server: its abort codes, and the size that it indicates",
     "DE": "the download of the SDO server: access, size and limits before a value is taken",
     "US": "the segments of an upload: toggle bit, last segment, and when a transfer ends",
-    "DS": "the segments of a download: toggle bit, size told and size sent, refusal at once",
+    "DS": "the segments of a download: toggle bit, indicated and sent size, immediate refusal",
     "BD": "the block download: sequence numbers, what is acknowledged, CRC, padding",
     "BU": "the block upload: block size, what is sent again, CRC, end of transfer",
-    "SG": "what the SDO server does with requests that it does not know, and while it is busy",
+    "SG": "what the SDO server does with unknown requests, and while it is busy",
     "PC": "the order of the mapping procedure: PDO off, number 0, entries, number, PDO on",
-    "PR": "when a PDO is sent or taken over: transmission type, inhibit time, event timer",
+    "PR": "when a PDO is sent or applied: transmission type, inhibit time, event timer",
     "SY": "object 1005h, and what a SYNC counter does",
-    "EM": "objects 1001h, 1003h, 1014h and 1015h, and when an error counts as gone",
+    "EM": "objects 1001h, 1003h, 1014h and 1015h, and when an error counts as cleared",
     "EB": "object 1029h, and the state in which an error leaves the node",
     "ST": "objects 1010h and 1011h: their signatures, and what is kept over power-off",
     "LS": "the LSS states, and the identity (1018h) that is compared",
@@ -52,14 +52,14 @@ _HINTS: Final[Mapping[str, str]] = {
     "D4": "the state machine of CiA 402: controlword, statusword, modes",
     "OD": "this object in the EDS, and its row in the object dictionary of the firmware",
 }
-"""By group."""
+"""Hints by group."""
 
 
 def hint(result: Result) -> str:
-    """Say where to look, without a full stop; empty where nothing is known."""
+    """Return where to look, without a full stop; empty if unknown."""
     match result.outcome.verdict:
         case CheckVerdict.BLOCKED:
-            return "the node: it did not come back; switch it off and on, then run the check alone"
+            return "the node: it no longer answers; switch it off and on, then run the check alone"
         case CheckVerdict.INCONCLUSIVE:
             return "this host and the bus: load, adapter, other nodes; then run the check alone"
         case _:
@@ -67,23 +67,23 @@ def hint(result: Result) -> str:
 
 
 ShowFrames = Callable[[Sequence[FrameLine]], list[str]]
-"""Writes the lines of a check, one each, for people."""
+"""Formats the lines of a check."""
 
 
 _DATA_WIDTH: Final = len("[8]  00 11 22 33 44 55 66 77")
 
 
 def plain_frames(lines: Sequence[FrameLine]) -> list[str]:
-    """Write lines with their bytes alone."""
+    """Format lines with their bytes only."""
     return [plain_frame(line) for line in lines]
 
 
 def plain_frame(line: FrameLine, meaning: str = "") -> str:
-    """Write a line.
+    """Format a line.
 
     Args:
         line: a frame, or a remark.
-        meaning: what stands behind a frame; empty where nobody knows.
+        meaning: text after a frame; empty if unknown.
     """
     seconds, micros = divmod(line.at_us, 1_000_000)
     head = f" ({seconds:03}.{micros:06})  {line.direction}  "
@@ -98,7 +98,7 @@ def plain_frame(line: FrameLine, meaning: str = "") -> str:
 
 
 def frame_of(line: FrameLine) -> CanFrame | None:
-    """Return the frame of a line; None if it is none."""
+    """Return the frame of a line; None for a remark."""
     try:
         return CanFrame.parse(line.text)
     except (ValueError, WireError):
@@ -106,7 +106,7 @@ def frame_of(line: FrameLine) -> CanFrame | None:
 
 
 def cut(lines: list[str], most: int) -> list[str]:
-    """Return the first and the last lines where there are more than `most`, and how many are not.
+    """Return the first and last lines if there are more than `most`, and how many are omitted.
 
     >>> cut(["a", "b", "c", "d", "e"], 3)
     ['a', '... 3 more lines ...', 'e']
@@ -119,7 +119,7 @@ def cut(lines: list[str], most: int) -> list[str]:
 
 
 def all_goes(outcome: CheckOutcome, first: CheckOutcome | None, show: ShowFrames) -> list[str]:
-    """Return the lines of a check, those of its first go before them if they differ."""
+    """Return the lines of a check, preceded by those of its first attempt if they differ."""
     if first is None:
         return show(outcome.evidence)
     if same_go(first, outcome):
@@ -132,13 +132,13 @@ SAME: Final = "first: the same"
 
 
 def same_go(first: CheckOutcome, again: CheckOutcome) -> bool:
-    """Return whether two goes differ in nothing but their times."""
+    """Return whether two attempts differ only in their times."""
     one, other = ([line[1:] for line in each.evidence] for each in (first, again))
     return (first.verdict, first.reason, one) == (again.verdict, again.reason, other)
 
 
 UNWELL: Final = (CheckVerdict.FAIL, CheckVerdict.BLOCKED, CheckVerdict.INCONCLUSIVE)
-"""What somebody has to look at, the worst first."""
+"""Verdicts that need attention, the worst first."""
 
 
 class _GroupRow(NamedTuple):
@@ -154,18 +154,18 @@ class _GroupRow(NamedTuple):
 
     @property
     def counts(self) -> dict[CheckVerdict, int]:
-        """How many gave which verdict; those that nobody gave are left out."""
+        """Number of results per verdict, without those that do not occur."""
         return verdict_counts(self.results)
 
 
 def verdict_counts(results: Iterable[Result]) -> dict[CheckVerdict, int]:
-    """Count verdicts, in their own order; those that nobody gave are left out."""
+    """Count verdicts, in their own order, without those that do not occur."""
     counts = Counter(result.outcome.verdict for result in results)
     return {verdict: counts[verdict] for verdict in CheckVerdict if counts[verdict]}
 
 
 def counts_text(counts: dict[CheckVerdict, int]) -> str:
-    """Write counts for people.
+    """Return counts as text.
 
     >>> counts_text({CheckVerdict.PASS: 3, CheckVerdict.FAIL: 1})
     '3 pass, 1 fail'
@@ -185,13 +185,13 @@ def by_clause(report: Report) -> list[_GroupRow]:
 
 
 def unwell(report: Report) -> list[Result]:
-    """Return what somebody has to look at, the worst first."""
+    """Return the results that need attention, the worst first."""
     found = [result for result in report.results if result.outcome.verdict in UNWELL]
     return sorted(found, key=lambda result: UNWELL.index(result.outcome.verdict))
 
 
 def causes(results: Iterable[Result]) -> list[list[Result]]:
-    """Put checks of objects together that fail alike: one of a kind stands for all."""
+    """Group object checks that fail in the same way: one stands for all of its kind."""
     found: dict[tuple[str, ...], list[Result]] = {}
     for number, each in enumerate(results):
         kind = _OF_OBJECT.fullmatch(each.check.id)
@@ -203,11 +203,11 @@ def causes(results: Iterable[Result]) -> list[list[Result]]:
 
 _OF_OBJECT: Final = re.compile(r"OD-.*-(\w+)")
 _PLACE: Final = re.compile(r"step \d+|\b[0-9A-F]{4}h?:[0-9A-F]{2}\b|\b\d+ bytes")
-"""What differs in the reasons of objects that fail alike."""
+"""The parts of a reason that differ between objects that fail in the same way."""
 
 
 def repair_commands(report: Report) -> tuple[str, ...]:
-    """Return the commands that write back what could not be restored, in their order."""
+    """Return the commands that restore the remaining objects, in their order."""
     head = f"canmon net {shlex.quote(report.source)} write {report.node_id}"
     return tuple(f"{head} {shlex.quote(words)} --yes" for words in report.repairs)
 

@@ -27,9 +27,9 @@ from tickrig.host.canopen.conform.verdict import CheckOutcome, CheckVerdict, Rep
 from tickrig.host.text.html_page import PageTemplate
 
 _MOST_LINES: Final = 200
-"""Of frames of one go at a check."""
+"""Lines shown of one attempt at a check."""
 _MOST_OPEN: Final = 12
-"""Up to so many failures are unfolded at once."""
+"""Number of failures that are unfolded at once."""
 
 
 def html_page(
@@ -39,8 +39,8 @@ def html_page(
 
     Args:
         report: the run.
-        baseline: failures that are known.
-        show: writes frames.
+        baseline: known failures.
+        show: formats frames.
     """
 
     def frames(outcome: CheckOutcome) -> str:

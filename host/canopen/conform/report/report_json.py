@@ -1,4 +1,4 @@
-"""A report as JSON, for programs (docs/reference/canopen/conform.md has what each field means)."""
+"""A report as JSON, for programs (docs/reference/canopen/conform.md defines the fields)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tickrig.host.canopen.conform.suite import group_titles
 from tickrig.host.canopen.conform.verdict import CheckOutcome, CheckVerdict, Report, Result
 
 _VERSION: Final = 1
-"""It changes when a field changes its meaning or goes."""
+"""It changes when a field changes its meaning or disappears."""
 
 _Object = dict[str, object]
 
@@ -22,7 +22,7 @@ def report_json(report: Report, baseline: Baseline = NONE_KNOWN) -> str:
 
     Args:
         report: the run.
-        baseline: failures that are known.
+        baseline: known failures.
     """
     said: _Object = {
         "v": _VERSION,

@@ -14,10 +14,10 @@ from tickrig.host.text.page_text import duration, one_line
 from tickrig.host.text.values import counted
 
 _MOST_SHOWN: Final = 20
-"""So many failures are shown with their frames; the others without."""
-_ELSEWHERE: Final = "more, without their frames, which --html FILE and --json have:"
+"""Number of failures that are shown with their frames."""
+_ELSEWHERE: Final = "more, without their frames; --html FILE and --json have them:"
 _MOST_LINES: Final = 40
-"""Of frames of one failure."""
+"""Lines shown of one failure."""
 _MOST_REASONS: Final = 12
 
 
@@ -31,9 +31,9 @@ def text_report(
 
     Args:
         report: the run.
-        baseline: failures that are known; they are named and not shown.
-        show: writes frames.
-        again: the command that judges one check alone, without its id; empty if there is none.
+        baseline: known failures; they are only named.
+        show: formats frames.
+        again: the command that runs one check alone, without its id; empty if there is none.
     """
     parts = [_head(report), _groups(report), _not_applicable(report)]
     found = [result for result in overview.unwell(report) if not baseline.knows(result)]
@@ -70,7 +70,7 @@ def _groups(report: Report) -> list[str]:
 
 
 def _not_applicable(report: Report) -> list[str]:
-    """Say why checks were not applicable, the most frequent reason first."""
+    """Return why checks were not applicable, the most frequent reason first."""
     reasons = Counter(
         one_line(result.outcome.reason)
         for result in report.results
@@ -81,16 +81,16 @@ def _not_applicable(report: Report) -> list[str]:
     ranked = sorted(reasons.items(), key=lambda each: (-each[1], each[0]))
     rows = [f"{number:5}  {reason}" for reason, number in ranked[:_MOST_REASONS]]
     more = len(ranked) - _MOST_REASONS
-    return ["not applicable:", *rows, *([f"       and {more} reasons more"] if more > 0 else [])]
+    return ["not applicable:", *rows, *([f"       and {more} more reasons"] if more > 0 else [])]
 
 
 def _was_begun(result: Result) -> bool:
-    """Return whether a check has something of its own to tell."""
+    """Return whether a check has details of its own to show."""
     return result.outcome.verdict is CheckVerdict.FAIL or bool(result.outcome.evidence)
 
 
 def _never_begun(results: list[Result]) -> list[str]:
-    """Count checks of which nothing was seen on the bus, with the reason that they share."""
+    """Count checks without any frame on the bus, with their common reason."""
     counts = Counter((each.outcome.verdict, one_line(each.outcome.reason)) for each in results)
     return [
         f"{str(verdict).upper()} {counted(number, 'check')}: {reason}"
@@ -99,7 +99,7 @@ def _never_begun(results: list[Result]) -> list[str]:
 
 
 def _failure(alike: list[Result], show: overview.ShowFrames | None, again: str) -> list[str]:
-    """Tell a failure, and which are like it; without frames, without where to look too."""
+    """Return the text of a failure and its like; without frames, without hints too."""
     result = alike[0]
     clause = f"  {one_line(result.check.source)}"
     reason = [f"  {one_line(result.outcome.reason)}"] if result.outcome.reason else []
@@ -112,7 +112,7 @@ def _failure(alike: list[Result], show: overview.ShowFrames | None, again: str) 
 
 
 def _like(results: list[Result]) -> list[str]:
-    """Name what failed likewise."""
+    """Name the checks that failed in the same way."""
     if not results:
         return []
     names = [one_line(result.check.id) for result in results[:_MOST_REASONS]]
@@ -142,4 +142,4 @@ def _ending(report: Report, baseline: Baseline) -> Iterator[str]:
     if report.doubt:
         yield one_line(report.doubt)
     if report.aborted:
-        yield f"not all was judged: {one_line(report.aborted)}"
+        yield f"the run is incomplete: {one_line(report.aborted)}"

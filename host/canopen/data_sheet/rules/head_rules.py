@@ -29,14 +29,14 @@ _WIDEST: Final = 32
 _DUMMY: Final = re.compile(r"dummy([0-9a-f]{4})")
 _DUMMY_TYPES: Final = range(1, 0x20)
 _DUMMIES: Final = tuple(f"Dummy{kind:04d}" for kind in range(1, 8))
-"""Those that CiA 306 lists."""
+"""The dummy objects that CiA 306 lists."""
 _PDO_AREAS: Final = (("NrOfRXPDO", range(0x1400, 0x1600)), ("NrOfTXPDO", range(0x1800, 0x1A00)))
 _IDENTITY_OBJECT: Final = 0x1018
 _IDENTITY: Final = (("VendorNumber", 1), ("ProductNumber", 2), ("RevisionNumber", 3))
 
 
 def number(document: Document, section: str, key: str) -> int | None:
-    """Return the number of a keyword; None where there is none of 32 bits."""
+    """Return the number of a keyword; None if it is not a 32-bit number."""
     try:
         found = eds_value.parse_number(eds_value.plain_numbers(document.file.value(section, key)))
     except ValueError:
@@ -45,7 +45,7 @@ def number(document: Document, section: str, key: str) -> int | None:
 
 
 def sections(document: Document) -> Iterator[RuleFinding]:
-    """Find sections that every tool wants, and that are not there."""
+    """Find missing sections that every tool needs."""
     for title in _NEEDED:
         if title not in document.file.sections and not document.file.is_xml:
             last = len(document.texts)
@@ -58,7 +58,7 @@ def sections(document: Document) -> Iterator[RuleFinding]:
 
 
 def file_info(document: Document) -> Iterator[RuleFinding]:
-    """Judge [FileInfo]."""
+    """Check [FileInfo]."""
     if document.file.is_xml:
         return
     file = document.file
@@ -78,7 +78,7 @@ def file_info(document: Document) -> Iterator[RuleFinding]:
 
 
 def device_info(document: Document) -> Iterator[RuleFinding]:
-    """Judge [DeviceInfo] by itself."""
+    """Check [DeviceInfo] by itself."""
     file, title = document.file, "DeviceInfo"
     if title not in file.sections:
         return
@@ -107,7 +107,7 @@ def device_info(document: Document) -> Iterator[RuleFinding]:
 
 
 def _missing(document: Document, key: str) -> str:
-    """Return what a keyword of [DeviceInfo] stands for that is not there."""
+    """Return the value that a missing keyword of [DeviceInfo] stands for."""
     row = document.rows.get((_IDENTITY_OBJECT, dict(_IDENTITY).get(key, 0)))
     if key in dict(_IDENTITY) and row is not None and row.has_default:
         return f"0x{int.from_bytes(row.default, 'little'):08X}"
@@ -115,7 +115,7 @@ def _missing(document: Document, key: str) -> str:
 
 
 def counts(document: Document) -> Iterator[RuleFinding]:
-    """Hold the numbers of [DeviceInfo] against the objects."""
+    """Compare the numbers in [DeviceInfo] with the objects."""
     title = "DeviceInfo"
     for key, area in _PDO_AREAS:
         present = sum(index in area for index in document.device.objects)
@@ -123,7 +123,7 @@ def counts(document: Document) -> Iterator[RuleFinding]:
         if said is not None and line is not None and said != present:
             be = "is" if present == 1 else "are"
             what = f"{key}={said}, but of {area[0]:X}h to {area[-1]:X}h there {be} {present}"
-            whole = present and are_whole(document)  # else some may be lost
+            whole = present and are_whole(document)  # otherwise some may be lost
             sound = not document.file.is_xml and (said < present or whole)
             edits = (document.with_value(line, str(present)),) if sound else ()
             yield document.found("pdo-count", what, title, key, *edits)
@@ -138,7 +138,7 @@ def counts(document: Document) -> Iterator[RuleFinding]:
 
 
 def features(document: Document) -> Iterator[RuleFinding]:
-    """Hold what [DeviceInfo] promises against the objects that it needs."""
+    """Check that the objects exist which [DeviceInfo] promises."""
     title, rows = "DeviceInfo", document.rows
     if number(document, title, "LSS_Supported") and any(
         (0x1018, sub) not in rows for sub in (2, 4)
@@ -155,7 +155,7 @@ def features(document: Document) -> Iterator[RuleFinding]:
 
 
 def dummy_usage(document: Document) -> Iterator[RuleFinding]:
-    """Judge [DummyUsage]."""
+    """Check [DummyUsage]."""
     for line in document.lines_of("DummyUsage"):
         match = _DUMMY.fullmatch(line.key.lower())
         said = eds_value.without_comment(line.value)
@@ -181,12 +181,12 @@ def comment_lines(document: Document) -> Iterator[RuleFinding]:
     wanted = {f"line{at}" for at in range(1, len(numbers) + 1)}
     if said != len(numbers) or numbers != wanted:
         edits = (document.with_value(head, str(len(numbers))),) if numbers == wanted else ()
-        what = f"Lines={shorten(head.value)}, and there are {len(numbers)}, from Line1 on"
+        what = f"Lines={shorten(head.value)}, but there are {len(numbers)}, starting at Line1"
         yield document.found("comment-lines", what, "Comments", "Lines", *edits)
 
 
 def commissioning(document: Document) -> Iterator[RuleFinding]:
-    """Find what a DCF has and this one has not, and the other way round."""
+    """Find what a DCF needs and this one lacks, and what an EDS must not have."""
     file, title = document.file, "DeviceComissioning"
     if document.name.lower().endswith(".dcf") and title not in file.sections:
         yield document.found("commissioning-missing", f"the DCF has no [{title}]")
@@ -202,4 +202,4 @@ def commissioning(document: Document) -> Iterator[RuleFinding]:
 
 
 _DCF_KEYS: Final = frozenset(key.lower() for key in known_keys.OF_DCF if key != "ParameterValue")
-"""Of that one the reader tells."""
+"""Keywords that the reader reports."""

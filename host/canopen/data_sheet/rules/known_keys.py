@@ -34,7 +34,7 @@ _ENTRY: Final = (
 )
 OF_DCF: Final = ("ParameterValue", "Denotation", "UploadFile", "DownloadFile", "ParamRefd")
 _OURS: Final = ("MaxBytes", "DefaultBytes", "Unit", "Factor")
-"""Not of CiA 306; our reader, and in part the canopen library, take them."""
+"""Not in CiA 306; this reader, and partly the canopen library, accept them."""
 
 _LIST: Final = re.compile(r"SupportedObjects|NrOfEntries|[0-9]+", re.IGNORECASE)
 _KEYS: Final = {
@@ -42,14 +42,14 @@ _KEYS: Final = {
     "DummyUsage": re.compile(r"Dummy[0-9A-F]{4}", re.IGNORECASE),
     **dict.fromkeys(("MandatoryObjects", "OptionalObjects", "ManufacturerObjects"), _LIST),
 }
-"""What the keywords of sections with numbered ones look like."""
+"""Patterns of the keywords of sections with numbered keywords."""
 
 SECTION: Final = re.compile(
     r"[0-9A-F]{4}(sub[0-9A-F]{1,2}|Name|Value|Denotation|ObjectLinks)?"
     r"|[0-9A-F]{1,3}(sub[01])?|M[0-9].*|Tool[0-9]+",
     re.IGNORECASE,
 )
-"""Sections beside those with names of their own: objects, data types, modules, tools."""
+"""Sections without fixed names: objects, data types, modules, tools."""
 
 
 def _spelled(*names: str) -> dict[str, str]:
@@ -80,19 +80,19 @@ _NUMBERS: Final = {
     "DynamicChannels": r"NrOfSeg|(Type|PPOffset)[0-9]+",
     "Tools": r"Items",
 }
-"""The keywords of sections that have numbers."""
+"""Sections whose keywords have numbers as values."""
 _LISTED_NUMBERS: Final = re.compile(
     r"(Mandatory|Optional|Manufacturer)Objects|(Supported|Connected)Modules"
     r"|M[0-9]+(FixedObjects|SubExtends)|[0-9A-F]{4}ObjectLinks",
     re.IGNORECASE,
 )
-"""Sections that have nothing but numbers."""
+"""Sections in which all values are numbers."""
 _COUNTED: Final = re.compile(r"NrOfEntries|Lines|ProductVersion|ProductRevision", re.IGNORECASE)
-"""Keywords of other sections that have numbers."""
+"""Keywords of other sections whose values are numbers."""
 
 
 def is_number(section: str, key: str) -> bool:
-    """Return whether a keyword has a number, whatever the data type of its object.
+    """Return whether the value of a keyword is a number, for any data type of its object.
 
     >>> is_number("DeviceInfo", "VendorNumber"), is_number("1600Value", "NrOfEntries")
     (True, True)
@@ -109,7 +109,7 @@ def is_number(section: str, key: str) -> bool:
 
 
 def keys_of(section: str) -> dict[str, str] | None:
-    """Return the keywords of a section by their lower case; None where any may stand."""
+    """Return the keywords of a section by their lower case; None if any is allowed."""
     if object_section(section) is not None:
         return _OBJECT
     if is_module_object(section):
@@ -118,7 +118,7 @@ def keys_of(section: str) -> dict[str, str] | None:
 
 
 def numbered(section: str, key: str) -> str | None:
-    """Return how a keyword of a list is spelled, as `Line3`, `Dummy001B` or `12`; None for another.
+    """Return the spelling of a numbered keyword, as `Line3`, `Dummy001B` or `12`; None for others.
 
     >>> numbered("Comments", "line5"), numbered("DummyUsage", "dummy001b"), numbered("Tools", "x")
     ('Line5', 'Dummy001B', None)

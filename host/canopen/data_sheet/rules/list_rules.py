@@ -1,6 +1,6 @@
-"""Rules over the three lists of objects: each object in one, numbered from 1 on.
+"""Rules over the three lists of objects: each object is in one, numbers start at 1.
 
-What is listed and not described may be lost: it stays in its list, and no count is lowered.
+A listed object without a description may be lost: it stays in its list, and no count is lowered.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class ObjectList:
 
     Attributes:
         title: of its section.
-        entries: index by line, in their order; None for what is none.
+        entries: index by line, in file order; None if it is not an index.
     """
 
     def __init__(self, document: Document, title: str) -> None:
@@ -41,7 +41,7 @@ class ObjectList:
 
     @property
     def indices(self) -> list[int]:
-        """Those that are indices."""
+        """The valid indices."""
         return [index for _, index in self.entries if index is not None]
 
 
@@ -54,7 +54,7 @@ def _index(text: str) -> int | None:
 
 
 def _home(index: int) -> str:
-    """Return the list that an object belongs to.
+    """Return the list to which an object belongs.
 
     >>> _home(0x1018), _home(0x2000), _home(0x6000)
     ('MandatoryObjects', 'ManufacturerObjects', 'OptionalObjects')
@@ -65,12 +65,12 @@ def _home(index: int) -> str:
 
 
 def described(document: Document) -> set[int]:
-    """Return the objects that have a section, and belong into a list."""
+    """Return the objects that have a section and belong in a list."""
     return {index for _, index, sub in document.file.objects() if sub is None and index in _INDICES}
 
 
 def are_whole(document: Document) -> bool:
-    """Return whether the lists are there, as long as they say, and all that they name is there."""
+    """Return whether the lists exist, are complete, and name only described objects."""
     if _OPTIONAL not in document.file.sections:
         return False
     found = [ObjectList(document, title) for title in LISTS if title in document.file.sections]
@@ -82,7 +82,7 @@ def are_whole(document: Document) -> bool:
 
 
 def lists(document: Document) -> Iterator[RuleFinding]:
-    """Judge the three lists; each finding mends its list as a whole."""
+    """Check the three lists; each finding fixes its whole list."""
     if document.file.is_xml:
         return
     found = [ObjectList(document, title) for title in LISTS]
@@ -90,7 +90,7 @@ def lists(document: Document) -> Iterator[RuleFinding]:
     listed = {index for each in found for index in each.indices}
     for index in sorted(present - listed):
         title = _home(index)
-        what = f"{index:04X}h is in no list, {title} was expected"
+        what = f"{index:04X}h is not in any list; expected {title}"
         edits = _mended(document, found, title, present)
         yield document.found("list-missing", what, f"{index:04X}", "", *edits)
     seen: set[int] = set()
@@ -114,14 +114,14 @@ def _faults(
         return
     for line, index in each.entries:
         if index is None or index not in _INDICES:
-            yield "list-entry", f"{shorten(line.content)} is no index", line.number
+            yield "list-entry", f"{shorten(line.content)} is not an index", line.number
             continue
         if index not in present:
             yield "list-extra", f"{index:04X}h has no section", line.number
         elif index in seen:
             yield "list-doubled", f"{index:04X}h is listed twice", line.number
         elif _is_wrong(each.title, index):
-            what = f"{index:04X}h is in {each.title}, {_home(index)} was expected"
+            what = f"{index:04X}h is in {each.title}; expected {_home(index)}"
             yield "list-wrong", what, line.number
         seen.add(index)
     numbers = [int(line.key) for line, _ in each.entries]
@@ -134,7 +134,7 @@ def _faults(
 
 
 def _is_wrong(title: str, index: int) -> bool:
-    """Return whether an object is in the wrong list; profiles have mandatory ones of their own."""
+    """Return whether an object is in the wrong list; profiles define mandatory objects too."""
     if title == _MANDATORY:
         return _home(index) == _MANUFACTURER
     return title != _home(index)
@@ -143,7 +143,7 @@ def _is_wrong(title: str, index: int) -> bool:
 def _mended(
     document: Document, found: list[ObjectList], title: str, present: set[int]
 ) -> tuple[Edit, ...]:
-    """Return the edits that make a list right; that of another list comes with its own finding."""
+    """Return the edits that correct a list; another list has its own finding."""
     each = next(one for one in found if one.title == title)
     if title not in document.file.sections:
         return (
@@ -164,12 +164,12 @@ def _mended(
 
 
 def _may_be_set(said: int | None, listed: int, wanted: int) -> bool:
-    """Return whether a count is wrong, and does not tell of entries that are lost."""
+    """Return whether a count is wrong and does not indicate lost entries."""
     return said is None or (said != wanted and (said <= listed or said < wanted))
 
 
 def _rewritten(document: Document, each: ObjectList, wanted: list[int]) -> Iterator[Edit]:
-    """Yield the edits of those lines of a list that change."""
+    """Yield the edits of the lines of a list that change."""
     lines = [line for line, _ in each.entries]
     for at, index in enumerate(wanted[: len(lines)]):
         if (lines[at].key, each.entries[at][1]) != (str(at + 1), index):

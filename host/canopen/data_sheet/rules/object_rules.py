@@ -16,14 +16,14 @@ from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
 
 _LONGEST_NAME: Final = 241
 _STRUCTURE: Final = 0xFF
-"""The sub-index that tells the structure of an object (CiA 301, 7.4.3)."""
+"""The sub-index that holds the structure of an object (CiA 301, 7.4.3)."""
 _OF_ELEMENTS: Final = (
     *("DataType", "AccessType", "PDOMapping", "DefaultValue", "LowLimit", "HighLimit"),
 )
 
 
 def names(document: Document) -> Iterator[RuleFinding]:
-    """Judge the names of objects and entries."""
+    """Check the names of objects and entries."""
     for section, _, _ in document.file.objects():
         name = document.file.value(section, "ParameterName")
         if len(name) > _LONGEST_NAME:
@@ -35,7 +35,7 @@ def names(document: Document) -> Iterator[RuleFinding]:
 
 
 def kinds(document: Document) -> Iterator[RuleFinding]:
-    """Find objects that do not say what they are, and entries that may or may not be mapped."""
+    """Find objects without an ObjectType, and entries without PDOMapping."""
     file = document.file
     for section, index, sub in file.objects():
         described = document.device.objects.get(index)
@@ -44,7 +44,7 @@ def kinds(document: Document) -> Iterator[RuleFinding]:
         composed = sub is None and described.code not in VARIABLES
         if composed and not file.has(section, "ObjectType"):
             line = f"ObjectType=0x{described.code:X}"
-            what = f"ObjectType is missing, and there are sub-indices: {line} is taken"
+            what = f"ObjectType is missing, but there are sub-indices: {line} is taken"
             edit = document.add_to(section, [line])
             yield document.found("object-type-missing", what, section, "", edit)
         if not composed and file.has(section, "DataType") and not file.has(section, "PDOMapping"):
@@ -53,7 +53,7 @@ def kinds(document: Document) -> Iterator[RuleFinding]:
 
 
 def sub_numbers(document: Document) -> Iterator[RuleFinding]:
-    """Hold SubNumber against the sub-indices that are there; what is missing is not hidden."""
+    """Compare SubNumber with the existing sub-indices; a missing sub-index stays visible."""
     file = document.file
     for section, index, sub in file.objects():
         described = document.device.objects.get(index)
@@ -73,7 +73,7 @@ def sub_numbers(document: Document) -> Iterator[RuleFinding]:
 
 
 def _is_whole(document: Document, section: str, index: int) -> bool:
-    """Return whether all but SubNumber agrees that no sub-index is missing."""
+    """Return whether all but SubNumber agree that no sub-index is missing."""
     if document.device.objects[index].code in VARIABLES:
         return document.file.has(section, "ObjectType")
     subs, row = sorted(document.subs(index)), document.rows.get((index, 0))
@@ -83,7 +83,7 @@ def _is_whole(document: Document, section: str, index: int) -> bool:
 
 
 def sub_zeros(document: Document) -> Iterator[RuleFinding]:
-    """Judge the sub-index 0 of arrays and records."""
+    """Check sub-index 0 of arrays and records."""
     for index, described in document.device.objects.items():
         if described.code in VARIABLES:
             continue
@@ -112,14 +112,14 @@ def _highest(document: Document, index: int, section: str, said: int) -> Iterato
 
 
 def _section_of(row: EntryDescription) -> Iterator[str]:
-    """Yield the section of an entry; without a default where it has none."""
+    """Yield the section of an entry; without DefaultValue if it has no default."""
     yield ""
     for line in entry_lines(row):
         yield "DefaultValue=" if line.startswith("DefaultValue=") and not row.has_default else line
 
 
 def compact_edits(document: Document, section: str) -> tuple[Edit, ...]:
-    """Return what writes each entry of a compact object as a section of its own."""
+    """Return the edits that write each entry of a compact object as its own section."""
     place = object_section(section)
     known = all(document.file.value(section, key) for key in ("DataType", "AccessType"))
     if place is None or document.file.is_xml or not known:
@@ -129,7 +129,7 @@ def compact_edits(document: Document, section: str) -> tuple[Edit, ...]:
     told = set(document.subs(index))
     try:
         texts = [text for row in rows if row.sub not in told for text in _section_of(row)]
-    except ValueError:  # a name with control characters, which are mended first
+    except ValueError:  # a name with control characters, which are fixed first
         return ()
     edits = [
         Edit(line.number)

@@ -31,9 +31,9 @@ _RESTRICTED: Final = (
 _SYNC: Final = 0x1005
 _EMCY: Final = 0x1014
 _SDO: Final = range(0x1200, 0x1300)
-"""Servers, clients from 1280h on; sub-indices 1 and 2 are COB-IDs."""
+"""Servers, and clients from 1280h on; sub-indices 1 and 2 are COB-IDs."""
 _DEFAULT_SERVER: Final = {(0x1200, 1): 0x600, (0x1200, 2): 0x580}
-"""The lowest CAN-ID, which the node-ID is added to."""
+"""The lowest CAN-ID of each type, to which the node-ID is added."""
 _ALL_SUBS: Final = (1 << len(ELEMENTS)) - 1
 _NEEDED_SUBS: Final = 0b11
 """COB-ID and transmission type."""
@@ -43,7 +43,7 @@ _NODE: Final = 5
 
 
 def cob_ids(document: Document) -> Iterator[RuleFinding]:
-    """Judge the COB-IDs of PDOs, SDO servers and clients, SYNC and EMCY."""
+    """Check the COB-IDs of PDOs, SDO servers and clients, SYNC and EMCY."""
     taken: dict[int, str] = {}
     for row in document.rows.values():
         if _is_cob_id(row) and row.data_type is DataType.UNSIGNED32 and row.has_default:
@@ -87,13 +87,13 @@ def _cob_id(
     own = int.from_bytes(row.power_on_data(_NODE), "little") & _IDS
     who = f"{row.index:04X}h:{row.sub:02X}"
     if own in taken:
-        what = f"CAN-ID 0x{own:03X} of node {_NODE} is that of {taken[own]}, too"
+        what = f"CAN-ID 0x{own:03X} of node {_NODE} is also that of {taken[own]}"
         yield document.found("cob-id-unique", what, place, "DefaultValue")
     taken.setdefault(own, who)
 
 
 def _is_of_server(document: Document, row: EntryDescription, base: int) -> bool:
-    """Return whether a default is that of the first server; that of one node is, in a DCF."""
+    """Return whether a default is that of the first server; in a DCF it is that of one node."""
     default = int.from_bytes(row.default, "little")
     if document.file.is_dcf and not row.relative:
         return default in range(base + _LOWEST_NODE, base + _HIGHEST_NODE + 1)
@@ -101,7 +101,7 @@ def _is_of_server(document: Document, row: EntryDescription, base: int) -> bool:
 
 
 def compact(document: Document) -> Iterator[RuleFinding]:
-    """Judge what CompactPDO implies."""
+    """Check what CompactPDO implies."""
     title, key = "DeviceInfo", "CompactPDO"
     mask = number(document, title, key)
     if not mask or document.file.is_xml:
@@ -118,7 +118,7 @@ def compact(document: Document) -> Iterator[RuleFinding]:
 
 
 def halves(document: Document) -> Iterator[RuleFinding]:
-    """Find PDOs that lack their parameter or their mapping."""
+    """Find PDOs without their communication parameter or their mapping."""
     objects = document.device.objects
     for index in objects:
         if (index in _RPDO or index in _TPDO) and index + _MAPPING not in objects:
@@ -131,7 +131,7 @@ def halves(document: Document) -> Iterator[RuleFinding]:
 
 
 def reserved(document: Document) -> Iterator[RuleFinding]:
-    """Find the sub-index 4 of communication parameters: a device must refuse it."""
+    """Find sub-index 4 of communication parameters: a device must refuse it."""
     described = set[int]()
     for section, index, sub in document.file.objects():
         described.add(index)
@@ -145,7 +145,7 @@ def reserved(document: Document) -> Iterator[RuleFinding]:
 
 
 def mappings(document: Document) -> Iterator[RuleFinding]:
-    """Judge what is mapped by default."""
+    """Check the default mapping."""
     for index in document.device.objects:
         if index - _MAPPING in _RPDO:
             yield from _mapping(document, index, Access.RPDO)
@@ -160,7 +160,7 @@ def _mapping(document: Document, index: int, way: Access) -> Iterator[RuleFindin
     count = len(in_use)
     if head is not None and head.has_default and head.data_type.is_integer:
         count = int.from_bytes(head.default, "little")
-    if count > _MOST_MAPPED:  # an MPDO, or none
+    if count > _MOST_MAPPED:  # an MPDO, or not a number of objects
         if count not in (254, 255):
             what = f"{count} objects are mapped, {_MOST_MAPPED} were allowed"
             yield document.found("mapping-count", what, f"{index:04X}sub0", "DefaultValue")
@@ -182,7 +182,7 @@ def _mapping(document: Document, index: int, way: Access) -> Iterator[RuleFindin
 def _mapped(
     document: Document, row: EntryDescription, value: int, way: Access
 ) -> Iterator[RuleFinding]:
-    """Judge one object that is mapped."""
+    """Check one mapped object."""
     index, sub, bits = value >> 16, value >> 8 & 0xFF, value & 0xFF
     place, what = _section(document, row), f"{index:04X}h:{sub:02X}"
     if index < 0x20:  # a dummy
@@ -204,6 +204,6 @@ def _mapped(
 
 
 def _section(document: Document, row: EntryDescription) -> str:
-    """Return the section that an entry is described in."""
+    """Return the section that describes an entry."""
     section = f"{row.index:04X}sub{row.sub:X}"
     return section if section in document.file.sections else f"{row.index:04X}"

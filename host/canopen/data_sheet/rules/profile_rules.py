@@ -17,12 +17,12 @@ _DEVICE_TYPE: Final = (0x1000, 0)
 _IDENTITY: Final = 0x1018
 _COMMUNICATION: Final = range(0x1000, 0x2000)
 _WRITE_ONLY: Final = (0x1024, 0x1026, *range(0x1F50, 0x1F60))
-"""Objects that take what they need not give back: commands, programs."""
+"""Write-only objects: commands, programs."""
 _PROFILE_AREA: Final = range(0x6000, 0xA000)
 _TEXTS: Final = (
     *(DataType.VISIBLE_STRING, DataType.UNICODE_STRING, DataType.OCTET_STRING, DataType.DOMAIN),
 )
-"""Data types whose values are as long as they are."""
+"""Data types without a fixed length."""
 _INPUTS_OUTPUTS: Final = (
     (1 << 16, "digital inputs", (0x6000, 0x6020, 0x6100, 0x6120)),
     (1 << 17, "digital outputs", (0x6200, 0x6220, 0x6300, 0x6320)),
@@ -37,11 +37,11 @@ _GUESSED: Final = (
     *("data-type-missing", "data-type-unknown", "empty-value", "no-number"),
     *("access-missing", "access-form"),
 )
-"""Where one of these is found, the reader has taken something that nobody wrote."""
+"""If one of these rules is broken, the reader assumed a value that the file lacks."""
 
 
 def mandatory(document: Document) -> Iterator[RuleFinding]:
-    """Find what each CANopen device has, and this one has not."""
+    """Find objects that each CANopen device must have, and this one lacks."""
     objects = document.device.objects
     if not objects:
         return
@@ -57,7 +57,7 @@ def mandatory(document: Document) -> Iterator[RuleFinding]:
 
 
 def communication(document: Document) -> Iterator[RuleFinding]:
-    """Hold the objects of the communication area against CiA 301."""
+    """Compare the objects of the communication area with CiA 301."""
     for index, described in document.device.objects.items():
         standard = standard_object(index)
         if standard is not None and standard.composed == (described.code in VARIABLES):
@@ -86,7 +86,7 @@ def _entry(
             what = f"its DataType is {row.data_type.name}, {wanted.name} was allowed"
             yield document.found("communication-type", what, place, "DataType")
     if Access.WRITE in row.access and standard is not None and standard.fixed:
-        what = "the bus may write it, reading was allowed"
+        what = "the bus may write it; it must be read-only"
         yield document.found("communication-access", what, place, "AccessType")
     elif Access.READ not in row.access and row.index not in _WRITE_ONLY and standard is not None:
         what = "the bus may not read it"
@@ -94,13 +94,13 @@ def _entry(
 
 
 def _is_composed(document: Document, row: EntryDescription) -> bool:
-    """Return whether an object has the kind that its types are known for."""
+    """Return whether an object has the kind to which its known types belong."""
     standard, described = standard_object(row.index), document.device.objects[row.index]
     return standard is not None and standard.composed == (described.code not in VARIABLES)
 
 
 def profile(document: Document) -> Iterator[RuleFinding]:
-    """Hold the device type against the objects of the profile."""
+    """Compare the device type with the objects of the profile."""
     row, objects = document.rows.get(_DEVICE_TYPE), document.device.objects
     if row is None or row.data_type is not DataType.UNSIGNED32:
         return
@@ -114,7 +114,7 @@ def profile(document: Document) -> Iterator[RuleFinding]:
     if number == _IO_PROFILE:
         for flag, what, some in _INPUTS_OUTPUTS:
             if more & flag and not any(index in objects for index in some):
-                text = f"it promises {what}, but there is none of {some[0]:04X}h to {some[-1]:04X}h"
+                text = f"it declares {what}, but has none of {some[0]:04X}h to {some[-1]:04X}h"
                 yield document.found("profile-objects", text, "1000", "DefaultValue")
     elif number == _DRIVE_PROFILE:
         for index in _DRIVE:

@@ -23,12 +23,12 @@ _BEHIND_WORD: Final = re.compile(r"(?<!\s)\s*+(?:[#;]|//).*$")
 
 
 def encoding(document: Document) -> Iterator[RuleFinding]:
-    """Find what the bytes of the file are not: ASCII without a mark."""
+    """Find deviations from ASCII without a byte order mark."""
     edit = Edit(0, EditPlace.ENCODING)
     if document.encoding.startswith("utf-16"):
         yield document.found("utf-16", "the file is UTF-16, ASCII was allowed", "", 0, edit)
     elif document.has_bom and not document.file.is_xml:
-        yield document.found("bom", "a byte order mark stands before the file", "", 0, edit)
+        yield document.found("bom", "the file begins with a byte order mark", "", 0, edit)
     if document.file.is_xml:
         return
     if not document.is_unicode:
@@ -41,12 +41,12 @@ def encoding(document: Document) -> Iterator[RuleFinding]:
             yield document.found("non-ascii", what, "", number)
         if _CONTROLS.search(text):
             clean = Edit(number, lines=(_CONTROLS.sub("", text),))
-            what = "a control character stands in the line"
+            what = "the line has a control character"
             yield document.found("control-character", what, "", number, clean)
 
 
 def line_ends(document: Document) -> Iterator[RuleFinding]:
-    """Find lines that end with CR alone, and files of several minds."""
+    """Find lines that end with CR alone, and files with mixed line ends."""
     ends = set(document.ends) - {""}
     if document.file.is_xml:
         return
@@ -56,23 +56,23 @@ def line_ends(document: Document) -> Iterator[RuleFinding]:
         yield document.found("line-ends", "the line ends with CR alone", "", first, edit)
     elif len(ends) > 1:
         other = document.ends.index("\n" if document.ends[0] == "\r\n" else "\r\n") + 1
-        yield document.found("mixed-line-ends", "CR LF and LF end lines here", "", other)
+        yield document.found("mixed-line-ends", "the file mixes CR LF and LF", "", other)
 
 
 def titles(document: Document) -> Iterator[RuleFinding]:
-    """Find titles that are written in another way, and sections that nobody knows."""
+    """Find titles with another spelling, and unknown sections."""
     for line in document.file.lines:
         if not line.title or document.file.is_xml:
             continue
         if line.section in KNOWN_SECTIONS.values() or SECTION.fullmatch(line.section):
             yield from _title(document, line)
         else:
-            what = f"[{shorten(line.section)}] is no section of CiA 306"
+            what = f"[{shorten(line.section)}] is not a section of CiA 306"
             yield document.found("unknown-section", what, "", line.number)
 
 
 def _title(document: Document, line: EdsLine) -> Iterator[RuleFinding]:
-    """Judge the title of a section that is known; hexadecimal digits have either case."""
+    """Check the title of a known section; hexadecimal digits may have either case."""
     wanted = f"[{line.section}]"
     named = line.section in KNOWN_SECTIONS.values()
     plain = not named and _PLAIN.fullmatch(line.content)
@@ -83,7 +83,7 @@ def _title(document: Document, line: EdsLine) -> Iterator[RuleFinding]:
 
 
 def keywords(document: Document) -> Iterator[RuleFinding]:
-    """Find keywords that nobody knows, or that are spelled in another case."""
+    """Find unknown keywords, and keywords with another spelling."""
     if document.file.is_xml:
         return
     for line in document.file.lines:
@@ -92,7 +92,7 @@ def keywords(document: Document) -> Iterator[RuleFinding]:
             continue
         spelled = known.get(line.key.lower()) or numbered(line.section, line.key)
         if spelled is None:
-            what = f"{shorten(line.key)} is no keyword of CiA 306 here"
+            what = f"{shorten(line.key)} is not a keyword of CiA 306 here"
             yield document.found("unknown-key", what, line.section, line.number)
         elif spelled != line.key:
             text = document.texts[line.number - 1].replace(line.key, spelled, 1)
@@ -118,12 +118,12 @@ def comments(document: Document) -> Iterator[RuleFinding]:
             remark = match[0].strip().lstrip("#/;").strip()
             kept = [f"; {remark}"] if remark else []
             alone = Edit(line.number, lines=(*kept, raw[: match.start()]))
-            what = f"a comment stands behind {shorten(raw[: match.start()].strip())!r}"
+            what = f"a comment follows {shorten(raw[: match.start()].strip())!r}"
             yield document.found("inline-comment", what, line.section, line.number, alone)
 
 
 def _is_word(document: Document, line: EdsLine) -> bool:
-    """Return whether a line gives a number, or an access type: no text in which `#` may stand."""
+    """Return whether a line holds a number or an access type: not a text that may contain `#`."""
     if line.key.lower() == "accesstype" or is_number(line.section, line.key):
         return line.key.lower() != "count"
     return kind_of(document, line) is not None

@@ -13,11 +13,11 @@ from tickrig.wire.canopen.eds.eds_file import shorten
 from tickrig.wire.canopen.eds.eds_value import object_section
 
 _SIGNS: Final = 2
-"""One alone may be a slip: a missing line end, one object that is only listed."""
+"""One alone may be a slip: a missing line end, or one object that is only listed."""
 
 
 def truncated(document: Document) -> Iterator[RuleFinding]:
-    """Find a file that ends before what it announces."""
+    """Find a file that ends before everything that it announces."""
     lines = [line for line in document.file.lines if line.content]
     if document.file.is_xml or not lines:
         return
@@ -31,7 +31,7 @@ def truncated(document: Document) -> Iterator[RuleFinding]:
 
 
 def _listed_behind(document: Document, last: str) -> list[int]:
-    """Return the listed objects without a section, if they are those behind the last section."""
+    """Return the listed objects without a section, if they come after the last section."""
     place, present = object_section(last), described(document)
     listed = [index for title in LISTS for index in ObjectList(document, title).indices]
     for order in (listed, sorted(listed)):

@@ -1,4 +1,4 @@
-"""Rules over values: numbers, node-IDs, defaults, limits; and what mends those of the reader."""
+"""Rules over values: numbers, node-IDs, defaults, limits; and fixes for findings of the reader."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _NODE_ID: Final = re.compile(r"\$NODEID(\+(0x[0-9A-F]+|[0-9]+))?", re.IGNORECASE
 _NUMBERS: Final = frozenset(
     kind for kind in DataType if kind.is_integer or kind in (*eds_value.FLOATS, *eds_value.TIMES)
 )
-"""Data types that have a number for a value."""
+"""Data types whose values are numbers."""
 _VALUES: Final = frozenset({"defaultvalue", "lowlimit", "highlimit", "parametervalue"})
 _NUMBERED: Final = re.compile(r"(line)?0+([1-9][0-9]*)", re.IGNORECASE | re.ASCII)
 """Keywords of lists that are written with leading zeros."""
@@ -31,9 +31,9 @@ _OF_ELEMENTS: Final = re.compile(r"([0-9A-F]{4})(Value|Name|Denotation)")
 
 
 def numbers(document: Document) -> Iterator[RuleFinding]:
-    """Find numbers that are octal for some readers and decimal for others, and odd node-IDs."""
+    """Find numbers that some readers take for octal and others for decimal, and odd node-IDs."""
     for line in document.file.lines:
-        if not _CANDIDATE.search(line.value):  # most lines are none
+        if not _CANDIDATE.search(line.value):  # most lines have none
             continue
         if not line.is_keyword or document.keyword(line.section, line.key) is not line:
             continue
@@ -41,7 +41,7 @@ def numbers(document: Document) -> Iterator[RuleFinding]:
         if kind is None and not is_number(line.section, line.key):
             continue
         if line.section == "FileInfo" or (document.file.is_xml and line.key == "ObjFlags"):
-            continue  # `file_info` looks at the form of a version; flags of XML are hexadecimal
+            continue  # `file_info` checks the form of a version; flags in XML are hexadecimal
         terms = eds_value.without_comment(line.value).replace(" ", "").split("+")
         if any(_OCTAL.fullmatch(term) for term in terms) and (kind is None or kind.is_integer):
             yield _leading_zero(document, line, terms)
@@ -50,7 +50,7 @@ def numbers(document: Document) -> Iterator[RuleFinding]:
 
 
 def list_numbers(document: Document) -> Iterator[RuleFinding]:
-    """Find keywords of lists whose own number has leading zeros: other readers do not find them."""
+    """Find numbered keywords with leading zeros: other readers do not find them."""
     for line in () if document.file.is_xml else document.file.lines:
         zeros = _NUMBERED.fullmatch(line.key) if line.is_keyword else None
         if zeros is None or eds_value.object_section(line.section) is not None:
@@ -63,7 +63,7 @@ def list_numbers(document: Document) -> Iterator[RuleFinding]:
 
 
 def kind_of(document: Document, line: eds_value.EdsLine) -> DataType | None:
-    """Return the data type of the value that a line gives, None if it gives none, or no number."""
+    """Return the data type of the value in a line, None if it is not a number."""
     of_elements = _OF_ELEMENTS.fullmatch(line.section)
     place = eds_value.object_section(line.section)
     if of_elements is not None and of_elements[2] == "Value" and line.key.isdecimal():
@@ -78,7 +78,7 @@ def kind_of(document: Document, line: eds_value.EdsLine) -> DataType | None:
 
 
 def _leading_zero(document: Document, line: eds_value.EdsLine, terms: list[str]) -> RuleFinding:
-    """Judge a number, or a sum with the node-ID; a value is mended that is one either way."""
+    """Check a number, or a sum with the node-ID; fix a value that is a number in both readings."""
     octal = [term for term in terms if _OCTAL.fullmatch(term)]
     first = octal[0]
     what = f"{shorten(line.content)} is {int(first, 8)} in octal, {int(first)} in decimal"
@@ -93,7 +93,7 @@ def _leading_zero(document: Document, line: eds_value.EdsLine, terms: list[str])
 
 
 def _node_id(document: Document, section: str, line: eds_value.EdsLine) -> Iterator[RuleFinding]:
-    """Judge what the node-ID is added to; blanks are left to the author."""
+    """Check what is added to the node-ID; blanks are left to the author."""
     plain = line.value.replace(" ", "")
     if _NODE_ID.fullmatch(plain) and plain.startswith("$NODEID"):
         return
@@ -109,12 +109,12 @@ def _node_id(document: Document, section: str, line: eds_value.EdsLine) -> Itera
         edits = (document.with_value(line, mended),)
     what = f"{shorten(line.content)} is not $NODEID or $NODEID+NUMBER"
     if edits:
-        what += f": {mended} is meant"
+        what += f": use {mended}"
     yield document.found("nodeid-form", what, section, line.number, *edits)
 
 
 def limits(document: Document) -> Iterator[RuleFinding]:
-    """Hold defaults against limits, and limits against the data type."""
+    """Compare defaults with limits, and limits with the data type."""
     for row in document.rows.values():
         section = f"{row.index:04X}"
         if section not in document.file.sections or document.subs(row.index):
@@ -139,7 +139,7 @@ def _limit(
             return
         lowest, highest = kind.limits
         if limit is not None and not lowest <= limit <= highest:
-            what = f"{key}={shorten(text)} is no {kind.name}"
+            what = f"{key}={shorten(text)} is not a valid {kind.name}"
             yield document.found("limit-range", what, section, key)
 
 
@@ -158,7 +158,7 @@ def _text(limit: int | float | None) -> str:
 
 
 def of_reader(document: Document) -> Iterator[RuleFinding]:
-    """Give what the reader found, with what mends it."""
+    """Yield the findings of the reader, with the edits that fix them."""
     file = document.file
     by_line = {line.number: line for line in file.lines}
     for finding in (*file.errors, *file.warnings):
@@ -169,12 +169,12 @@ def of_reader(document: Document) -> Iterator[RuleFinding]:
         if mend is not None and line is not None and not file.is_xml:
             edits = mend(document, finding, line)
         if finding.rule == "doubled-key" and line is not None and document.is_again(line):
-            continue  # said of the section
+            continue  # reported for the section
         text = finding.reason
         if finding.rule == "doubled-section" and line is not None:
             text = _doubled_text(document, line)
         elif finding.rule in _OF_ONE_ENTRY and _is_compact_record(document, finding.section):
-            text += "; better than adding it, describe each entry of the RECORD"
+            text += "; rather than adding it, describe each entry of the RECORD"
         where = shorten(finding.section)
         yield RuleFinding(RULES[finding.rule], document.name, finding.line, where, text, edits)
 
@@ -203,7 +203,7 @@ def _word(document: Document, finding: Finding, line: eds_value.EdsLine) -> tupl
 
 
 def _taken(finding: Finding) -> str:
-    """Return what the reader says that it has taken."""
+    """Return the value that the reader says it uses."""
     return finding.reason.rpartition(": ")[2].partition(" ")[0]
 
 
@@ -213,7 +213,7 @@ def _access(document: Document, finding: Finding, line: eds_value.EdsLine) -> tu
 
 
 def _empty(document: Document, finding: Finding, line: eds_value.EdsLine) -> tuple[Edit, ...]:
-    """Give an empty keyword the value that it counts as; a DataType only where CiA 301 has one."""
+    """Set an empty keyword to its implied value; a DataType only if CiA 301 defines one."""
     if line.key.lower() == "datatype" and _taken(finding) == str(int(DataType.DOMAIN)):
         return ()
     return (document.with_value(line, _taken(finding)),)
@@ -222,7 +222,7 @@ def _empty(document: Document, finding: Finding, line: eds_value.EdsLine) -> tup
 def _standard_type(
     document: Document, finding: Finding, line: eds_value.EdsLine
 ) -> tuple[Edit, ...]:
-    """Add the data type that CiA 301 gives an object, where it gives one."""
+    """Add the data type that CiA 301 gives an object, if there is one."""
     kind = DataType[_taken(finding)]
     if kind is DataType.DOMAIN:
         return ()
@@ -230,20 +230,20 @@ def _standard_type(
 
 
 def _bytes(document: Document, finding: Finding, line: eds_value.EdsLine) -> tuple[Edit, ...]:
-    """Write the bytes that are taken; what a text is meant for is left to the author."""
+    """Write the bytes that are used; the meaning of a text is left to the author."""
     taken = finding.reason.rpartition(": ")[2].removesuffix(" is taken").replace(" ", "")
     is_plain = eds_value.is_hex_bytes(taken) and eds_value.without_comment(line.value) == line.value
     return (document.with_value(line, taken),) if is_plain else ()
 
 
 def _bit_rate(document: Document, finding: Finding, line: eds_value.EdsLine) -> tuple[Edit, ...]:
-    """Write kbit/s where bit/s are meant."""
+    """Write kbit/s if bit/s are meant."""
     taken = _taken(finding)
     return (document.with_value(line, taken),) if taken.isdecimal() else ()
 
 
 def _kind(document: Document, finding: Finding, line: eds_value.EdsLine) -> tuple[Edit, ...]:
-    """Write the kind that is taken, where it has sub-indices."""
+    """Write the object type that is used, if the object has sub-indices."""
     place = eds_value.object_section(finding.section)
     described = document.device.objects.get(place[0]) if place is not None else None
     if described is None or not document.subs(place[0] if place else 0):
@@ -252,9 +252,9 @@ def _kind(document: Document, finding: Finding, line: eds_value.EdsLine) -> tupl
 
 
 def _comment(document: Document, finding: Finding, line: eds_value.EdsLine) -> tuple[Edit, ...]:
-    """Make the line a comment; before the first section, where one is told, all such lines.
+    """Turn the line into a comment; for a line before the first section, all of these lines.
 
-    What has lost its title stays: as comments its keywords would be lost without a word.
+    Lines that lost their title stay: as comments, their keywords would be lost silently.
     """
     lines = [line]
     if not line.section and document.head_is_lost:
@@ -268,7 +268,7 @@ def _comment(document: Document, finding: Finding, line: eds_value.EdsLine) -> t
 
 
 def _doubled_key(document: Document, finding: Finding, line: eds_value.EdsLine) -> tuple[Edit, ...]:
-    """Drop a keyword that says the same again; which of two values is meant nobody knows."""
+    """Drop a keyword that repeats the same value; the right one of two values is unknown."""
     first = document.keyword(line.section, line.key)
     same = first is not None and first.value == line.value
     return (Edit(line.number),) if same else ()
@@ -277,7 +277,7 @@ def _doubled_key(document: Document, finding: Finding, line: eds_value.EdsLine) 
 def _doubled_section(
     document: Document, finding: Finding, line: eds_value.EdsLine
 ) -> tuple[Edit, ...]:
-    """Move keywords to the first section, and the title out; unless they contradict it."""
+    """Move keywords to the first section, and remove the title, unless they contradict it."""
     if _contradicting(document, line):
         return ()
     moved: list[str] = []
@@ -294,8 +294,8 @@ def _doubled_section(
 def _again(
     document: Document, title: eds_value.EdsLine
 ) -> Iterator[tuple[eds_value.EdsLine, eds_value.EdsLine | None]]:
-    """Yield the keywords behind a title, each with the line that counts."""
-    lines = document.file.lines  # a slice would be all of the rest, for each title
+    """Yield the keywords after a title, each with the line that counts."""
+    lines = document.file.lines  # a slice would copy the whole rest, for each title
     behind = (lines[at] for at in range(title.number, len(lines)))
     for line in takewhile(lambda other: not other.title, behind):
         if line.is_keyword and line.key:
@@ -303,7 +303,7 @@ def _again(
 
 
 def _contradicting(document: Document, title: eds_value.EdsLine) -> list[str]:
-    """Return what a section that is there again says otherwise."""
+    """Return the contradictions of a repeated section."""
     return [
         f"{shorten(line.content)} against {shorten(first.value)}"
         for line, first in _again(document, title)
@@ -328,12 +328,12 @@ _MENDS: Final[dict[str, Callable[[Document, Finding, eds_value.EdsLine], tuple[E
 }
 
 _OF_LINES: Final = ("inline-comment", "sub0-missing")
-"""Rules of the reader that a rule over lines or objects tells of, too."""
+"""Rules of the reader that a rule over lines or objects also reports."""
 _OF_ONE_ENTRY: Final = ("data-type-missing", "access-missing")
 
 
 def stray_lines(document: Document) -> Iterator[RuleFinding]:
-    """Find lines that say nothing, and what is there twice, where the reader does not look."""
+    """Find lines without a meaning, and duplicates, where the reader does not look."""
     seen: set[tuple[str, str]] = set()
     for line in () if document.file.is_xml else document.file.lines:
         if line.title:
@@ -347,7 +347,7 @@ def stray_lines(document: Document) -> Iterator[RuleFinding]:
         elif line.content and not eds_value.describes_device(line.section):
             yield from _stray(document, line, seen)
         elif line.content and not line.section and line.is_keyword and line.key:
-            what = f"{shorten(line.content)!r} stands before the first section"
+            what = f"{shorten(line.content)!r} is before the first section"
             edits = () if document.head_is_lost else (document.comment_out(line.number),)
             yield document.found("no-keyword", what, "", line.number, *edits)
 

@@ -25,14 +25,14 @@ from tickrig.wire.canopen.sdo import (
 from tickrig.wire.canopen.sdo_frame import REQUEST_COB_ID, RESPONSE_COB_ID
 
 _MOST: Final = 0.8
-"""Part of a bus from which on periods are left out: what was asked is not answered in time."""
+"""Bus load from which on periods are skipped, because answers do not arrive in time."""
 
 _Load = float
-"""Bits in a microsecond."""
+"""Bits per microsecond."""
 
 
 def check_load(bus: BusFile) -> tuple[RuleFinding, ...]:
-    """Return a finding if the periods of the drives take too much of the bus.
+    """Return a finding if the periods of the drives load the bus too much.
 
     Frames are counted to the bit, with values of 0.
     """
@@ -49,17 +49,17 @@ def check_load(bus: BusFile) -> tuple[RuleFinding, ...]:
 
 
 def _said(drives: int, sdo: _Load, pdos: _Load) -> str:
-    """Say what takes how much, and how many drives would not be too many."""
+    """Return the shares of the load, and how many drives the bus can carry."""
     text = f"{sdo + pdos:.0%} of the bus in each period"
     if not drives:
         return f"{text} for PDOs"
     fitting = max(0, int(drives * (_MOST - pdos) / sdo))
     what = f"polling of {counted(drives, 'drive')} by SDO {sdo:.0%}, PDOs {pdos:.0%}"
-    return f"{text}: {what}; {_MOST:.0%} would do for {fitting} of them"
+    return f"{text}: {what}; {_MOST:.0%} is enough for {fitting} of them"
 
 
 def polling_load(slave: BusSlave, master: BusMaster) -> _Load:
-    """Return what is asked of a drive, and told it, by SDO."""
+    """Return the SDO requests and responses of a drive in each period."""
     period_us = drive_driver.period_us_of(slave) or master.sync_period_us
     if not (drive_driver.is_drive(slave) and slave.boot and period_us):
         return 0.0
@@ -98,7 +98,7 @@ def _bits(slave: BusSlave, request: bytes, response: bytes) -> int:
 
 
 def pdo_load(slave: BusSlave, master: BusMaster) -> _Load:
-    """Return what PDOs take that come in periods."""
+    """Return the load of periodic PDOs."""
     written_us = (
         drive_driver.period_us_of(slave) or master.sync_period_us
         if drive_driver.is_drive(slave)

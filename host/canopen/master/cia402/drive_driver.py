@@ -19,7 +19,7 @@ from tickrig.host.canopen.periodic_timer import PeriodicTimer
 from tickrig.host.canopen.sdo_transfer import download, upload
 from tickrig.wire.instant import NEVER
 
-# How a drive is driven, as its bus.yml says.
+# The settings of a drive in its bus.yml.
 
 _DRIVE_PROFILE: Final = 402
 _PERIOD_MS: Final = 10
@@ -33,17 +33,17 @@ _SWITCHING_STATES: Final = {
     5: drive_state.DriveState.OPERATION_ENABLED,
     6: drive_state.DriveState.QUICK_STOP_ACTIVE,
 }
-"""`switching_state` of a bus.yml, by its number."""
+"""States of `switching_state` in a bus.yml, by number."""
 
 
 @dataclass(frozen=True, slots=True)
 class DriveSettings:
-    """How an axis is driven.
+    """The settings of an axis.
 
     Attributes:
         channel: its name, its scales and offsets.
         axis: 0 for the first axis of the device.
-        switching_state: in this state the mode is changed.
+        switching_state: the state in which the mode is changed.
         homing_us: how long homing may take.
     """
 
@@ -54,14 +54,14 @@ class DriveSettings:
 
 
 def is_drive(slave: BusSlave) -> bool:
-    """Return whether a slave is driven as a drive: by its driver, or else its device type."""
+    """Return whether a slave is operated as a drive: by its driver, or else its device type."""
     if slave.driver:
         return "402" in slave.driver
     return slave.identity.device_type & 0xFFFF == _DRIVE_PROFILE
 
 
 def axes_of(slave: BusSlave) -> tuple[DriveSettings, ...]:
-    """Return how the axes of a drive are driven."""
+    """Return the settings of the axes of a drive."""
     state = _SWITCHING_STATES[_number(slave, "switching_state", _ENABLED)]
     homing_us = 1_000_000 * _number(slave, "homing_timeout_seconds", _HOMING_S)
     return tuple(
@@ -71,26 +71,26 @@ def axes_of(slave: BusSlave) -> tuple[DriveSettings, ...]:
 
 
 def period_us_of(slave: BusSlave) -> int:
-    """Return the period in which ros2_canopen polls a node, 0 if it does with each SYNC."""
+    """Return the period in which ros2_canopen polls a node, 0 if it polls with each SYNC."""
     if not _number(slave, "polling", 1):
         return 0
     return 1_000 * _number(slave, "period", _PERIOD_MS)
 
 
 def _number(slave: BusSlave, key: str, default: int) -> int:
-    """Return a setting, the default where the driver does not take what is there."""
+    """Return a setting, the default if the driver does not accept the value."""
     item = slave.settings.get(key)
     value = None if item is None else SETTINGS[key].value_of(item)
     return default if value is None else value
 
 
-# How homing goes, by bits 10, 12 and 13 of the statusword (CiA 402-2, homing mode).
+# The course of homing, by bits 10, 12 and 13 of the statusword (CiA 402-2, homing mode).
 
 _START_US: Final = 1_000_000
-"""So soon the drive is at rest before homing, and homing has begun."""
+"""Time limit for the drive to be at rest before homing, and for the start of homing."""
 
 _SEEN_US: Final = 100_000
-"""By then a drive that has homed before shows that it homes again."""
+"""Within this time, a drive that has homed before shows that it homes again."""
 
 _REACHED: Final = drive_state.Statusword.TARGET_REACHED
 _ATTAINED: Final = drive_state.Statusword.MODE_12
@@ -100,13 +100,13 @@ _ERROR: Final = drive_state.Statusword.MODE_13
 async def home(
     name: str, mode: drive_mode.HomingMode, within_us: int, caught_up: Callable[[], Operation]
 ) -> None:
-    """Start homing in a drive that is in this mode, and wait for its end.
+    """Start homing in a drive that is in homing mode, and wait for its end.
 
     Args:
         name: of the joint.
-        mode: what the drive is in.
+        mode: the mode of the drive.
         within_us: how long homing may take.
-        caught_up: waits until the statusword is of after the controlword.
+        caught_up: waits for a statusword sent after the controlword.
 
     Raises:
         DriveFailed: it does not start, does not end in time, or reports an error.
@@ -123,7 +123,7 @@ async def _home(
     await _await(name, mode, _ERROR | _REACHED, 0, _START_US, "is not at rest")
     mode.runs = True
     every = _ERROR | _ATTAINED | _REACHED
-    if mode.status & _ATTAINED:  # by the homing before: the bit may fall and rise unseen
+    if mode.status & _ATTAINED:  # set by the previous homing: the bit may fall and rise unseen
         await caught_up()
         with suppress(DriveFailed):
             await Until(lambda: not mode.status & _ATTAINED, _SEEN_US, "")
@@ -136,7 +136,7 @@ async def _home(
 async def _await(  # noqa: PLR0913, PLR0917 - a row of what is awaited
     name: str, mode: drive_mode.HomingMode, mask: int, before: int, within_us: int, complaint: str
 ) -> None:
-    """Wait until some bits are no longer as before; raise DriveFailed where they say error."""
+    """Wait until some bits have changed; raise DriveFailed if they report an error."""
     await Until(lambda: mode.status & mask != before, within_us, f"{name}: homing {complaint}")
     if mode.status & _ERROR:
         raise DriveFailed(f"{name}: homing error (bit 13 of the statusword)")
@@ -150,16 +150,16 @@ _POSITION: Final = drive_mode.DriveObject(0x6064, 4)
 _VELOCITY: Final = drive_mode.DriveObject(0x606C, 4)
 _TORQUE: Final = drive_mode.DriveObject(0x6077, 2)
 READ: Final = (_STATUSWORD, _MODE_DISPLAY, _POSITION, _VELOCITY, _TORQUE)
-"""In each period."""
+"""Objects that are transferred in each period."""
 
 _HOMING_METHOD: Final = drive_mode.DriveObject(0x6098, 1)
 _SUPPORTED: Final = drive_mode.DriveObject(0x6502, 4, signed=False)
 
 AXIS: Final = 0x800
-"""From the objects of an axis to those of the next."""
+"""Offset from the objects of an axis to those of the next."""
 
 _CAUGHT_UP: Final = 3
-"""So many statuswords after an answer, one is of after all that was sent before."""
+"""After this many statuswords following an answer, one was sent after all earlier requests."""
 
 _SWITCH_US: Final = 5_000_000
 """How long a change of state or of mode may take."""
@@ -168,24 +168,24 @@ T = TypeVar("T")
 
 
 class DriveDriver:
-    """Reads and writes an axis in each period; its async operations wait for what comes of that.
+    """Reads and writes an axis in each period; its async operations wait for the results.
 
     `CanopenMaster.perform` runs them: `master.perform(arm.init())`.
 
     `halt` is a quick stop. While the mode has no set-point, bit 8 halts the drive.
 
     Args:
-        settings: how it is driven.
-        image: what PDOs carry; all else goes by SDO.
-        talk: takes what is to be said to the node by SDO.
+        settings: settings of the axis.
+        image: the values in PDOs; all others go by SDO.
+        talk: takes SDO scripts for the node.
 
     Attributes:
         name: of the joint.
-        statusword: as it was read last.
-        controlword: as it was written last.
-        mode: what the drive says that it is in, by number.
-        cycles: how often it was read and written.
-        refusals: what the drive refused by SDO, the first one first.
+        statusword: last one that was read.
+        controlword: last one that was written.
+        mode: the mode that the drive reports, by number.
+        cycles: number of read and write cycles.
+        refusals: SDO requests that the drive refused, the oldest first.
     """
 
     def __init__(
@@ -202,44 +202,44 @@ class DriveDriver:
 
     @property
     def state(self) -> drive_state.DriveState:
-        """The state that the statusword says; unknown until one was read since the node booted.
+        """The state in the statusword; unknown until one was read since the node booted.
 
-        It is unknown again when the node is lost, until a statusword comes.
+        It becomes unknown when the node is lost, until a statusword comes.
         """
         return (
             drive_state.state_of(self.statusword) if self._known else drive_state.DriveState.UNKNOWN
         )
 
     def doubt(self) -> None:
-        """Know nothing of the drive's state until its next statusword."""
+        """Treat the state of the drive as unknown until its next statusword."""
         self._known = False
         self._image.doubt(self._key(_STATUSWORD))
 
     @property
     def position(self) -> float:
-        """Where the joint is, in its user's units."""
+        """Position of the joint, in the user's units."""
         channel = self._channel
         return self._value(_POSITION) * channel.scale_pos_from_dev + channel.offset_pos_from_dev
 
     @property
     def velocity(self) -> float:
-        """How fast it is."""
+        """Speed of the joint, in the user's units."""
         return self._value(_VELOCITY) * self._channel.scale_vel_from_dev
 
     @property
     def effort(self) -> float:
-        """The torque that it has, 0 if the drive cannot say."""
+        """Actual torque, 0 if the drive does not report it."""
         return self._value(_TORQUE) * self._channel.scale_eff_from_dev
 
     def set_target(self, target: float) -> None:
-        """Take a set-point for the chosen mode, in the user's units; a torque in per mille.
+        """Set a set-point for the current mode, in the user's units; a torque in per mille.
 
         Raises:
             DriveFailed: the drive is not in Operation enabled.
-            ValueError: no number, or a mode without a target.
+            ValueError: the target is not a number, or the mode has no target.
         """
         if not hasattr(target, "__float__"):
-            raise ValueError(f"{self.name}: {target!r} is no target: a number is wanted")
+            raise ValueError(f"{self.name}: {target!r} is not a target: expected a number")
         if self.state is not drive_state.DriveState.OPERATION_ENABLED:
             raise DriveFailed(f"{self.name}: no target in {self._where()}")
         channel = self._channel
@@ -250,7 +250,7 @@ class DriveDriver:
         self._mode.set_target(target)
 
     def cycle(self) -> Script[None]:
-        """Read, then write, as is done in each period."""
+        """Read, then write; called in each period."""
         for item in READ:
             yield from self._read(item)
         self.statusword, self.mode = self._value(_STATUSWORD), self._value(_MODE_DISPLAY)
@@ -279,10 +279,10 @@ class DriveDriver:
         yield from self._write(CONTROLWORD, word)
 
     async def init(self) -> None:
-        """Enable the drive, and home it if its homing method is not 0; then no mode is chosen.
+        """Enable the drive, and home it if its homing method is not 0; then it has no mode.
 
         Raises:
-            DriveFailed: it does not get there in time.
+            DriveFailed: it does not complete in time.
         """
         await Until(lambda: self.cycles > 0, _SWITCH_US, f"{self.name}: the node has not booted")
         self.controlword, self._reset_fault = 0, True
@@ -293,18 +293,18 @@ class DriveDriver:
             await self.choose(drive_mode.ModeNumber.NONE)
 
     async def recover(self) -> None:
-        """Reset a fault, and enable the drive again; the target is forgotten."""
+        """Reset a fault, and enable the drive again; the target is dropped."""
         self._reset_fault = True
         self._mode.begin()
         await self.switch_to(drive_state.DriveState.OPERATION_ENABLED)
 
     async def shut_down(self) -> None:
-        """Choose no mode, and take the voltage away."""
+        """Select no mode, and disable the voltage."""
         await self.choose(drive_mode.ModeNumber.NONE)
         await self.switch_to(drive_state.DriveState.SWITCH_ON_DISABLED)
 
     def halt(self) -> None:
-        """Stop quickly; a drive that is not in Operation enabled stays as it is."""
+        """Do a quick stop; a drive that is not in Operation enabled stays as it is."""
         state = drive_state.state_of(self.statusword)
         if (
             word := drive_state.lead(
@@ -314,10 +314,10 @@ class DriveDriver:
             self.controlword = word
 
     async def switch_to(self, goal: drive_state.DriveState | str) -> None:
-        """Lead the drive to a state, step by step to Operation enabled, else at once.
+        """Lead the drive to a state; to Operation enabled step by step, otherwise directly.
 
         Args:
-            goal: a state, or its words: `Switched on`.
+            goal: a state, or its name: `Switched on`.
 
         Raises:
             ValueError: there is no such state.
@@ -338,15 +338,15 @@ class DriveDriver:
         await Until(lambda: self.state is not state, _SWITCH_US, complaint)
 
     async def choose(self, mode: int | str) -> None:
-        """Change the mode of operation; the drive has no target then, and is halted.
+        """Change the mode of operation; the drive then has no target, and is halted.
 
         Args:
-            mode: by its number or its abbreviation: `pp`, `vl`, `pv`, `tq`, `hm`, `ip`, `csp`,
+            mode: its number or its abbreviation: `pp`, `vl`, `pv`, `tq`, `hm`, `ip`, `csp`,
                 `csv`, `cst`, `none`.
 
         Raises:
             ValueError: there is no such mode.
-            DriveFailed: the drive has not this mode, or does not show it in time.
+            DriveFailed: the drive does not have this mode, or does not report it in time.
         """
         number = drive_mode.ModeNumber.of(mode)
         if number is drive_mode.ModeNumber.NONE:
@@ -363,7 +363,7 @@ class DriveDriver:
         await Until(
             lambda: self.mode == number,
             _SWITCH_US,
-            f"{self.name}: mode {number} is not shown in 6061h",
+            f"{self.name}: mode {number} is not reported in 6061h",
         )
         self._chosen, self._mode = number, chosen
         await self.switch_to(drive_state.DriveState.OPERATION_ENABLED)
@@ -374,16 +374,16 @@ class DriveDriver:
         return bool(modes >> number - 1 & 1)
 
     async def _home(self) -> None:
-        """Home, unless the method is 0."""
+        """Home, unless the homing method is 0."""
         method = await self._exchange(self._read(_HOMING_METHOD))
         if method and isinstance(self._mode, drive_mode.HomingMode):
             await home(self.name, self._mode, self._settings.homing_us, self._catch_up)
 
     async def _catch_up(self) -> None:
-        """Wait for statuswords of after the controlword, however late drive and bus are.
+        """Wait for statuswords sent after the controlword, whatever the delay of drive and bus.
 
-        Who has answered an SDO has the RPDOs before it; which a SYNC may still have to bring into
-        force, and then a TPDO has to come.
+        A drive that answered an SDO has received the RPDOs before it. A SYNC may still have to
+        apply them, and then a TPDO has to come.
         """
         key, late = self._key(_STATUSWORD), f"{self.name}: no statusword"
         await self._next_cycle()
@@ -398,12 +398,12 @@ class DriveDriver:
         await Until(lambda: self.cycles > cycles, _SWITCH_US, f"{self.name}: the node was lost")
 
     def _request(self, key: Key) -> Script[None]:
-        """Have the drive answer, whatever it says."""
+        """Make the drive answer; the answer does not matter."""
         with suppress(SdoAborted):
             yield from upload(*key)
 
     async def _exchange(self, script: Script[T]) -> T:
-        """Say something to the drive between two periods; return what came of it."""
+        """Send something to the drive between two periods; return the result."""
         ended: list[T | Exception] = []
         lost = DriveFailed(f"{self.name}: the node was lost")
         self._talk(QueuedScript("", script, ended.append, ended.append, lambda: ended.append(lost)))
@@ -419,7 +419,7 @@ class DriveDriver:
         return item.value_of(self._image.read(self._key(item)))
 
     def _read(self, item: drive_mode.DriveObject) -> Script[int]:
-        """Read an object by SDO, unless a TPDO carries it or the drive has it not."""
+        """Read an object by SDO, unless a TPDO carries it or the drive does not have it."""
         key = self._key(item)
         if not self._image.receives(key) and key not in self._missing:
             try:
@@ -431,7 +431,7 @@ class DriveDriver:
         return self._value(item)
 
     def _write(self, item: drive_mode.DriveObject, value: int) -> Script[None]:
-        """Write an object by RPDO, by SDO where none carries it."""
+        """Write an object by RPDO, or by SDO if none carries it."""
         key, bits = self._key(item), item.bits_of(value)
         if self._image.sends(key):
             self._image.write(key, bits)
@@ -452,18 +452,18 @@ _AWAITED_US: Final = 3_000_000
 
 
 class DriveNode:
-    """Drives its axes, one after the other, in each period and while the node is booted.
+    """Drives its axes, one after the other, in each period while the node is booted.
 
-    A period in which the last one's SDO transfers still last is left out.
+    A period is skipped while the SDO transfers of the last one still run.
 
     Args:
         slave: the node.
-        image: what its PDOs carry.
-        axes: how each is driven.
+        image: the values in its PDOs.
+        axes: settings of each axis.
         period_us: 0 for once with each SYNC.
 
     Attributes:
-        drivers: one for each axis.
+        drivers: one per axis.
     """
 
     def __init__(
@@ -480,7 +480,7 @@ class DriveNode:
 
     @property
     def due_us(self) -> int:
-        """When `tick` has something to do."""
+        """When to call `tick` next."""
         return self._timer.due_us if self._slave.good else NEVER
 
     @property
@@ -489,11 +489,11 @@ class DriveNode:
         return self._slave.good
 
     def is_awaited(self, now_us: int) -> bool:
-        """Whether its node boots, and not for so long that nobody waits any more."""
+        """Whether its node boots, and the driver still waits for it."""
         return self._slave.booting and now_us - self._slave.began_us < _AWAITED_US
 
     def tick(self, now_us: int, *, sync: bool) -> None:
-        """Begin a period, if one is due.
+        """Start a period, if one is due.
 
         Args:
             now_us: the time.

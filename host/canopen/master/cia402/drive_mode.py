@@ -62,9 +62,9 @@ class DriveObject:
     """An object of a drive.
 
     Attributes:
-        index: of its first axis.
-        size: bytes.
-        sub: of the object.
+        index: index for the first axis.
+        size: in bytes.
+        sub: sub-index of the object.
         signed: whether it is an INTEGER.
     """
 
@@ -75,20 +75,20 @@ class DriveObject:
 
     @property
     def lowest(self) -> int:
-        """The least value."""
+        """The smallest value."""
         return -(1 << 8 * self.size - 1) if self.signed else 0
 
     @property
     def highest(self) -> int:
-        """The greatest value."""
+        """The largest value."""
         return (1 << 8 * self.size - self.signed) - 1
 
     def value_of(self, bits: int) -> int:
-        """Return the value that so many bits are."""
+        """Return the value of raw bits."""
         return bits - (1 << 8 * self.size) if bits > self.highest else bits
 
     def bits_of(self, value: int) -> int:
-        """Return the bits of a value."""
+        """Return the raw bits of a value."""
         return value & (1 << 8 * self.size) - 1
 
 
@@ -96,7 +96,7 @@ _Write = Callable[[DriveObject, int], Script[None]]
 
 
 class DriveMode:
-    """What a mode does in each period; it is chosen while the drive has it.
+    """What a mode does in each period; it is used while the drive is in it.
 
     Attributes:
         controlword: its bits of 6040h.
@@ -106,17 +106,17 @@ class DriveMode:
         self.controlword = 0
 
     def begin(self) -> None:
-        """Have no set-point, as when the mode is chosen."""
+        """Clear the set-point, as when the mode is selected."""
 
     def set_target(self, value: float) -> None:
-        """Take a set-point in units of the device; ValueError where a mode has none."""
+        """Set a set-point in units of the device; ValueError if the mode has none."""
         raise ValueError("this mode has no target")
 
     def read(self, statusword: int) -> None:
-        """Take the statusword of this period."""
+        """Process the statusword of this period."""
 
     def write(self, write: _Write) -> Script[bool]:
-        """Write the set-point; return whether there is one: without, the drive is halted."""
+        """Write the set-point; return whether there is one: without one, the drive is halted."""
         yield from ()
         return False
 
@@ -135,17 +135,17 @@ class _TargetMode(DriveMode):
         self._target: int | None = None
 
     def begin(self) -> None:
-        """Have no target."""
+        """Clear the target."""
         self._target = None
 
     def set_target(self, value: float) -> None:
-        """Take a target; what is too large for the object is cut.
+        """Set a target; a value too large for the object is limited.
 
         Raises:
-            ValueError: it is no number.
+            ValueError: it is not a number.
         """
         if not math.isfinite(value):
-            raise ValueError(f"{value} is no target")
+            raise ValueError(f"{value} is not a target")
         self._target = max(self._object.lowest, min(int(value), self._object.highest))
 
     def write(self, write: _Write) -> Script[bool]:
@@ -159,20 +159,20 @@ class _TargetMode(DriveMode):
 
 
 class _ProfilePositionMode(_TargetMode):
-    """Writes each new target once, and has it taken by the handshake of bits 4 and 12."""
+    """Writes each new target once, with the handshake of bits 4 and 12."""
 
     def begin(self) -> None:
-        """Have no target, and none that was given."""
+        """Clear the current and the pending target."""
         super().begin()
         self._given: int | None = None
         self._acknowledged = False
 
     def read(self, statusword: int) -> None:
-        """Look for the acknowledge."""
+        """Check for the acknowledge."""
         self._acknowledged = bool(statusword & Statusword.MODE_12)
 
     def write(self, write: _Write) -> Script[bool]:
-        """Raise bit 4 for a new target, let it fall when it is acknowledged."""
+        """Set bit 4 for a new target, clear it when the target is acknowledged."""
         self.controlword |= _AT_ONCE
         if self._target is None:
             return False
@@ -189,25 +189,25 @@ class _ProfilePositionMode(_TargetMode):
 
 
 class HomingMode(DriveMode):
-    """Starts homing by bit 4; bits 10, 12 and 13 of the statusword say how it goes.
+    """Starts homing by bit 4; bits 10, 12 and 13 of the statusword report its course.
 
     Attributes:
-        runs: homing is to run.
+        runs: whether homing should run.
         status: these bits.
     """
 
     MASK: Final = Statusword.TARGET_REACHED | Statusword.MODE_12 | Statusword.MODE_13
 
     def begin(self) -> None:
-        """Do not home."""
+        """Stop homing."""
         self.runs, self.status = False, 0
 
     def read(self, statusword: int) -> None:
-        """Take its bits."""
+        """Process the bits of homing."""
         self.status = statusword & self.MASK
 
     def write(self, write: _Write) -> Script[bool]:
-        """Set bit 4 while homing is to run."""
+        """Set bit 4 while homing should run."""
         self.controlword = int(_START) if self.runs else 0
         yield from ()
         return self.runs

@@ -34,7 +34,7 @@ MODE_BITS: Final = 0x0270
 
 
 class Statusword(IntFlag):
-    """Bits of 6041h that a mode of operation looks at."""
+    """Bits of 6041h that depend on the mode of operation."""
 
     TARGET_REACHED = 0x0400
     MODE_12 = 0x1000
@@ -56,7 +56,7 @@ class DriveState(Enum):
 
     @classmethod
     def of(cls, state: DriveState | str) -> DriveState:
-        """Return a state by its words, as `Switched on`; ValueError if there is none."""
+        """Return a state by its name, as `Switched on`; ValueError if there is none."""
         try:
             return cls(state)
         except ValueError:
@@ -88,7 +88,7 @@ _SHUTDOWN: Final = (_NO_STOP | _VOLTAGE, _RESET | _ON)
 _SWITCH_ON: Final = (_NO_STOP | _VOLTAGE | _ON, _RESET | _ENABLE)
 _ENABLE_OPERATION: Final = (_NO_STOP | _VOLTAGE | _ON | _ENABLE, _RESET)
 _QUICK_STOP: Final = (_VOLTAGE, _RESET | _NO_STOP)
-"""Bits that are set, and bits that are cleared; all others stay."""
+"""Bits to set, and bits to clear; all others stay."""
 
 _ALONE: Final = (_NOTHING, _NOTHING)
 """The drive makes this transition by itself."""
@@ -124,7 +124,7 @@ _ENABLING: Final = {
 
 
 def state_of(statusword: int) -> DriveState:
-    """Return the state that a statusword says."""
+    """Return the state in a statusword."""
     for mask, value, state in _PATTERNS:
         if statusword & mask == value:
             return state
@@ -132,11 +132,11 @@ def state_of(statusword: int) -> DriveState:
 
 
 def next_state(state: DriveState, goal: DriveState) -> DriveState:
-    """Return the next state on the way to another: it itself, unless that is Operation enabled."""
+    """Return the next state on the way: the state itself, except for Operation enabled."""
     return _ENABLING.get(state, goal) if goal is DriveState.OPERATION_ENABLED else goal
 
 
 def lead(controlword: int, state: DriveState, following: DriveState) -> int | None:
-    """Return the controlword that leads from a state to another, None if none does."""
+    """Return the controlword that leads from a state to another, None if there is none."""
     bits = TRANSITIONS.get((state, following))
     return None if bits is None else controlword & ~int(bits[1]) | int(bits[0])

@@ -172,7 +172,7 @@ def test_a_run_that_cannot_be_is_told_once(pytester: pytest.Pytester, run: Run) 
 
 @pytest.mark.parametrize(
     ("sent", "reason"),
-    [("()", "node 5 does not answer; heard here: nobody"), ("[CanFrame(0x706)]", "*here: 6")],
+    [("()", "node 5 does not answer; other nodes: none"), ("[CanFrame(0x706)]", "*other nodes: 6")],
 )
 def test_a_dead_node_is_an_error_in_a_line(
     pytester: pytest.Pytester, run: Run, sent: str, reason: str

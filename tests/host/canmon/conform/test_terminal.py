@@ -41,7 +41,7 @@ def test_yes_begins_and_shows_how_far_it_is() -> None:
     child.sendline("y")
     child.expect_exact("node 5 is read")
     child.expect_exact("1 check, 0 failures: NMT-03")
-    child.expect_exact("Error: node 5 does not answer; heard here: nobody")
+    child.expect_exact("Error: node 5 does not answer; other nodes: none")
     child.expect(pexpect.EOF)
     child.close()
     assert child.exitstatus == 4

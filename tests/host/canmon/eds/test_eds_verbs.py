@@ -117,7 +117,7 @@ def test_a_report_has_a_case_for_each_rule_of_each_file(
         (("fix", "empty.eds", "-o", "a.eds", "--dry-run"), "give -o OUT, or --dry-run"),
         (("fix", "empty.eds", "-o", "a.eds"), "FILE empty.eds: no EDS: it describes no object"),
         (("fix", "a.xdd", "-o", "a.eds"), "FILE a.xdd: XDD files cannot be fixed"),
-        (("show", "large.eds"), "FILE large.eds: more than 32,000,000 bytes: no EDS"),
+        (("show", "large.eds"), "FILE large.eds: more than 32,000,000 bytes: not an EDS"),
         (("show", "empty.eds"), "FILE empty.eds: has no objects (no-objects)"),
         (("diff", "empty.eds", "empty.eds"), "FILE empty.eds: has no objects (no-objects)"),
         (
@@ -193,7 +193,7 @@ def test_a_file_too_large_for_an_eds_is_refused_by_hosts_too(tmp_path: Path) -> 
     words = ["conform", "none.toml", "--node", "5", "--eds", str(path)]
     result = CliRunner().invoke(main, words)
     assert (result.exit_code, result.stderr) == (
-        *(2, f"Error: --eds {path}: more than 32,000,000 bytes: no EDS\n"),
+        *(2, f"Error: --eds {path}: more than 32,000,000 bytes: not an EDS\n"),
     )
     for read in (read_sound, read_eds):
         with pytest.raises(EdsError, match="more than 32,000,000 bytes"):

@@ -60,7 +60,7 @@ def _without_value(match: re.Match[str]) -> str:
 def test_nothing_but_an_answer_is_expected_unless_told(rig: str) -> None:
     result = net(rig, "boot", "5", "--steps")
     assert result.exit_code == 0, result.output
-    assert steps(result.stdout) == ["1000h:00 device type: 00020192h; not looked at"]
+    assert steps(result.stdout) == ["1000h:00 device type: 00020192h; not checked"]
     assert "nothing is expected of the node but that it answers" in result.stderr
     assert net(rig, "boot", "5").stdout == ""
 

@@ -82,7 +82,7 @@ def test_a_node_without_power_is_blocked_not_failed(tmp_path: Path) -> None:
     path.write_text(RIG.format(eds=EDS) + '[fault]\nboard = "power_off@50ms"\n')
     result = conform(str(path), "--node", "5", *NMT)
     assert result.exit_code == 4, result.output
-    assert result.stderr == "Error: node 5 does not answer; heard here: nobody\n"
+    assert result.stderr == "Error: node 5 does not answer; other nodes: none\n"
     assert not result.stdout, "no wall of what was not judged"
     said = json.loads(conform(str(path), "--node", "5", *NMT, "--json").stdout)
     assert said["counts"]["blocked"] == 3
@@ -166,7 +166,10 @@ def test_an_eds_of_another_device_is_told_first(rig: str, tmp_path: Path) -> Non
     result = conform(rig, "--node", "5", *words)
     first, *_, last = result.stdout.splitlines()
     assert first.startswith("this EDS is of another device: ")
-    assert "device type 00020192h there, 000F0191h here, product 00006210h there" in first
+    assert (
+        "device type 00020192h in the EDS, 000F0191h in the node, product 00006210h in the EDS"
+        in first
+    )
     assert last == first
     assert "this EDS is of another device: " in page.read_text("utf-8")
     assert "another device" not in conform(rig, "--node", "5", "--eds", str(EDS), *NMT).stdout

@@ -44,10 +44,10 @@ def test_the_default_sdo_server_is_asked_for_without_an_eds() -> None:
 
 def test_what_nobody_asked_for_is_not_said_to_be_missing(tmp_path: Path) -> None:
     assert reasons("UE-09") == [
-        "not applicable: without an EDS nobody knows of any write-only object"
+        "not applicable: without an EDS there is no known write-only object"
     ]
     assert reasons("D4-02", device="epos") == [
-        "not applicable: without an EDS nobody knows of any 6040h:00"
+        "not applicable: without an EDS there is no known 6040h:00"
     ]
     eds = tmp_path / "less.eds"
     eds.write_text(R1_EDS.read_text("utf-8").replace("[1200", "[11F0"), "utf-8")
@@ -61,5 +61,5 @@ def test_what_is_found_is_told_once() -> None:
     slave = make_slave(Dictionary([kind, count, *identity]), 5)
     found = Judged(slave).judge(ConformancePlan()).findings
     assert [text for text in found if "1018h:05" in text] == [
-        "1018h:05 cannot be there, and the node has it"
+        "1018h:05 cannot be there, but the node has it"
     ]

@@ -92,7 +92,7 @@ def test_a_node_that_never_answers_blocks_all_at_once() -> None:
     report = judge(Liar(lambda now_us, rx: ()))
     assert {r.outcome.verdict for r in report.results} == {CheckVerdict.BLOCKED}
     assert report.duration_us < 10_000_000
-    assert report.aborted == "node 5 does not answer; heard here: nobody"
+    assert report.aborted == "node 5 does not answer; other nodes: none"
     assert report.absent
 
 
@@ -101,7 +101,7 @@ def test_who_is_heard_is_named_where_nobody_answers() -> None:
         return (data_frame(0x710, b"\x05"),) if now_us % 100_000 == 0 else ()
 
     report = judge(Liar(beat, busy=True))
-    assert report.aborted == "node 5 does not answer; heard here: 16"
+    assert report.aborted == "node 5 does not answer; other nodes: 16"
 
 
 @pytest.mark.parametrize("level", [Level.READ_ONLY, Level.INTRUSIVE])

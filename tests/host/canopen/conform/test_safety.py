@@ -253,7 +253,7 @@ def test_what_must_be_refused_is_written_to_objects_of_the_manufacturer_too() ->
     report = r1.judge(ConformancePlan(Level.COMMUNICATION, ("DE", "OD-2*"), confirm=yes), link=link)
     assert 0x2001 in written_on(link)
     reasons = {r.check.id: r.outcome.reason for r in report.results}
-    assert reasons["DE-11"].endswith("h would be written with what it takes: --intrusive")
+    assert reasons["DE-11"].endswith("h would be written with a valid value: --intrusive")
 
 
 def test_what_must_never_be_written_never_is() -> None:

@@ -266,7 +266,7 @@ def test_a_configuration_that_is_dated_is_told_to_be_so() -> None:
         net.master.nmt.command(NmtCommand.RESET_COMMUNICATION)
         net.master.run_for("200ms")
         second = net.master.explain("left")
-    assert "1020h:01 configuration date: 00000000h; not 0000007Bh: configured anew" in first
+    assert "1020h:01 configuration date: 00000000h; not 0000007Bh: configuring again" in first
     assert "1020h:01 configuration date: 0000007Bh; as expected" in second
     assert "1020h:02 configuration time: 000001C8h; as expected" in second
 
@@ -306,7 +306,7 @@ def test_a_slave_that_misses_its_reset_is_not_booted_again_until_it_is_reset() -
         assert told[-4:] == [
             "node 5 left: booted",
             "heartbeat: none within 150 ms; lost; reset node is sent, once",
-            "heartbeat: Operational; heard again, but not booted: no boot-up",
+            "heartbeat: Operational; sends again, but is not booted: no boot-up",
             "node 5 left: now Operational",
         ]
         net.master.nmt.command(NmtCommand.RESET_NODE, 5)

@@ -27,7 +27,7 @@ def test_drives_without_pdos_fill_a_bus(tmp_path: Path) -> None:
     (one,) = check_load(bus(tmp_path, 6))
     assert one.text == (
         "1000 kbit/s: 103% of the bus in each period:"
-        " polling of 6 drives by SDO 103%, PDOs 0%; 80% would do for 4 of them"
+        " polling of 6 drives by SDO 103%, PDOs 0%; 80% is enough for 4 of them"
     )
     assert one.line == 2
 

@@ -210,7 +210,7 @@ def test_modes_that_the_drive_has_not_and_words_that_are_none(tmp_path: Path) ->
         with pytest.raises(ValueError, match="no target"):
             drives.joint.set_target(1.0)
         drives.master.perform(drives.joint.choose("pp"))
-        with pytest.raises(ValueError, match="nan is no target"):
+        with pytest.raises(ValueError, match="nan is not a target"):
             drives.joint.set_target(float("nan"))
 
 
@@ -231,7 +231,7 @@ def test_words_that_are_no_joint_state_target_or_time_are_answered_by_those_ther
         with pytest.raises(ValueError, match=r"no mode '99'; known: none, pp"):
             master.perform(joint.choose(99))
         for target in ("x", None, [1.0]):
-            with pytest.raises(ValueError, match=r"joint2: .* is no target: a number is wanted"):
+            with pytest.raises(ValueError, match=r"joint2: .* is not a target: expected a number"):
                 joint.set_target(target)  # type: ignore[arg-type]
         master.perform(joint.switch_to("Switched on"))
         assert joint.state is DriveState.SWITCHED_ON

@@ -234,7 +234,7 @@ def test_a_guarded_slave_is_lost_each_time_it_falls_silent() -> None:
         assert desk.at(begun_us + 400_000) == ["000#8102"]
         assert desk.at(begun_us + 500_000) == ["702#R1"]  # and once only
     lost = "guarding: none within 300 ms; lost; reset node is sent, once"
-    assert told(desk) == [lost, "boot-up: heard; booted anew", lost]
+    assert told(desk) == [lost, "boot-up: received; booting again", lost]
 
 
 def test_a_guarded_slave_that_never_answers_is_lost_as_often_as_it_boots() -> None:

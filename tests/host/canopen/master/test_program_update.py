@@ -30,7 +30,7 @@ def test_other_software_is_replaced_and_the_slave_booted_from_the_beginning() ->
         told = net.master.explain("left")
     said = [line.split("ms  ")[-1] for line in told.splitlines()]
     assert said == [
-        "1000h:00 device type: 00020192h; not looked at",
+        "1000h:00 device type: 00020192h; not checked",
         "1F56h:01 software identification: 00010002h; not 00010003h: to be updated",
         "1F51h:01 := stop: taken; goes on",
         "1F51h:01 := clear: taken; goes on",
@@ -39,7 +39,7 @@ def test_other_software_is_replaced_and_the_slave_booted_from_the_beginning() ->
         "1F56h:01 software identification: 00010003h; as expected",
         "1F51h:01 := start: taken; goes on",
         "1F51h:01 program control: started; booted from the beginning",
-        "1000h:00 device type: 00020192h; not looked at",
+        "1000h:00 device type: 00020192h; not checked",
         "1F56h:01 software identification: 00010003h; as expected",
         "node 5 left: booted",
     ]
@@ -95,7 +95,7 @@ def test_flashing_that_never_ends_is_given_up_after_a_minute() -> None:
     slave = plain_slave(application=BootLoader)
     slave.dictionary[0x1F57, 1].source = lambda entry: b"\x01\0\0\0"
     with network(LEFT, slaves=(slave,)) as net:
-        with pytest.raises(BootFailed, match="1F57h:01 flash status: not written after 600 looks"):
+        with pytest.raises(BootFailed, match="1F57h:01 flash status: not written after 600 polls"):
             net.master.boot("70s")
         assert net.status() == "I"
 

@@ -49,7 +49,7 @@ def test_a_place_at_which_there_can_be_nothing_is_taken_though_there_is_somethin
     found, findings = places((0x1005, 1), (0x1016, 5), (0x1014, 1))
     assert found == ["5FFF.00", "1016.05", "1005.01"]
     assert findings == tuple(
-        f"{where} is not described, and the node has it"
+        f"{where} is not described, but the node has it"
         for where in ("1016h:05", "1005h:01", "1014h:01")
     )
 
@@ -90,4 +90,4 @@ def test_a_node_that_has_every_sub_index_fails(known: bool, anywhere: bool) -> N
     verdict = CheckVerdict.FAIL if anywhere else CheckVerdict.PASS
     assert [result.outcome.verdict for result in report.results] == [verdict] * 3
     why = "is not described" if known else "cannot be there"
-    assert (f"1000h:01 {why}, and the node has it" in report.findings) == anywhere
+    assert (f"1000h:01 {why}, but the node has it" in report.findings) == anywhere

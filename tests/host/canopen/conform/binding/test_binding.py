@@ -137,7 +137,7 @@ def test_without_an_eds_only_what_cia_301_knows_is_bound() -> None:
     assert place(binding, "rw_u16") == "1015.00"
     assert place(binding, "sdo_server_2") == "1201.01"
     assert place(binding, "tpdo_async") == "1800.00"
-    assert binding.reasons["domain"].startswith("without an EDS nobody knows of any domain")
+    assert binding.reasons["domain"].startswith("without an EDS there is no known domain")
     written = [bound for bound in binding.bound.values() if isinstance(bound, BoundObject)]
     assert all(0x1000 <= bound.index < 0x2000 for bound in written)
 
@@ -161,15 +161,15 @@ def test_what_means_something_in_its_profile_stands_for_nothing(
     mode = EntryDescription(index, 0, "Mode", DataType.UNSIGNED8, RW)
     for allow in (set[int](), {index}):
         assert bound_to(profile, mode, allow=allow).reasons["rw_u8"] == (
-            "no integer of 8 bits that may be read and written takes any value: "
-            f"what {index:04X}h and its like hold means something"
+            "no integer of 8 bits that may be read and written accepts any value: "
+            f"values of {index:04X}h have a meaning"
         )
 
 
 def test_an_object_that_must_never_be_written_is_not_bound() -> None:
     bench = make_bench(make_dictionary())
     binding = bind(r1_device(), bench.upload, never={0x2003, 0x1018})
-    assert binding.reasons["rw_u64"].endswith("and it must not be written")
+    assert binding.reasons["rw_u64"].endswith("and --never forbids to write it")
     assert place(binding, "absent_sub") == "1016.05"
 
 
@@ -195,7 +195,7 @@ def test_what_the_node_does_not_have_is_a_finding_and_the_next_is_taken() -> Non
     binding = bind(device(*described), bench_of(described[1]).upload)
     assert place(binding, "rw_u64") == "2001.00"
     assert binding.findings == (
-        "2000h:00 Gain is described, and the node does not have it: "
+        "2000h:00 Gain is described, but the node does not have it: "
         "object does not exist (06020000h)",
     )
 
@@ -206,7 +206,7 @@ def test_another_size_than_described_is_a_finding() -> None:
     binding = bind(device(described), bench.upload)
     assert "rw_u32" in binding.reasons
     assert binding.findings == (
-        "2000h:00 Gain is described as UNSIGNED32, and the node sends 2 bytes",
+        "2000h:00 Gain is described as UNSIGNED32, but the node sends 2 bytes",
     )
 
 
@@ -214,7 +214,7 @@ def test_what_is_not_described_and_there_is_a_finding() -> None:
     hidden = EntryDescription(0x5FFF, 0, "Hidden", DataType.UNSIGNED8, RW)
     binding = bind(device(), bench_of(hidden).upload)
     assert binding.bound["absent_object"] == BoundPlace(0x5FFE, 0)
-    assert binding.findings == ("5FFFh:00 is not described, and the node has it",)
+    assert binding.findings == ("5FFFh:00 is not described, but the node has it",)
 
 
 def test_what_cannot_be_read_is_not_written() -> None:

@@ -47,7 +47,7 @@ def test_optional_objects_are_features() -> None:
 def test_without_an_eds_a_node_shows_what_it_has() -> None:
     found = features(make_bench(make_dictionary()), None)
     assert found.words == WITHOUT_EDS
-    assert found.reasons["lss"] == "without an EDS nobody knows whether it has LSS"
+    assert found.reasons["lss"] == "without an EDS it is unknown whether it has LSS"
 
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
@@ -84,16 +84,16 @@ def test_lss_without_an_address_is_a_finding() -> None:
     bench = make_bench(Dictionary(entry.description for entry in bare))
     device = EdsDevice(DeviceInfo(), tuple(entry.description for entry in bare), {})
     found = find_features(bind(device, bench.upload), bench.client, EdsClaims.of_file(open_eds(R1)))
-    assert found.reasons["lss"] == "1018h has not the four numbers of an LSS address"
+    assert found.reasons["lss"] == "1018h lacks the four numbers of an LSS address"
     assert found.findings == (
-        "the EDS says that it has LSS, and 1018h has not the numbers of its address",
+        "the EDS says that it has LSS, but 1018h lacks the numbers of its address",
     )
 
 
 def test_another_identity_than_the_head_of_the_eds_is_a_finding() -> None:
     file = EdsFile("a.eds", R1.read_text().replace("VendorNumber=0x0000AB01", "VendorNumber=0x12"))
     found = features(make_bench(make_dictionary()), file)
-    assert found.findings == ("1018h:01 is 0000AB01h, and the EDS has VendorNumber=00000012h",)
+    assert found.findings == ("1018h:01 is 0000AB01h, but the EDS has VendorNumber=00000012h",)
 
 
 def test_a_drive_without_a_controlword_is_a_finding() -> None:
@@ -102,7 +102,7 @@ def test_a_drive_without_a_controlword_is_a_finding() -> None:
     found = features(bench, open_eds(R1))
     assert "402" in found.words
     assert found.findings == (
-        "1000h says that it is a device of CiA 402, and it has none of 6040h, 6041h",
+        "1000h says that it is a device of CiA 402, but it has none of 6040h, 6041h",
     )
 
 

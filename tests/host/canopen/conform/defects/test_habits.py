@@ -307,7 +307,7 @@ def test_a_limit_that_leaves_one_value_makes_a_constant() -> None:
     report = judge_as_described(Defect("one value", (), rows=(only,)), "NMT", "HB", "NG", "ST")
     assert not_harmless(report) == []
     reasons = {r.outcome.reason for r in report.results if r.check.id == "HB-01"}
-    assert reasons == {"1017h:00 takes only 500 to 500"}
+    assert reasons == {"1017h:00 accepts only 500 to 500"}
 
 
 def test_an_event_timer_of_the_node_disturbs_no_check() -> None:

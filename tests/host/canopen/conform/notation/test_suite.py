@@ -70,7 +70,7 @@ def test_each_name_stands_for_something_on_some_node() -> None:
 @pytest.mark.parametrize("line", ["", "sleep 5", "> ", "write 1017:00", "wait 5", "none on 705"])
 def test_a_line_that_is_no_step_is_refused(line: str) -> None:
     with pytest.raises(
-        ValueError, match=r"is no step; docs/reference/canopen/conform\.md has the notation"
+        ValueError, match=r"is not a step; docs/reference/canopen/conform\.md has the notation"
     ):
         parse_step(line)
 
@@ -78,8 +78,8 @@ def test_a_line_that_is_no_step_is_refused(line: str) -> None:
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
-        ("NMT-03 title", "is no head like 'group: NMT, what it is about'"),
-        ("group: NMT, states\n\ntitle alone", "is no head like 'NMT-03 what conforming means'"),
+        ("NMT-03 title", "is not a head like 'group: NMT, what it is about'"),
+        ("group: NMT, states\n\ntitle alone", "is not a head like 'NMT-03 what conforming means'"),
         ("group: NMT, states\n\nNMT-03 title\nwait 5 ms", "NMT-03 has no level and no source"),
     ],
 )

@@ -189,11 +189,11 @@ def test_store_and_restore_are_never_written() -> None:
         (entry(U8, RW, low=9), entry(U8, RW), ["type 0 is below its lower limit 9", "low"]),
         (entry(U8, CONST, 5), entry(U8, CONST, 6), ["type holds 06, want 05"]),
         (entry(U8, WO), entry(U8, RW), ["read "]),
-        (entry(U8, RO), entry(U8, RW), ["write 1 bytes were taken, want abort 0601 0002h"]),
+        (entry(U8, RO), entry(U8, RW), ["write 1 bytes were accepted, want abort 0601 0002h"]),
         (entry(U8, RW), entry(DataType.VISIBLE_STRING, RW), ["type 0 bytes", "long 1 bytes were"]),
         (
             *(entry(U16, RW), entry(DataType.VISIBLE_STRING, RW, "ab")),
-            ["long 3 bytes were taken", "short 2 bytes were taken"],
+            ["long 3 bytes were accepted", "short 2 bytes were accepted"],
         ),
         (
             *(entry(U8, RW), entry(U8, WO)),

@@ -65,7 +65,7 @@ def test_of_many_failures_the_last_ones_are_told_without_their_frames() -> None:
     text = text_report(MANY, again="canmon conform can0 --node 5")
     assert text.count("FAIL UE-") == 30
     assert text.count("look at") == 20
-    assert "\n\n10 more, without their frames, which --html FILE and --json have:\n\n" in text
+    assert "\n\n10 more, without their frames; --html FILE and --json have them:\n\n" in text
     last = text[text.index("FAIL UE-29") :].split("\n\n")[0]
     assert last.splitlines() == [
         "FAIL UE-29: what UE-29 wants",
@@ -124,11 +124,11 @@ def test_steps_are_in_json_and_on_the_page_of_what_failed() -> None:
 
 
 def test_checks_that_nobody_began_are_counted_in_a_line() -> None:
-    reason = "node 5 does not answer; heard here: nobody"
+    reason = "node 5 does not answer; other nodes: none"
     silent = tuple(result(f"UE-{n}", CheckVerdict.BLOCKED, reason, evidence=()) for n in range(30))
     text = text_report(replace(SAMPLE, results=(*silent, *SAMPLE.results)))
     assert text.count("BLOCKED") == 2
-    assert "\n\nBLOCKED 30 checks: node 5 does not answer; heard here: nobody\n" in text
+    assert "\n\nBLOCKED 30 checks: node 5 does not answer; other nodes: none\n" in text
     assert "\nBLOCKED PR-03: " in text
 
 
@@ -233,7 +233,7 @@ def test_a_known_failure_that_passes_is_told_on_the_page() -> None:
 
 
 def test_why_a_run_says_nothing_of_the_node_is_told_everywhere() -> None:
-    doubtful = replace(SAMPLE, doubt="this EDS is of another device: vendor 1h there, 2h here")
+    doubtful = replace(SAMPLE, doubt="this EDS is of another device: vendor 1h in EDS, 2h here")
     for write in (html_page, report_json, report_junit, text_report):
         assert doubtful.doubt in write(doubtful)
     assert text_report(doubtful).splitlines()[0] == doubtful.doubt
@@ -330,10 +330,10 @@ def test_findings_are_counted_where_a_terminal_ends() -> None:
 @pytest.mark.parametrize(
     ("data", "why"),
     [
-        (b"NMT-01 NMT-02\n", "line 1: 'NMT-01 NMT-02' is no id of a check"),
-        (b"\xff\xfe", "is no text: byte 0 is no UTF-8"),
+        (b"NMT-01 NMT-02\n", "line 1: 'NMT-01 NMT-02' is not the id of a check"),
+        (b"\xff\xfe", "is not a text: byte 0 is not UTF-8"),
         (b"\n" + b"A" * 1_000, "line 2: 'AAAA"),
-        (b'{"v": 1, "checks": []}', "is no id of a check"),
+        (b'{"v": 1, "checks": []}', "is not the id of a check"),
     ],
 )
 def test_what_is_no_baseline_is_refused(tmp_path: Path, data: bytes, why: str) -> None:

@@ -24,7 +24,7 @@ def test_lss_answers_of_other_nodes_fail_nothing_and_their_node_ids_stay() -> No
     known = ", ".join(map(str, sorted(ids)))
     assert outcomes["LS-02"].verdict is CheckVerdict.INCONCLUSIVE
     assert outcomes["LS-02"].reason.endswith(f"other nodes may have answered: {known}")
-    assert outcomes["LS-04"].reason == f"the other nodes would take LSS 11h too: {known}"
+    assert outcomes["LS-04"].reason == f"other nodes would also execute LSS 11h: {known}"
     judged.link.send((CanFrame.parse("000#8200"),))
     judged.rig.run_for(100_000)
     assert [other.node_id for other in others] == ids
