@@ -578,7 +578,7 @@ class Gateway:
         return OK
 
     def _info(self, request: _GatewayRequest) -> str:
-        """Say vendor-ID, product code, revision, serial number, class, protocol, version."""
+        """Return vendor-ID, product code, revision, serial number, class, protocol, version."""
         _check_count(request, 1, 1)
         _one_of(request.words[0], ("version",), "info")
         return f"0x00000000 0x00000000 0.0 0 0 3.0 {self._version}"

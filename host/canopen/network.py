@@ -165,10 +165,10 @@ class NodeSession:
         return None
 
     def run(self, script: dialogue.Script[T], listen: _Listen) -> T:
-        """Run a script to its end, and return or raise what it does.
+        """Run a script to its end, and return its result or raise its error.
 
         Args:
-            script: what is said; nothing else is said meanwhile.
+            script: the script; no other runs at the same time.
             listen: waits.
 
         Raises:

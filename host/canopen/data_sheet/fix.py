@@ -29,7 +29,7 @@ _NO_LETTER: Final = re.compile("[\udc80-\udcff]")
 
 @dataclass(frozen=True, slots=True)
 class _Fixed:
-    """A file that was mended.
+    """A fixed file.
 
     Attributes:
         document: the fixed document.
@@ -49,7 +49,7 @@ class _Fixed:
 
 
 def fix(document: Document, *, ascii_only: bool = False) -> _Fixed:
-    """Mend a file until nothing changes; lines that no finding names stay to the byte.
+    """Fix a file until nothing changes; lines without findings keep all bytes.
 
     A file that looks truncated stays unchanged: after a fix it would look complete. Other encodings
     than Unicode become UTF-8.

@@ -311,7 +311,7 @@ class BusExchange:
 
     @property
     def presence(self) -> Presence:
-        """How many nodes have answered so far: two, if most objects were told twice each time."""
+        """How many nodes have answered: two if most objects were answered twice each time."""
         if self._is_silent:
             return Presence.NONE
         told = self._answered
