@@ -138,7 +138,7 @@ def parse_request(line: str) -> _GatewayRequest | None:
             )
         numbers.append(number(words.pop(0), _MAX_NUMBER, "number"))
     if not words:
-        raise GatewayError(_GatewayErrorCode.SYNTAX, "there is no command")
+        raise GatewayError(_GatewayErrorCode.SYNTAX, "the command is missing")
     return _GatewayRequest(int(head[1]), tuple(numbers), words[0].lower(), tuple(words[1:]))
 
 
