@@ -557,7 +557,11 @@ class CanopenSlave(Copyable):
             if description.index in area:
                 data = stored.get(description.key)
                 if data is None:
-                    data = description.power_on_data(self.node_id)
+                    data = (
+                        description.power_on_data(self.node_id)
+                        if description.relative
+                        else description.default
+                    )
                 # `assign`, not `force`: it was not written over the bus, so `written`
                 # does not act.
                 entry.assign(data)

@@ -45,7 +45,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Final
 
-from tickrig.device.twin import Cache, Listeners
+from tickrig.device.twin import Listeners
 from tickrig.emulators.can.arbitration import dominant
 from tickrig.emulators.can.fault_confinement import ErrorCounters
 from tickrig.emulators.can.faults import CanFaults, FaultVerdict
@@ -64,7 +64,6 @@ if TYPE_CHECKING:
 _ERROR_BITS: Final = 6 + RECESSIVE_BITS  # an error flag, and what follows it
 _ECHO_BITS: Final = 6  # the error flags of the others, which begin when the first one ends
 _HEADER_BITS: Final = 19  # from start of frame to DLC
-_KEPT_LENGTHS: Final = 8_192
 
 
 def _first_difference(frames: Sequence[CanFrame]) -> int:
@@ -109,7 +108,6 @@ class CanSegment(TransmissionOutcomes):
         super().__init__(bit_rate, faults, observers, on_traffic)
         self.now_us, self.shorted = start_us, False
         self.received, self.whole = False, True
-        self._lengths: Cache[int, tuple[bytes, int]] = Cache()  # of the latest data by CAN-ID
         self._finish: Callable[[], None] | None = None  # of the plan; None for `_deliver`
 
     @property
@@ -264,11 +262,7 @@ class CanSegment(TransmissionOutcomes):
                 self._start, winners = arbiter.free, arbiter.take()
             self._winners = winners
             frame = winners[0].next
-            latest = self._lengths.get(frame[0])
-            if latest and latest[0] == frame[1] and not (frame[2] or frame[3]):
-                bits = latest[1]
-            else:
-                bits = self._length(frame)
+            bits = kept_bits(frame) if type(frame[1]) is bytes else frame_bits(frame)
             if self._on_bus > 1 and not self._faults.active and len(winners) == 1:
                 self._finish = None
                 self._free = free = self._start + bits * self.bit
@@ -285,14 +279,6 @@ class CanSegment(TransmissionOutcomes):
         self._arbiter.put_back(self._winners)
         self._winners, self._start = [], self._recovery.due
         self._finish, self._due_us = self._come_back, -(-self._start // self.unit)
-
-    def _length(self, frame: CanFrame) -> int:
-        if len(self._lengths) >= _KEPT_LENGTHS:
-            self._lengths.clear()
-        bits = kept_bits(frame) if type(frame[1]) is bytes else frame_bits(frame)
-        if not (frame[2] or frame[3]):
-            self._lengths[frame[0]] = frame[1], bits
-        return bits
 
     def _judge(self, frame: CanFrame, bits: int) -> None:
         """Plan a transmission that may fail."""
@@ -324,7 +310,7 @@ class CanSegment(TransmissionOutcomes):
         received = dominant(frames)
         losers = [end for end in self._winners if end.next != received]
         if all(end.controller.state is ErrorState.PASSIVE for end in losers):
-            self._settle(self._override, self._length(received))
+            self._settle(self._override, frame_bits(received))
         else:
             self._settle(self._fail, _first_difference(frames) + _ECHO_BITS + _ERROR_BITS)
 

@@ -167,7 +167,11 @@ class TransmissionOutcomes(SegmentFields):
         if sender.waiting:
             arbiter.push(sender)
         self._winners = []
-        if receivers := self.routes.receivers(frame):
+        routes = self.routes
+        receivers = None if frame[3] or routes.unfiltered else routes._table.get(frame[0])
+        if receivers is None:
+            receivers = routes.receivers(frame)
+        if receivers:
             alone = (frame,)
             for end in receivers:
                 if end is not sender:

@@ -71,7 +71,7 @@ typedef struct {
 
 typedef struct {
     PyObject_HEAD
-    PyObject *arbiter, *confinement, *faults, *finish, *lengths, *news, *observers, *on_traffic;
+    PyObject *arbiter, *confinement, *faults, *finish, *news, *observers, *on_traffic;
     PyObject *recovery, *repeating, *sound, *stale, *announced, *winners;
     PyObject *busy, *received, *routes, *shorted, *whole;
     us due_us, free, on_bus, start, bit, now_us, unit;
@@ -132,7 +132,7 @@ static PyMemberDef busy_fields[] = {
 static PyMemberDef segment_fields[] = {
     OBJECT("_arbiter", Segment, arbiter), OBJECT("_confinement", Segment, confinement),
     OBJECT("_faults", Segment, faults), OBJECT("_finish", Segment, finish),
-    OBJECT("_lengths", Segment, lengths), OBJECT("_news", Segment, news),
+    OBJECT("_news", Segment, news),
     OBJECT("_observers", Segment, observers), OBJECT("_on_traffic", Segment, on_traffic),
     OBJECT("_recovery", Segment, recovery), OBJECT("_repeating", Segment, repeating),
     OBJECT("_sound", Segment, sound), OBJECT("_stale", Segment, stale),

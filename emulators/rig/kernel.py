@@ -90,7 +90,7 @@ if TYPE_CHECKING or _KERNEL is None:
         """The fields of a `CanSegment`."""
 
         __slots__ = (
-            *("_arbiter", "_confinement", "_due_us", "_faults", "_finish", "_free", "_lengths"),
+            *("_arbiter", "_confinement", "_due_us", "_faults", "_finish", "_free"),
             *("_news", "_observers", "_on_bus", "_on_traffic", "_recovery", "_repeating"),
             *("_sound", "_stale", "_start", "_announced", "_winners", "bit", "busy", "now_us"),
             *("received", "routes", "shorted", "unit", "whole"),

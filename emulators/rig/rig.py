@@ -472,7 +472,7 @@ class Rig(Copyable):
             next_us = min(self._planned_us, self._wires.due_us)
             if next_us > deadline_us or next_us == NEVER:
                 if deadline_us < NEVER:
-                    self._idle_to(deadline_us)
+                    self._pass_to(deadline_us)
                 return done()
             self._happen(next_us)
             self._wires.advance(self.now_us)
@@ -557,9 +557,6 @@ class Rig(Copyable):
         """Advance through a time without ticks with work."""
         bus = self._bus
         (self._wires if bus is None or not bus.whole else bus).advance(t_us)
-        self._idle_to(t_us)
-
-    def _idle_to(self, t_us: int) -> None:
         if t_us > self.now_us:
             if self._in_real_time:
                 self._clock.wait_until(t_us)

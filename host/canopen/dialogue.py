@@ -310,7 +310,9 @@ class Dialogue:
                 self._pass_fence(step, answer)
             else:
                 self._keep_misnamed(now_us, named, data)
-        elif self._is_answer(step, answer, named, data):
+        elif (named == self._expected != _NONE_NAMED and not step.goes_on) or self._is_answer(
+            step, answer, named, data
+        ):
             self._unanswered.clear()
             took_us = max(LEAST_COPY_US, now_us - self._sent_us)
             self._answer, self._settled_us = data, now_us + min(took_us, _MOST_COPY_US)
@@ -444,12 +446,10 @@ class Dialogue:
         """Send the request of a step, or first a fence; or wait before it."""
         at = step.index, step.sub
         self._step = step
-        if step.goes_on:
-            self._send_request(at, step.request)
-        elif at in self._unanswered:
+        if not step.goes_on and at in self._unanswered:
             fence = self._unanswered.fence(at)
             self._send_request(fence, sdo.UploadInitiateRequest(*fence).encode())
-        elif at == self._transfer and self._now_us < self._settled_us:
+        elif not step.goes_on and at == self._transfer and self._now_us < self._settled_us:
             self.due_us = self._settled_us
         else:
             self._send_request(at, step.request)

@@ -304,7 +304,8 @@ def parse_request(frame: bytes) -> Request:
 
 def parse_response(frame: bytes) -> Response:
     """Read a frame of a server; FramingError if it is not a command."""
-    check_frame(frame)
+    if len(frame) != FRAME_BYTES:
+        check_frame(frame)
     specifier = frame[0] & SPECIFIER
     choice = _BLOCK_RESPONSES.get(specifier)
     parse = _RESPONSES.get(specifier) if choice is None else choice[frame[0] & BLOCK_SUBCOMMAND]

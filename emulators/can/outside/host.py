@@ -133,7 +133,8 @@ class CanHost:
             inbox += self._end.poll_stamped(rig.now_us)
             if not inbox:
                 if rig.now_us >= deadline_us:
-                    self._look(timeout_us)
+                    if timeout_us is not None and timeout_us <= 0:
+                        self._look()
                     return None
                 rig.run_to(deadline_us if deadline_us < NEVER else self._chunk_us(), self._end)
         return inbox.popleft()
@@ -165,10 +166,8 @@ class CanHost:
             self._own.add(at_us)
             self._end.receive(at_us, frame, (frame,))
 
-    def _look(self, timeout_us: int | None) -> None:
+    def _look(self) -> None:
         """Count a poll without result; a wait that has timed out does not count."""
-        if timeout_us is None or timeout_us > 0:
-            return
         if refusal := self._looks.refusal(self.now_us, _LOOKING):
             raise LinkError(refusal)
 

@@ -76,15 +76,10 @@ def _absent_places(device: EdsDevice, reader: ObjectReader) -> Iterator[_AbsentP
     certain, likely = ([at for at in places if at[1] <= _LAST_SUB] for places in (counted, behind))
     what = "record with a sub-index free"
     yield _AbsentPlaces("absent_sub", what, tuple(certain), tuple(likely))
-    variables = [index for index, last in highest.items() if not last and not _is_composed(index)]
-    certain = [(index, 1) for index in variables if standard_object(index)]
-    likely = [(index, 1) for index in variables if not standard_object(index)]
+    variables = {index: standard_object(index) for index, last in highest.items() if not last}
+    certain = [(index, 1) for index, known in variables.items() if known and not known.composed]
+    likely = [(index, 1) for index, known in variables.items() if not known]
     yield _AbsentPlaces("sub_of_variable", "variable", tuple(certain), tuple(likely))
-
-
-def _is_composed(index: int) -> bool:
-    known = standard_object(index)
-    return known is not None and known.composed
 
 
 _DEVICE_TYPE: Final = 0x1000
@@ -197,7 +192,7 @@ def bind(
     reader = ObjectReader(upload)
     found = device or probe_device(reader)
     entries = {(entry.index, entry.sub): entry for entry in found.entries}
-    facts = list(map(facts_of, found.entries))
+    facts = facts_of(found.entries)
     search = _Search(found, reader, allow, never, device is not None, entries, facts)
     for wanted in WANTED:
         _bind_object(search, wanted)

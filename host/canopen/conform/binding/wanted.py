@@ -56,10 +56,15 @@ class EntryFacts(NamedTuple):
     free: bool
 
 
-def facts_of(entry: EntryDescription) -> EntryFacts:
-    """Find out the facts about an entry."""
-    free = entry.index not in COMMUNICATION_AREA or entry.index in HARMLESS
-    return EntryFacts(entry, entry.access._value_, int(entry.data_type), free)
+def facts_of(entries: Iterable[EntryDescription]) -> list[EntryFacts]:
+    """Find out the facts about entries."""
+    return [
+        EntryFacts(
+            *(entry, entry.access._value_, int(entry.data_type)),
+            free=entry.index not in COMMUNICATION_AREA or entry.index in HARMLESS,
+        )
+        for entry in entries
+    ]
 
 
 class WantedObject(NamedTuple):

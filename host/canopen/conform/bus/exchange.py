@@ -59,8 +59,7 @@ _Line = tuple[int, Direction, CanFrame | str]
 class Evidence:
     """The lines of one attempt at a check: if there are many, the first and the last ones.
 
-    Frames are formatted only when the lines are read: frames between checks, nine tenths of a run,
-    are never formatted.
+    Frames are formatted only when the lines are read.
     """
 
     def __init__(self) -> None:
@@ -249,9 +248,9 @@ class BusExchange:
         crashes: reasons why the running check fails in any case, without duplicates.
         boots: boot-up messages of the node so far.
         others: node-IDs of others that were on the bus so far; 0 for what is of no node.
-        deadline_us: when the check under way has to have ended.
+        deadline_us: time at which the running check must have ended.
         transfer: the answer of the node to the last SDO request that names an object.
-        played: a node-ID that is no other node's: the tester plays it, or gives it to the node.
+        played: a node-ID of no other node: the tester simulates it, or assigns it to the node.
         unanswered: requests that name an object and were not answered, the first one first.
     """
 
@@ -285,7 +284,7 @@ class BusExchange:
         self.played: int | None = None
         self._shared_host, self._late_us = shared_host, 0
         self._unread: defaultdict[str, deque[tuple[int, CanFrame]]] = defaultdict(_queue)
-        self._watched: frozenset[str] = frozenset()
+        self._watched, self._keeps = frozenset[str](), False
         self.evidence, self.disturbances = Evidence(), dict[str, None]()
         self.crashes: dict[str, None] = {}
 
@@ -294,17 +293,19 @@ class BusExchange:
         """Bus time."""
         return self._link.now_us
 
-    def begin(self, within_us: int, watched: frozenset[str] = frozenset()) -> None:
-        """Begin a check, or the work between checks: forget all frames before.
+    def begin(self, within_us: int, watched: frozenset[str] | None = None) -> None:
+        """Begin a check, or what is done between checks: forget all frames before.
 
         Args:
             within_us: how long it may last.
-            watched: CAN-IDs whose frames are kept, besides those of the node.
+            watched: CAN-IDs of which frames are kept, beside those of the node; None between
+                checks, where no evidence is kept.
         """
         self.deadline_us = NEVER
         self._listen(self.now_us)
         within_us = round(within_us * self._allowance.slowness)
-        self.deadline_us, self._watched = self.now_us + within_us, watched
+        self.deadline_us, self._watched = self.now_us + within_us, watched or frozenset()
+        self._keeps = watched is not None
         self._unread.clear()
         self.evidence, self.disturbances, self.crashes = Evidence(), {}, {}
         self._busy_us, self._late_us = self.now_us, 0
@@ -356,7 +357,8 @@ class BusExchange:
             now_us = link.now_us
             if held_us > _HELD_US and self._allowance.slowness > 1:
                 self.disturb(_TOO_LOW)
-        self.evidence.add(now_us - self.start_us, Direction.SENT, frame)
+        if self._keeps:
+            self.evidence.add(now_us - self.start_us, Direction.SENT, frame)
         self._allowance.use(now_us, frame)
         if is_request:
             data = frame.data
@@ -497,7 +499,8 @@ class BusExchange:
         can_id, own = self._origins.get((frame[0], frame[3])) or self._origin(frame)
         if own or can_id in self._watched:
             self._unread[can_id].append((at_us, frame))
-            self.evidence.add(at_us - self.start_us, Direction.RECEIVED, frame)
+            if self._keeps:
+                self.evidence.add(at_us - self.start_us, Direction.RECEIVED, frame)
         if own:
             if frame.can_id == self._response:
                 self._allowance.use(at_us, frame)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Final, ParamSpec, TypeVar
+from typing import Final, TypeVar
 
 from tickrig.host.canopen.conform.bus.exchange import BusExchange, StepFailed
 from tickrig.host.canopen.conform.check import ANSWER_MS, Address
@@ -17,7 +17,6 @@ from tickrig.wire.canopen.sdo import Abort
 
 # Reads and writes objects of the node under test, apart from its checks.
 
-P = ParamSpec("P")
 T = TypeVar("T")
 
 SizeOf = Callable[[Address], int | None]
@@ -64,11 +63,18 @@ class SdoClient:
             SdoMisnamed: it answers, and names another object.
             LinkClosed: the bus is gone.
         """
-        return self._twice(upload, index, sub, self.size_of((index, sub)) or 0)
+        size = self.size_of((index, sub)) or 0
+        try:
+            return self.run(upload(index, sub, size))
+        except SdoTimeout:  # one frame may be lost
+            return self.run(upload(index, sub, size))
 
     def download(self, index: int, sub: int, data: bytes) -> None:
         """Write an object, as `upload` reads one; raises the same."""
-        self._twice(download, index, sub, data)
+        try:
+            self.run(download(index, sub, data))
+        except SdoTimeout:
+            self.run(download(index, sub, data))
 
     def number(self, index: int, sub: int) -> int | None:
         """Return an unsigned number of at most 32 bits, None if the node gives none."""
@@ -76,13 +82,6 @@ class SdoClient:
             return number_of(self.upload(index, sub))
         except SdoFailed:
             return None
-
-    def _twice(self, make: Callable[P, Script[T]], *words: P.args, **named: P.kwargs) -> T:
-        """Run a script, and once more if the node did not answer: one frame may be lost."""
-        try:
-            return self.run(make(*words, **named))
-        except SdoTimeout:
-            return self.run(make(*words, **named))
 
     def abort(self) -> None:
         """End a transfer that a check left open; stacks look which object the abort names."""
