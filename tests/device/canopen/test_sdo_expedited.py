@@ -47,6 +47,18 @@ def test_an_object_that_is_made_on_demand_is_asked_each_time() -> None:
     assert answers == ["585#4300100005000000", "585#4300100004000000"]
 
 
+def test_an_answer_follows_the_value_and_the_node_id() -> None:
+    bus, read = booted(), "4002200000000000"
+    entry = bus.slave.dictionary[0x2002, 0]
+    for value in (1, 1, 2):
+        entry.value = value
+        assert bus.step(f"605#{read}") == [f"585#430220000{value}000000"]
+    bus.slave.pending_id = 6
+    bus.slave.reset_node()
+    bus.step()
+    assert bus.step(f"606#{read}") == ["586#4302200000000000"]
+
+
 DOWNLOADS = [
     ("2F002000A5000000", "6000200000000000", "4F002000A5000000"),  # DE-01
     ("2B01200034120000", "6001200000000000", "4B01200034120000"),  # DE-02
