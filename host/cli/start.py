@@ -163,6 +163,14 @@ def paint(stream: TextIO, text: str) -> None:
     stream.flush()
 
 
+def write_harmless(stream: TextIO, text: str) -> None:
+    """Write text of which every character is known to be harmless; looking at each takes time."""
+    if isinstance(stream, _HarmlessStream):
+        io.TextIOWrapper.write(stream, text)
+    else:
+        stream.write(text)
+
+
 def as_is(stream: TextIO) -> TextIO:
     """Return the stream that writes what a command paints itself."""
     stream.flush()

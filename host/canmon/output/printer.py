@@ -3,25 +3,25 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from enum import StrEnum
 from math import isfinite
-from typing import TYPE_CHECKING, Final, assert_never
+from typing import TYPE_CHECKING, Final, TextIO, assert_never
 
 from tickrig._lazy import LazyModule
 from tickrig.host.canmon.model.frames import DumpLines, Record, decoded_text, line_text
 from tickrig.host.canmon.model.logs.log_file import Mark, dropped
 from tickrig.host.canmon.model.logs.log_writer import comment, log_line
 from tickrig.host.canmon.model.logs.notation import DUMP_HEADER, drop_line, json_line, line_json
-from tickrig.host.cli.start import as_is
+from tickrig.host.cli.start import as_is, write_harmless
 from tickrig.host.text.page_text import json_text, one_line
 from tickrig.host.text.values import counted
 from tickrig.wire.can import CanFrame, ErrorFrame
 
 if TYPE_CHECKING:
     from tickrig.host.canmon.model.columns import column_meanings, column_text
-    from tickrig.host.canmon.model.columns import columns as column_blocks
+    from tickrig.host.canmon.model.columns.columns import Columns
     from tickrig.host.canmon.model.decode import filter as filters
     from tickrig.host.canmon.model.decode import services
     from tickrig.host.canmon.model.decode.decoded import Decoded
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 else:  # slow; seldom wanted; numpy
     column_meanings = LazyModule("tickrig.host.canmon.model.columns.column_meanings")
     column_text = LazyModule("tickrig.host.canmon.model.columns.column_text")
-    column_blocks = LazyModule("tickrig.host.canmon.model.columns.columns")
     filters = LazyModule("tickrig.host.canmon.model.decode.filter")
     services = LazyModule("tickrig.host.canmon.model.decode.services")
 
@@ -229,24 +228,15 @@ class BlockPrinter:
     """
 
     def __init__(self, output: DumpFormat, lines: DumpLines, decoder: Decoder | None) -> None:
-        self._print, self._screen = (
-            printer_of(output, lines, raw=False),
-            column_text.ScreenText(lines),
-        )
-        self._output, self._meaning, self._decode = output, FilteredDecoder(decoder, None), None
+        self._output, self._screen, self._decode = output, column_text.ScreenText(lines), None
         if decoder is not None:
             self._decode = column_meanings.ColumnMeanings(decoder).texts
 
-    def text(self, columns: column_blocks.Columns) -> str:
-        """Write frames; the last line is without its end."""
-        if not len(columns):
-            return ""
-        if not column_text.fits(columns):
-            found = self._meaning.take(column_blocks.records(columns))
-            return "\n".join(self._print(*one) for one in found)
+    def texts(self, columns: Columns) -> Iterator[str]:
+        """Write frames that fit, each line with its end; a terminal obeys nothing in them."""
         if self._output is DumpFormat.LOG:
-            return column_text.log_lines(columns)[:-1]
-        return self._screen.text(columns, self._decode and self._decode(columns))[:-1]
+            return iter([column_text.log_lines(columns)])
+        return self._screen.texts(columns, self._decode and self._decode(columns))
 
 
 _DROPS: Final = {
@@ -276,21 +266,26 @@ class StdoutWriter:
         self, decoded_frames: Sequence[DecodedFrame], lost: int, marks: Sequence[Mark] = ()
     ) -> bool:
         """Print frames, at once; it always takes more."""
-        return self.take_text(
-            "\n".join([self._printer(*one) for one in decoded_frames]), lost, marks
-        )
-
-    def take_text(self, text: str, lost: int, marks: Sequence[Mark] = ()) -> bool:
-        """Print lines of frames, the last without its end."""
         lines = [DUMP_HEADER] if self._header else []
-        lines += [text] if text else []
+        lines += [self._printer(*one) for one in decoded_frames]
         if lost != self._lost and (said := _DROPS.get(self._output)):
             lines.append(said(lost - self._lost))
         if marks and (write := _MARKS.get(self._output)):
             lines += map(write, marks)
         self._header, self._lost = False, lost
         if lines:
-            stream = sys.stdout if self._shown else as_is(sys.stdout)
+            stream = self._stream()
             stream.write("\n".join(lines) + "\n")
             stream.flush()
         return False
+
+    def take_block(self, texts: Iterable[str], lost: int) -> None:
+        """Print the lines of a block, as `BlockPrinter.texts` has them."""
+        stream = self._stream()
+        for text in texts:
+            write_harmless(stream, text)
+        stream.flush()
+        self.take((), lost)
+
+    def _stream(self) -> TextIO:
+        return sys.stdout if self._shown else as_is(sys.stdout)

@@ -278,8 +278,10 @@ def _pass_pieces(
         for piece in log.pieces():
             if isinstance(piece, Sequence):
                 writer.take(list(meaning.take(piece)), log.lost, log.marks)
+            elif len(piece) and column_text.fits(piece):
+                writer.take_block(blocks.texts(piece), log.lost)
             else:
-                writer.take_text(blocks.text(piece), log.lost)
+                writer.take(list(meaning.take(column_blocks.records(piece))), log.lost)
 
 
 def _with_keys(log: LogFile, keys: _TriggerKeys) -> _Take:

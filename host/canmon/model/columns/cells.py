@@ -1,7 +1,8 @@
 """Numbers as text, a column at once, as `str` writes each; needs numpy.
 
->>> joined(3, scaled(np.array([1, 3, -25]), Scale.of(0.1, 0))[0]).split()
-['0.1', '0.3', '-2.5']
+>>> parts, right = scaled(np.array([1, 3, -25]), Scale.of(0.1, 0))
+>>> joined(3, [*parts, b" "]), right.tolist()
+('0.1 0.3 -2.5 ', [True, False, True])
 """
 
 from __future__ import annotations
@@ -82,8 +83,8 @@ def together(count: int, parts: Sequence[Part]) -> Cells:
 
 def joined(count: int, parts: Sequence[Part]) -> str:
     """Return all lines as one text."""
-    rows = together(count, parts)
-    return rows.tobytes().translate(None, b"\0").decode("utf-8", "surrogatepass")
+    found = together(count, parts).tobytes().translate(None, b"\0")
+    return found.decode("utf-8", "surrogatepass")
 
 
 def where(rows: Mask, text: bytes, other: bytes = b"") -> Cells:
@@ -137,13 +138,14 @@ class Texts:
             rows[places, : piece.shape[1]] = piece
         return rows
 
-    def lines(self, parts: Sequence[Part] = ()) -> str:
-        """Return a line for each row: parts that stand before its text, and that."""
-        text = joined(self._count, [*parts, self.cells, b"\n"])
-        if not self._wide:
-            return text
-        wide = [self._wide[row] for row in sorted(self._wide)]
-        between = text.split(_MARK)
+    def lines(self, rows: slice, parts: Sequence[Part] = ()) -> str:
+        """Return lines of some rows: parts that stand before their texts, and these."""
+        texts = self.cells[rows]
+        found = joined(len(texts), [*parts, texts, b"\n"])
+        if not self._wide or _MARK not in found:
+            return found
+        wide = [self._wide[row] for row in range(*rows.indices(self._count)) if row in self._wide]
+        between = found.split(_MARK)
         return "".join([part for pair in zip(between, [*wide, ""], strict=True) for part in pair])
 
 

@@ -285,13 +285,13 @@ class _Bits(NamedTuple):
 def _each_column(head: str, bits: _Bits, write: Callable[[int], str], unit: str = "") -> _Column:
     """Return a signal whose numbers are written one by one, those of few bits once for all."""
 
-    def shown(raw: int) -> str:
+    def text(raw: int) -> str:
         return write(bits.number(raw))
 
     if bits.length <= _SHORT:
-        table = cells.TextTable(bits.length, shown)
+        table = cells.TextTable(bits.length, text)
         return _Column(head, lambda payloads: [table.cells(bits.of(payloads).view(np.int64))], unit)
-    return _Column(head, lambda payloads: [cells.of_few(bits.of(payloads), shown)], unit)
+    return _Column(head, lambda payloads: [cells.of_few(bits.of(payloads), text)], unit)
 
 
 def _whole_column(
@@ -309,18 +309,18 @@ def _whole_column(
     times, more = scale
     limit = (cells.WHOLE - abs(more)) // max(1, abs(times))
 
-    def shown(payloads: _Payloads) -> Sequence[cells.Part]:
+    def column(payloads: _Payloads) -> Sequence[cells.Part]:
         raw = bits.of(payloads)
         numbers = bits.signed(raw)
         right = _within(numbers, raw, bits, limit)
         if right is None:
             return cells.whole(numbers * times + more if scale != (1, 0) else numbers)
         parts = cells.whole(np.where(right, numbers, 0) * times + more)
-        return [_mended(parts, right, raw, lambda found: write(bits.number(found)))]
+        return [_corrected(parts, right, raw, lambda found: write(bits.number(found)))]
 
     if limit <= 0 or max(abs(times), abs(more)) >= cells.WHOLE:
         return _each_column(head, bits, write, unit)
-    return _Column(head, shown, unit)
+    return _Column(head, column, unit)
 
 
 def _scaled_column(
@@ -331,7 +331,7 @@ def _scaled_column(
     if exact is None:
         return _each_column(head, bits, write, unit)
 
-    def shown(payloads: _Payloads) -> Sequence[cells.Part]:
+    def column(payloads: _Payloads) -> Sequence[cells.Part]:
         raw = bits.of(payloads)
         numbers = bits.signed(raw)
         parts, right = cells.scaled(numbers, exact)
@@ -340,9 +340,9 @@ def _scaled_column(
             right &= within
         if right.all():
             return parts
-        return [_mended(parts, right, raw, lambda found: write(bits.number(found)))]
+        return [_corrected(parts, right, raw, lambda found: write(bits.number(found)))]
 
-    return _Column(head, shown, unit)
+    return _Column(head, column, unit)
 
 
 def _within(
@@ -357,14 +357,14 @@ def _within(
     return None if right.all() else right
 
 
-def _mended(
+def _corrected(
     parts: Sequence[cells.Part], right: cells.Mask, raw: _Payloads, write: Callable[[int], str]
 ) -> cells.Cells:
-    """Return a text in which those that are not right are written anew."""
+    """Return a text in which those that are not right are replaced."""
     wrong = np.flatnonzero(~right)
-    anew = cells.of_texts(map(write, raw[wrong].tolist()))
-    rows = cells.widened(cells.together(len(raw), parts), anew.shape[1])
-    rows[wrong] = cells.widened(anew, rows.shape[1])
+    texts = cells.of_texts(map(write, raw[wrong].tolist()))
+    rows = cells.widened(cells.together(len(raw), parts), texts.shape[1])
+    rows[wrong] = cells.widened(texts, rows.shape[1])
     return rows
 
 
@@ -436,7 +436,7 @@ def _message_writer(file: DbcFile, can_id: int, extended: bool) -> _Write:
         rows, both = np.arange(len(samples)), (cells.Texts(len(samples)), cells.Texts(len(samples)))
         for put, texts in zip((write, single), both, strict=True):
             put(texts, rows, samples, np.full(len(samples), length))
-        ours, theirs = map(cells.Texts.lines, both)
+        ours, theirs = (texts.lines(slice(None)) for texts in both)
         return write if ours == theirs else single
 
     return _by_length(make)
@@ -452,10 +452,10 @@ def _message_columns(message: DbcMessage, length: int) -> list[_Column] | None:
         start = signal.start ^ 7 if swapped else signal.start  # from the first bit on the bus
         if start + signal.length > 8 * min(length, message.length):
             continue
-        column = _signal_column(signal, start, swapped)
-        if column is None:
+        found = _signal_column(signal, start, swapped)
+        if found is None:
             return None
-        columns.append(column)
+        columns.append(found)
     return columns
 
 

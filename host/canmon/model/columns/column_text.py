@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import lru_cache
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
 from tickrig.host.canmon.model import frames
 from tickrig.host.canmon.model.columns import cells
-from tickrig.host.canmon.model.columns.columns import Columns, Ints
+from tickrig.host.canmon.model.columns.columns import Columns, Ints, select
 from tickrig.wire.can import ERROR_FLAG, EXTENDED_MAX, MAX_DATA_BYTES, STANDARD_MAX
 
 # The lines of a block are a matrix of bytes: a row for each frame, and in it a place for each
@@ -26,11 +26,14 @@ _ABSENT: Final = 256
 """The row of a byte that is not there."""
 
 
-_SPACED: Final = cells.table([*(f" {byte:02X}" for byte in range(256)), ""], "<u4")
 _PAIRS: Final = cells.table([*(f"{byte:02X}" for byte in range(256)), ""], "<u2")
 _THREE: Final = cells.table([f"{number:03d}" for number in range(1_000)], "<u4")
 _STANDARD: Final = cells.table([f"{can_id:03X}" for can_id in range(STANDARD_MAX + 1)], "<u4")
 _BLANKS: Final = np.array([b" " * count for count in range(frames.DATA_WIDTH + 3)])
+
+
+_SLAB: Final = 1 << 12
+"""Lines that are written at once; what is made of them stays in the cache of the processor."""
 
 
 def fits(columns: Columns) -> bool:
@@ -43,7 +46,11 @@ def _seconds(span_us: Ints, write: Callable[[int], str]) -> list[cells.Part]:
     seconds = span_us // 1_000_000
     micros = span_us - seconds * 1_000_000
     high, low = np.divmod(micros, 1_000)
-    return [cells.of_few(seconds, write), b".", cells.of(_THREE[high]), cells.of(_THREE[low])]
+    return [
+        cells.of_few(seconds, write),
+        b".",
+        *(cells.of(_THREE[part])[:, :3] for part in (high, low)),
+    ]
 
 
 def _channels(columns: Columns) -> cells.Part:
@@ -52,18 +59,24 @@ def _channels(columns: Columns) -> cells.Part:
     return cells.of_texts(columns.channels)[columns.channel]
 
 
-def _octets(columns: Columns, table: npt.NDArray[Any], remote: cells.Mask) -> cells.Cells:
-    """Write the bytes of the data."""
+def _octets(columns: Columns, remote: cells.Mask, blank: bytes = b"") -> cells.Cells:
+    """Write the bytes of the data, each behind a blank or none."""
     octets = columns.payload.astype("<u8").view(np.uint8).reshape(-1, MAX_DATA_BYTES)
     lengths = np.where(remote, 0, columns.dlc)
     there = np.arange(MAX_DATA_BYTES) < lengths[:, np.newaxis]
-    return cells.of(table[np.where(there, octets, np.int16(_ABSENT))])
+    pairs = cells.of(_PAIRS[np.where(there, octets, np.int16(_ABSENT))])
+    if not blank:
+        return pairs
+    rows = np.empty((*octets.shape, 3), np.uint8)
+    rows[:, :, 0] = there * np.uint8(ord(blank))
+    rows[:, :, 1:] = pairs.reshape(*octets.shape, 2)
+    return rows.reshape(len(octets), -1)
 
 
 def _idents(ident: npt.NDArray[np.uint32]) -> tuple[cells.Cells, cells.Mask]:
     """Write identifiers of three or eight digits, and say which have eight."""
     long = ident & np.uint32(frames.EXTENDED | frames.ERROR) != 0
-    short = cells.of(_STANDARD[ident & STANDARD_MAX])
+    short = cells.of(_STANDARD[ident & STANDARD_MAX])[:, :3]
     if not long.any():
         return short, long
     rows = cells.widened(short, 8)
@@ -93,7 +106,7 @@ def log_lines(columns: Columns) -> str:
             b" ",
             _idents(ident)[0],
             *sharp,
-            _octets(columns, _PAIRS, remote),
+            _octets(columns, remote),
             cells.where(columns.sent, b" T"),
             b"\n",
         ],
@@ -110,13 +123,18 @@ class ScreenText:
     def __init__(self, lines: frames.DumpLines) -> None:
         self._lines = lines
 
-    def text(self, columns: Columns, meanings: cells.Texts | None = None) -> str:
+    def texts(self, columns: Columns, meanings: cells.Texts | None = None) -> Iterator[str]:
         """Write frames, each line with its end.
 
         Args:
-            columns: the frames, one at least.
+            columns: the frames.
             meanings: what stands behind each, empty where nothing does; None for none at all.
         """
+        for begin in range(0, len(columns), _SLAB):
+            rows = slice(begin, begin + _SLAB)
+            yield self._text(select(columns, rows), rows, meanings)
+
+    def _text(self, columns: Columns, rows: slice, meanings: cells.Texts | None) -> str:
         lines = self._lines
         ident, remote = columns.ident, columns.ident & np.uint32(frames.REMOTE) != 0
         idents, long = _idents(ident)
@@ -125,7 +143,7 @@ class ScreenText:
             parts += [b"  ", cells.where(columns.sent, b"TX - -", b"RX - -")]
         parts += [b"  ", *self._indents(long), idents, b"  "]
         length = cells.of(_THREE[columns.dlc])[:, 2:3]
-        data: list[cells.Part] = [b" [", length, b"] ", _octets(columns, _SPACED, remote)]
+        data: list[cells.Part] = [b" [", length, b"] ", _octets(columns, remote, b" ")]
         errors = ident & np.uint32(frames.ERROR) != 0
         if remote.any():
             data.append(cells.where(remote, b" remote request"))
@@ -134,8 +152,8 @@ class ScreenText:
         if meanings is None:
             return cells.joined(len(columns), [*parts, *data, b"\n"])
         blanks = frames.DATA_WIDTH + 1 - len(b" [8] ") - 3 * np.where(remote, 5, columns.dlc)
-        blanks = np.where(meanings.cells[:, 0] != 0, 3 + np.where(errors, 0, blanks), 0)
-        return meanings.lines([*parts, *data, cells.of(_BLANKS[blanks])])
+        blanks = np.where(meanings.cells[rows, 0] != 0, 3 + np.where(errors, 0, blanks), 0)
+        return meanings.lines(rows, [*parts, *data, cells.of(_BLANKS[blanks])])
 
     def _indents(self, long: cells.Mask) -> list[cells.Part]:
         """Return what stands before identifiers of three digits once one of eight was there."""
@@ -223,7 +241,7 @@ def _asc_lines(columns: Columns, begin_us: int, number: Callable[[str], int]) ->
             cells.where(columns.sent, b"Tx  ", b"Rx  "),
             cells.where(remote, b" r ", b" d "),
             cells.of(_THREE[columns.dlc])[:, 2:3],
-            _octets(columns, _SPACED, remote),
+            _octets(columns, remote, b" "),
             b"\n",
         ],
     )

@@ -139,7 +139,7 @@ class Rows:
         return columns if self.known.all() else select(columns, np.flatnonzero(self.known))
 
 
-def select(columns: Columns, rows: Ints) -> Columns:
+def select(columns: Columns, rows: Ints | slice) -> Columns:
     """Return some rows."""
     at_us, ident, dlc, payload, sent, channel = (part[rows] for part in columns.parts)
     return Columns(at_us, ident, dlc, payload, sent, channel, columns.channels)

@@ -38,7 +38,7 @@ def assert_alike(records: list[Record], size: int, dbc: tuple[Path, ...] = ()) -
     found = [
         text
         for block in blocks(records, size)
-        for text in meanings.texts(block).lines().split("\n")[:-1]
+        for text in meanings.texts(block).lines(slice(None)).split("\n")[:-1]
     ]
     assert found == texts(Decoder(dbc=dbc), records)
 
@@ -128,4 +128,4 @@ def test_text_of_a_file_is_data(tmp_path: Path) -> None:
     )
     record = Record(0, "can0", CanFrame(0x185, bytes(4)))
     meanings = ColumnMeanings(Decoder(dbc=[path]))
-    assert meanings.texts(blocks([record], 1)[0]).lines() == "dbc M s=0%s{0}%(x)d\n"
+    assert meanings.texts(blocks([record], 1)[0]).lines(slice(None)) == "dbc M s=0%s{0}%(x)d\n"
