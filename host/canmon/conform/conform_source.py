@@ -43,18 +43,6 @@ _LOCAL: Final = ("virtual", "udp_multicast")
 """Interfaces of python-can whose bus connects processes, mostly of one machine."""
 
 
-def _leave() -> None:
-    """Do nothing."""
-
-
-def _know_nothing(node_id: int) -> None:
-    """Return None: nothing is known about the node."""
-
-
-def _watch_nothing(node_id: int, run: ConformRun) -> None:
-    """Return no watch."""
-
-
 @dataclass(frozen=True, slots=True)
 class ConformSource:
     """An open bus.
@@ -82,10 +70,10 @@ class ConformSource:
     shared_host: bool = False
     nodes: dict[int, str] = field(default_factory=dict)
     eds: dict[int, str] = field(default_factory=dict)
-    describe: Callable[[int], NodeDescription | None] = _know_nothing
+    describe: Callable[[int], NodeDescription | None] = lambda node_id: None
     stimulus: Callable[[int], Stimulus] | None = None
-    close: Callable[[], object] = _leave
-    watch: Callable[[int, ConformRun], None] = _watch_nothing
+    close: Callable[[], object] = lambda: None
+    watch: Callable[[int, ConformRun], None] = lambda node_id, run: None
 
 
 def open_conform_source(

@@ -49,9 +49,6 @@ from tickrig.host.cli.start import INTERRUPTED
 from tickrig.host.text.page_text import one_line
 from tickrig.host.text.whole_file import check_file, check_not_read, write_whole
 
-# The files of a conformance run, checked before it and written after it, and frames in them.
-
-
 # The files of a conformance run: checked before it, and written after it.
 
 _HTML: Final = "--html"

@@ -8,7 +8,7 @@ import shutil
 import subprocess
 import sys
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -345,9 +345,6 @@ class _ControlStimulus(SignalStimulus):
             return client.request(do, **fields)
 
 
-# Questions before anything on the bus may move, and the progress of a run.
-
-
 # Nodes on a bus, found by listening only.
 
 _LISTEN_US: Final = 1_500_000
@@ -359,18 +356,18 @@ _FUNCTIONS: Final = (0x080, 0x180, 0x280, 0x380, 0x480, 0x580, 0x700)
 
 def list_nodes(source: ConformSource) -> int:
     """List the nodes on a bus if no node was given; return the exit status."""
-    lines = [f"node {node_id}  {name}" for node_id, name in source.nodes.items()]
-    ended = source.virtual
+    found: list[dict[int, str]] = [source.nodes] if source.virtual else []
     with until_interrupted():
-        if not ended:
-            heard = nodes_heard(source.link)
-            lines = [f"node {each}  {counted(frames, 'frame')}" for each, frames in heard.items()]
-            ended = True
+        if not found:
+            heard = nodes_heard(source.link).items()
+            found.append({node_id: counted(frames, "frame") for node_id, frames in heard})
+    if not found:
+        return INTERRUPTED
     with until_unread():
-        for line in lines:
-            click.echo(line)
-    if lines or not ended:
-        return 0 if lines else INTERRUPTED
+        for node_id, text in found[0].items():
+            click.echo(f"node {node_id}  {text}")
+    if found[0]:
+        return 0
     say(f"no frames within {_LISTEN_US / 1e6:.1f} s; a node that sends nothing itself is not found")
     return NOTHING_JUDGED
 
@@ -397,17 +394,6 @@ def _node_of(frame: CanFrame) -> int | None:
     sent = not (frame.extended or frame.remote) and node_id
     return node_id if sent and frame.can_id & 0x780 in _FUNCTIONS else None
 
-
-def _listed(nodes: dict[int, str] | dict[int, int]) -> str:
-    """Write node-IDs for people.
-
-    >>> _listed({3: 1, 16: 2})
-    'node 3, node 16'
-    """
-    return ", ".join(f"node {node_id}" for node_id in nodes)
-
-
-_Confirm = Callable[[str], bool]
 
 _DOES = {
     Level.READ_ONLY: "is only read",
@@ -446,7 +432,7 @@ class Consent:
             Refused: the answer is no, or there is no terminal to ask.
         """
         if others:
-            say(f"also on this bus: {_listed(others)}")
+            say(f"also on this bus: {', '.join(f'node {each}' for each in others)}")
         if level is Level.READ_ONLY or self._yes or self._virtual:
             return
         what = f"node {node_id} {_DOES[level]}: what it drives may move, other nodes may trip"
