@@ -17,7 +17,6 @@ from tickrig.emulators.rig.rig import Coupling, Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.host.text.trace import Mark
 from tickrig.wire.can import CanFrame, Frames
-from tickrig.wire.instant import NEVER
 
 
 class CanEmulator(RunningEmulator):
@@ -74,10 +73,6 @@ class CanEmulator(RunningEmulator):
         end.auto_recovery = True
         self._ends.append(end)
         return end
-
-    @property
-    def _host_due_us(self) -> int:
-        return NEVER
 
     def _listen(self, now_us: int) -> None:
         for at_us, frame in self._host.poll_stamped(now_us):

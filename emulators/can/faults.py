@@ -26,7 +26,7 @@ class FaultVerdict(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class CanFaultType(FaultForm):
+class _CanFaultType(FaultForm):
     """A fault that can be armed by name.
 
     Attributes:
@@ -36,22 +36,21 @@ class CanFaultType(FaultForm):
     verdict: FaultVerdict | None = None
 
 
-CAN_FAULTS: Final[Mapping[str, CanFaultType]] = {
-    "drop": CanFaultType(
-        "each frame is acknowledged, and received by no node",
-        verdict=FaultVerdict.DROPPED,
+CAN_FAULTS: Final[Mapping[str, _CanFaultType]] = {
+    "drop": _CanFaultType(
+        "each frame is acknowledged, and received by no node", verdict=FaultVerdict.DROPPED
     ),
-    "corrupt": CanFaultType(
+    "corrupt": _CanFaultType(
         "a bit of each frame is inverted: an error frame follows, and the frame is sent again",
         verdict=FaultVerdict.CORRUPTED,
     ),
-    "duplicate": CanFaultType(
+    "duplicate": _CanFaultType(
         "each frame is sent twice, because its sender sees the last bit wrong",
         verdict=FaultVerdict.DUPLICATED,
     ),
-    "delay": CanFaultType("each time a node sends, it is delayed by 10 ms"),
-    "babble": CanFaultType("a broken node sends 000# without a pause", rated=False),
-    "short": CanFaultType("the lines are shorted: no node can send", rated=False),
+    "delay": _CanFaultType("each time a node sends, it is delayed by 10 ms"),
+    "babble": _CanFaultType("a broken node sends 000# without a pause", rated=False),
+    "short": _CanFaultType("the lines are shorted: no node can send", rated=False),
 }
 
 

@@ -4,7 +4,7 @@
 #
 # Nearly all that goes wrong with a node is something that its frames suffer: an answer is late, a
 # heartbeat missing, a PDO too short. So a fault is a line of `NODE_FAULTS`: which frames it acts
-# on (`NodeFrames`), and what is sent, or received, instead of one (a function that returns frames,
+# on (`_NodeFrames`), and what is sent, or received, instead of one (a function that returns frames,
 # each with how much later it comes). The slave knows nothing of it, as a real one would not.
 #
 #   Station -> FaultyNode -> (TracedDevice) -> Node -> slave         port: CanEnd -> CanWire
@@ -66,7 +66,7 @@ _SHORTEST_BITS: Final = 47
 """Bits of a frame without data, with those to the next one."""
 
 
-class NodeFrames(Flag):
+class _NodeFrames(Flag):
     """Kinds of frames from and to a node."""
 
     OTHER = auto()
@@ -87,17 +87,17 @@ class NodeFrames(Flag):
     REQUEST = FOR_SDO | FOR_SDO_START | FOR_SDO_END
 
 
-_NO_FRAMES: Final = NodeFrames(0)
+_NO_FRAMES: Final = _NodeFrames(0)
 
 
 _ANSWERS: Final = {
-    int(sdo_frame.ServerCommand.UPLOAD): NodeFrames.SDO_INDEX,
-    int(sdo_frame.ServerCommand.DOWNLOAD): NodeFrames.SDO_INDEX,
-    int(sdo_frame.ServerCommand.BLOCK_UPLOAD): NodeFrames.SDO_INDEX,
-    int(sdo_frame.ServerCommand.UPLOAD_SEGMENT): NodeFrames.SDO_SEGMENT,
-    int(sdo_frame.ServerCommand.DOWNLOAD_SEGMENT): NodeFrames.SDO_SEGMENT,
-    0xE0: NodeFrames.SDO_REST,  # no service has it
-    0x80: NodeFrames.SDO_REST,
+    int(sdo_frame.ServerCommand.UPLOAD): _NodeFrames.SDO_INDEX,
+    int(sdo_frame.ServerCommand.DOWNLOAD): _NodeFrames.SDO_INDEX,
+    int(sdo_frame.ServerCommand.BLOCK_UPLOAD): _NodeFrames.SDO_INDEX,
+    int(sdo_frame.ServerCommand.UPLOAD_SEGMENT): _NodeFrames.SDO_SEGMENT,
+    int(sdo_frame.ServerCommand.DOWNLOAD_SEGMENT): _NodeFrames.SDO_SEGMENT,
+    0xE0: _NodeFrames.SDO_REST,  # no service has it
+    0x80: _NodeFrames.SDO_REST,
 }
 
 
@@ -110,48 +110,48 @@ class _SdoBlocks(Copyable):
         self._of_client = self._of_server = False  # whose segments are under way
         self._last = 0  # sequence number of the last segment of all, if it has passed
 
-    def received(self, data: bytes) -> NodeFrames:
+    def received(self, data: bytes) -> _NodeFrames:
         """Return the kind of a request."""
         first = data[0] if data else sdo_frame.ClientCommand.ABORT
         specifier = first & sdo_frame.SPECIFIER
         if self._of_client and first != sdo_frame.ClientCommand.ABORT:
             self._pass(first)
-            return NodeFrames.FOR_SDO
+            return _NodeFrames.FOR_SDO
         if first in (sdo_frame.BLOCK_START, sdo_frame.BLOCK_ACKNOWLEDGE):
             ended = self._last and len(data) > 1 and data[1] == self._last
             self._of_server, self._last = not ended, 0
-            return NodeFrames.FOR_SDO
+            return _NodeFrames.FOR_SDO
         self._of_client = self._of_server = False
         if specifier == sdo_frame.ClientCommand.BLOCK_DOWNLOAD and first & 1:
-            return NodeFrames.FOR_SDO_END
+            return _NodeFrames.FOR_SDO_END
         starts = (
             specifier in (sdo_frame.ClientCommand.DOWNLOAD, sdo_frame.ClientCommand.UPLOAD)
             or specifier == sdo_frame.ClientCommand.BLOCK_DOWNLOAD
             or (specifier == sdo_frame.ClientCommand.BLOCK_UPLOAD and not first & 3)
         )
-        return NodeFrames.FOR_SDO_START if starts else NodeFrames.FOR_SDO
+        return _NodeFrames.FOR_SDO_START if starts else _NodeFrames.FOR_SDO
 
-    def sent(self, data: bytes) -> NodeFrames:
+    def sent(self, data: bytes) -> _NodeFrames:
         """Return the kind of an answer."""
         first = data[0] if data else sdo_frame.ServerCommand.ABORT
         if first == sdo_frame.ServerCommand.ABORT:
             self._of_client = self._of_server = False
-            return NodeFrames.SDO_REST
+            return _NodeFrames.SDO_REST
         if self._of_server:
             self._pass(first)
-            return NodeFrames.SDO_REST
+            return _NodeFrames.SDO_REST
         specifier = first & sdo_frame.SPECIFIER
         if specifier == sdo_frame.ServerCommand.BLOCK_UPLOAD and first & 1:
-            return NodeFrames.SDO_END
+            return _NodeFrames.SDO_END
         if specifier != sdo_frame.ServerCommand.BLOCK_DOWNLOAD:
             return _ANSWERS[specifier]
         if not first & sdo_frame.BLOCK_SUBCOMMAND:  # a download by blocks begins
             self._of_client, self._last = True, 0
-            return NodeFrames.SDO_INDEX
+            return _NodeFrames.SDO_INDEX
         if first == sdo_frame.BLOCK_ACKNOWLEDGE:
             ended = self._last and len(data) > 1 and data[1] == self._last
             self._of_client, self._last = not ended, 0
-        return NodeFrames.SDO_REST
+        return _NodeFrames.SDO_REST
 
     def _pass(self, first: int) -> None:
         if first & sdo_frame.BLOCK_LAST:
@@ -164,7 +164,7 @@ _Sent = tuple[tuple[int, CanFrame], ...]
 """The frames sent instead of a frame, each with its delay in us."""
 
 
-class ArmedNodeFault(Copyable):
+class _ArmedNodeFault(Copyable):
     """An armed fault of a node.
 
     Attributes:
@@ -178,7 +178,7 @@ class ArmedNodeFault(Copyable):
     __slots__ = ("arguments", "fault_type", "kept", "next_us", "trigger")
 
     def __init__(
-        self, fault_type: NodeFaultType, arguments: FaultArguments, trigger: FaultTrigger
+        self, fault_type: _NodeFaultType, arguments: FaultArguments, trigger: FaultTrigger
     ) -> None:
         self.fault_type, self.arguments, self.trigger = fault_type, arguments, trigger
         self.kept: dict[int, bytes] = {}
@@ -189,12 +189,12 @@ class ArmedNodeFault(Copyable):
         return self.arguments[name]
 
 
-def _lost(fault: ArmedNodeFault, frame: CanFrame) -> _Sent:
+def _lost(fault: _ArmedNodeFault, frame: CanFrame) -> _Sent:
     return ()
 
 
 @dataclass(frozen=True, slots=True)
-class NodeFaultType(FaultForm):
+class _NodeFaultType(FaultForm):
     """A fault of a node that can be armed by name.
 
     Attributes:
@@ -208,15 +208,15 @@ class NodeFaultType(FaultForm):
         boots: the second node sends a boot-up first.
     """
 
-    frames: NodeFrames = field(default=_NO_FRAMES, kw_only=True)
-    instead: Callable[[ArmedNodeFault, CanFrame], _Sent] = field(default=_lost, kw_only=True)
-    matches: Callable[[NodeFaults, ArmedNodeFault, CanFrame], bool] | None = field(
+    frames: _NodeFrames = field(default=_NO_FRAMES, kw_only=True)
+    instead: Callable[[_ArmedNodeFault, CanFrame], _Sent] = field(default=_lost, kw_only=True)
+    matches: Callable[[NodeFaults, _ArmedNodeFault, CanFrame], bool] | None = field(
         default=None, kw_only=True
     )
-    by_itself: Callable[[NodeFaults, ArmedNodeFault], Frames] | None = field(
+    by_itself: Callable[[NodeFaults, _ArmedNodeFault], Frames] | None = field(
         default=None, kw_only=True
     )
-    abort: Callable[[NodeFaults, ArmedNodeFault, CanFrame], CanFrame] | None = field(
+    abort: Callable[[NodeFaults, _ArmedNodeFault, CanFrame], CanFrame] | None = field(
         default=None, kw_only=True
     )
     controller: bool = field(default=False, kw_only=True)
@@ -227,11 +227,11 @@ class NodeFaultType(FaultForm):
 # Effect of each fault on a frame.
 
 
-def _late(fault: ArmedNodeFault, frame: CanFrame) -> _Sent:
+def _late(fault: _ArmedNodeFault, frame: CanFrame) -> _Sent:
     return ((fault["delay"], frame),)
 
 
-def _again(fault: ArmedNodeFault, frame: CanFrame) -> _Sent:
+def _again(fault: _ArmedNodeFault, frame: CanFrame) -> _Sent:
     return ((0, frame), (fault["delay"], frame))
 
 
@@ -239,33 +239,33 @@ def _with(frame: CanFrame, data: bytes) -> _Sent:
     return ((0, data_frame(frame.can_id, data)),)
 
 
-def _other_index(fault: ArmedNodeFault, frame: CanFrame) -> _Sent:
+def _other_index(fault: _ArmedNodeFault, frame: CanFrame) -> _Sent:
     index = (int.from_bytes(frame.data[1:3], "little") + fault["by"]) & 0xFFFF
     return _with(frame, frame.data[:1] + index.to_bytes(2, "little") + frame.data[3:])
 
 
-def _other_toggle(fault: ArmedNodeFault, frame: CanFrame) -> _Sent:
+def _other_toggle(fault: _ArmedNodeFault, frame: CanFrame) -> _Sent:
     return _with(frame, bytes([frame.data[0] ^ sdo_frame.TOGGLE]) + frame.data[1:])
 
 
-def _other_crc(fault: ArmedNodeFault, frame: CanFrame) -> _Sent:
+def _other_crc(fault: _ArmedNodeFault, frame: CanFrame) -> _Sent:
     turned = bytes(byte ^ 0xFF for byte in frame.data[1:3])
     return _with(frame, frame.data[:1] + turned + frame.data[3:])
 
 
-def _other_state(fault: ArmedNodeFault, frame: CanFrame) -> _Sent:
+def _other_state(fault: _ArmedNodeFault, frame: CanFrame) -> _Sent:
     return _with(frame, bytes([NmtState[fault["state"].upper()]]))
 
 
-def _shorter(fault: ArmedNodeFault, frame: CanFrame) -> _Sent:
+def _shorter(fault: _ArmedNodeFault, frame: CanFrame) -> _Sent:
     return _with(frame, frame.data[: max(0, len(frame.data) - fault["bytes"])])
 
 
-def _longer(fault: ArmedNodeFault, frame: CanFrame) -> _Sent:
+def _longer(fault: _ArmedNodeFault, frame: CanFrame) -> _Sent:
     return _with(frame, (frame.data + bytes(fault["bytes"]))[:_MAX_DATA])
 
 
-def _stale(fault: ArmedNodeFault, frame: CanFrame) -> _Sent:
+def _stale(fault: _ArmedNodeFault, frame: CanFrame) -> _Sent:
     return _with(frame, fault.kept.setdefault(frame.can_id, frame.data))
 
 
@@ -337,7 +337,7 @@ def _parse_tpdo(word: str) -> int | None:
 _READS: Final = (sdo_frame.ClientCommand.UPLOAD, sdo_frame.ClientCommand.BLOCK_UPLOAD)
 
 
-def _is_object(faults: NodeFaults, fault: ArmedNodeFault, frame: CanFrame) -> bool:
+def _is_object(faults: NodeFaults, fault: _ArmedNodeFault, frame: CanFrame) -> bool:
     """Return whether a request starts a transfer to be aborted."""
     target, access = fault["object"], fault["access"]
     reads = frame.data[0] & sdo_frame.SPECIFIER in _READS
@@ -347,12 +347,12 @@ def _is_object(faults: NodeFaults, fault: ArmedNodeFault, frame: CanFrame) -> bo
     return target.index in (None, index) and target.sub in (None, sub)
 
 
-def _is_tpdo(faults: NodeFaults, fault: ArmedNodeFault, frame: CanFrame) -> bool:
+def _is_tpdo(faults: NodeFaults, fault: _ArmedNodeFault, frame: CanFrame) -> bool:
     number = fault["tpdo"]
     return number is None or faults.cob_id(0x1800 + number - 1, 1, -1) == frame.can_id
 
 
-def _aborted(faults: NodeFaults, fault: ArmedNodeFault, frame: CanFrame) -> CanFrame:
+def _aborted(faults: NodeFaults, fault: _ArmedNodeFault, frame: CanFrame) -> CanFrame:
     target = fault.arguments.values.get("object")
     code = fault.arguments.values.get("code") if target is None else target.code
     code = int(sdo_frame.AbortCode.GENERAL) if code is None else code
@@ -364,19 +364,19 @@ def _aborted(faults: NodeFaults, fault: ArmedNodeFault, frame: CanFrame) -> CanF
 # Own actions of some faults.
 
 
-def _restarted(faults: NodeFaults, fault: ArmedNodeFault) -> Frames:
+def _restarted(faults: NodeFaults, fault: _ArmedNodeFault) -> Frames:
     faults.restart()
     return ()
 
 
-def _emergencies(faults: NodeFaults, fault: ArmedNodeFault) -> Frames:
+def _emergencies(faults: NodeFaults, fault: _ArmedNodeFault) -> Frames:
     code = fault["code"]
     register = ErrorRegister.GENERIC | (ErrorRegister.COMMUNICATION if code >> 12 == 8 else 0)
     data = code.to_bytes(2, "little") + bytes([register]) + bytes(5)
     return (data_frame(faults.emcy_id, data),)
 
 
-def _babbles(faults: NodeFaults, fault: ArmedNodeFault) -> Frames:
+def _babbles(faults: NodeFaults, fault: _ArmedNodeFault) -> Frames:
     """Fill the queue for a tick with frames of the node's highest priority."""
     wanted = faults.node.tick_us * faults.wire.bit_rate // (_BIT_US * _SHORTEST_BITS) + 1
     return (data_frame(faults.emcy_id, b""),) * max(0, wanted - faults.node.port.waiting)
@@ -395,16 +395,16 @@ def _code(text: str, default: str, low: int, high: int) -> FaultArgument:
 
 
 def _on(
-    frames: NodeFrames,
+    frames: _NodeFrames,
     text: str,
-    instead: Callable[[ArmedNodeFault, CanFrame], _Sent] = _lost,
+    instead: Callable[[_ArmedNodeFault, CanFrame], _Sent] = _lost,
     *arguments: FaultArgument,
     **more: Any,
-) -> NodeFaultType:
+) -> _NodeFaultType:
     """Return a fault that acts on frames; with the argument `tpdo` on those of one TPDO."""
     if _TPDO in arguments:
         more["matches"] = _is_tpdo
-    return NodeFaultType(text, arguments=arguments, frames=frames, instead=instead, **more)
+    return _NodeFaultType(text, arguments=arguments, frames=frames, instead=instead, **more)
 
 
 _TPDO: Final = FaultArgument("tpdo", "which TPDO", "any", "any or 1 to 512", read=_parse_tpdo)
@@ -426,9 +426,9 @@ _ACCESS: Final = FaultArgument(
     "access", "which transfers", "both", choices=("both", "read", "write")
 )
 
-NODE_FAULTS: Final[Mapping[str, NodeFaultType]] = {
+NODE_FAULTS: Final[Mapping[str, _NodeFaultType]] = {
     "sdo_abort": _on(
-        NodeFrames.FOR_SDO_START,
+        _NodeFrames.FOR_SDO_START,
         "the SDO server aborts transfers of an object, or of all",
         _lost,
         _OBJECT,
@@ -437,77 +437,77 @@ NODE_FAULTS: Final[Mapping[str, NodeFaultType]] = {
         abort=_aborted,
     ),
     "sdo_busy": _on(
-        NodeFrames.FOR_SDO_START,
+        _NodeFrames.FOR_SDO_START,
         "the SDO server refuses each new transfer: it has no connection free",
         _lost,
         _code("abort code", "0x060A0023", 0x1_0000, 0xFFFF_FFFF),
         abort=_aborted,
     ),
-    "sdo_mute": _on(NodeFrames.REQUEST, "the SDO server ignores requests"),
+    "sdo_mute": _on(_NodeFrames.REQUEST, "the SDO server ignores requests"),
     "sdo_slow": _on(
-        NodeFrames.SDO,
+        _NodeFrames.SDO,
         "each SDO answer is late",
         _late,
         _time("delay", "800ms", "how much later it comes"),
     ),
     "sdo_twice": _on(
-        NodeFrames.SDO,
+        _NodeFrames.SDO,
         "each SDO answer comes twice",
         _again,
         _time("delay", "1ms", "how much later it comes again"),
     ),
     "sdo_wrong_index": _on(
-        NodeFrames.SDO_INDEX,
+        _NodeFrames.SDO_INDEX,
         "SDO answers name another object",
         _other_index,
         FaultArgument("by", "what is added to the index", "1", low=1, high=0xFFFF),
     ),
     "sdo_toggle": _on(
-        NodeFrames.SDO_SEGMENT, "SDO segments have the wrong toggle bit", _other_toggle
+        _NodeFrames.SDO_SEGMENT, "SDO segments have the wrong toggle bit", _other_toggle
     ),
     "sdo_crc": _on(
-        NodeFrames.SDO_END | NodeFrames.FOR_SDO_END,
+        _NodeFrames.SDO_END | _NodeFrames.FOR_SDO_END,
         "the CRC at the end of a block transfer is wrong, either way",
         _other_crc,
     ),
-    "heartbeat_mute": _on(NodeFrames.HEARTBEAT, "heartbeats are missing"),
+    "heartbeat_mute": _on(_NodeFrames.HEARTBEAT, "heartbeats are missing"),
     "heartbeat_state": _on(
-        NodeFrames.HEARTBEAT, "heartbeats report another state", _other_state, _STATE
+        _NodeFrames.HEARTBEAT, "heartbeats report another state", _other_state, _STATE
     ),
     "heartbeat_late": _on(
-        NodeFrames.HEARTBEAT,
+        _NodeFrames.HEARTBEAT,
         "heartbeats come late",
         _late,
         _time("delay", "1s", "how much later they come"),
     ),
     "boot_late": _on(
-        NodeFrames.BOOT_UP,
+        _NodeFrames.BOOT_UP,
         "the node starts slowly: until its boot-up it neither sends nor receives",
         _late,
         _time("delay", "3s", "how much later it boots"),
         silent=True,
     ),
     "boots_twice": _on(
-        NodeFrames.BOOT_UP,
+        _NodeFrames.BOOT_UP,
         "each boot-up comes twice",
         _again,
         _time("delay", "10ms", "how much later it comes again"),
     ),
-    "boots_again": NodeFaultType(
+    "boots_again": _NodeFaultType(
         "the node restarts by itself, at once and then each period",
         arguments=(_time("period", "5s", "from one to the next"),),
         by_itself=_restarted,
     ),
-    "pdo_short": _on(NodeFrames.PDO, "TPDOs have bytes too few", _shorter, _BYTES, _TPDO),
-    "pdo_long": _on(NodeFrames.PDO, "TPDOs have bytes too many, up to 8", _longer, _BYTES, _TPDO),
-    "pdo_mute": _on(NodeFrames.PDO, "TPDOs are missing", _lost, _TPDO),
+    "pdo_short": _on(_NodeFrames.PDO, "TPDOs have bytes too few", _shorter, _BYTES, _TPDO),
+    "pdo_long": _on(_NodeFrames.PDO, "TPDOs have bytes too many, up to 8", _longer, _BYTES, _TPDO),
+    "pdo_mute": _on(_NodeFrames.PDO, "TPDOs are missing", _lost, _TPDO),
     "pdo_stale": _on(
-        NodeFrames.PDO,
+        _NodeFrames.PDO,
         "TPDOs repeat the data of the first one since the fault began",
         _stale,
         _TPDO,
     ),
-    "emcy_storm": NodeFaultType(
+    "emcy_storm": _NodeFaultType(
         "an EMCY is sent over and over",
         arguments=(
             _code("emergency error code", "0x8110", 0, 0xFFFF),
@@ -516,19 +516,19 @@ NODE_FAULTS: Final[Mapping[str, NodeFaultType]] = {
         by_itself=_emergencies,
     ),
     "id_doubled": _on(
-        NodeFrames.SENT,
+        _NodeFrames.SENT,
         "a second node has this node-ID: it boots, and sends each frame too",
         _again,
         _time("delay", "1ms", "how much later it sends"),
         boots=True,
     ),
-    "sync_lost": _on(NodeFrames.SYNC, "the node receives no SYNC"),
-    "bus_off": NodeFaultType(
+    "sync_lost": _on(_NodeFrames.SYNC, "the node receives no SYNC"),
+    "bus_off": _NodeFaultType(
         "its CAN controller is bus-off, and does not come back until the fault ends",
         rated=False,
         controller=True,
     ),
-    "babble": NodeFaultType(
+    "babble": _NodeFaultType(
         "the node sends frames on its EMCY CAN-ID without a pause", by_itself=_babbles
     ),
 }
@@ -555,7 +555,7 @@ class NodeFaults(Copyable):
     def __init__(self, node: Node, wire: CanWire) -> None:
         self.node, self.wire = node, wire
         self.station: Station[Frames] | None = None
-        self._armed: dict[str, ArmedNodeFault] = {}
+        self._armed: dict[str, _ArmedNodeFault] = {}
         self._tallies: dict[str, FaultTally] = {}
         self._narrowed: tuple[str, ...] = ()
         self._blocks = _SdoBlocks()
@@ -588,7 +588,7 @@ class NodeFaults(Copyable):
         bound = bind_arguments(name, fault_type, arguments)
         tally = self._tallies[name] = FaultTally(bound.count)
         chance = self.wire.faults.chance(f"{self.node.name} {name}")
-        armed = ArmedNodeFault(fault_type, bound, FaultTrigger(chance, bound, tally))
+        armed = _ArmedNodeFault(fault_type, bound, FaultTrigger(chance, bound, tally))
         self._armed[name] = armed
         if fault_type.controller:
             tally.allow()
@@ -696,7 +696,7 @@ class NodeFaults(Copyable):
 
     def _send(self, frame: CanFrame) -> Frames:
         kind = self._kind_of_sent(frame)
-        if self._now_us < self._silent_us and kind is not NodeFrames.BOOT_UP:
+        if self._now_us < self._silent_us and kind is not _NodeFrames.BOOT_UP:
             return self._hear(Mark.FROM_DEVICE, frame, ())
         coming: _Sent = ((0, frame),)
         for armed in self._acting_on(kind, frame):
@@ -713,7 +713,7 @@ class NodeFaults(Copyable):
         at_once = tuple(each for late_us, each in coming if not late_us)
         return self._hear(Mark.FROM_DEVICE, frame, at_once)
 
-    def _acting_on(self, kind: NodeFrames, frame: CanFrame) -> list[ArmedNodeFault]:
+    def _acting_on(self, kind: _NodeFrames, frame: CanFrame) -> list[_ArmedNodeFault]:
         return [
             armed
             for armed in self._armed.values()
@@ -732,27 +732,27 @@ class NodeFaults(Copyable):
                 hear(self._now_us, mark, (frame,), left)
         return left
 
-    def _kind_of_received(self, frame: CanFrame) -> NodeFrames:
+    def _kind_of_received(self, frame: CanFrame) -> _NodeFrames:
         if frame.remote or frame.extended:
             return _NO_FRAMES
         request_id = sdo_frame.REQUEST_COB_ID + self.node.slave.node_id
         if frame.can_id == self.cob_id(0x1200, 1, request_id):
             whole = len(frame.data) == sdo_frame.FRAME_BYTES
-            return self._blocks.received(frame.data) if whole else NodeFrames.FOR_SDO
+            return self._blocks.received(frame.data) if whole else _NodeFrames.FOR_SDO
         sync = frame.can_id == self.cob_id(0x1005, 0, _SYNC_COB_ID)
-        return NodeFrames.SYNC if sync else _NO_FRAMES
+        return _NodeFrames.SYNC if sync else _NO_FRAMES
 
-    def _kind_of_sent(self, frame: CanFrame) -> NodeFrames:
+    def _kind_of_sent(self, frame: CanFrame) -> _NodeFrames:
         can_id = frame.can_id
         if frame.remote or frame.extended:
-            return NodeFrames.OTHER
+            return _NodeFrames.OTHER
         if can_id == self._error_control_id:
             boots = frame.data == bytes([NmtState.INITIALISING])
-            return NodeFrames.BOOT_UP if boots else NodeFrames.HEARTBEAT
+            return _NodeFrames.BOOT_UP if boots else _NodeFrames.HEARTBEAT
         if can_id == self.sdo_answer_id:
             return self._blocks.sent(frame.data)
         others = (self.emcy_id, _SYNC_COB_ID, _TIME_COB_ID, _LSS_ANSWER)
-        return NodeFrames.OTHER if can_id in others else NodeFrames.PDO
+        return _NodeFrames.OTHER if can_id in others else _NodeFrames.PDO
 
 
 class _FaultyNode(Copyable, DeviceBefore[Frames]):

@@ -122,10 +122,7 @@ _COMMANDS: Final = {
         "Operate and watch the emulator whose control socket is SOCKET.",
     ),
     "demo": (f"{_HERE}.cli:demo", "Show an emulated device and a host at work."),
-    "doctor": (
-        f"{_HERE}.cli:doctor",
-        "See what of this machine tickrig can use, and what to do.",
-    ),
+    "doctor": (f"{_HERE}.cli:doctor", "See what of this machine tickrig can use, and what to do."),
     "emu": (f"{_HERE}.emu_cli:emu", "Emulate a built-in device or one of an installed package."),
     "init": (
         f"{_TESTING}.init_cli:init",
@@ -141,10 +138,7 @@ _COMMANDS: Final = {
         f"{_TESTING}.report_cli:report_command",
         "Make one HTML page of test runs that were kept as JSON.",
     ),
-    "run": (
-        f"{_TESTING}.run_cli:run",
-        "Run the bench of a rig file: all its devices on one rig.",
-    ),
+    "run": (f"{_TESTING}.run_cli:run", "Run the bench of a rig file: all its devices on one rig."),
     "rtc": (
         "tickrig.host.rtc.commands.cli:rtc",
         "Run RT components, and work with them while they run.",

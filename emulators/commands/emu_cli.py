@@ -7,13 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from tickrig.emulators.commands.run_options import (
-    device_options,
-    device_types,
-    line_options,
-    panel_option,
-    run_named,
-)
+from tickrig.emulators.commands import run_options
 from tickrig.host.cli.extensions import ExtensionError
 from tickrig.host.cli.messages import Refused, say
 from tickrig.host.cli.options import LazyGroup
@@ -51,7 +45,8 @@ class _DeviceGroup(LazyGroup):
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Return the names, built-in ones first; report each device type that cannot be loaded."""
         self.commands.update(
-            (name, device_command(each)) for name, each in device_types().load_foreign(say).items()
+            (name, device_command(each))
+            for name, each in run_options.device_types().load_foreign(say).items()
         )
         return list(self.commands)
 
@@ -59,7 +54,7 @@ class _DeviceGroup(LazyGroup):
         """Return the command line of a device."""
         if cmd_name in self.commands:
             return self.commands[cmd_name]
-        types = device_types()
+        types = run_options.device_types()
         if cmd_name not in (names := types.names()):
             hint = near(cmd_name, dict.fromkeys([*_OURS, *names]))
             raise Refused(f"no device {cmd_name!r}; {hint}")
@@ -73,18 +68,18 @@ def device_command(device_type: DeviceType) -> click.Command:
     """Make the command line of a device type: its own options and the common ones."""
     declared = {option.name: option for option in device_type.options}
 
-    @device_options(field for field in device_type.fields if field.name not in declared)
-    @line_options(", ".join(device_type.line.faults), lambda: _inputs(device_type))
+    @run_options.device_options(field for field in device_type.fields if field.name not in declared)
+    @run_options.line_options(", ".join(device_type.line.faults), lambda: _inputs(device_type))
     @click.pass_context
     def run(context: click.Context, /, **options: Any) -> None:
-        context.exit(run_named(device_type.name, options))
+        context.exit(run_options.run_named(device_type.name, options))
 
     first = device_type.text or f"Emulate {device_type.title}."
     example = f"\b\ntickrig emu {device_type.name} --link /tmp/{device_type.name}"
     command = click.command(device_type.name, help=f"{first}\n\n{_HELP}\n\n{example}")(run)
     command.params[:0] = declared.values()
     if device_type.panel:
-        panel_option(command)
+        run_options.panel_option(command)
     return command
 
 

@@ -113,11 +113,7 @@ FOLLOW: Final = Experiment(
 
 LEADER: Final = Experiment(
     "Experiment B1: leaders are exchanged while all robots move (Figs. 98, 99)",
-    {
-        "Ref-Hard": Pose(-1.2, 1.5),
-        "Segway RMP": Pose(0.0, 0.0),
-        "BlackShip": Pose(-1.2, 0.0),
-    },
+    {"Ref-Hard": Pose(-1.2, 1.5), "Segway RMP": Pose(0.0, 0.0), "BlackShip": Pose(-1.2, 0.0)},
     {"Omni-Wheel": Pose(0.0, 1.5)},
     {"A": _ROUND, "B": _ROUND},
     {3: "A", 1: "B"},
@@ -152,11 +148,7 @@ LEADER: Final = Experiment(
 
 FOUR: Final = Experiment(
     "Experiment B2: four robots on one command (Figs. 91, 101)",
-    {
-        "Ref-Hard": Pose(-1.2, 1.0),
-        "Segway RMP": Pose(0.0, 0.0),
-        "BlackShip": Pose(-1.2, -1.0),
-    },
+    {"Ref-Hard": Pose(-1.2, 1.0), "Segway RMP": Pose(0.0, 0.0), "BlackShip": Pose(-1.2, -1.0)},
     {"Omni-Wheel": Pose(0.0, 2.0)},
     {"A": _ROUND, "B": (_Push(7, 1.0), _Push(5.2, 1.0, -1.0))},
     {3: "A", 1: "B"},

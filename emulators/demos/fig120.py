@@ -382,7 +382,12 @@ def _turn(stage: _Fig120Stage, echo: _Echo) -> list[CurveSample]:
         for at_us in range(begin_us, begin_us + act.duration_us, stage.step_us):
             stage.run_to(at_us)
             stage.set(_POTENTIOMETER, act.volts((at_us - begin_us) / act.duration_us))
-            sample = _look(stage, start_us)
+            sample = CurveSample(
+                (stage.now_us - start_us) / 1e6,
+                _number(stage.get(_POTENTIOMETER)),
+                int(_number(stage.get(_REFERENCE))),
+                _number(stage.get(_SHAFT)),
+            )
             if (at_us - begin_us) % _PERIOD_US < stage.step_us:
                 echo(_row(sample))
             samples.append(sample)
@@ -390,15 +395,6 @@ def _turn(stage: _Fig120Stage, echo: _Echo) -> list[CurveSample]:
         if act.is_step:
             echo(_arrival(samples[first:]))
     return samples
-
-
-def _look(stage: _Fig120Stage, start_us: int) -> CurveSample:
-    return CurveSample(
-        (stage.now_us - start_us) / 1e6,
-        _number(stage.get(_POTENTIOMETER)),
-        int(_number(stage.get(_REFERENCE))),
-        _number(stage.get(_SHAFT)),
-    )
 
 
 def _arrival(samples: list[CurveSample]) -> str:

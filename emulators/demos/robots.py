@@ -96,11 +96,7 @@ def _drive_wheels(name: str, base: WheeledBase, echo: _Echo) -> RobotTrack:
     for forward_pct, left_pct, duration_s in _WAY:
         stick.tilt(forward_pct, left_pct)
         end_us += duration_s * _SECOND_US
-        asked = (
-            forward_pct / 100 * stick.full_v.value,
-            0.0,
-            left_pct / 100 * stick.full_w.value,
-        )
+        asked = (forward_pct / 100 * stick.full_v.value, 0.0, left_pct / 100 * stick.full_w.value)
         while link.now_us < end_us:
             serve(server, link, link.now_us + LOOK_US)
             planned = advanced(planned, asked, LOOK_US / _SECOND_US)

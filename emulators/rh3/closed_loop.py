@@ -39,15 +39,8 @@ PLACE: Final = ("x_m", "y_m", "heading_rad")
 class Mounted:
     """An object carried by a base, as a coupling of the rig."""
 
-    @property
-    def tick_us(self) -> int:
-        """The update period of the base's outputs."""
-        return LOOK_US
-
-    @property
-    def due_us(self) -> int:
-        """Always `NEVER`: a moving base has work itself."""
-        return NEVER
+    tick_us: Final = LOOK_US  # the update period of the base's outputs
+    due_us: Final = NEVER  # a moving base has work itself
 
 
 class MountedUrg(Mounted):

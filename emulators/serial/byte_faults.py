@@ -293,9 +293,7 @@ BYTE_FAULTS: Final[Mapping[str, FaultType[bytes]]] = {
     "dup": FaultType("each byte arrives twice at this rate", _Dup),
     "cut": FaultType("nothing passes", _Cut, rated=False),
     "delay": FaultType(
-        "an answer comes late",
-        _Delay,
-        arguments=(_time("time", "how late", "100ms"), _FRAME, WAY),
+        "an answer comes late", _Delay, arguments=(_time("time", "how late", "100ms"), _FRAME, WAY)
     ),
     "jitter": FaultType(
         "an answer comes late by a random time",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Final, Protocol
 
 from tickrig.device.twin import NonCopyable
 from tickrig.emulators.bench.running_emulator import RunningEmulator
@@ -153,14 +153,10 @@ class SerialHub(NonCopyable):
     """
 
     why_not_copied = "its ports belong to this machine"
+    due_us: Final = NEVER  # only the hosts know when data arrive
 
     def __init__(self, ports: Sequence[LineOutside]) -> None:
         self._ports = tuple(ports)
-
-    @property
-    def due_us(self) -> int:
-        """`NEVER`: only the hosts know when data arrive."""
-        return NEVER
 
     @property
     def lost(self) -> int:

@@ -464,6 +464,7 @@ class NetworkPort(NonCopyable):
     """
 
     why_not_copied = "it is a TCP port of this machine"
+    due_us: Final = NEVER  # only the host knows when data arrive
 
     def __init__(self, url: ServeUrl, buffer_bytes: int = 4_096) -> None:
         self._listener = _listen(url)
@@ -479,11 +480,6 @@ class NetworkPort(NonCopyable):
         self.url = str(replace(url, host=_reachable(self.address), port=self.port))
         if not ipaddress.ip_address(self.address.partition("%")[0]).is_loopback:
             _log.warning(_OPEN_TO_OTHERS, self.port, self.address)
-
-    @property
-    def due_us(self) -> int:
-        """`NEVER`: only the host knows when data arrive."""
-        return NEVER
 
     @property
     def lost(self) -> int:

@@ -202,6 +202,7 @@ class PtyPort(NonCopyable):
     """
 
     why_not_copied = "it is a pty of this machine"
+    due_us: Final = NEVER  # only the host knows when data arrive
 
     def __init__(self, link: Path | None = None, buffer_bytes: int = 4_096) -> None:
         # The slave stays open here: on Linux reading the master fails with EIO while no process has
@@ -225,11 +226,6 @@ class PtyPort(NonCopyable):
     def fileno(self) -> int:
         """Return the descriptor to wait on for actions of the host."""
         return self._visits.wakes
-
-    @property
-    def due_us(self) -> int:
-        """`NEVER`: only the host knows when data arrive."""
-        return NEVER
 
     @property
     def host_setting(self) -> str:

@@ -42,6 +42,7 @@ class CanBusPort(NonCopyable):
     """
 
     why_not_copied = "it is a bus of this machine"
+    due_us: Final = NEVER  # only the bus knows when traffic arrives
 
     def __init__(
         self,
@@ -60,11 +61,6 @@ class CanBusPort(NonCopyable):
     def failed(self) -> str:
         """Reason why the adapter last failed to send or read, empty if there was no error."""
         return self.reads.last or self._failed
-
-    @property
-    def due_us(self) -> int:
-        """`NEVER`: only the bus knows when traffic arrives."""
-        return NEVER
 
     def poll(self, now_us: int, /) -> Frames:
         """Read without blocking.

@@ -165,7 +165,11 @@ def run_squares(options: MotionOptions, size: SquarePlan, save: Path | None) -> 
     click.echo("              before   after")
     _print_row("E_max,syst", before.most_m, after.most_m)
     _print_row("return, most", max(before.returns_m), max(after.returns_m))
-    text = _conf(corrected)
+    text = (
+        f"conf.default.radiusOfLeftWheel: {corrected.left:.7f}\n"
+        f"conf.default.radiusOfRightWheel: {corrected.right:.7f}\n"
+        f"conf.default.lengthOfAxle: {corrected.axle:.7f}\n"
+    )
     click.echo(text, nl=False)
     if save is not None:
         try:
@@ -176,15 +180,6 @@ def run_squares(options: MotionOptions, size: SquarePlan, save: Path | None) -> 
 
 def _print_row(what: str, before_m: float, after_m: float) -> None:
     click.echo(f"{what:<12} {before_m * 1e3:7.1f} {after_m * 1e3:7.1f} mm")
-
-
-def _conf(wheels: Wheels) -> str:
-    """Return an Odometry.conf."""
-    return (
-        f"conf.default.radiusOfLeftWheel: {wheels.left:.7f}\n"
-        f"conf.default.radiusOfRightWheel: {wheels.right:.7f}\n"
-        f"conf.default.lengthOfAxle: {wheels.axle:.7f}\n"
-    )
 
 
 def go_to(x: float, y: float, theta: float, **options: Any) -> None:

@@ -16,18 +16,11 @@ from tickrig.device.twin.snapshot import MachineSnapshot
 from tickrig.emulators.bench.operator import parse_fault_spec
 from tickrig.emulators.record.replay import BenchRecording, read_trace
 from tickrig.emulators.serial.emulator import LineSettings
-from tickrig.emulators.testing.bench import tasks
+from tickrig.emulators.testing.bench import plan_parts, tasks
 from tickrig.emulators.testing.bench.bench_rig import BenchDescription, Parts, text_of
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
 from tickrig.emulators.testing.bench.modes.mode import BenchMode
 from tickrig.emulators.testing.bench.modes.virtual_mode import VirtualMode
-from tickrig.emulators.testing.bench.plan_parts import (
-    BenchedDevice,
-    mounts_of,
-    name_of,
-    parts_of,
-    rig_of,
-)
 from tickrig.emulators.testing.rig_file.plan import RigPlan, Tolerances
 from tickrig.emulators.testing.rig_file.reader import read_rig_file
 from tickrig.host.links.link import Closing
@@ -326,20 +319,20 @@ class Bench(BenchDevice, Closing):
 
     def __init__(
         self,
-        device: BenchedDevice | None = None,
+        device: plan_parts.BenchedDevice | None = None,
         /,
         *,
         seed: int = 0,
         line: LineSettings | None = None,
         mode: str = VIRTUAL,
         sdo_timeout: Duration | None = None,
-        **devices: BenchedDevice,
+        **devices: plan_parts.BenchedDevice,
     ) -> None:
-        named = {**({} if device is None else {name_of(device): device}), **devices}
+        named = {**({} if device is None else {plan_parts.name_of(device): device}), **devices}
         if not named:
             raise ValueError("a bench has at least one device")
         sdo_timeout_us = None if sdo_timeout is None else us_of(sdo_timeout)
-        parts = Parts(mounts=mounts_of(named, seed, line, sdo_timeout_us), seed=seed)
+        parts = Parts(mounts=plan_parts.mounts_of(named, seed, line, sdo_timeout_us), seed=seed)
         self._start(_emulated(mode, parts, RigPlan()))
 
     def _start(self, mode: BenchMode) -> None:
@@ -366,7 +359,7 @@ class Bench(BenchDevice, Closing):
         """
         if mode == HARDWARE:
             return cls.of_mode(hardware_mode.HardwareMode(plan, terminal))
-        return cls.of_mode(_emulated(mode, parts_of(plan), plan))
+        return cls.of_mode(_emulated(mode, plan_parts.parts_of(plan), plan))
 
     @classmethod
     def of_mode(cls, mode: BenchMode) -> Self:
@@ -645,9 +638,9 @@ def _never() -> bool:
 def _emulated(mode: str, parts: Parts, plan: RigPlan) -> BenchMode:
     """Start emulated devices in virtual or in real time."""
     if mode == VIRTUAL:
-        return VirtualMode(rig_of(parts, plan))
+        return VirtualMode(plan_parts.rig_of(parts, plan))
     if mode != _REAL:
         raise ValueError(f"a bench of emulated devices is virtual or real, not {mode!r}")
     return real_mode.RealMode.open(
-        parts.mounts, plan.real, lambda outside: rig_of(parts, plan, outside)
+        parts.mounts, plan.real, lambda outside: plan_parts.rig_of(parts, plan, outside)
     )

@@ -207,17 +207,17 @@ def missing_of(lines: Sequence[WireLine]) -> str:
 
 
 class BenchOperator(Operator):
-    """The operator of several devices."""
+    """The operator of several devices.
 
-    _assembly: Assembly
-    _wires: tuple[str, ...]
+    Args:
+        assembly: the devices.
+        queue: receives scheduled actions.
+        faults: of their wires and nodes.
+    """
 
-    @classmethod
-    def at(cls, assembly: Assembly, queue: EventQueue, faults: AssemblyFaults) -> BenchOperator:
-        """Return the operator of several devices, with scheduled actions in a queue."""
-        hands = cls(assembly.inputs, assembly.tick_us, queue, faults)
-        hands._assembly, hands._wires = assembly, faults.wires
-        return hands
+    def __init__(self, assembly: Assembly, queue: EventQueue, faults: AssemblyFaults) -> None:
+        super().__init__(assembly.inputs, assembly.tick_us, queue, faults)
+        self._assembly, self._wires = assembly, faults.wires
 
     def full_name_of(self, name: str) -> str:
         """Return the full name of a fault; the prefix of device or wire is optional."""
@@ -307,7 +307,7 @@ class RigState(Copyable):
         for mount in mounts:
             if isinstance(mount, BusMount):
                 self.rig.move_on(mount.wire)
-        self.operator = BenchOperator.at(self.assembly, self.rig.event_queue, self.faults)
+        self.operator = BenchOperator(self.assembly, self.rig.event_queue, self.faults)
 
     def _start(self, start: Mapping[str, Mapping[str, Setting]]) -> None:
         for device, values in start.items():
@@ -570,13 +570,6 @@ class BenchRig(RunningEmulator):
         if self.state.recorder is None:
             raise NotOnThisBench("nothing was recorded on this bench")
         self.state.recorder.save(path, self.rig.now_us)
-
-    @property
-    def _host_due_us(self) -> int:
-        return NEVER
-
-    def _listen(self, now_us: int) -> None:
-        """`NEVER`: hosts of a bench poll themselves."""
 
     def send(self, now_us: int, data: bytes) -> None:
         """Send bytes on the line of the only serial device, as the host."""

@@ -156,7 +156,7 @@ class _BenchRun(EmulatorRun[_BenchOptions]):
         except ValueError as error:
             raise Refused(str(error)) from None
         device, faults = self._parts.assembly, self._parts.faults
-        operator = BenchOperator.at(device, EventQueue(), faults)
+        operator = BenchOperator(device, EventQueue(), faults)
         return operator, ScenarioParser(device, operator)
 
     def _open(self, stack: ExitStack) -> BenchRig:

@@ -332,13 +332,9 @@ class _CampaignRun:
             say(f"{why}; nothing was begun")
         else:
             done, size = len(self._journal.verdicts), self._plan.size()
-            command = shlex.join(["tickrig", *_without_fresh(sys.argv[1:])])
+            command = shlex.join(["tickrig", *[word for word in sys.argv[1:] if word != "--fresh"]])
             say(f"{why}: {done} of {size} runs are kept; go on with {command}")
         raise click.exceptions.Exit(status)
-
-
-def _without_fresh(words: Sequence[str]) -> list[str]:
-    return [word for word in words if word != "--fresh"]
 
 
 @contextmanager

@@ -64,22 +64,11 @@ class _BusYml(NamedTuple):
     urdf: Path | None = None
 
 
-class _BusPortOpener(NamedTuple):
-    """A bus outside.
-
-    Attributes:
-        port: the bus.
-        name: its name for messages.
-        channel: its name in logs.
-    """
-
-    port: CountingPort
-    name: str
-    channel: str
-
-
-def open_bus(options: BusOptions, stack: ExitStack) -> _BusPortOpener:
+def open_bus(options: BusOptions, stack: ExitStack) -> tuple[CountingPort, str, str]:
     """Open the bus from options, environment or configuration files of python-can.
+
+    Returns:
+        The bus, its name for messages, and its name in logs.
 
     Raises:
         Refused: no bus is given, or it cannot be opened.
@@ -89,7 +78,7 @@ def open_bus(options: BusOptions, stack: ExitStack) -> _BusPortOpener:
     stack.callback(close_bus, bus)
     name = interface if channel is None else f"{interface} {channel}"
     label = "_".join(str(channel).split()) if channel not in (None, "") else interface
-    return _BusPortOpener(port_on(bus, interface, f"CAN bus {name}"), name, label)
+    return port_on(bus, interface, f"CAN bus {name}"), name, label
 
 
 class _RigNodes(NamedTuple):

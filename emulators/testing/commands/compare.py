@@ -504,11 +504,7 @@ def _on_bus(
     if not isinstance(bit_rate, int):
         raise ValueError(f"its bit rate is {bit_rate!r:.60}")
     return _compare_bus(
-        recording,
-        lambda bus: make_nodes(described, bus),
-        tolerance,
-        options["settle_us"],
-        bit_rate,
+        recording, lambda bus: make_nodes(described, bus), tolerance, options["settle_us"], bit_rate
     )
 
 

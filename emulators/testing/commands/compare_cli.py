@@ -30,11 +30,7 @@ _tolerance: Final = add_options(
     ),
     click.option("--ignore", multiple=True, metavar="PATTERN", help="Lines to ignore."),
     click.option(
-        "--kind",
-        "kinds",
-        multiple=True,
-        metavar="PATTERN",
-        help="Lines with an independent order.",
+        "--kind", "kinds", multiple=True, metavar="PATTERN", help="Lines with an independent order."
     ),
 )
 

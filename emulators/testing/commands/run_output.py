@@ -24,12 +24,7 @@ from tickrig.emulators.testing.bench.bench import Bench
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
 from tickrig.emulators.testing.bench.modes.virtual_mode import VirtualMode
 from tickrig.emulators.testing.plugin.bench_evidence import BenchWitness, SignalSampler
-from tickrig.emulators.testing.report.bench_report import (
-    Outcome,
-    RunEnvironment,
-    SignalSeries,
-    TestRecord,
-)
+from tickrig.emulators.testing.report import bench_report
 from tickrig.emulators.testing.report.report_file import check_report
 from tickrig.emulators.testing.rig_file.plan import RigPlan
 from tickrig.host.canmon.model.graph import plot, series
@@ -259,7 +254,7 @@ class RunPlots:
             lines = self._path_lines(diagram) if diagram.is_path else _lines(diagram, taken)
             click.echo("\n".join(line.rstrip() for line in lines))
 
-    def _write(self, file: Path, taken: dict[str, SignalSeries], title: str) -> None:
+    def _write(self, file: Path, taken: dict[str, bench_report.SignalSeries], title: str) -> None:
         if file.suffix.lower() != _CSV:
             picture.write_figure(self._figure(taken, title), title, file)
             return
@@ -267,7 +262,7 @@ class RunPlots:
         with replacing(file) as beside, beside.open("w", encoding="utf-8", newline="") as text:
             graph_file.write_csv(text, curves, _view(curves))
 
-    def _figure(self, taken: dict[str, SignalSeries], title: str) -> Figure:
+    def _figure(self, taken: dict[str, bench_report.SignalSeries], title: str) -> Figure:
         heights = [2 if one.is_path else 1 for one in self._diagrams]
         figure = picture.new_figure(9, 1 + 2.5 * sum(heights))
         figure.suptitle(title)
@@ -326,7 +321,7 @@ def _size() -> tuple[int, int]:
     return max(width, 30), min(max(height - 1, 10), 28)
 
 
-def _curve(taken: SignalSeries) -> series.Series:
+def _curve(taken: bench_report.SignalSeries) -> series.Series:
     """Return a signal as `canmon graph` draws it; one that steps holds its value until then."""
     curve, before = series.Series(taken.name, unit=taken.unit), None
     for at_us, value in taken.points:
@@ -342,7 +337,7 @@ def _view(curves: Sequence[series.Series]) -> series.View:
     return series.View(0, max(end_us, 1))
 
 
-def _lines(diagram: _Diagram, taken: dict[str, SignalSeries]) -> list[str]:
+def _lines(diagram: _Diagram, taken: dict[str, bench_report.SignalSeries]) -> list[str]:
     """Return curves as lines for a terminal; the second unit has its own axis."""
     curves = [_curve(taken[name]) for name in diagram.names]
     units = list(dict.fromkeys(curve.unit for curve in curves))
@@ -352,7 +347,7 @@ def _lines(diagram: _Diagram, taken: dict[str, SignalSeries]) -> list[str]:
     return plot.render(curves, _view(curves), *_size(), colour=colour)
 
 
-def _draw_curves(first: Axes, taken: Sequence[SignalSeries]) -> None:
+def _draw_curves(first: Axes, taken: Sequence[bench_report.SignalSeries]) -> None:
     """Draw curves over time; the second unit has its own axis, on the right."""
     units = list(dict.fromkeys(one.unit for one in taken))[:2]
     fields = {units[0]: first, **{unit: first.twinx() for unit in units[1:]}}
@@ -424,9 +419,9 @@ class RunPage:
             Refused: it cannot be written.
         """
         seen, rig, file = self._witness.evidence(), self._rig, self.plan.path
-        record = TestRecord(
+        record = bench_report.TestRecord(
             file.name if file else "bench",
-            Outcome.PASSED,
+            bench_report.Outcome.PASSED,
             mode="virtual" if virtual else "real",
             virtual_us=seen.now_us,
             seed=self.plan.seed,
@@ -438,7 +433,7 @@ class RunPage:
             trace=seen.trace,
         )
         late = "" if virtual else f"; late ticks: {rig.rig.late_ticks}"
-        environment = RunEnvironment(
+        environment = bench_report.RunEnvironment(
             self._begun.strftime("%Y-%m-%d %H:%M:%S %z"),
             record.mode,
             record.seed,

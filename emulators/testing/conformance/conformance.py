@@ -225,7 +225,7 @@ def conformance(  # noqa: PLR0913 - by keyword
             stimulus=source.stimulus(number) if source.stimulus else None,
             confirm=Consent(yes=False, virtual=True, alone=len(source.nodes) <= 1).confirm,
         )
-        file = _eds(eds)
+        file = open_eds(Path(eds)) if isinstance(eds, Path | str) else eds
         known = source.describe(number) if file is None else NodeDescription.of_file(file)
         run = ConformRun(
             *(source.link, number, plan),
@@ -281,10 +281,6 @@ def node_id_of(node: Node, node_id: int | None) -> int:
     if node_id is None or node_id not in _NODE_IDS:
         raise ValueError(f"node_id is 1..127, not {node_id}; this slave does not tell it itself")
     return node_id
-
-
-def _eds(eds: Path | str | EdsFile | None) -> EdsFile | None:
-    return open_eds(Path(eds)) if isinstance(eds, Path | str) else eds
 
 
 # A report as text and as files, as from `canmon conform`, for programs.

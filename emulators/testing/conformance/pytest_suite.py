@@ -31,7 +31,7 @@ from tickrig.host.canopen.conform.report.overview import cut, hint
 from tickrig.host.canopen.conform.suite import OBJECTS, chosen_checks
 from tickrig.host.canopen.conform.verdict import CheckVerdict, Report, Result
 from tickrig.host.canopen.eds import open_eds
-from tickrig.wire.canopen.eds.eds_device import EdsDevice, read_device
+from tickrig.wire.canopen.eds.eds_device import read_device
 
 _MOST_LINES: Final = 60
 _ANY_NODE_ID: Final = 1
@@ -80,7 +80,7 @@ def conformance_tests(
     if not isinstance(node, str) and (known is None or given is None):
         made = _judged_of(node)
         node_id_of(made, given)
-        known = known or _told_by(made)
+        known = known or (describe_slave(made).device if isinstance(made, CanopenSlave) else None)
     options |= {"eds": eds, "level": level}
     objects: tuple[Check, ...] = ()
     if known is not None and plan.may_choose(OBJECTS):
@@ -97,11 +97,6 @@ def _judged_of(make: Callable[[], Node]) -> Node:
     """Return the argument of `conformance`: the made object, or a factory for each power-on."""
     made = make()
     return cast("Node", make) if is_step(made) else made
-
-
-def _told_by(made: Node) -> EdsDevice | None:
-    """Return the description of one of our slaves."""
-    return describe_slave(made).device if isinstance(made, CanopenSlave) else None
 
 
 def _test_on_bench(name: str, options: dict[str, Any], baseline: Baseline) -> Test:

@@ -46,10 +46,7 @@ class World:
     """
 
     def __init__(
-        self,
-        bench: Bench,
-        faults: Sequence[str] | None = None,
-        inputs: Sequence[str] | None = None,
+        self, bench: Bench, faults: Sequence[str] | None = None, inputs: Sequence[str] | None = None
     ) -> None:
         self._bench, described = bench, bench.describe()
         forms = described.faults

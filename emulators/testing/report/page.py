@@ -10,14 +10,7 @@ from typing import Final
 
 from markupsafe import escape
 
-from tickrig.emulators.testing.report import overview
-from tickrig.emulators.testing.report.bench_report import (
-    BenchReport,
-    JournalLine,
-    Outcome,
-    RunEnvironment,
-    TestRecord,
-)
+from tickrig.emulators.testing.report import bench_report, overview
 from tickrig.emulators.testing.report.timeline import Timeline, timeline_of
 from tickrig.host.canmon.model.graph.plot import widened
 from tickrig.host.text import page_text
@@ -60,14 +53,14 @@ class _PageRoom:
         admitted: number of the test and part, of all that have room.
     """
 
-    tests: Sequence[TestRecord]
+    tests: Sequence[bench_report.TestRecord]
     timelines: Sequence[Timeline | None]
     room_bytes: int = _PAGE_BYTES
     admitted: set[tuple[int, _PagePart]] = field(init=False, default_factory=set)
 
     def __post_init__(self) -> None:
         """Share the room."""
-        order = list(Outcome)
+        order = list(bench_report.Outcome)
         first = sorted(range(len(self.tests)), key=lambda n: order.index(self.tests[n].outcome))
         for part in _PagePart:
             for number in first:
@@ -89,7 +82,7 @@ class _PageRoom:
                 return _size_of(_cut(test.trace, _TRACE_BYTES)[0])
 
 
-def _journal_texts(test: TestRecord) -> Iterator[str]:
+def _journal_texts(test: bench_report.TestRecord) -> Iterator[str]:
     """Yield the texts of the lines that are shown, each with room for what is around it."""
     for line in test.journal[-_JOURNAL_LINES:]:
         yield line.text[:_LINE_CHARACTERS] + " " * _LINE_BYTES
@@ -130,14 +123,14 @@ class _TestOnPage:
     place: overview.ReportedTest
     timeline: Timeline | None
     longrepr: str
-    journal: tuple[JournalLine, ...]
+    journal: tuple[bench_report.JournalLine, ...]
     journal_left_out: int
     trace: str
     left_out: tuple[str, ...]
     opened: bool
 
 
-def html_page(report: BenchReport, room_bytes: int = _PAGE_BYTES) -> str:
+def html_page(report: bench_report.BenchReport, room_bytes: int = _PAGE_BYTES) -> str:
     """Return the page.
 
     Args:
@@ -161,7 +154,7 @@ def html_page(report: BenchReport, room_bytes: int = _PAGE_BYTES) -> str:
 @cache
 def _template(page: str = "page.html") -> PageTemplate:
     """Return a template; it is compiled once."""
-    return PageTemplate(__package__, {"Outcome": Outcome}, script="page.js", page=page)
+    return PageTemplate(__package__, {"Outcome": bench_report.Outcome}, script="page.js", page=page)
 
 
 # The page of one run without tests, as of `tickrig run --report`.
@@ -212,8 +205,8 @@ class PagePath:
 
 
 def run_page(
-    record: TestRecord,
-    run: RunEnvironment,
+    record: bench_report.TestRecord,
+    run: bench_report.RunEnvironment,
     wires: Sequence[Sequence[str]],
     paths: Sequence[PagePath] = (),
 ) -> str:
@@ -260,7 +253,9 @@ def _test_on_page(
     )
 
 
-def _left_out(test: TestRecord, timeline: Timeline | None, parts: set[_PagePart]) -> Iterator[str]:
+def _left_out(
+    test: bench_report.TestRecord, timeline: Timeline | None, parts: set[_PagePart]
+) -> Iterator[str]:
     """Yield what of a test is not on the page, for people."""
     texts = (
         (_PagePart.TEXT, "the text", test.longrepr, _TEXT_BYTES),

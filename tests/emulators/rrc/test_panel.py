@@ -39,7 +39,7 @@ def on_panel(act: Act, size: tuple[int, int] = (80, 24)) -> None:
             await act(panel, emulator, pilot)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(rrc_panel, "REFRESH_S", 3_600.0)  # it looks when it is told to
+        patch.setattr(rrc_panel, "_REFRESH_S", 3_600.0)  # it looks when it is told to
         asyncio.run(main())
 
 

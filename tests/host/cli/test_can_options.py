@@ -24,8 +24,8 @@ def nothing_configured(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 
 def opened(**options: Any) -> tuple[str, str]:
     with ExitStack() as stack:
-        bus = open_bus(BusOptions(**options), stack)
-        return bus.name, bus.channel
+        _, name, channel = open_bus(BusOptions(**options), stack)
+        return name, channel
 
 
 def refused(**options: Any) -> str:

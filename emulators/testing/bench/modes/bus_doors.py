@@ -18,7 +18,7 @@ from tickrig.emulators.can.end import CanEnd
 from tickrig.emulators.can.outside.bridge import CanBridge
 from tickrig.emulators.can.outside.bus_port import port_on
 from tickrig.emulators.testing.bench.errors import PortGone
-from tickrig.emulators.testing.bench.modes.door_watch import DoorWatch, LinkGone, Seen
+from tickrig.emulators.testing.bench.modes.door_watch import HostPace, LinkGone, Seen
 from tickrig.emulators.testing.rig_file.plan import BusPlan
 from tickrig.host.links import can_link
 from tickrig.host.links.echo import free_of_echo
@@ -34,7 +34,7 @@ class _BusGone(PortGone, can.CanOperationError):
 class _Watched(can.BusABC):
     """Monitoring added to a bus class."""
 
-    _watch: DoorWatch
+    _watch: HostPace
     _reads: can_link.BusReceiver
 
     def recv(self, timeout: float | None = None) -> can.Message | None:
@@ -96,7 +96,7 @@ def _open_bus(plan: BusPlan, options: dict[str, Any]) -> can.BusABC:
     return bus
 
 
-def open_watched_bus(plan: BusPlan, watch: DoorWatch, options: dict[str, Any]) -> can.BusABC:
+def open_watched_bus(plan: BusPlan, watch: HostPace, options: dict[str, Any]) -> can.BusABC:
     """Open a monitored bus; see `_open_bus`."""
     bus = _open_bus(plan, options)
     kind = type(bus)
@@ -116,7 +116,7 @@ def _name_of(plan: BusPlan) -> str:
     return plan.interface if plan.channel is None else f"{plan.interface} {plan.channel}"
 
 
-def frame_link(plan: BusPlan, watch: DoorWatch) -> StampedLink:
+def frame_link(plan: BusPlan, watch: HostPace) -> StampedLink:
     """Return a link to a bus, which does not receive its own frames.
 
     Raises:

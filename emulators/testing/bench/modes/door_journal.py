@@ -13,7 +13,7 @@ from weakref import WeakSet
 
 from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.testing.bench.bench_rig import Journal
-from tickrig.emulators.testing.bench.modes.door_watch import DoorWatch, HostPace, Seen
+from tickrig.emulators.testing.bench.modes.door_watch import HostPace, Seen
 from tickrig.emulators.testing.bench.mounts import LineMount, Mount
 from tickrig.emulators.testing.rig_file.plan import RigPlan
 from tickrig.host.text.bench_header import BenchHeader, DeviceEntry, Place, WireEntry, WireType
@@ -107,7 +107,7 @@ class DoorJournal(Journal):
         self._now_us, self._after, self._lock = now_us, after, threading.Lock()
         self._watches: defaultdict[str, WeakSet[_BusWatch]] = defaultdict(WeakSet)
 
-    def watch(self, mount: Mount, pace: HostPace) -> DoorWatch:
+    def watch(self, mount: Mount, pace: HostPace) -> HostPace:
         """Return a monitor for a connection of a wire.
 
         Args:
@@ -176,17 +176,21 @@ class DoorJournal(Journal):
                     other.known[str(frame)] += by
 
 
-class _Watch:
+class _Watch(HostPace):
     """Monitor that forwards the traffic of hosts."""
 
     def __init__(self, pace: HostPace, hear: Callable[[Mark, Any], None]) -> None:
-        self.waited, self.passed, self.sending = pace.waited, hear, pace.sending
+        super().__init__()
+        self._pace, self._hear = pace, hear
 
-    def used(self) -> None:
-        """Always allow."""
+    def waited(self, wanted_us: int, took_us: int) -> None:
+        self._pace.waited(wanted_us, took_us)
+
+    def passed(self, mark: Mark, traffic: Any) -> None:
+        self._hear(mark, traffic)
 
 
-class _BusWatch:
+class _BusWatch(_Watch):
     """Monitor of one of several connections of a bus, each of which sees each frame.
 
     Attributes:
@@ -194,14 +198,9 @@ class _BusWatch:
     """
 
     def __init__(self, pace: HostPace, wire: str, journal: DoorJournal) -> None:
-        self.waited, self._wire, self._journal = pace.waited, wire, journal
+        super().__init__(pace, partial(journal.hear_frames, wire, self))
+        self._wire, self._journal = wire, journal
         self.known: Counter[str] = Counter()
-
-    def used(self) -> None:
-        """Always allow."""
-
-    def passed(self, mark: Mark, frames: Seen) -> None:
-        self._journal.hear_frames(self._wire, self, mark, frames)
 
     @contextmanager
     def sending(self, frames: Frames) -> Iterator[None]:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from pathlib import Path
 from time import monotonic_ns
-from typing import Any, Final, Generic, Protocol
+from typing import Any, Final, Generic
 
 import serial
 
@@ -25,29 +25,12 @@ Seen = tuple[CanFrame | ErrorFrame, ...]
 """Frames of a bus connection."""
 
 
-class DoorWatch(Protocol):
-    """Monitor of a connection: traffic, and timing of the host."""
-
-    def used(self) -> None:
-        """Called before the host sends or waits; may forbid it by raising."""
-
-    def waited(self, wanted_us: int, took_us: int) -> None:
-        """Called after a wait without result: the requested and the actual duration."""
-
-    def sending(self, traffic: Any) -> AbstractContextManager[object]:
-        """Return a context for sending bytes or frames, which other connections may see."""
-        ...
-
-    def passed(self, mark: Mark, traffic: Any) -> None:
-        """Called with bytes or frames."""
-
-
 def _now_us() -> int:
     return monotonic_ns() // 1_000
 
 
 class HostPace:
-    """How late a host was in its waits.
+    """Monitor of a connection: how late its host was in its waits; subclasses see the traffic.
 
     Attributes:
         late_us: the worst so far.
@@ -56,12 +39,18 @@ class HostPace:
     def __init__(self, now_us: Callable[[], int] = _now_us) -> None:
         self._now_us, self.late_us = now_us, 0
 
+    def used(self) -> None:
+        """Called before the host sends or waits; may forbid it by raising."""
+
+    def passed(self, mark: Mark, traffic: Any) -> None:
+        """Called with bytes or frames."""
+
     def waited(self, wanted_us: int, took_us: int) -> None:
-        """Record a wait without result."""
+        """Record a wait without result: the requested and the actual duration."""
         self.late_us = max(self.late_us, took_us - wanted_us)
 
-    def sending(self, traffic: object) -> AbstractContextManager[object]:
-        """Return an empty context."""
+    def sending(self, traffic: Any) -> AbstractContextManager[object]:
+        """Return a context for sending bytes or frames, which other connections may see."""
         return nullcontext()
 
     @contextmanager
@@ -84,7 +73,7 @@ class WatchedLink(Generic[W]):
         watch: the monitor.
     """
 
-    def __init__(self, link: Link[W], watch: DoorWatch) -> None:
+    def __init__(self, link: Link[W], watch: HostPace) -> None:
         self._link, self._watch, self._closed = link, watch, False
 
     @property
@@ -148,7 +137,7 @@ class WatchedFrameLink(WatchedLink[Frames]):
         watch: the monitor.
     """
 
-    def __init__(self, link: StampedLink, watch: DoorWatch) -> None:
+    def __init__(self, link: StampedLink, watch: HostPace) -> None:
         super().__init__(link, watch)
         self._stamped = link
 
@@ -177,7 +166,7 @@ class _SerialGone(PortGone, serial.SerialException):
 class WatchedPort(serial.SerialBase):
     """Monitoring added to a port class."""
 
-    _watch: DoorWatch
+    _watch: HostPace
 
     def read(self, size: int = 1) -> bytes:
         """Read like the port, and record data and delay."""
@@ -209,7 +198,7 @@ class WatchedPort(serial.SerialBase):
         return written
 
 
-def open_watched_serial(url: str, watch: DoorWatch, options: dict[str, Any]) -> serial.SerialBase:
+def open_watched_serial(url: str, watch: HostPace, options: dict[str, Any]) -> serial.SerialBase:
     """Open a port.
 
     Args:

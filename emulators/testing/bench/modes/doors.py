@@ -13,13 +13,7 @@ from tickrig.emulators.serial.bridge import Bridge
 from tickrig.emulators.serial.emulator import SerialHub
 from tickrig.emulators.serial.network import NetworkPort, parse_serve_url
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
-from tickrig.emulators.testing.bench.modes.door_watch import (
-    DoorWatch,
-    LinkGone,
-    WatchedFrameLink,
-    WatchedLink,
-    open_watched_serial,
-)
+from tickrig.emulators.testing.bench.modes import door_watch
 from tickrig.emulators.testing.bench.modes.mode import Address
 from tickrig.emulators.testing.bench.mounts import BusMount, LineMount, Mount
 from tickrig.emulators.testing.rig_file.plan import BusPlan, DoorPlan, RealPlan
@@ -77,7 +71,7 @@ class Doors:
     def __init__(
         self,
         places: Mapping[str, LinePlace | BusPlan],
-        watch_of: Callable[[str], DoorWatch],
+        watch_of: Callable[[str], door_watch.HostPace],
         begin: Callable[[], None],
     ) -> None:
         self._places, self._watch_of, self._begin = places, watch_of, begin
@@ -86,11 +80,11 @@ class Doors:
     def link(self, wire: str) -> Link[Any]:
         """Connect a link."""
         place, watch = self._place(wire), self._watch_of(wire)
-        link: WatchedLink[Any]
+        link: door_watch.WatchedLink[Any]
         if isinstance(place, BusPlan):
-            link = WatchedFrameLink(bus_doors.frame_link(place, watch), watch)
+            link = door_watch.WatchedFrameLink(bus_doors.frame_link(place, watch), watch)
         else:
-            link = WatchedLink(_line_link(place), watch)
+            link = door_watch.WatchedLink(_line_link(place), watch)
         self._opened.callback(link.close)
         self._begin()
         return link
@@ -103,7 +97,9 @@ class Doors:
         data, parity, stop = int(place.framing[0]), place.framing[1], float(place.framing[2:])
         own = {"baudrate": place.baud, "bytesize": data, "parity": parity, "stopbits": stop}
         locked = {"exclusive": True}  # a second host takes bytes away from the first
-        port = open_watched_serial(place.url, self._watch_of(wire), {**own, **locked, **options})
+        port = door_watch.open_watched_serial(
+            place.url, self._watch_of(wire), {**own, **locked, **options}
+        )
         self._opened.callback(port.close)
         self._begin()
         return port
@@ -159,7 +155,7 @@ def _line_link(place: LinePlace) -> Link[bytes]:
     try:
         return SerialLink(place.url, place.baud)
     except LinkClosed as error:
-        raise LinkGone(str(error)) from error
+        raise door_watch.LinkGone(str(error)) from error
 
 
 _IN_PROCESS: Final = "virtual"

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NoReturn, TypeVar
+from typing import Any, Final, NoReturn, TypeVar
 
 from tickrig.emulators.bench.operator import FaultOrder, FaultSpec
 from tickrig.emulators.bench.running_emulator import keeping_time
@@ -23,10 +23,6 @@ from tickrig.emulators.testing.bench.plan_parts import parts_of
 from tickrig.emulators.testing.bench.tasks import Condition, text_of
 from tickrig.emulators.testing.rig_file.plan import BusPlan, HardwarePlan, RigPlan
 from tickrig.host.control.requests import Object
-
-if TYPE_CHECKING:
-    pass
-
 
 # Addresses of the wires of real devices.
 

@@ -9,20 +9,14 @@ from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
-from typing import IO, Any, Final, Protocol
+from typing import IO, Any, Final
 
 from tickrig.device.physical import InputSignal, SignalType
 from tickrig.emulators.bench.operator import AssemblyFaults, FaultOrder, FaultSpec, Operator
 from tickrig.emulators.rig.emulated import HasSignals
 from tickrig.emulators.rig.event_queue import EventQueue
+from tickrig.emulators.testing.bench import errors
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
-from tickrig.emulators.testing.bench.errors import (
-    BenchBlocked,
-    MachineTooSlow,
-    NotOnThisBench,
-    OperatorRefused,
-    PortGone,
-)
 from tickrig.emulators.testing.bench.modes.door_journal import DoorJournal
 from tickrig.emulators.testing.bench.modes.mode import POWER
 from tickrig.emulators.testing.rig_file.plan import DevicePlan, HardwarePlan, PowerPlan, RigPlan
@@ -75,9 +69,11 @@ class _PowerSwitch:
             said = done.stderr.decode("utf-8", "replace").strip().split("\n")[-1]
             raise self._blocked(on, f"exit status {done.returncode}{said and f': {said}'}")
 
-    def _blocked(self, on: bool, why: str) -> BenchBlocked:
+    def _blocked(self, on: bool, why: str) -> errors.BenchBlocked:
         state, command = ("on", self._plan.on) if on else ("off", self._plan.off)
-        return BenchBlocked(f"{self._device} was not switched {state}: {' '.join(command)}: {why}")
+        return errors.BenchBlocked(
+            f"{self._device} was not switched {state}: {' '.join(command)}: {why}"
+        )
 
 
 # Requests and questions to a human at the terminal.
@@ -117,9 +113,9 @@ class Terminal:
                         host(_POLL_US)
                 line = terminal.readline()
         except OSError as error:
-            raise OperatorRefused(f"there is no terminal ({error.strerror})") from None
+            raise errors.OperatorRefused(f"there is no terminal ({error.strerror})") from None
         if not line:
-            raise OperatorRefused("the terminal was closed (end of input)")
+            raise errors.OperatorRefused("the terminal was closed (end of input)")
         return line.decode("utf-8", "replace").strip()
 
     def have_done(self, text: str) -> None:
@@ -134,9 +130,9 @@ class Terminal:
         """
         while answer := self.prompt(f"{text}, {_DONE}:").lower():
             if answer == "n":
-                raise OperatorRefused(f"the operator did not do this: {text}")
+                raise errors.OperatorRefused(f"the operator did not do this: {text}")
             if answer == "c":
-                raise NotOnThisBench(f"the operator cannot do this: {text}")
+                raise errors.NotOnThisBench(f"the operator cannot do this: {text}")
 
     def sees(self, question: str) -> bool:
         """Ask a yes/no question."""
@@ -154,15 +150,20 @@ _HOLD_US: Final = 1_000_000
 
 
 class _HumanOperator:
-    """`DeviceOperator` of a human, with the texts of the device type.
+    """The operator of a device: a human at the terminal, with the texts of the device type.
 
-    Set values are stored and not asked for again.
+    Set values are stored and not asked for again. Names are those within the device.
 
     Args:
         device: name of the device.
         physical: an equivalent device, for its tables and set values.
         terminal: terminal of the human.
         power: switches the device; None if the human does.
+
+    Attributes:
+        late_us: largest known delay of the device.
+        quick: acts without delay.
+        said_no: the human answered no; that is valid however late the machine was.
     """
 
     late_us, quick = 0, False
@@ -231,7 +232,7 @@ class _HumanOperator:
         """Ask to make a physical fault; NotOnThisBench for a wire fault or a given time."""
         item = self._find_fault(spec.name)
         if (spec.arguments, spec.from_us, spec.to_us, for_us) != ((), 0, NEVER, None):
-            raise NotOnThisBench(f"no hand makes {spec.name} at a certain time")
+            raise errors.NotOnThisBench(f"no hand makes {spec.name} at a certain time")
         self.have_done(f"make this fault: {item.text} ({item.name})")
         self._record.set(spec.name, 1)
 
@@ -264,7 +265,7 @@ class _HumanOperator:
 
     def _find_fault(self, name: str) -> InputSignal:
         if name not in self._physical.inputs.table:
-            raise NotOnThisBench(
+            raise errors.NotOnThisBench(
                 f"no hand can make {name}: it changes what passes on the wire, which an emulator"
                 " alone can (key control of [hardware])"
             )
@@ -290,7 +291,7 @@ _OBJECT: Final = "0x"
 
 
 class _EmulatorOperator:
-    """`DeviceOperator` that uses the control socket of an emulator.
+    """The operator of a device: the control socket of an emulator. Names are as for a human.
 
     Args:
         path: of its socket.
@@ -309,7 +310,7 @@ class _EmulatorOperator:
         try:
             self._client = ControlClient(path)
         except OSError as error:
-            raise PortGone(f"{plan.name}: no emulator at {path}: {error.strerror}") from None
+            raise errors.PortGone(f"{plan.name}: no emulator at {path}: {error.strerror}") from None
         described = self._request("describe")
         inputs, outputs, wire_faults = (
             _names_of(described, key) for key in ("inputs", "outputs", "wire_faults")
@@ -325,9 +326,9 @@ class _EmulatorOperator:
         """Largest delay of a step since the start; 0 if the emulator is gone."""
         try:
             late_us = self._request("status", since=self._begun_us)["late_us"]
-        except MachineTooSlow:
+        except errors.MachineTooSlow:
             return _NO_ANSWER_US
-        except PortGone:
+        except errors.PortGone:
             return 0
         assert isinstance(late_us, int)
         return late_us
@@ -404,7 +405,7 @@ class _EmulatorOperator:
     def switch_power(self, *, on: bool) -> None:
         """Switch the supply."""
         if self._power is None:
-            raise NotOnThisBench("this device has no input that is its supply")
+            raise errors.NotOnThisBench("this device has no input that is its supply")
         self.set(self._power, (POWER[self._power] if on else 1 - POWER[self._power],))
 
     def close(self) -> None:
@@ -442,9 +443,9 @@ class _EmulatorOperator:
             raise
         except TimeoutError:
             text = f"the emulator at {self._path} has not answered for {TIMEOUT_S:g} s"
-            raise MachineTooSlow(text) from None
+            raise errors.MachineTooSlow(text) from None
         except (OSError, ValueError) as error:
-            raise PortGone(f"the emulator at {self._path} is gone: {error}") from None
+            raise errors.PortGone(f"the emulator at {self._path} is gone: {error}") from None
 
 
 def _names_of(found: Object, key: str) -> frozenset[str]:
@@ -467,62 +468,7 @@ def _prefix_of(plan: DevicePlan, names: frozenset[str], path: Path) -> str:
 # The operator of one real device.
 
 
-class _DeviceOperator(Protocol):
-    """An operator: a human at the terminal, or the control socket of an emulator.
-
-    Names are those within the device, without its name.
-
-    Attributes:
-        said_no: a human answered no; that is valid however late the machine was.
-        quick: acts without delay.
-    """
-
-    said_no: bool
-    quick: bool
-
-    @property
-    def late_us(self) -> int:
-        """Largest known delay of the device."""
-        ...
-
-    def prepare(self, like: HasSignals) -> None:
-        """Reset the device and switch its power off, if possible."""
-
-    def begin(self) -> None:
-        """Switch it on, if `prepare` has switched it off."""
-
-    def set(self, name: str, values: tuple[Setting, ...]) -> None:
-        """Set an input, or all inputs of a group."""
-
-    def set_all(self, values: Mapping[str, Setting]) -> None:
-        """Set several inputs, before the device has its power."""
-
-    def get(self, name: str) -> Setting:
-        """Return the present value of an input or output."""
-        ...
-
-    def press(self, name: str, duration_us: int) -> None:
-        """Press and release a button."""
-
-    def fault(self, spec: FaultSpec, now_us: int, for_us: int | None) -> None:
-        """Start a fault; its times are those of the bench, whose time is `now_us`."""
-
-    def clear(self, fault: str) -> None:
-        """Clear a fault."""
-
-    def sees(self, text: str) -> bool | None:
-        """Return an observation; None if the device itself answers."""
-        ...
-
-    def have_done(self, text: str) -> bool:
-        """Run an action described in words; return False if the operator cannot."""
-        ...
-
-    def switch_power(self, *, on: bool) -> None:
-        """Switch the supply."""
-
-    def close(self) -> None:
-        """Release all resources."""
+_DeviceOperator = _HumanOperator | _EmulatorOperator
 
 
 class Operators:
@@ -592,7 +538,7 @@ class Operators:
             case "get":
                 return {"values": {name: self._get(name) for name in fields["names"]}}
             case _:
-                raise NotOnThisBench(f"real devices do not answer {do!r}")
+                raise errors.NotOnThisBench(f"real devices do not answer {do!r}")
         return {}
 
     def _set(self, name: str, values: list[Setting]) -> None:
@@ -627,7 +573,7 @@ class Operators:
         operator, wanted = self._operator_at(device), replace(spec, name=fault)
         is_input = name in self._like.state.assembly.inputs.table
         if order.when and not operator.quick:
-            raise NotOnThisBench(f"no hand makes {fault} the moment that something is so")
+            raise errors.NotOnThisBench(f"no hand makes {fault} the moment that something is so")
 
         def begin(now_us: int) -> None:
             order.begin(now_us)
@@ -715,5 +661,5 @@ class Operators:
 
     def _operator_at(self, device: str) -> _DeviceOperator:
         if device not in self._operators:
-            raise NotOnThisBench(f"there is no operator of {device}")
+            raise errors.NotOnThisBench(f"there is no operator of {device}")
         return self._operators[device]

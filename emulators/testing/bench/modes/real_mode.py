@@ -10,7 +10,7 @@ from contextlib import ExitStack, suppress
 from functools import partial
 from pathlib import Path
 from queue import Empty
-from typing import TYPE_CHECKING, Any, Final, NoReturn, Self, TypeVar
+from typing import Any, Final, NoReturn, Self, TypeVar
 
 from tickrig.emulators.bench.control import EmulatorControl
 from tickrig.emulators.bench.running_emulator import RunningEmulator, keeping_time
@@ -26,10 +26,6 @@ from tickrig.host.control.requests import RequestDispatcher
 from tickrig.host.control.server import ControlServer
 from tickrig.host.links.ready import WaitingQueue
 from tickrig.host.text.trace import Mark
-
-if TYPE_CHECKING:
-    pass
-
 
 # A rig in real time, in its own thread, with calls from other threads.
 
@@ -248,9 +244,6 @@ class _Watch(HostPace):
     def used(self) -> None:
         if self._thread.here:
             raise _HostInCondition
-
-    def passed(self, mark: Mark, traffic: Any) -> None:
-        """Do nothing: the rig records it itself."""
 
 
 class RealMode(EmulatedMode):

@@ -14,7 +14,7 @@ from tickrig.emulators.testing.plugin.journal_text import last_lines
 def test_what_pdos_carry_is_known_after_their_mapping_is_dropped(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(journal, "KEPT", 200)
+    monkeypatch.setattr(journal, "_KEPT", 200)
     with cell(tmp_path) as drives:
         drives.master.run_for("2s")
         text = last_lines(drives.bench, 60)
