@@ -34,7 +34,7 @@ _VERBS: Final = {
 }
 
 
-class Verbs(LazyGroup):
+class _Verbs(LazyGroup):
     """The verbs of canmon."""
 
     def invoke(self, ctx: click.Context) -> Any:
@@ -43,7 +43,7 @@ class Verbs(LazyGroup):
             return super().invoke(ctx)
 
 
-@click.group(cls=Verbs, commands=_VERBS)
+@click.group(cls=_Verbs, commands=_VERBS)
 @version_option()
 def main() -> None:
     """Watch, decode, send, replay and check CAN traffic: a bus, a log file, or standard input.

@@ -18,10 +18,10 @@ if TYPE_CHECKING:
     from tickrig.host.canmon.model.decode.node_memory import EdsObjects
     from tickrig.host.canmon.model.frames import Record
 
-T = TypeVar("T")
+_T = TypeVar("_T")
 
 _DECODER: Final = ("decode",)
-RULE: Final = ("wants", "selection", "judge", "end")
+_RULE: Final = ("wants", "selection", "judge", "end")
 
 
 def _is_class_with(found: object, methods: Iterable[str]) -> bool:
@@ -32,7 +32,7 @@ _DECODERS: Final = ExtensionGroup[Any](
     "tickrig.decoders",
     "decoder or rule",
     {},
-    lambda found: _is_class_with(found, _DECODER) or _is_class_with(found, RULE),
+    lambda found: _is_class_with(found, _DECODER) or _is_class_with(found, _RULE),
     "a class with `decode`, nor a check rule",
 )
 
@@ -67,7 +67,7 @@ def load_rule(name: str) -> Callable[[], Rule]:
     except ExtensionError as error:
         hint = "" if name in _DECODERS.names() else "; without a package it is as 'emcy never'"
         raise ExtensionError(f"{error}{hint}") from None
-    if not _is_class_with(found, RULE):
+    if not _is_class_with(found, _RULE):
         raise ExtensionError(f"{name!r} is a decoder, no rule")
 
     def make() -> Rule:
@@ -125,7 +125,7 @@ class _CheckedRule(Rule):
         return _called(self.name, lambda: list(self._rule.notes(evidence))) if known else ()
 
 
-def _called(name: str, call: Callable[..., T], *arguments: object) -> T:
+def _called(name: str, call: Callable[..., _T], *arguments: object) -> _T:
     try:
         return call(*arguments)
     except Exception as error:  # a foreign rule may raise anything

@@ -44,13 +44,13 @@ class _HasDescriptor(Protocol):
         ...
 
 
-Read = TypeVar("Read", bound="int | _HasDescriptor")
-Written = TypeVar("Written", bound="int | _HasDescriptor")
+_Read = TypeVar("_Read", bound="int | _HasDescriptor")
+_Written = TypeVar("_Written", bound="int | _HasDescriptor")
 
 
 def ready(
-    readers: Iterable[Read], writers: Iterable[Written] = (), wait_s: float | None = None
-) -> tuple[list[Read], list[Written]]:
+    readers: Iterable[_Read], writers: Iterable[_Written] = (), wait_s: float | None = None
+) -> tuple[list[_Read], list[_Written]]:
     """Wait until descriptors can be read or written.
 
     Args:
@@ -75,8 +75,8 @@ def ready(
 if sys.platform != "win32":
 
     def _polled(
-        readers: Sequence[Read], writers: Sequence[Written], wait_s: float | None
-    ) -> tuple[list[Read], list[Written]]:
+        readers: Sequence[_Read], writers: Sequence[_Written], wait_s: float | None
+    ) -> tuple[list[_Read], list[_Written]]:
         """Do the same with `poll`, which counts in whole milliseconds."""
         wanted: dict[int, int] = {}
         for sources, event in ((readers, select.POLLIN), (writers, select.POLLOUT)):
@@ -129,10 +129,10 @@ def _select(
 
 # A queue whose waits end on time.
 
-T = TypeVar("T")
+_T = TypeVar("_T")
 
 
-class WaitingQueue(Generic[T]):
+class WaitingQueue(Generic[_T]):
     """A queue for one reading thread and any writing threads.
 
     `queue.SimpleQueue` waits without end (CPython 3.11) if its timeout has passed before it checks
@@ -141,17 +141,17 @@ class WaitingQueue(Generic[T]):
     """
 
     def __init__(self) -> None:
-        self._items: deque[T] = deque()
+        self._items: deque[_T] = deque()
         self._nothing_new = Lock()
         self._nothing_new.acquire()
 
-    def put(self, item: T) -> None:
+    def put(self, item: _T) -> None:
         """Append an item without blocking."""
         self._items.append(item)
         with suppress(RuntimeError):  # something else is new, too
             self._nothing_new.release()
 
-    def get(self, wait_s: float | None = None) -> T:
+    def get(self, wait_s: float | None = None) -> _T:
         """Return the first item.
 
         Args:

@@ -24,7 +24,7 @@ _UNIT_US: Final = 10_000
 
 _SLOWEST: Final = 1
 
-T = TypeVar("T")
+_T = TypeVar("_T")
 
 
 class RrcClient(Closing):
@@ -387,7 +387,7 @@ class RrcClient(Closing):
         self._slow_down_before(cmd.Limit)
         self.limit(v_pct, w_pct, sum_pct, product_pct, radius_pct)
 
-    def _drain(self, queue: deque[Arrival[T]], timeout_us: int) -> Iterator[Arrival[T]]:
+    def _drain(self, queue: deque[Arrival[_T]], timeout_us: int) -> Iterator[Arrival[_T]]:
         until_us = self._link.now_us + timeout_us
         self._channel.step(self._link.now_us)
         while queue or self._link.now_us < until_us:

@@ -45,13 +45,13 @@ UNKNOWN_KEPT: Final = 100
 _ANSWER: Final = re.compile(r"(?![A-Z]{2}:)[ -~]+")
 """A bare line of text; `XX:...` is a message of newer firmware, not an answer."""
 
-T = TypeVar("T")
+_T = TypeVar("_T")
 Answer = Ok | Refusal | Text
 _log = log_of(__name__)
 
 
 @dataclass(frozen=True, slots=True)
-class Arrival(Generic[T]):
+class Arrival(Generic[_T]):
     """A received item with its time.
 
     Attributes:
@@ -60,7 +60,7 @@ class Arrival(Generic[T]):
     """
 
     at_us: int
-    value: T
+    value: _T
 
 
 class Inbox:

@@ -15,7 +15,7 @@ from typing import Final, Generic, TypeVar
 Place = str | tuple[str | int, ...]
 """Place of a step in its file: `FILE:LINE`, keys and indices, or a line number."""
 
-What = TypeVar("What")
+_What = TypeVar("_What")
 _Came = TypeVar("_Came")
 
 FOREVER: Final = 0
@@ -37,7 +37,7 @@ class Condition(Generic[_Came]):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Step(Generic[What, _Came]):
+class Step(Generic[_What, _Came]):
     """One step; its parts run in this order, and most steps have only one.
 
     Attributes:
@@ -54,13 +54,13 @@ class Step(Generic[What, _Came]):
 
     place: Place
     at_us: int | None = None
-    what: What | None = None
+    what: _What | None = None
     wanted: tuple[Condition[_Came], ...] = ()
     within_us: int = 0
     goes_on: bool = False
-    on_fail: tuple[Step[What, _Came], ...] = ()
+    on_fail: tuple[Step[_What, _Came], ...] = ()
     times: int | None = None
-    steps: tuple[Step[What, _Came], ...] = ()
+    steps: tuple[Step[_What, _Came], ...] = ()
 
     @property
     def takes_time(self) -> bool:

@@ -38,8 +38,8 @@ from tickrig.wire.canopen.nmt import NmtState
 # `ColumnSurvey` in blocks of numpy. Both let `NodeBoard` follow the nodes; a survey is a board
 # that remembers when. Times are relative to the first frame; one before it counts as 0.
 
-T = TypeVar("T")
-Key = TypeVar("Key")
+_T = TypeVar("_T")
+_Key = TypeVar("_Key")
 
 _MOST_BINS: Final = 2_000
 _FIRST_WIDTH_US: Final = 1_000
@@ -47,7 +47,7 @@ _MOST_MARKS: Final = 1_000
 _MOST_SIGNALS: Final = 400
 
 
-class TimeBins(Generic[Key]):
+class TimeBins(Generic[_Key]):
     """Sums over spans of time of equal width, which doubles when there are too many.
 
     Args:
@@ -62,8 +62,8 @@ class TimeBins(Generic[Key]):
 
     def __init__(self, most: int = _MOST_BINS, width_us: int = _FIRST_WIDTH_US) -> None:
         self._most, self.width_us = most, width_us
-        self.sums: dict[Key, dict[int, int]] = {}
-        self.ranges: dict[Key, dict[int, tuple[float, float]]] = {}
+        self.sums: dict[_Key, dict[int, int]] = {}
+        self.ranges: dict[_Key, dict[int, tuple[float, float]]] = {}
 
     def reach(self, at_us: int) -> None:
         """Make room for a time; spans are merged if there are too many."""
@@ -83,24 +83,24 @@ class TimeBins(Generic[Key]):
                 joined[place >> shift] = min(was[0], low), max(was[1], high)
             self.ranges[name] = joined
 
-    def add(self, key: Key, at_us: int, amount: int) -> None:
+    def add(self, key: _Key, at_us: int, amount: int) -> None:
         """Add to the span of a time."""
         self.reach(at_us)
         self.add_at(key, at_us // self.width_us, amount)
 
-    def add_at(self, key: Key, place: int, amount: int) -> None:
+    def add_at(self, key: _Key, place: int, amount: int) -> None:
         """Add to a span; `reach` has made room for it."""
         spans = self.sums.setdefault(key, {})
         spans[place] = spans.get(place, 0) + amount
 
-    def spread_at(self, key: Key, place: int, low: float, high: float) -> None:
+    def spread_at(self, key: _Key, place: int, low: float, high: float) -> None:
         """Let the range of a span hold these values; `reach` has made room for it."""
         spans = self.ranges.setdefault(key, {})
         was = spans.get(place)
         spans[place] = (low, high) if was is None else (min(was[0], low), max(was[1], high))
 
 
-class Thinned(Generic[T]):
+class Thinned(Generic[_T]):
     """Things in their order: all of them, or every second, every fourth once they are many.
 
     Attributes:
@@ -110,10 +110,10 @@ class Thinned(Generic[T]):
 
     def __init__(self, most: int = _MOST_MARKS) -> None:
         self._most, self._step = most, 1
-        self.items: list[T] = []
+        self.items: list[_T] = []
         self.count = 0
 
-    def append(self, item: T) -> None:
+    def append(self, item: _T) -> None:
         """Take one more."""
         if self.count % self._step == 0:
             self.items.append(item)

@@ -54,7 +54,7 @@ the first two begin with 0xFF, which crcmod wants as it is after the final xor.
 
 
 @dataclass(frozen=True, slots=True)
-class Counter:
+class _Counter:
     """Bits of one byte that count up and begin again.
 
     Attributes:
@@ -107,7 +107,7 @@ class _ChecksumField:
 class FrameFields:
     """The changing fields of a frame; checksums come after counters, in their order."""
 
-    counters: tuple[Counter, ...] = ()
+    counters: tuple[_Counter, ...] = ()
     checksums: tuple[_ChecksumField, ...] = ()
 
     def check(self, size: int) -> None:
@@ -129,7 +129,7 @@ class FrameFields:
         return data
 
 
-def parse_counter(text: str) -> Counter:
+def parse_counter(text: str) -> _Counter:
     """Read `BYTE:LOW..HIGH`, as `0:0..255`, or of some bits `0.4+4:0..14`.
 
     Raises:
@@ -146,7 +146,7 @@ def parse_counter(text: str) -> Counter:
         raise ValueError(
             f"{text!r} counts from {low} to {high}; {bits} bits hold {(1 << bits) - 1}"
         )
-    return Counter(byte, shift, bits, low, high)
+    return _Counter(byte, shift, bits, low, high)
 
 
 def parse_checksum(text: str) -> _ChecksumField:

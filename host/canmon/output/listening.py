@@ -57,7 +57,7 @@ _TERMINAL: Final = "/dev/tty"
 _PATIENCE_S: Final = 0.02
 
 
-class Screen:
+class _Screen:
     """The controlling terminal, also where standard input is a pipe.
 
     On leaving, however that comes about, the terminal is as it was before. One that is stuck
@@ -213,7 +213,7 @@ def _wake_on_time() -> None:
 
 
 Given = ParamSpec("Given")
-Result = TypeVar("Result")
+_Result = TypeVar("_Result")
 
 
 class _FramesLost(click.ClickException):
@@ -267,10 +267,10 @@ class _Interruptions(Interrupter):
         else:
             super().received(number, frame)
 
-    def behind(self, act: Callable[Given, Result]) -> Callable[Given, Result]:
+    def behind(self, act: Callable[Given, _Result]) -> Callable[Given, _Result]:
         """Return what does the same, and is not cut short: an interruption ends it behind that."""
 
-        def whole(*arguments: Given.args, **named: Given.kwargs) -> Result:
+        def whole(*arguments: Given.args, **named: Given.kwargs) -> _Result:
             self._held = True
             try:
                 result = act(*arguments, **named)
@@ -291,7 +291,7 @@ def until_interrupted() -> Iterator[_Interruptions]:
         yield interruptions
 
 
-Item = TypeVar("Item", bound="AnyRecord")
+_Item = TypeVar("_Item", bound="AnyRecord")
 
 _POLL_US: Final = 20_000
 _NOT_COME: Final = 1
@@ -321,9 +321,9 @@ def bit_rates_of(words: Sequence[str], options: BusOptions) -> BitRates:
 
 
 def follow(  # noqa: PLR0913 - how, on a screen and without
-    source: AnySource[Item],
+    source: AnySource[_Item],
     words: Sequence[str],
-    take: Callable[[Sequence[Item]], None],
+    take: Callable[[Sequence[_Item]], None],
     span_us: int | None,
     lines: _Lines | None = None,
     *,
@@ -347,7 +347,7 @@ def follow(  # noqa: PLR0913 - how, on a screen and without
 
 
 def listen(
-    source: AnySource[Item], take: Callable[[Sequence[Item]], None], span_us: int | None
+    source: AnySource[_Item], take: Callable[[Sequence[_Item]], None], span_us: int | None
 ) -> None:
     """Take what comes until the source ends or the time is over: in a log by its own times."""
     begin_s, last_us = time.monotonic(), None
@@ -422,8 +422,8 @@ _Lines = Callable[[int, int, int], list[str]]
 
 
 def _paint(
-    source: AnySource[Item],
-    take: Callable[[Sequence[Item]], None],
+    source: AnySource[_Item],
+    take: Callable[[Sequence[_Item]], None],
     lines: _Lines,
     span_us: int | None,
     press: Callable[[str], None] = lambda key: None,
@@ -438,7 +438,7 @@ def _paint(
         press: acts on other keys, and what it does is shown at once.
     """
     watch, begin_s, due_s = Stopwatch(), time.monotonic(), 0.0
-    with Screen() as screen:
+    with _Screen() as screen:
         while not (source.ended or screen.is_gone or _is_over(begin_s, span_us)):
             records = source.poll(_POLL_US)
             take(records)

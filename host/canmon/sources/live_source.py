@@ -28,7 +28,7 @@ _QUEUE_FRAMES: Final = 200_000
 _WAIT_US: Final = 100_000
 """How long a thread may take to see that it shall end."""
 
-Item = TypeVar("Item", bound="Record | LineRecord")
+_Item = TypeVar("_Item", bound="Record | LineRecord")
 _Read_co = TypeVar("_Read_co", bound="Record | LineRecord", covariant=True)
 
 
@@ -59,7 +59,7 @@ class Reader(Protocol[_Read_co]):
         """Close the bus."""
 
 
-class LiveSource(AnySource[Item]):
+class LiveSource(AnySource[_Item]):
     """One or more buses or serial ports, read by a thread each.
 
     What the caller does not fetch is kept up to a limit; frames beyond it are
@@ -79,12 +79,12 @@ class LiveSource(AnySource[Item]):
 
     def __init__(
         self,
-        readers: Sequence[Reader[Item]],
+        readers: Sequence[Reader[_Item]],
         chosen: Iterable[CandumpFilter | None] = repeat(None),
         queue_frames: int = _QUEUE_FRAMES,
     ) -> None:
         self._readers, self._queue_frames = readers, queue_frames
-        self._queue: deque[Item | Mark] = deque()
+        self._queue: deque[_Item | Mark] = deque()
         self._marking: deque[None] = deque()  # an entry for each mark in the queue
         self._came: WaitingQueue[None] = WaitingQueue()
         self._stop, self._overruns, self.failed = False, 0, ""
@@ -127,7 +127,7 @@ class LiveSource(AnySource[Item]):
         """Frames that the drivers dropped or that found the queue full."""
         return self._overruns + sum(reader.lost for reader in self._readers)
 
-    def poll(self, timeout_us: int, /) -> list[Item]:
+    def poll(self, timeout_us: int, /) -> list[_Item]:
         """Wait for a first frame, then return all that are there, up to a mark."""
         self.marks = ()
         for reader, chosen in self._stepped:
@@ -163,11 +163,11 @@ class LiveSource(AnySource[Item]):
         for reader in self._readers:
             reader.close()
 
-    def _reopening(self) -> list[ReopeningReader[Item]]:
+    def _reopening(self) -> list[ReopeningReader[_Item]]:
         return [one for one in self._readers if isinstance(one, ReopeningReader)]
 
-    def _up_to_mark(self) -> list[Item]:
-        batch: list[Item] = []
+    def _up_to_mark(self) -> list[_Item]:
+        batch: list[_Item] = []
         while self._queue:
             one = self._queue.popleft()
             if isinstance(one, Mark):
@@ -177,12 +177,12 @@ class LiveSource(AnySource[Item]):
             batch.append(one)
         return batch
 
-    def _receive(self, reader: Reader[Item], chosen: CandumpFilter | None) -> None:
+    def _receive(self, reader: Reader[_Item], chosen: CandumpFilter | None) -> None:
         while not self._stop and not self.failed:
             self._take(reader, chosen, _WAIT_US)
         self._came.put(None)
 
-    def _take(self, reader: Reader[Item], chosen: CandumpFilter | None, timeout_us: int) -> None:
+    def _take(self, reader: Reader[_Item], chosen: CandumpFilter | None, timeout_us: int) -> None:
         try:
             records = reader.read(timeout_us)
         except LinkClosed as error:
@@ -219,7 +219,7 @@ def _monotonic_us() -> int:
     return time.monotonic_ns() // 1_000
 
 
-class ReopeningReader(Generic[Item]):
+class ReopeningReader(Generic[_Item]):
     """A reader over readers of which each is used until its bus is gone.
 
     Until somebody sets `wanted` it is as the first of them. A bus is back when it was opened and
@@ -243,13 +243,13 @@ class ReopeningReader(Generic[Item]):
 
     def __init__(
         self,
-        reader: Reader[Item],
-        open_reader: Callable[[], Reader[Item]],
+        reader: Reader[_Item],
+        open_reader: Callable[[], Reader[_Item]],
         clock: Callable[[], int] = _monotonic_us,
         wait: Callable[[float], None] = time.sleep,
     ) -> None:
         self.name, self.tally, self.wanted, self.gaps = reader.name, reader.tally, False, 0
-        self._reader: Reader[Item] | None = reader
+        self._reader: Reader[_Item] | None = reader
         self._open_reader, self._clock, self._wait = open_reader, clock, wait
         self._gone_us: int | None = None
         self._lost = self._away_us = self._due_us = 0
@@ -264,7 +264,7 @@ class ReopeningReader(Generic[Item]):
         """Whether the bus is gone now."""
         return self._gone_us is not None
 
-    def read(self, timeout_us: int, /) -> Sequence[Item | Mark]:
+    def read(self, timeout_us: int, /) -> Sequence[_Item | Mark]:
         """Wait for a first frame; tell by a mark that the bus went, or is there again.
 
         Raises:
@@ -272,7 +272,7 @@ class ReopeningReader(Generic[Item]):
         """
         try:
             reader = self._reader or self._opened(timeout_us)
-            records: Sequence[Item | Mark] = () if reader is None else reader.read(timeout_us)
+            records: Sequence[_Item | Mark] = () if reader is None else reader.read(timeout_us)
         except LinkClosed as error:
             if not self.wanted:
                 raise
@@ -300,7 +300,7 @@ class ReopeningReader(Generic[Item]):
             reader, self._reader = self._reader, None
             reader.close()
 
-    def _opened(self, timeout_us: int) -> Reader[Item] | None:
+    def _opened(self, timeout_us: int) -> Reader[_Item] | None:
         """Try once more, or wait until that is due."""
         early_us = self._due_us - self._clock()
         if early_us > 0:

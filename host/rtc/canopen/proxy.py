@@ -137,20 +137,20 @@ class PdoSink:
 
 # Ports that SDO carries: texts, and what is wider than a PDO (ours: K5).
 
-T = TypeVar("T", bound=Struct)
+_T = TypeVar("_T", bound=Struct)
 
 _TRANSPORT: Final = {"transport": rtc_canopen.PortTransport.SDO.value}
 """What the profile of such a port says beside what all ports say."""
 
 
-class _SdoOutPort(OutPort[T]):
+class _SdoOutPort(OutPort[_T]):
     """An OutPort that says in its profile what carries it."""
 
     def _properties(self) -> Mapping[str, str]:
         return {**super()._properties(), **_TRANSPORT}
 
 
-class _SdoInPort(InPort[T]):
+class _SdoInPort(InPort[_T]):
     """An InPort that says in its profile what carries it."""
 
     def _properties(self) -> Mapping[str, str]:
@@ -294,7 +294,7 @@ def _text(value: str) -> str:
     return value.partition("\0")[0]
 
 
-OK: Final = ReturnCode.RTC_OK
+_OK: Final = ReturnCode.RTC_OK
 
 
 class ProxyRequest(Enum):
@@ -386,21 +386,21 @@ class ProxyRtc(RtComponent):
             sink.clear()
         for written in self.sdo_sinks:
             written.clear()
-        return OK
+        return _OK
 
     def on_deactivated(self, ec: ExecutionContext) -> ReturnCode:
         """Let no data pass; ask for Pre-operational."""
         self.requested, self.passing, self.confirmed = ProxyRequest.DEACTIVATE, False, False
-        return OK
+        return _OK
 
     def on_aborting(self, ec: ExecutionContext) -> ReturnCode:
         """Ask for Stopped, which takes the place of what on_deactivated asked for."""
         self.requested, self.ready = ProxyRequest.ABORT, False
-        return OK
+        return _OK
 
     def on_reset(self, ec: ExecutionContext) -> ReturnCode:
         """Ask for a reset of the device; RTC_OK once it has booted."""
         if self.ready:
-            return OK
+            return _OK
         self.requested = ProxyRequest.RESET
         return ReturnCode.RTC_ERROR

@@ -74,7 +74,7 @@ _SYNC_COB_ID: Final = 0x080
 
 _MOST_MS: Final = 0xFFFF
 
-Table = Mapping[tuple[int, int], bytes]
+_Table = Mapping[tuple[int, int], bytes]
 
 
 class ServerObjects:
@@ -101,7 +101,7 @@ class ServerObjects:
             for node in definition.nodes
         ]
         sync_ms = definition.master.sync_ms
-        self._table: Table = {
+        self._table: _Table = {
             (0x1000, 0): _u32(_DEVICE_TYPE),
             (0x1001, 0): bytes(1),
             (0x1005, 0): _u32(_SYNC_COB_ID | bool(sync_ms) * nmt.FLAG_30),
@@ -141,7 +141,7 @@ class ServerObjects:
         return None if (index, sub) in self._table else AbortCode.NO_SUBINDEX
 
 
-def _array(index: int, values: Iterable[bytes]) -> Table:
+def _array(index: int, values: Iterable[bytes]) -> _Table:
     """Return an array or record with its number of entries."""
     entries = list(values)
     numbered = {(index, sub): value for sub, value in enumerate(entries, 1)}

@@ -118,10 +118,10 @@ class SystemView:
     waiting: tuple[RtConnection, ...]
 
 
-T = TypeVar("T")
+_T = TypeVar("_T")
 
 
-class PendingTransfer(Generic[T]):
+class PendingTransfer(Generic[_T]):
     """SDO transfers that somebody waits for.
 
     Args:
@@ -133,10 +133,10 @@ class PendingTransfer(Generic[T]):
         problem: why they failed, empty if they did not.
     """
 
-    def __init__(self, empty: T) -> None:
+    def __init__(self, empty: _T) -> None:
         self.done, self.data, self.problem = False, empty, ""
 
-    def succeed(self, data: T | None) -> None:
+    def succeed(self, data: _T | None) -> None:
         """Take the result."""
         self.done = True
         if data is not None:
@@ -313,8 +313,8 @@ class ServerView:
         return node
 
     def _transfer(
-        self, node_id: int, script: Script[T] | Script[None], empty: T
-    ) -> PendingTransfer[T]:
+        self, node_id: int, script: Script[_T] | Script[None], empty: _T
+    ) -> PendingTransfer[_T]:
         transfer = PendingTransfer(empty)
         callbacks = transfer.succeed, transfer.fail, transfer.drop
         job = QueuedScript("transfer", script, *callbacks, moves=False)

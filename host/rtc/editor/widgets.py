@@ -16,10 +16,10 @@ from textual.widgets import Input, Label
 
 from tickrig.host.tui import Line, LineView, line_text, line_width
 
-T = TypeVar("T")
+_T = TypeVar("_T")
 
 
-class CursorRow(NamedTuple, Generic[T]):
+class CursorRow(NamedTuple, Generic[_T]):
     """A line, and what it stands for.
 
     Attributes:
@@ -30,7 +30,7 @@ class CursorRow(NamedTuple, Generic[T]):
 
     key: str
     line: Line
-    item: T
+    item: _T
 
 
 _FOCUSED: Final = "reverse"
@@ -39,7 +39,7 @@ _MARGIN: Final = 2
 """Columns at the left in which a click opens or folds."""
 
 
-class CursorView(LineView, Generic[T]):
+class CursorView(LineView, Generic[_T]):
     """Shows rows; the cursor stays on what it was on while others come and go.
 
     What a row under the cursor ends with stands below, too, where the row is cut.
@@ -70,27 +70,27 @@ class CursorView(LineView, Generic[T]):
             view: whose row.
         """
 
-        def __init__(self, view: CursorView[T]) -> None:
+        def __init__(self, view: CursorView[_T]) -> None:
             super().__init__()
             self.view = view
 
     def __init__(self, id: str) -> None:  # noqa: A002 - Textual's name
         super().__init__(id)
-        self.rows_shown: list[CursorRow[T]] = []
+        self.rows_shown: list[CursorRow[_T]] = []
         self.cursor = 0
         self.title, self._framed = id, ("", "")
 
     @property
-    def row(self) -> CursorRow[T] | None:
+    def row(self) -> CursorRow[_T] | None:
         """The row under the cursor, None if there is none."""
         return self.rows_shown[self.cursor] if self.rows_shown else None
 
     @property
-    def in_view(self) -> Sequence[CursorRow[T]]:
+    def in_view(self) -> Sequence[CursorRow[_T]]:
         """The rows that are on the screen."""
         return self.rows_shown[self.top : self.top + max(1, self.rows)]
 
-    def offer(self, rows: Sequence[CursorRow[T]]) -> None:
+    def offer(self, rows: Sequence[CursorRow[_T]]) -> None:
         """Show rows."""
         before = self.row
         self.rows_shown = list(rows)
@@ -204,7 +204,7 @@ class QuestionScreen(ModalScreen[str | None]):
         self.dismiss(None)
 
 
-class ChoiceScreen(ModalScreen[T | None]):
+class ChoiceScreen(ModalScreen[_T | None]):
     """Asks for one of several rows; what is typed leaves those that contain it; None is no answer.
 
     Args:
@@ -228,10 +228,10 @@ class ChoiceScreen(ModalScreen[T | None]):
     ChoiceScreen CursorView { height: 1fr; }
     """
 
-    def __init__(self, text: str, rows: Sequence[CursorRow[T]]) -> None:
+    def __init__(self, text: str, rows: Sequence[CursorRow[_T]]) -> None:
         super().__init__()
         self._text, self._rows = text, rows
-        self.choices = CursorView[T]("choices")
+        self.choices = CursorView[_T]("choices")
 
     def compose(self) -> ComposeResult:
         """Lay it out."""

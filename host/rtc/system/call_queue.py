@@ -17,7 +17,7 @@ from tickrig.wire.instant import NEVER
 
 # Calls of other threads, made in the thread that runs a manager: nobody else touches it.
 
-R = TypeVar("R")
+_R = TypeVar("_R")
 
 CALL_TIMEOUT_US: Final = 1_000_000
 _LOG: Final = log_of(__name__)
@@ -46,7 +46,7 @@ class CallQueue:
         """Return what can be read while there is something to `make`; -1 at the end."""
         return self._reader.fileno()
 
-    def call(self, function: Callable[[], R], timeout_us: int | None = None) -> R:
+    def call(self, function: Callable[[], _R], timeout_us: int | None = None) -> _R:
         """Have a function called in the manager's thread, and wait for what it returns.
 
         In that thread itself it is called at once.
@@ -65,7 +65,7 @@ class CallQueue:
         """
         if threading.get_ident() == self._owner:
             return function()
-        future: Future[R] = Future()
+        future: Future[_R] = Future()
         wait_s = (self._timeout_us if timeout_us is None else timeout_us) / 1e6
         self._enter((future, function))
         try:
@@ -139,7 +139,7 @@ def _logged(function: Callable[[], object]) -> None:
         _LOG.exception("a call from another thread raised")
 
 
-def _fulfil(future: Future[R], function: Callable[[], R]) -> None:
+def _fulfil(future: Future[_R], function: Callable[[], _R]) -> None:
     try:
         future.set_result(function())
     except BaseException as error:

@@ -168,8 +168,8 @@ def _quoted(text: str) -> str:
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
-TOML: Final = ".toml"
-XML: Final = ".xml"
+_TOML: Final = ".toml"
+_XML: Final = ".xml"
 
 
 def read_system(path: Path) -> System:
@@ -211,8 +211,8 @@ def write_system(text: str, path: Path) -> None:
 
 def file_format(path: Path) -> str:
     """Return `toml` or `xml`; Refused for another ending."""
-    if path.suffix.lower() not in (TOML, XML):
-        raise Refused(f"system {path}: the name ends in {TOML} or {XML}")
+    if path.suffix.lower() not in (_TOML, _XML):
+        raise Refused(f"system {path}: the name ends in {_TOML} or {_XML}")
     return path.suffix.lower().removeprefix(".")
 
 

@@ -55,7 +55,7 @@ OpenSource = Callable[[str, tuple[str, ...]], Source]
 """Makes a source for who asks, with the hosts that addresses may name."""
 
 
-V = TypeVar("V")
+_V = TypeVar("_V")
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,17 +104,17 @@ class _CacheCounts:
 
 
 @dataclass(slots=True)
-class _Entry(Generic[V]):
+class _Entry(Generic[_V]):
     """What is known of an address; `next_us` is when it may be asked for again."""
 
-    value: V | None = None
+    value: _V | None = None
     fetched_us: int = 0
     next_us: int = 0
     pending: bool = False
     unknown: bool = False
 
 
-class LookupCache(Generic[V]):
+class LookupCache(Generic[_V]):
     """Holds values by their addresses; while the source does not answer, old ones serve.
 
     Args:
@@ -126,15 +126,15 @@ class LookupCache(Generic[V]):
         invalid: what latest text was none, and why.
     """
 
-    def __init__(self, parse: Callable[[str], V]) -> None:
-        self._parse, self._entries = parse, OrderedDict[str, _Entry[V]]()
+    def __init__(self, parse: Callable[[str], _V]) -> None:
+        self._parse, self._entries = parse, OrderedDict[str, _Entry[_V]]()
         self.counts, self.trouble, self.invalid, self._pending = _CacheCounts(), "", "", 0
 
     def __len__(self) -> int:
         """Return how many addresses have a value."""
         return sum(entry.value is not None for entry in self._entries.values())
 
-    def look_up(self, address: str, source: Source, limits: CacheLimits, now_us: int) -> V | None:
+    def look_up(self, address: str, source: Source, limits: CacheLimits, now_us: int) -> _V | None:
         """Return the value under an address, None if there is none now; it may be asked for."""
         entry = self._entries.setdefault(address, _Entry())
         self._entries.move_to_end(address)
@@ -152,7 +152,7 @@ class LookupCache(Generic[V]):
         self._pending -= len(ended)
         return tuple(fetched.address for fetched in ended if self._take(fetched, limits, now_us))
 
-    def value(self, address: str) -> V | None:
+    def value(self, address: str) -> _V | None:
         """Return what is held under an address, however old; this is no look-up."""
         return entry.value if (entry := self._entries.get(address)) is not None else None
 
@@ -162,7 +162,7 @@ class LookupCache(Generic[V]):
         for entry in self._entries.values():
             entry.pending = False
 
-    def _answer(self, entry: _Entry[V], limits: CacheLimits, now_us: int) -> V | None:
+    def _answer(self, entry: _Entry[_V], limits: CacheLimits, now_us: int) -> _V | None:
         counts, age_us = self.counts, now_us - entry.fetched_us
         if entry.value is None or age_us > limits.keep_us:
             counts.misses += 1
@@ -188,7 +188,7 @@ class LookupCache(Generic[V]):
         entry.next_us = now_us + (limits.fresh_us if known else limits.unknown_us)
         return known
 
-    def _parsed(self, fetched: Fetched) -> V | None:
+    def _parsed(self, fetched: Fetched) -> _V | None:
         if fetched.status is SourceStatus.UNKNOWN:
             return None
         try:

@@ -13,7 +13,7 @@ from tickrig.host.rtc.ucode.cache import CacheLimits, LookupCache, OpenSource, S
 from tickrig.host.text.log import log_of
 from tickrig.wire.rtc_types.rtc import Time, TimedLongSeq, TimedStringSeq
 
-V = TypeVar("V")
+_V = TypeVar("_V")
 
 _WAIT_US: Final = 2_000_000
 """What comes later than this after it was wanted is not written: the robot is elsewhere."""
@@ -30,7 +30,7 @@ class WantedUcode(NamedTuple):
     received: Time
 
 
-class Lookup(RtComponent, Generic[V]):
+class Lookup(RtComponent, Generic[_V]):
     """Finds something for each ucode that arrives: in its cache, else at a service.
 
     No period waits for the service. What is found later is written later, with the time at
@@ -53,7 +53,7 @@ class Lookup(RtComponent, Generic[V]):
     """
 
     def __init__(
-        self, instance_name: str, in_port: str, cache: LookupCache[V], open_source: OpenSource
+        self, instance_name: str, in_port: str, cache: LookupCache[_V], open_source: OpenSource
     ) -> None:
         super().__init__(instance_name)
         bind = self.configuration.bind
@@ -79,7 +79,7 @@ class Lookup(RtComponent, Generic[V]):
         """Say what is wanted for a value that arrived."""
 
     @abstractmethod
-    def _write(self, found: list[tuple[WantedUcode, V]]) -> None:
+    def _write(self, found: list[tuple[WantedUcode, _V]]) -> None:
         """Write what was found, one thing at least, all received at one time."""
 
     @property

@@ -210,7 +210,7 @@ def begin(at_us: int, node: int, request: _Initiate, data: bytes) -> _OpenTransf
     return opened
 
 
-def answers(running: _OpenTransfer, answer: _Answer) -> bool:
+def _answers(running: _OpenTransfer, answer: _Answer) -> bool:
     """Say whether this is the answer to the request; block upload may be switched to another."""
     upload = isinstance(answer, sdo.UploadInitiateResponse)
     return (
@@ -512,7 +512,7 @@ class SdoChannel:
 
     def _answer(self, at_us: int, message: _Answer) -> str:
         running = self._running
-        if running and answers(running, message):
+        if running and _answers(running, message):
             return _take_answer(running, message)
         latest = self._latest
         if latest and latest.retries and latest.entry == (message.index, message.sub):

@@ -115,7 +115,7 @@ def decimate(series: Series, from_us: int, to_us: int, columns: int) -> list[_Ba
     return bars
 
 
-class Stop(NamedTuple):
+class _Stop(NamedTuple):
     """One stop of a curve: a column, and what lies in it.
 
     Attributes:
@@ -141,7 +141,7 @@ class Curve:
     label: str
     axis: int
     unit: str
-    stops: tuple[Stop, ...]
+    stops: tuple[_Stop, ...]
 
 
 class _StateRun(NamedTuple):
@@ -205,10 +205,10 @@ def chart(series: Sequence[Series], view: View, columns: int) -> Chart:
     return Chart(view, columns, curves, bands, ranges)
 
 
-def _stops(series: Series, view: View, columns: int) -> tuple[Stop, ...]:
+def _stops(series: Series, view: View, columns: int) -> tuple[_Stop, ...]:
     bars = decimate(series, view.from_us, view.to_us, columns)
     seen = series.between(view.from_us, view.to_us)
-    inside = [Stop(x, bar) for x, bar in enumerate(bars) if bar is not None]
+    inside = [_Stop(x, bar) for x, bar in enumerate(bars) if bar is not None]
     left = [_outside(series, seen.start - 1, view, columns)] if seen.start else []
     right = [_outside(series, seen.stop, view, columns)] if seen.stop < len(series) else []
     return (*left, *inside, *right)
@@ -238,10 +238,10 @@ def _runs(series: Series, view: View, columns: int) -> Iterator[_StateRun]:
         yield _StateRun(begin, columns, name)
 
 
-def _outside(series: Series, index: int, view: View, columns: int) -> Stop:
+def _outside(series: Series, index: int, view: View, columns: int) -> _Stop:
     value = series.values[index]
     x = (series.at_us[index] - view.from_us) * columns // (view.span_us + 1)
-    return Stop(x, _Bar(value, value, value, value))
+    return _Stop(x, _Bar(value, value, value, value))
 
 
 def _range(curves: Sequence[Curve], axis: int, columns: int) -> tuple[float, float]:

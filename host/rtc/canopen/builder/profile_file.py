@@ -84,7 +84,7 @@ def check_identifiers(type_name: str, ports: Iterable[str]) -> None:
 
 
 _Table = Mapping[str, Any]
-E = TypeVar("E", bound=Enum)
+_E = TypeVar("_E", bound=Enum)
 
 EXAMPLE: Final = Path(__file__).with_name("example.toml").read_text("utf-8")
 
@@ -168,7 +168,7 @@ def _port(number: int, table: _Table, word_bits: int) -> CanopenPortProfile:
         raise _ProfileError(f"port {number}: {error}") from None
 
 
-def _member(table: _Table, key: str, kind: type[E]) -> E:
+def _member(table: _Table, key: str, kind: type[_E]) -> _E:
     """Return a member of an enumeration by its value."""
     value, known = _take(table, key, str), [str(item.value) for item in kind]
     if value not in known:

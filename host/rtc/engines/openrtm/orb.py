@@ -46,7 +46,7 @@ _REASONS: Final = {
 }
 
 
-class OrbFailed(RuntimeError):  # noqa: N818 - what an ORB did
+class _OrbFailed(RuntimeError):  # noqa: N818 - what an ORB did
     """There can be no ORB here."""
 
 
@@ -76,7 +76,7 @@ class Orb:
             self._poa = self._orb.resolve_initial_references("RootPOA")
             self._poa._get_the_POAManager().activate()
         except CORBA.INITIALIZE:
-            raise OrbFailed(f"cannot listen at {endpoint}: no address or free port here") from None
+            raise _OrbFailed(f"cannot listen at {endpoint}: no address or free port here") from None
 
     def serve(self, skeleton: type, *answers: object) -> Reference:
         """Let peers call an object.
