@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Final
 
 from tickrig.device.canopen.ds402 import indices
-from tickrig.device.canopen.ds402.automaton import DriveState, Statusword
 from tickrig.device.canopen.ds402.settings import clamped
 from tickrig.device.twin import Part
+from tickrig.wire.canopen.drive import DriveState, Statusword
 
 if TYPE_CHECKING:
     from tickrig.device.canopen.dictionary import Dictionary, Entry

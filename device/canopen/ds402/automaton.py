@@ -4,56 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from enum import Enum, IntEnum, IntFlag, auto
+from enum import Enum, auto
 from typing import Final
 
 from tickrig.device.canopen.ds402 import indices
 from tickrig.device.canopen.ds402.axis import Axis, Control, Stopping
 from tickrig.device.canopen.ds402.settings import ErrorCode, is_controllable
 from tickrig.device.twin import Immutable, Part
+from tickrig.wire.canopen.drive import DriveState
 
 # The state machine of a drive, and what the drive does in each state (CiA 402-2).
-
-
-class Controlword(IntFlag):
-    """Bits of 6040h; 4, 5 and 6 belong to the mode of operation."""
-
-    SWITCH_ON = 0x0001
-    ENABLE_VOLTAGE = 0x0002
-    QUICK_STOP = 0x0004  # active at 0
-    ENABLE_OPERATION = 0x0008
-    START = 0x0010  # new set-point, start homing
-    CHANGE_AT_ONCE = 0x0020
-    RELATIVE = 0x0040
-    FAULT_RESET = 0x0080
-    HALT = 0x0100
-    CHANGE_ON_SET_POINT = 0x0200
-
-
-class Statusword(IntFlag):
-    """Bits of 6041h beside those of the state; 12 and 13 belong to the mode of operation."""
-
-    VOLTAGE_ENABLED = 0x0010
-    WARNING = 0x0080
-    REMOTE = 0x0200
-    TARGET_REACHED = 0x0400
-    INTERNAL_LIMIT = 0x0800
-    MODE_12 = 0x1000  # set-point acknowledge, homing attained, speed is zero, follows the target
-    MODE_13 = 0x2000  # homing error, following error
-    HOMED = 0x8000  # of the manufacturer: the position refers to the home position
-
-
-class DriveState(IntEnum):
-    """State by its bits in the statusword."""
-
-    NOT_READY_TO_SWITCH_ON = 0x00
-    SWITCH_ON_DISABLED = 0x40
-    READY_TO_SWITCH_ON = 0x21
-    SWITCHED_ON = 0x23
-    OPERATION_ENABLED = 0x27
-    QUICK_STOP_ACTIVE = 0x07
-    FAULT_REACTION_ACTIVE = 0x0F
-    FAULT = 0x08
 
 
 class Command(Enum):

@@ -61,6 +61,7 @@ from tickrig.device.canopen.ds402.stretch import Stretch
 from tickrig.device.canopen.ds402.trapezoid import RampShape
 from tickrig.device.canopen.slave import TICK_US, Application, CanopenSlave
 from tickrig.wire.canopen.datatypes import Value
+from tickrig.wire.canopen.drive import Controlword, DriveState
 from tickrig.wire.canopen.nmt import NmtState
 from tickrig.wire.canopen.sdo_frame import AbortCode
 from tickrig.wire.instant import NEVER
@@ -104,7 +105,7 @@ _TARGETS: Final = (
     indices.INTERPOLATION_DATA,
 )
 
-_MOVING: Final = (automaton.DriveState.OPERATION_ENABLED, automaton.DriveState.QUICK_STOP_ACTIVE)
+_MOVING: Final = (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE)
 """States in which a lost connection matters."""
 
 _COOLING_US: Final = 1_000_000
@@ -209,7 +210,7 @@ class Ds402(Application):
         node.sync_handlers.append(self._sync)
 
     @property
-    def state(self) -> automaton.DriveState:
+    def state(self) -> DriveState:
         """The state of the drive."""
         return self.automaton.state
 
@@ -235,7 +236,7 @@ class Ds402(Application):
     @property
     def enabled(self) -> bool:
         """Whether it is in Operation enabled."""
-        return self.automaton.state is automaton.DriveState.OPERATION_ENABLED
+        return self.automaton.state is DriveState.OPERATION_ENABLED
 
     @property
     def error_code(self) -> int:
@@ -314,9 +315,9 @@ class Ds402(Application):
             case _AbortConnection.FAULT:
                 self._note(max(self._lost, default=settings.ErrorCode.COMMUNICATION))
             case _AbortConnection.DISABLE_VOLTAGE:
-                self.automaton.enter(automaton.DriveState.SWITCH_ON_DISABLED)
+                self.automaton.enter(DriveState.SWITCH_ON_DISABLED)
             case _AbortConnection.QUICK_STOP:
-                self.automaton.enter(automaton.DriveState.QUICK_STOP_ACTIVE)
+                self.automaton.enter(DriveState.QUICK_STOP_ACTIVE)
             case _:  # no action, or a manufacturer-specific one
                 return
         self.request()
@@ -383,7 +384,7 @@ class Ds402(Application):
             self.node.emergency_clear(code)
         self._faults.clear()
         self.parameters.write(indices.ERROR_CODE, 0)
-        self.automaton.enter(automaton.DriveState.SWITCH_ON_DISABLED)
+        self.automaton.enter(DriveState.SWITCH_ON_DISABLED)
 
     def _begin_mode(self, *, enabled: bool = False) -> None:
         """Restart the chosen mode."""
@@ -454,14 +455,14 @@ class Ds402(Application):
         self._view.controlword = controlword = self.parameters.number(indices.CONTROLWORD)
         rising, falling = controlword & ~before, before & ~controlword
         command = automaton.command_of(controlword)
-        if self.state is automaton.DriveState.FAULT and rising & automaton.Controlword.FAULT_RESET:
+        if self.state is DriveState.FAULT and rising & Controlword.FAULT_RESET:
             self._reset_faults()
         elif command is not None:
             self.automaton.obey(command)
         if self.enabled:
-            if rising & automaton.Controlword.START:
+            if rising & Controlword.START:
                 self.mode.start()
-            if falling & automaton.Controlword.START:
+            if falling & Controlword.START:
                 self.mode.stop()
         self.request()
 

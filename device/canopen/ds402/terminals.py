@@ -59,7 +59,7 @@ READ: Final[dict[str, Callable[[Ds402], float | str]]] = {
     "position": lambda drive: drive.axis.position,
     "current_a": lambda drive: drive.axis.motor.current_ma / 1_000,
     "winding_c": lambda drive: drive.axis.motor.winding_dc / 10,
-    "drive_state": lambda drive: drive.state.name.capitalize().replace("_", " "),
+    "drive_state": lambda drive: drive.state.words,
     "mode": lambda drive: drive.mode_number,
     "error_code": lambda drive: drive.error_code,
     "at_negative_limit": lambda drive: int(drive.switches.negative_limit),

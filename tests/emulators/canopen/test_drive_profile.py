@@ -8,12 +8,12 @@ from typing import Any
 import pytest
 from canopen.profiles.p402 import BaseNode402
 
-from tickrig.device.canopen.ds402.automaton import DriveState
 from tickrig.device.canopen.models import epos
 from tickrig.emulators.can.outside.sim_network import SimNetwork
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
+from tickrig.wire.canopen.drive import DriveState
 from tickrig.wire.canopen.eds.eds_writer import write_eds
 
 RIGHT_WHEEL = 2

@@ -6,10 +6,10 @@ from abc import abstractmethod
 from typing import ClassVar, Final
 
 from tickrig.device.canopen.ds402 import indices
-from tickrig.device.canopen.ds402.automaton import Statusword
 from tickrig.device.canopen.ds402.axis import STEP_S, Control, Ramp
 from tickrig.device.canopen.ds402.modes.mode import DriveView, Mode
 from tickrig.device.servo.servo import Line
+from tickrig.wire.canopen.drive import Statusword
 
 _STEP_US: Final = 1_000
 

@@ -6,10 +6,10 @@ from enum import Enum, IntFlag, auto
 from typing import Final, NamedTuple
 
 from tickrig.device.canopen.ds402 import indices, trapezoid
-from tickrig.device.canopen.ds402.automaton import Statusword
 from tickrig.device.canopen.ds402.modes.mode import DriveView, Mode
 from tickrig.device.canopen.ds402.modes.profile_position import SLOWEST, STEEPEST
 from tickrig.device.twin import Part
+from tickrig.wire.canopen.drive import Statusword
 
 # The search for home: a table of the methods, and the direction by the switches (CiA 402-2).
 

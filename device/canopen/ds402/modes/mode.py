@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 from tickrig.device.canopen.ds402 import indices
-from tickrig.device.canopen.ds402.automaton import Controlword, Statusword
 from tickrig.device.canopen.ds402.axis import Axis, Clamped, Control, Limits, Stopping, Switches
 from tickrig.device.canopen.ds402.settings import Parameters, Settings
 from tickrig.device.twin import Part
+from tickrig.wire.canopen.drive import Controlword, Statusword
 
 if TYPE_CHECKING:
     from tickrig.device.servo.servo import Line

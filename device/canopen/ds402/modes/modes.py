@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from typing import ClassVar, Final
 
 from tickrig.device.canopen.ds402 import indices
-from tickrig.device.canopen.ds402.automaton import Statusword
 from tickrig.device.canopen.ds402.axis import STEP_S, Control
 from tickrig.device.canopen.ds402.modes.cyclic import (
     CyclicPosition,
@@ -16,6 +15,7 @@ from tickrig.device.canopen.ds402.modes.cyclic import (
 from tickrig.device.canopen.ds402.modes.homing import Homing
 from tickrig.device.canopen.ds402.modes.mode import DriveView, Mode, Window
 from tickrig.device.canopen.ds402.modes.profile_position import ProfilePosition
+from tickrig.wire.canopen.drive import Statusword
 
 # Profile velocity, profile torque and cyclic synchronous torque mode (CiA 402-2).
 

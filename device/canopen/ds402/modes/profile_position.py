@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from tickrig.device.canopen.ds402 import indices, trapezoid
-from tickrig.device.canopen.ds402.automaton import Controlword, Statusword
 from tickrig.device.canopen.ds402.modes.mode import DriveView, Mode, Window
 from tickrig.device.canopen.ds402.settings import Settings
 from tickrig.device.twin import Immutable
+from tickrig.wire.canopen.drive import Controlword, Statusword
 
 SLOWEST: Final = 1.0
 """Lowest velocity in counts per second, so that each profile ends."""

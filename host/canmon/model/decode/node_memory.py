@@ -16,9 +16,9 @@ from typing import Final, NamedTuple
 
 from tickrig.host.canmon.model.decode import decoded
 from tickrig.host.canopen.eds import read_sound
-from tickrig.host.canopen.master.cia402.drive_state import DriveState, state_of
 from tickrig.host.text.steps import content_lines
 from tickrig.wire.canopen.datatypes import DataType, Value
+from tickrig.wire.canopen.drive import state_of
 from tickrig.wire.canopen.eds.eds_device import EdsDevice
 from tickrig.wire.canopen.eds.eds_file import Finding
 from tickrig.wire.canopen.eds.eds_writer import VARIABLES
@@ -55,8 +55,7 @@ BITS: Final = {"statusword": _STATUSWORD_BITS, "controlword": _CONTROLWORD_BITS}
 
 
 _BY_BITS: Final = tuple(
-    "" if (state := state_of(bits)) is DriveState.UNKNOWN else state.value.lower()
-    for bits in range(0x80)
+    "" if (state := state_of(bits)) is None else state.words.lower() for bits in range(0x80)
 )
 
 

@@ -17,6 +17,7 @@ from tickrig.host.canopen.master.process_image import Key, ProcessImage
 from tickrig.host.canopen.master.waiting import DriveFailed, Operation, Until
 from tickrig.host.canopen.periodic_timer import PeriodicTimer
 from tickrig.host.canopen.sdo_transfer import download, upload
+from tickrig.wire.canopen.drive import Controlword, DriveState, Statusword, state_of
 from tickrig.wire.instant import NEVER
 
 # The settings of a drive in its bus.yml.
@@ -27,11 +28,11 @@ _HOMING_S: Final = 10
 _ENABLED: Final = 5
 
 _SWITCHING_STATES: Final = {
-    2: drive_state.DriveState.SWITCH_ON_DISABLED,
-    3: drive_state.DriveState.READY_TO_SWITCH_ON,
-    4: drive_state.DriveState.SWITCHED_ON,
-    5: drive_state.DriveState.OPERATION_ENABLED,
-    6: drive_state.DriveState.QUICK_STOP_ACTIVE,
+    2: DriveState.SWITCH_ON_DISABLED,
+    3: DriveState.READY_TO_SWITCH_ON,
+    4: DriveState.SWITCHED_ON,
+    5: DriveState.OPERATION_ENABLED,
+    6: DriveState.QUICK_STOP_ACTIVE,
 }
 """States of `switching_state` in a bus.yml, by number."""
 
@@ -49,7 +50,7 @@ class DriveSettings:
 
     channel: DriveChannel
     axis: int = 0
-    switching_state: drive_state.DriveState = drive_state.DriveState.OPERATION_ENABLED
+    switching_state: DriveState = DriveState.OPERATION_ENABLED
     homing_us: int = 1_000_000 * _HOMING_S
 
 
@@ -92,9 +93,9 @@ _START_US: Final = 1_000_000
 _SEEN_US: Final = 100_000
 """Within this time, a drive that has homed before shows that it homes again."""
 
-_REACHED: Final = drive_state.Statusword.TARGET_REACHED
-_ATTAINED: Final = drive_state.Statusword.MODE_12
-_ERROR: Final = drive_state.Statusword.MODE_13
+_REACHED: Final = Statusword.TARGET_REACHED
+_ATTAINED: Final = Statusword.MODE_12
+_ERROR: Final = Statusword.MODE_13
 
 
 async def home(
@@ -201,14 +202,12 @@ class DriveDriver:
         self._reset_fault = self._known = False
 
     @property
-    def state(self) -> drive_state.DriveState:
-        """The state in the statusword; unknown until one was read since the node booted.
+    def state(self) -> DriveState | None:
+        """The state in the statusword; None until one was read since the node booted.
 
-        It becomes unknown when the node is lost, until a statusword comes.
+        It becomes None when the node is lost, until a statusword comes.
         """
-        return (
-            drive_state.state_of(self.statusword) if self._known else drive_state.DriveState.UNKNOWN
-        )
+        return state_of(self.statusword) if self._known else None
 
     def doubt(self) -> None:
         """Treat the state of the drive as unknown until its next statusword."""
@@ -240,7 +239,7 @@ class DriveDriver:
         """
         if not hasattr(target, "__float__"):
             raise ValueError(f"{self.name}: {target!r} is not a target: expected a number")
-        if self.state is not drive_state.DriveState.OPERATION_ENABLED:
+        if self.state is not DriveState.OPERATION_ENABLED:
             raise DriveFailed(f"{self.name}: no target in {self._where()}")
         channel = self._channel
         if self._chosen in drive_mode.POSITIONS:
@@ -263,8 +262,8 @@ class DriveDriver:
 
     def _control(self) -> Script[None]:
         """Write the set-point and the controlword."""
-        word = self.controlword | drive_state.Controlword.HALT
-        if drive_state.state_of(self.statusword) is drive_state.DriveState.OPERATION_ENABLED:
+        word = self.controlword | Controlword.HALT
+        if state_of(self.statusword) is DriveState.OPERATION_ENABLED:
             halted = True
             self._mode.controlword = word & drive_state.MODE_BITS
             if self.mode == self._chosen:
@@ -272,10 +271,10 @@ class DriveDriver:
             else:
                 self._mode.controlword = 0
             word = word & ~drive_state.MODE_BITS | self._mode.controlword
-            word = word if halted else word & ~drive_state.Controlword.HALT
+            word = word if halted else word & ~Controlword.HALT
         self.controlword = word
         if self._reset_fault:
-            self._reset_fault, word = False, word & ~drive_state.Controlword.FAULT_RESET
+            self._reset_fault, word = False, word & ~Controlword.FAULT_RESET
         yield from self._write(CONTROLWORD, word)
 
     async def init(self) -> None:
@@ -286,7 +285,7 @@ class DriveDriver:
         """
         await Until(lambda: self.cycles > 0, _SWITCH_US, f"{self.name}: the node has not booted")
         self.controlword, self._reset_fault = 0, True
-        await self.switch_to(drive_state.DriveState.OPERATION_ENABLED)
+        await self.switch_to(DriveState.OPERATION_ENABLED)
         if await self._supports(drive_mode.ModeNumber.HOMING):
             await self.choose(drive_mode.ModeNumber.HOMING)
             await self._home()
@@ -296,24 +295,22 @@ class DriveDriver:
         """Reset a fault, and enable the drive again; the target is dropped."""
         self._reset_fault = True
         self._mode.begin()
-        await self.switch_to(drive_state.DriveState.OPERATION_ENABLED)
+        await self.switch_to(DriveState.OPERATION_ENABLED)
 
     async def shut_down(self) -> None:
         """Select no mode, and disable the voltage."""
         await self.choose(drive_mode.ModeNumber.NONE)
-        await self.switch_to(drive_state.DriveState.SWITCH_ON_DISABLED)
+        await self.switch_to(DriveState.SWITCH_ON_DISABLED)
 
     def halt(self) -> None:
         """Do a quick stop; a drive that is not in Operation enabled stays as it is."""
-        state = drive_state.state_of(self.statusword)
+        state = state_of(self.statusword)
         if (
-            word := drive_state.lead(
-                self.controlword, state, drive_state.DriveState.QUICK_STOP_ACTIVE
-            )
+            word := drive_state.lead(self.controlword, state, DriveState.QUICK_STOP_ACTIVE)
         ) is not None:
             self.controlword = word
 
-    async def switch_to(self, goal: drive_state.DriveState | str) -> None:
+    async def switch_to(self, goal: DriveState | str) -> None:
         """Lead the drive to a state; to Operation enabled step by step, otherwise directly.
 
         Args:
@@ -323,18 +320,18 @@ class DriveDriver:
             ValueError: there is no such state.
             DriveFailed: no transition leads there, or it takes too long.
         """
-        goal = drive_state.DriveState.of(goal)
+        goal = drive_state.state_named(goal)
         silent = f"{self.name}: no statusword since the node was lost, or booted"
         await Until(lambda: self._known, _SWITCH_US, silent)
         while (state := self.state) is not goal:
             following = drive_state.next_state(state, goal)
             word = drive_state.lead(self.controlword, state, following)
             if word is None:
-                raise DriveFailed(f"{self.name}: no way from {self._where()} to {goal.value}")
+                raise DriveFailed(f"{self.name}: no way from {self._where()} to {goal.words}")
             self.controlword = word
-            await self._leave(state, f"{self.name}: {following.value} was not reached")
+            await self._leave(state, f"{self.name}: {following.words} was not reached")
 
-    async def _leave(self, state: drive_state.DriveState, complaint: str) -> None:
+    async def _leave(self, state: DriveState | None, complaint: str) -> None:
         await Until(lambda: self.state is not state, _SWITCH_US, complaint)
 
     async def choose(self, mode: int | str) -> None:
@@ -366,7 +363,7 @@ class DriveDriver:
             f"{self.name}: mode {number} is not reported in 6061h",
         )
         self._chosen, self._mode = number, chosen
-        await self.switch_to(drive_state.DriveState.OPERATION_ENABLED)
+        await self.switch_to(DriveState.OPERATION_ENABLED)
 
     async def _supports(self, number: drive_mode.ModeNumber) -> bool:
         """Return whether 6502h has a mode."""
@@ -442,7 +439,10 @@ class DriveDriver:
             self.refusals.append(error)
 
     def _where(self) -> str:
-        return f"{self.state.value} (statusword {self.statusword:04X}h)"
+        state = self.state
+        return (
+            f"{state.words if state is not None else 'unknown'} (statusword {self.statusword:04X}h)"
+        )
 
 
 # The axes of one node, driven in its period.

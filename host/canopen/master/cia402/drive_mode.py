@@ -9,13 +9,13 @@ from enum import IntEnum
 from typing import Final
 
 from tickrig.host.canopen.dialogue import Script
-from tickrig.host.canopen.master.cia402.drive_state import Controlword, Statusword
 from tickrig.host.text.names import near
+from tickrig.wire.canopen.drive import Controlword, Statusword
 
-_START: Final = Controlword.MODE_4
+_START: Final = Controlword.START
 """New set-point, start homing, interpolate."""
 
-_AT_ONCE: Final = Controlword.MODE_5
+_AT_ONCE: Final = Controlword.CHANGE_AT_ONCE
 
 
 class ModeNumber(IntEnum):

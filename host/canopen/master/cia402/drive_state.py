@@ -1,80 +1,29 @@
-"""States of a drive by its statusword, and the controlwords that lead on (CiA 402-2).
+"""The controlwords that lead a drive from state to state (CiA 402-2).
 
->>> state_of(0x0637)
-<DriveState.OPERATION_ENABLED: 'Operation enabled'>
 >>> f"{lead(0x0100, DriveState.SWITCH_ON_DISABLED, DriveState.READY_TO_SWITCH_ON):04X}h"
 '0106h'
 """
 
 from __future__ import annotations
 
-from enum import Enum, IntFlag
 from typing import Final
 
 from tickrig.host.text.names import near
-
-
-class Controlword(IntFlag):
-    """Bits of 6040h."""
-
-    SWITCH_ON = 0x0001
-    ENABLE_VOLTAGE = 0x0002
-    QUICK_STOP = 0x0004  # active at 0
-    ENABLE_OPERATION = 0x0008
-    MODE_4 = 0x0010
-    MODE_5 = 0x0020
-    MODE_6 = 0x0040
-    FAULT_RESET = 0x0080
-    HALT = 0x0100
-    MODE_9 = 0x0200
-
+from tickrig.wire.canopen.drive import Controlword, DriveState
 
 MODE_BITS: Final = 0x0270
 """The bits that belong to the mode of operation."""
 
 
-class Statusword(IntFlag):
-    """Bits of 6041h that depend on the mode of operation."""
+def state_named(state: DriveState | str) -> DriveState:
+    """Return a state by its name, as `Switched on`; ValueError if there is none."""
+    by_words = {each.words: each for each in DriveState}
+    if isinstance(state, DriveState):
+        return state
+    if state not in by_words:
+        raise ValueError(f"no state {state!r}; {near(state, by_words)}")
+    return by_words[state]
 
-    TARGET_REACHED = 0x0400
-    MODE_12 = 0x1000
-    MODE_13 = 0x2000
-
-
-class DriveState(Enum):
-    """State of a drive, in words."""
-
-    UNKNOWN = "unknown"
-    NOT_READY_TO_SWITCH_ON = "Not ready to switch on"
-    SWITCH_ON_DISABLED = "Switch on disabled"
-    READY_TO_SWITCH_ON = "Ready to switch on"
-    SWITCHED_ON = "Switched on"
-    OPERATION_ENABLED = "Operation enabled"
-    QUICK_STOP_ACTIVE = "Quick stop active"
-    FAULT_REACTION_ACTIVE = "Fault reaction active"
-    FAULT = "Fault"
-
-    @classmethod
-    def of(cls, state: DriveState | str) -> DriveState:
-        """Return a state by its name, as `Switched on`; ValueError if there is none."""
-        try:
-            return cls(state)
-        except ValueError:
-            names = [each.value for each in cls]
-            raise ValueError(f"no state {state!r}; {near(str(state), names)}") from None
-
-
-_PATTERNS: Final = (
-    (0x4F, 0x00, DriveState.NOT_READY_TO_SWITCH_ON),
-    (0x4F, 0x40, DriveState.SWITCH_ON_DISABLED),
-    (0x6F, 0x21, DriveState.READY_TO_SWITCH_ON),
-    (0x6F, 0x23, DriveState.SWITCHED_ON),
-    (0x6F, 0x27, DriveState.OPERATION_ENABLED),
-    (0x6F, 0x07, DriveState.QUICK_STOP_ACTIVE),
-    (0x4F, 0x0F, DriveState.FAULT_REACTION_ACTIVE),
-    (0x4F, 0x08, DriveState.FAULT),
-)
-"""Mask, value, state."""
 
 _ON: Final = Controlword.SWITCH_ON
 _VOLTAGE: Final = Controlword.ENABLE_VOLTAGE
@@ -123,20 +72,16 @@ _ENABLING: Final = {
 """The next state on the way to Operation enabled."""
 
 
-def state_of(statusword: int) -> DriveState:
-    """Return the state in a statusword."""
-    for mask, value, state in _PATTERNS:
-        if statusword & mask == value:
-            return state
-    return DriveState.UNKNOWN
-
-
-def next_state(state: DriveState, goal: DriveState) -> DriveState:
+def next_state(state: DriveState | None, goal: DriveState) -> DriveState:
     """Return the next state on the way: the state itself, except for Operation enabled."""
-    return _ENABLING.get(state, goal) if goal is DriveState.OPERATION_ENABLED else goal
+    return (
+        _ENABLING.get(state, goal)
+        if state is not None and goal is DriveState.OPERATION_ENABLED
+        else goal
+    )
 
 
-def lead(controlword: int, state: DriveState, following: DriveState) -> int | None:
+def lead(controlword: int, state: DriveState | None, following: DriveState) -> int | None:
     """Return the controlword that leads from a state to another, None if there is none."""
-    bits = TRANSITIONS.get((state, following))
+    bits = None if state is None else TRANSITIONS.get((state, following))
     return None if bits is None else controlword & ~int(bits[1]) | int(bits[0])

@@ -7,8 +7,8 @@ from tests.device.canopen.reference import I16, RW, U32
 from tests.device.canopen.slave_bench import Bus
 from tickrig.device.canopen.dictionary import Dictionary, SdoAbort
 from tickrig.device.canopen.ds402 import Ds402
-from tickrig.device.canopen.ds402.automaton import DriveState
 from tickrig.device.canopen.stack import make_slave
+from tickrig.wire.canopen.drive import DriveState
 from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
 from tickrig.wire.instant import NEVER
 

@@ -6,13 +6,13 @@ from collections.abc import Callable
 
 from tests.device.canopen.slave_bench import Bus
 from tickrig.device.canopen.dictionary import Dictionary
-from tickrig.device.canopen.ds402.automaton import DriveState
 from tickrig.device.canopen.models import epos
 from tickrig.device.canopen.slave import CanopenSlave, ServiceMaker
 from tickrig.device.canopen.stack import make_slave
 from tickrig.device.servo.parameters import EPOS_WHEEL
 from tickrig.device.servo.servo import Servo
 from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.drive import DriveState
 from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
 
 TURN = 2_000

@@ -11,8 +11,8 @@ import pytest
 from tests.host.canopen.master.joints import MASTER, PDOS, eds
 from tickrig import Bench, open_bench
 from tickrig.host.canopen.master.canopen_master import CanopenMaster
-from tickrig.host.canopen.master.cia402.drive_state import DriveState
 from tickrig.testing import open_master
+from tickrig.wire.canopen.drive import DriveState
 
 MODES = ("pp", "pv", "ip", "csp", "csv", "tq", "cst")
 POSITIONS = {"pp", "ip", "csp"}

@@ -11,11 +11,11 @@ from tests.host.canopen.master.network import NODE_ID, network
 from tickrig.host.canopen.bus_file.bus_values import DriveChannel
 from tickrig.host.canopen.master.assignment import SlaveAssignment
 from tickrig.host.canopen.master.cia402.drive_driver import DriveNode, DriveSettings
-from tickrig.host.canopen.master.cia402.drive_state import DriveState
 from tickrig.host.canopen.master.nmt_master import ProcessData
 from tickrig.host.canopen.master.process_image import ProcessImage
 from tickrig.host.canopen.master.waiting import DriveFailed
 from tickrig.host.links.link import LinkClosed
+from tickrig.wire.canopen.drive import DriveState
 from tickrig.wire.canopen.nmt import NmtCommand
 
 HOMING_35 = "  sdo: [{index: 0x6098, value: 35}]\n"
@@ -281,7 +281,7 @@ def test_a_drive_that_missed_its_reset_is_unknown_and_no_recovery_succeeds(tmp_p
         drives.bench["joint2"].fault("unplugged", for_="600ms")
         drives.master.run_for("2s")
         assert drives.bench["joint2"].get("drive_state") == "Fault"
-        assert drives.joint.state is DriveState.UNKNOWN
+        assert drives.joint.state is None
         with pytest.raises(DriveFailed, match="joint2: no statusword since the node was lost"):
             drives.master.perform(drives.joint.recover())
         with pytest.raises(DriveFailed, match="joint2: no target in unknown"):
@@ -300,7 +300,7 @@ def test_a_recovery_by_sdo_finds_the_fault_of_a_drive_that_was_unplugged(tmp_pat
         for _ in range(2):
             drives.master.run_for("590ms")
             states.append(drives.joint.state)
-        assert states == [DriveState.UNKNOWN, DriveState.FAULT]
+        assert states == [None, DriveState.FAULT]
         drives.master.perform(drives.joint.recover())
         assert drives.bench["joint2"].get("drive_state") == "Operation enabled"
 

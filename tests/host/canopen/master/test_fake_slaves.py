@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from tests.host.canopen.master.joints import Cell, cell
-from tickrig.host.canopen.master.cia402.drive_state import DriveState
+from tickrig.wire.canopen.drive import DriveState
 
 RPM_S = 2_000
 SPEED = 1_500

@@ -9,10 +9,10 @@ import pytest
 from tests.host.canopen.master.joints import MASTER, NO_PDOS, eds
 from tickrig.host.canopen.bus_file.bus_file import BusFile, read_bus_file
 from tickrig.host.canopen.master.cia402.drive_driver import axes_of, is_drive, period_us_of
-from tickrig.host.canopen.master.cia402.drive_state import DriveState
 from tickrig.host.canopen.master.from_bus_file import plan_of
 from tickrig.host.links.link import Link
 from tickrig.testing import open_master
+from tickrig.wire.canopen.drive import DriveState
 
 
 def bus(folder: Path, node: str, master: str = MASTER) -> BusFile:

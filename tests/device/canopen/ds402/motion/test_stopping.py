@@ -6,7 +6,7 @@ import pytest
 
 from tests.device.canopen.ds402.wheel import Wheel
 from tickrig.device.canopen.dictionary import SdoAbort
-from tickrig.device.canopen.ds402.automaton import DriveState
+from tickrig.wire.canopen.drive import DriveState
 
 SOD = DriveState.SWITCH_ON_DISABLED
 QUICK_STOP = DriveState.QUICK_STOP_ACTIVE

@@ -5,7 +5,8 @@ from itertools import product
 import pytest
 
 from tests.device.canopen.ds402.wheel import Wheel
-from tickrig.device.canopen.ds402.automaton import Command, DriveState, command_of
+from tickrig.device.canopen.ds402.automaton import Command, command_of
+from tickrig.wire.canopen.drive import DriveState
 
 NOT_READY = DriveState.NOT_READY_TO_SWITCH_ON
 SOD = DriveState.SWITCH_ON_DISABLED

@@ -5,8 +5,9 @@ from __future__ import annotations
 import pytest
 
 from tests.device.canopen.ds402.wheel import Wheel
-from tickrig.device.canopen.ds402.automaton import Bounds, DriveState
+from tickrig.device.canopen.ds402.automaton import Bounds
 from tickrig.device.canopen.ds402.settings import register_of
+from tickrig.wire.canopen.drive import DriveState
 
 FAULT = DriveState.FAULT
 SOD = DriveState.SWITCH_ON_DISABLED
