@@ -242,6 +242,14 @@ wrong_number(const char *name, Py_ssize_t count, Py_ssize_t wanted)
 static int
 less(PyObject *a, PyObject *b)
 {
+#if PY_VERSION_HEX < 0x030C0000 && PYLONG_BITS_IN_DIGIT == 30
+    if (PyLong_CheckExact(a) && PyLong_CheckExact(b) && (size_t)Py_SIZE(a) <= 2 &&
+        (size_t)Py_SIZE(b) <= 2 && Py_SIZE(a) && Py_SIZE(b)) { /* digits: 3 % of a full bus */
+        const digit *x = ((PyLongObject *)a)->ob_digit, *y = ((PyLongObject *)b)->ob_digit;
+        uint64_t first = x[0] | (Py_SIZE(a) > 1 ? (uint64_t)x[1] << 30 : 0);
+        return first < (y[0] | (Py_SIZE(b) > 1 ? (uint64_t)y[1] << 30 : 0));
+    }
+#endif
     int over_a, over_b;
     if (!PyLong_CheckExact(a) || !PyLong_CheckExact(b)) {
         PyErr_SetString(PyExc_TypeError, "a heap of the kernel holds whole numbers");
