@@ -104,7 +104,7 @@ class BenchParser:
     def __init__(self, header: BenchHeader) -> None:
         self._header = header
         self._on_can = {name: header.on_can(name) for name in header.devices}
-        self._known: dict[str, BenchRecord] = {}  # lines repeat but for their time: read once
+        self._known: dict[str, BenchRecord] = {}
 
     def parse(self, lines: Iterable[str]) -> Iterator[BenchRecord]:
         """Read line by line; time must not run backwards, and nothing follows the end.
@@ -112,32 +112,36 @@ class BenchParser:
         Raises:
             TraceError: a damaged line.
         """
-        before = BenchRecord(0, "", Mark.PHYSICAL)
+        made, known, before_us, ended = tuple.__new__, self._known, 0, False
         for number, line in enumerate(lines, 2):
-            try:
-                record = self._record(line, number)
-            except (ValueError, WireError, RecursionError) as error:
-                raise TraceError(f"line {number}: {error}") from None
-            if record.at_us < before.at_us or before.mark is Mark.END:
+            at, _, rest = line.partition(" ")
+            digits = at[:-7] + at[-6:]
+            if rest in known and at[-7:-6] == "." and 7 <= len(digits) <= 18 and digits.isdigit():
+                _, name, mark, traffic, text, _ = known[rest]
+                record = made(BenchRecord, (int(digits), name, mark, traffic, text, number))
+            else:
+                try:
+                    record = self._record(line, number)
+                except (ValueError, WireError, RecursionError) as error:
+                    raise TraceError(f"line {number}: {error}") from None
+            if record.at_us < before_us or ended:
                 raise TraceError(
                     f"line {number} is earlier than the line above it, or behind the end"
                 )
             yield record
-            before = record
+            before_us, ended = record.at_us, record.mark is Mark.END
 
     def _record(self, line: str, number: int) -> BenchRecord:
+        """Read a line, and keep what it says: lines are often the same but for their time."""
         match = _LINE.fullmatch(line)
         if match is None:
             raise ValueError(f"not 'SECONDS NAME MARK TEXT': {line!r:.60}")
         seconds, micros, rest, name, mark, text = match.groups()
-        known = self._known.get(rest)
-        if known is None:
-            if len(self._known) >= _KEPT_LINES:
-                self._known.clear()
-            known = self._known[rest] = self._read(name, mark, text)
-        _, its_name, its_mark, traffic, its_text, _ = known
+        if len(self._known) >= _KEPT_LINES:
+            self._known.clear()
+        known = self._known[rest] = self._read(name, mark, text)
         at_us = int(seconds) * 1_000_000 + int(micros)
-        return BenchRecord(at_us, its_name, its_mark, traffic, its_text, number)
+        return known._replace(at_us=at_us, line=number)
 
     def _read(self, name: str | None, mark: str, text: str) -> BenchRecord:
         """Read the part after the time."""

@@ -51,7 +51,7 @@ class Master:
 
 
 @cache
-def _stored(cycle_us: int) -> dict[int, bytes]:
+def stored(cycle_us: int) -> dict[int, bytes]:
     """Return what a drive has kept: mode 8, PDOs that go with SYNC, its cycle."""
     made, kept = epos.dictionary(), dict[int, bytes]()
     for at, value in (
@@ -69,7 +69,7 @@ def rig(drives: int, cycle_us: int) -> Rig:
     """Put drives and their master onto a bus."""
     wire = CanWire()
     stations = [
-        Station(epos.make_epos(number, Nonvolatile(dict(_stored(cycle_us)))), wire.end())
+        Station(epos.make_epos(number, Nonvolatile(dict(stored(cycle_us)))), wire.end())
         for number in range(1, drives + 1)
     ]
     return Rig(Station(Master(drives, cycle_us), wire.end()), *stations)

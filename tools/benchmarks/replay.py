@@ -5,6 +5,7 @@ from __future__ import annotations
 from benchmarks.drives import CYCLE_US, Master, stored
 from benchmarks.table import rates
 from tickrig.device.canopen.models import epos
+from tickrig.device.canopen.slave import Nonvolatile
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.node import Node
 from tickrig.emulators.record.recorder import TraceRecorder
@@ -20,7 +21,7 @@ SECONDS = 10
 
 def node(number: int, wire: CanWire) -> Node:
     """Return a drive as the recorded one was made."""
-    return Node(f"drive{number}", epos.make_epos(number, stored(CYCLE_US)), wire)
+    return Node(f"drive{number}", epos.make_epos(number, Nonvolatile(dict(stored(CYCLE_US)))), wire)
 
 
 def trace() -> bytes:
