@@ -361,7 +361,9 @@ OTHER_NAMES = {
     "--wait": "ends as soon as the answer is there",
     "rrc test --json": "has a file since it was there; `--json -` prints",
     "canmon net scan --json": "a stream; the name is in scripts",
-    "canmon net scan --write": SECOND,
+    **dict.fromkeys(
+        [f"canmon net scan --{kind}" for kind in ("write", "workspace", "rules")], SECOND
+    ),
     "canmon net read --json": "a stream; the name is in scripts",
     "canmon net program --control": "the object 1F51h, program control",
 }
