@@ -8,7 +8,7 @@ message.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Container, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from math import isnan
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -37,6 +37,7 @@ class DeviceField(NamedTuple):  # a dataclass takes 2 ms more to import
         default: its value if not set.
         many: whether it can be given several times; its value is then a tuple.
         help: one sentence.
+        needs: names of the fields of which one has to be set, as without it this one does nothing.
     """
 
     name: str
@@ -50,6 +51,7 @@ class DeviceField(NamedTuple):  # a dataclass takes 2 ms more to import
     default: Any = None
     many: bool = False
     help: str = ""
+    needs: tuple[str, ...] = ()
 
     @property
     def word(self) -> str:
@@ -130,7 +132,27 @@ def read_config(
             read = tuple(map(field.read, plain))
         if read or field.many:
             values[field.name] = read if field.many else read[-1]
+    check_needed(known.values(), values, {known[key.replace("_", "-")].name for key in given})
     return values
+
+
+def check_needed(
+    fields: Iterable[DeviceField], values: Mapping[str, object], given: Container[str]
+) -> None:
+    """Raise ValueError if a field is set that does nothing without another one.
+
+    Args:
+        fields: of a device.
+        values: by names of fields.
+        given: the names of those that were set; one that has its default is none.
+    """
+    known = {field.name: field for field in fields}
+    for name, field in known.items():
+        idle = field.needs and not any(values[other] for other in field.needs)
+        if idle and name in given and values[name] != field.unset:
+            words = [f"--{known[other].word}" for other in field.needs]
+            others = " or ".join(filter(None, [", ".join(words[:-1]), words[-1]]))
+            raise ValueError(f"--{field.word} does nothing without {others}")
 
 
 def _plain(key: str, field: DeviceField, value: object) -> list[Any]:

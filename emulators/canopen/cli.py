@@ -10,7 +10,7 @@ import click
 from tickrig.emulators.canopen.choices import AUTO, MODEL_FAULTS, MODELS, NODE_FAULTS, PROFILES
 from tickrig.emulators.commands.run_options import run_options
 from tickrig.host.cli.can_options import BusCommand, bus_options
-from tickrig.host.cli.options import PATH
+from tickrig.host.cli.options import PATH, refuse_idle
 from tickrig.host.cli.start import load
 
 if TYPE_CHECKING:
@@ -126,6 +126,8 @@ def main(  # noqa: PLR0913 - options
     eval "$(_CANOPEN_SLAVE_EMU_COMPLETE=bash_source canopen-slave-emu)"
     """  # noqa: D301 - click wants the backspace
     if write_eds:
+        runs = ("node_id", "nodes", "rig", "bus_file", "urdf", "store", "trace", "control")
+        refuse_idle("--write-eds writes a file and ends", *runs)
         load(f"{_RUN}:write_eds")(options["model"], options["rtc"], write_eds)
     else:
         context.exit(load(f"{_RUN}:emulate")(node_id, nodes, rig, (bus_file, urdf), options))

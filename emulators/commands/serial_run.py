@@ -17,6 +17,7 @@ from tickrig.emulators.bench.operator import Operator
 from tickrig.emulators.bench.running_emulator import RunningEmulator, Transcript
 from tickrig.emulators.commands.device_type import ConfiguredDevice, DeviceType
 from tickrig.emulators.commands.run import EmulatorRun, RunOptions, mistakes_in
+from tickrig.emulators.fields import check_needed
 from tickrig.emulators.record.recorder import TraceFile
 from tickrig.emulators.rig.event_queue import EventQueue
 from tickrig.emulators.rig.faults import FaultyPort
@@ -60,6 +61,7 @@ def run_device(device_type: DeviceType, options: Mapping[str, Any]) -> int:
     own = {name: value for name, value in options.items() if name not in names}
     shared = _Options(**{name: value for name, value in options.items() if name in names})
     try:
+        check_needed(device_type.fields, own, own)
         configured = device_type.of_options(own, shared.seed)
     except ValueError as error:
         raise Refused(str(error)) from None

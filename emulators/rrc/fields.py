@@ -26,5 +26,6 @@ FIELDS: Final = (
         default=1_200,
         unit="WH",
         help="Capacity of the vehicle's battery.",
+        needs=("vehicle",),
     ),
 )

@@ -18,6 +18,7 @@ FIELDS: Final = (
         high=1,
         default=0.0,
         help="Share of the sensor's accuracy of 10 mm and 1 %.  [0]",
+        needs=("size", "walls", "posts"),
     ),
     DeviceField(
         name="scip",

@@ -32,6 +32,8 @@ def test_what_may_be_repeated_is_a_list() -> None:
         ("rrc", {"color": "red"}, "color: rrc has no such option; known: power-on-event"),
         ("rrc", {"panel": True}, "panel: rrc has no such option"),
         ("rrc", {"power_on_event": "Bang"}, "--power-on-event.*'Bang' is not one of"),
+        ("rrc", {"battery_wh": 500}, "--battery-wh does nothing without --vehicle"),
+        ("urg", {"noise": 1}, "--noise does nothing without --room, --wall or --post"),
         ("rtc-lite", {"baud": 1}, "--baud.*1 is not in the range 300<=x<=4000000"),
         ("rtc-lite", {"node": "nobody"}, "no node 'nobody'; known: echo"),
         ("rtc-lite", {"node": ["echo"]}, "node: it is given once, not as a list"),
@@ -68,6 +70,13 @@ TRIED = (
 )
 
 
+NEEDED: dict[tuple[str, str], dict[str, object]] = {
+    ("rrc", "battery-wh"): {"vehicle": True},
+    ("urg", "noise"): {"room": "4,3"},
+}
+"""What an option does nothing without."""
+
+
 def typed(device_type: DeviceType, word: str, text: str) -> tuple[object, str]:
     """Return what the command line makes of a value, or why it refuses it."""
     command = click.Command("emu", params=device_command(device_type).params)
@@ -87,7 +96,8 @@ def test_a_rig_file_reads_a_value_as_the_command_line_does(name: str, text: str)
         if field.kind is bool:  # a flag has no value on a command line
             continue
         try:
-            read = read_config(name, device_type.fields, {field.word: text})
+            config = {field.word: text, **NEEDED.get((name, field.word), {})}
+            read = read_config(name, device_type.fields, config)
             found = read[field.name], ""
         except ValueError as error:
             found = None, f"Invalid value for {error}"

@@ -37,6 +37,7 @@ from tickrig.emulators.testing.signals.sources import SignalSpec
 from tickrig.host.canopen.bus_file.bus_file import is_bus_file
 from tickrig.host.cli.can_options import BusOptions, open_raw
 from tickrig.host.cli.messages import Refused, refuse_path, say, show_findings
+from tickrig.host.cli.options import refuse_idle
 from tickrig.host.links.can_link import close_bus
 from tickrig.host.text.values import counted, parse_size, parse_time_us
 from tickrig.host.text.whole_file import write_whole
@@ -299,6 +300,8 @@ def emulate(
         specs = (*_specs(given, node_id), *_more(nodes))
     except ValueError as error:
         raise Refused(str(error)) from None
+    if bus_yml[0] is None and not any(isinstance(spec.device, Path) for spec in specs):
+        refuse_idle("it is for nodes of an EDS, DCF or XDD", "profile")
     file = _RigNodes() if rig is None else read_rig(rig)
     sdo = _sdo_limits(options.pop("sdo_timeout"), options.pop("sdo_memory"))
     run = _CanopenRun(

@@ -27,6 +27,7 @@ from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.emulator import Emulator
 from tickrig.emulators.testing.bench.recorded_device import make_recorded, user_code
 from tickrig.host.cli.messages import Refused, refuse_path, refused_at, say, show_findings
+from tickrig.host.cli.options import refuse_idle
 from tickrig.host.text.bench_record import BenchRecord
 from tickrig.host.text.byte_text import escape
 from tickrig.host.text.names import near
@@ -413,6 +414,7 @@ def run_compare(file: Path, *, verbose: bool, **options: Any) -> int:
     tolerance = _read_tolerance(options)
     try:
         recording = replay.read_bench_recording(file.read_bytes())
+        _refuse_idle(recording, options)
         mine = [*user_code(recording.header.devices.values()), *_given_code(options)]
         with mistakes_in(mine):
             runs = dict(_runs(file, recording, tolerance, options))
@@ -432,6 +434,26 @@ def run_compare(file: Path, *, verbose: bool, **options: Any) -> int:
     for line in lines:
         click.echo(line)
     return 0 if same else 1
+
+
+_OF_DEVICES: Final = ("type_name", "config", "nodes", "settle_us")
+"""Options of how devices are made, and when their power comes on."""
+
+
+def _refuse_idle(recording: replay.BenchRecording, options: Mapping[str, Any]) -> None:
+    """Refuse options that would do nothing with any device of a trace."""
+    used: set[str] = set()
+    for name in recording.header.devices:
+        if recording.at_port:
+            of_port = ("nodes",) if recording.header.on_can(name) else ("type_name", "config")
+            used |= {*of_port, "settle_us"}
+        elif not recording.header.on_can(name):
+            used |= {"type_name", "config"} if options["type_name"] else {"type_name"}
+    why = "this is a recording of a port, without such a device"
+    if not recording.at_port:
+        why = "the devices are made as the trace of their ticks says"
+        why += ", or of --type and --config" * ("type_name" in used)
+    refuse_idle(why, *(name for name in _OF_DEVICES if name not in used))
 
 
 def _given_code(options: Mapping[str, Any]) -> list[str]:

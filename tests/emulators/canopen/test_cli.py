@@ -312,6 +312,8 @@ def test_lss_finds_a_node_without_node_id() -> None:
         ("--node-id 5", "--node-id belongs to --eds, --dcf, --model or --rtc; with --node write"),
         (f"--eds {EDS} --dcf {DCF}", "--eds and --dcf name the same thing: give one of them"),
         (f"--dcf {DCF} --model f-palette", "--dcf and --model name the same thing"),
+        ("--model epos --write-eds - --trace t", "--trace does nothing here: --write-eds writes"),
+        ("--model epos --profile 402", "--profile does nothing here: it is for nodes of an EDS"),
         (f"--eds {EDS} --write-eds x.eds", "--write-eds belongs to --model or --rtc"),
         ("--model f-palette --write-eds /nowhere/x", "EDS /nowhere/x: No such file"),
         (f"--node 5={EDS} --profile 402 --node 5=f-palette", "node 5 is there twice"),

@@ -184,6 +184,31 @@ def test_the_trace_of_an_emulator_is_compared_tick_by_tick(tmp_path: Path) -> No
     assert "10.0 ms later" in compared(trace, "--tolerance", "5ms").stdout
 
 
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        (
+            ["--config", "power_on_event=PowerOn"],
+            "--config does nothing here: the devices are made",
+        ),
+        (["--node", "5=epos"], "--node does nothing here: the devices are made as the trace"),
+        (["--settle", "2s"], "--settle does nothing here: the devices are made as the trace"),
+        (["--type", "rrc", "--node", "5=epos"], "--node does nothing here"),
+    ],
+)
+def test_options_that_a_trace_of_ticks_does_not_use_are_refused(
+    tmp_path: Path, words: list[str], why: str
+) -> None:
+    trace = tmp_path / "run.trace"
+    scenario = ["--scenario", "-", "--trace", str(trace)]
+    made = CliRunner().invoke(rrc_emu, scenario, input="0 press power_button for 100ms\n1s end\n")
+    assert made.exit_code == 0
+    result = compared(trace, *words)
+    assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
+    assert why in result.stderr
+    assert compared(trace, "--type", "rrc", "--config", "power_on_event=PowerOn").exit_code == 1
+
+
 def test_a_bench_is_compared_device_by_device(tmp_path: Path) -> None:
     bench = Bench()
     bench.rig.run_for(5_000)
@@ -299,6 +324,8 @@ def test_a_node_that_does_otherwise_is_found(tmp_path: Path) -> None:
         ("rrc", ["--number", "x"], "--number: 'x' is not PATTERN=TOLERANCE"),
         ("rrc", ["--tolerance", "x"], "--tolerance 'x' is not a time"),
         ("rrc", ["--config", "x"], "--config: 'x' is not NAME=VALUE"),
+        ("rrc", ["--node", "5=epos"], "--node does nothing here: this is a recording of a port"),
+        ("bus", ["--type", "rrc", "--node", "5=epos"], "--type does nothing here: this is a"),
         ("silent", [], "no device says anything in it that could be compared"),
     ],
 )
