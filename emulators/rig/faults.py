@@ -396,6 +396,9 @@ class FaultyPort(Copyable, Generic[W]):
             before = faults.get(name)
             if isinstance(fault, HoldingFault) and isinstance(before, type(fault)):
                 fault.take_over(before)
+            elif isinstance(before, HoldingFault) and before.is_late and _holds(before):
+                before.end()  # the new one is of the other direction
+                fault = before
             faults[name] = fault
         if name in self._ending:
             self._ending.remove(name)

@@ -215,6 +215,24 @@ def test_a_late_answer_comes_also_if_its_fault_is_armed_again(bench: Bench) -> N
     assert (port.readline(), port.readline()) == (b"abc\n", b"de\n")
 
 
+@pytest.mark.parametrize("fault", ["delay=10ms", "jitter=10ms"])
+@pytest.mark.parametrize("ways", [("answer", "request"), ("request", "answer"), ("both", "answer")])
+def test_what_is_late_comes_also_if_its_fault_is_armed_for_the_other_way(
+    bench: Bench, fault: str, ways: tuple[str, str]
+) -> None:
+    bench.fault(f"delay=200ms,way={ways[0]}")
+    if fault.startswith("jitter"):
+        bench.fault(f"jitter=200ms,way={ways[0]}")
+    port = bench.serial(timeout=1)
+    port.write(b"abc\n")
+    bench.run_for("50ms")
+    if fault.startswith("jitter"):
+        bench.fault(f"delay=10ms,way={ways[1]}")
+    bench.fault(f"{fault},way={ways[1]}")
+    port.write(b"de\n")
+    assert (port.readline(), port.readline()) == (b"abc\n", b"de\n")
+
+
 def test_jitter_delays_by_chance_and_keeps_the_order(bench: Bench) -> None:
     bench.fault("jitter=30ms")
     port = bench.serial(timeout=1)
