@@ -109,6 +109,10 @@ class QuantityBank:
         self._values = {name: item.initial for name, item in self.table.items()}
         self._on_change, self.changed = on_change, True
 
+    def __setitem__(self, name: str, value: object) -> None:
+        """Raise TypeError: an input is set by `set`, which checks the value."""
+        raise TypeError(f"an input is set by a call: bank.set({name!r}, {value!r})")
+
     def __getitem__(self, name: str) -> int | float:
         """Return the present value of an input."""
         return self._values[name]

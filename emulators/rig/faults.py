@@ -398,7 +398,7 @@ class FaultyPort(Copyable, Generic[W]):
                 fault.take_over(before)
             elif isinstance(before, HoldingFault) and before.is_late and _holds(before):
                 before.end()  # the new one is of the other direction
-                fault = before
+                continue
             faults[name] = fault
         if name in self._ending:
             self._ending.remove(name)

@@ -70,3 +70,11 @@ def test_a_bank_of_quantities_keeps_fractions() -> None:
 
 def test_both_banks_are_at_the_public_door() -> None:
     assert (tickrig.InputBank, tickrig.QuantityBank) == (InputBank, QuantityBank)
+
+
+@pytest.mark.parametrize("kind", [InputBank, QuantityBank])
+def test_a_value_that_is_assigned_names_the_call(kind: type[QuantityBank]) -> None:
+    bank = kind([InputSignal("key", "a key", SignalType.BUTTON)])
+    with pytest.raises(TypeError, match=r"an input is set by a call: bank.set\('key', 1\)"):
+        bank["key"] = 1
+    assert bank["key"] == 0

@@ -368,6 +368,10 @@ class Bench(BenchDevice, Closing):
         bench._start(mode)
         return bench
 
+    def __setitem__(self, name: str, value: object) -> None:
+        """Raise TypeError: an input is set by `set`, which checks the value."""
+        raise TypeError(f"an input is set by a call: bench.set({name!r}, {value!r})")
+
     def __getitem__(self, name: str) -> BenchDevice:
         """Return a device; KeyError if the name is unknown."""
         if name not in self._devices:

@@ -224,6 +224,8 @@ def test_several_devices_have_names() -> None:
         bench.run_for("10ms")
         assert (bench["left"].get("state"), bench.get("right/state")) == ("Off", "Pre-operational")
         assert bench["panel"].link.receive(0) == b"EV:Initialized\n"
+        with pytest.raises(TypeError, match=r"an input is set by a call: bench.set\('x', 1\)"):
+            bench["x"] = 1
         with pytest.raises(KeyError, match="no device 'middle'; known: left, right, panel"):
             bench["middle"]
         with pytest.raises(ValueError, match="several wires"):

@@ -113,6 +113,19 @@ def test_a_test_tells_what_was_asked_and_how_to_repeat_it(page: Element) -> None
     assert wheel.startswith("Expected an EMCY within 800 ms")
 
 
+def test_a_folded_row_shows_the_faults_of_its_test(page: Element) -> None:
+    (summary,) = test_of(page, STOPS).all("summary")[:1]
+    assert "bus_unplugged" in summary.words
+    many = tuple(PlannedFault(f"fault{n}") for n in range(5))
+    (summary,) = (
+        one(TestRecord("t.py::t", Outcome.PASSED, faults=many))
+        .by_class("test")[0]
+        .all("summary")[:1]
+    )
+    assert "fault0 fault1 fault2 and 2 more faults" in summary.words
+    assert "fault3" not in summary.words
+
+
 def test_the_fault_plan_tells_what_came_of_each_order() -> None:
     faults = (
         PlannedFault("cut", 1_200_000, 1_400_000, "the 3rd OK:output", 100_000),
