@@ -105,7 +105,7 @@ CLEAN = (
     *(f"emulators/{each}" for each in ("rrc", "rtc_lite", "serial", "tkernel", "urg")),
     *(f"emulators/testing/{each}" for each in ("bench", "campaign", "conformance", "host_clock")),
     *("emulators/fields.py", "emulators/scenario.py"),
-    *(f"host/{each}" for each in ("canopen", "cli", "control", "links", "rrc", "text")),
+    *(f"host/{each}" for each in ("canopen", "cli", "control", "links", "rrc", "rtc", "text")),
     *(f"host/canmon/{each}" for each in ("net", "conform", "eds_verbs.py", "eds_document.py")),
 )
 """Folders whose docstrings, help and messages have no such phrases."""

@@ -587,10 +587,10 @@ class ExecutionContext:
         return ReturnCode.RTC_OK
 
     def join(self, others: ExecutionContexts) -> None:
-        """Go on with others from now on; a `Manager` sees to it.
+        """Continue after others from now on; called by `Manager`.
 
         Args:
-            others: are told when it is due at another time.
+            others: notified when its due time changes.
         """
         self._ticked_us, self._others = self.now_us, others
 

@@ -38,11 +38,11 @@ _SEQ_PORTS: Final[Mapping[str, Any]] = {
 class ConsoleIn(RtComponent):
     """Writes one number that was entered in each period.
 
-    OpenRTM's asks for a number and waits; here nothing waits, and `enter` is
-    called by whoever has the console.
+    That of OpenRTM waits for a number; here nothing blocks, and the owner of the console calls
+    `enter`.
 
     Attributes:
-        waiting: what was entered and not yet written.
+        waiting: numbers that were entered and not yet written.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("ConsoleIn", "Console input component")
@@ -74,11 +74,11 @@ class ConsoleIn(RtComponent):
 
 
 class ConsoleOut(RtComponent):
-    """Shows each number that arrives.
+    """Displays each number that arrives.
 
     Attributes:
-        received: all that arrived, in order.
-        show: called with each value; whoever has the console prints it.
+        received: all numbers that arrived, in order.
+        show: called with each value; the owner of the console prints it.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("ConsoleOut", "Console output component")

@@ -17,7 +17,7 @@ class _DeviceClient(Protocol):
     """What talks with a device."""
 
     def close(self) -> None:
-        """Give the line back."""
+        """Release the line."""
 
 
 C = TypeVar("C", bound=_DeviceClient)

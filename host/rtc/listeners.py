@@ -15,13 +15,13 @@ _LOG: Final = log_of(__name__)
 def call_listeners(
     who: str, listeners: Iterable[Callable[P, object]], *args: P.args, **kwargs: P.kwargs
 ) -> None:
-    """Call each listener; what one raises is logged, and nothing else comes of it.
+    """Call each listener; an exception in one is logged and has no other effect.
 
     Args:
-        who: has the listeners; for people.
-        listeners: called in their order; one may add or remove some meanwhile.
+        who: owner of the listeners, for messages.
+        listeners: called in their order; a listener may add or remove listeners.
         args: of each call.
-        kwargs: of each call.
+        kwargs: keyword arguments of each call.
     """
     for listener in tuple(listeners):
         try:

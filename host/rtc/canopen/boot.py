@@ -25,7 +25,7 @@ _EVENT: Final = 5
 """Sub-indices of a communication parameter."""
 
 _PROBE_US: Final = 1_000_000
-"""A node that has not been heard is asked for its device type so often."""
+"""Number of device type requests to a node that has not sent anything yet."""
 
 
 def probe() -> Script[None]:
@@ -65,7 +65,7 @@ def boot(
 
 
 def set_pdo(index: int, pdo: PdoEntry) -> Script[None]:
-    """Write what is given of a PDO, off meanwhile, and put it on; without a CAN-ID it stays off."""
+    """Write given parameters of a PDO while it is off, then enable it if it has a CAN-ID."""
     cob_id = pdo.cob_id
     if cob_id is None:
         cob_id = (yield from upload_number(index, _COB_ID)) & ~INVALID

@@ -87,7 +87,7 @@ class PortConnections:
 
 
 def are_there(manager: Manager, entry: definition.RtConnection) -> bool:
-    """Say whether both components are there; RtcRefused if one that is has no such port."""
+    """Return whether both components exist; RtcRefused if an existing one has no such port."""
     names = {component.instance_name for component in manager.components}
     ends = [end for end in (entry.source, entry.target) if end.rpartition(".")[0] in names]
     for end in ends:
@@ -130,7 +130,7 @@ class PdoLinks:
         self._make(now_us, link)
 
     def remove(self, now_us: int, link: definition.PdoLink) -> None:
-        """Give the RPDO its own COB-ID again; ServerRefused if there is no such link."""
+        """Restore the RPDO's own COB-ID; ServerRefused if there is no such link."""
         if link not in self.links:
             raise definition.ServerRefused(f"{link.source} and {link.target} are not linked")
         own = self._own.get(link.target, self.layout(link.target).cob_id)
@@ -165,7 +165,7 @@ class PdoLinks:
         check_lengths(link, self.layout(link.source), self.layout(link.target))
 
     def _make(self, now_us: int, link: definition.PdoLink) -> None:
-        """Give the RPDO the COB-ID of the TPDO."""
+        """Set the COB-ID of the RPDO to that of the TPDO."""
         cob_id, own = self.layout(link.source).cob_id, self.layout(link.target).cob_id
         if own != cob_id:  # else the node was set up again while it was linked
             self._own[link.target] = own

@@ -38,7 +38,7 @@ class PdoDataFlow:
         self._written = set[int]()  # places in _connected: 126 sinks are not looked at each tick
 
     def route(self) -> None:
-        """Collect anew which PDO goes to which OutPorts, and which InPorts have connectors."""
+        """Rebuild the tables of PDOs with their OutPorts, and of InPorts with connectors."""
         self._sources = {}
         for node in self._nodes.values():
             for source in node.proxy.sources if node.proxy else ():
@@ -56,7 +56,7 @@ class PdoDataFlow:
                     connector.buffer.on_write = partial(self._written.add, place)
 
     def watch(self, node: ServedNode) -> None:
-        """Collect anew whenever an InPort of a new proxy gets or loses a connector."""
+        """Rebuild the tables whenever an InPort of a new proxy gets or loses a connector."""
         for sink in node.proxy.sinks if node.proxy else ():
             for port in sink.ports:
                 port.on_connect.append(lambda _: self.route())
@@ -75,7 +75,7 @@ class PdoDataFlow:
         return bool(routes)
 
     def send_values(self) -> None:
-        """Send what came to InPorts; what cannot be sent now is dropped."""
+        """Send the values of InPorts; values that cannot be sent now are dropped."""
         if not self._written:
             return
         connected, places = self._connected, sorted(self._written)
@@ -125,7 +125,7 @@ class SdoDataFlow:
     def __init__(self, nodes: Mapping[int, ServedNode], notify: Notify) -> None:
         self._nodes, self._notify = nodes, notify
         self._busy = set[int]()  # node-IDs
-        self._failed = set[tuple[int, str]]()  # node-ID and port, of which was told
+        self._failed = set[tuple[int, str]]()  # node-ID and port that were reported
 
     def exchange(self, now_us: int) -> None:
         """Begin the transfers of a period."""
@@ -212,7 +212,7 @@ class SdoDataFlow:
             self._failed.discard((node.entry.id, name))
 
     def _report(self, node: ServedNode, kind: ServerEventType, port: str, why: str) -> None:
-        """Tell of a port that does not work, once until it works again."""
+        """Report a port that does not work, once until it works again."""
         at = node.entry.id, port
         if at not in self._failed:
             self._failed.add(at)

@@ -1,4 +1,4 @@
-"""System Definitions: what the server is told, and what it takes from an EDS."""
+"""System Definitions: the settings of the server, and what it takes from an EDS."""
 
 from __future__ import annotations
 
@@ -114,7 +114,8 @@ class PdoEntry:
 
     Attributes:
         mapping: the objects in it.
-        cob_id: its COB-ID; with bit 31 the PDO stays off, with bit 30 nobody may request it.
+        cob_id: its COB-ID; with bit 31 the PDO stays off, with bit 30 remote requests are not
+            allowed.
         type: transmission type.
         inhibit_100us: inhibit time in 100 us.
         event_ms: event timer.
@@ -221,7 +222,7 @@ class StartEntry:
 
 @dataclass(frozen=True, slots=True)
 class SystemDefinition:
-    """All that the server is told."""
+    """All settings of the server."""
 
     nodes: tuple[NodeEntry, ...]
     bus: BusEntry = BusEntry()

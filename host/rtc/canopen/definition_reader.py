@@ -50,7 +50,7 @@ def _read_table(
     items = _children(node, place)
     for key, (key_place, _) in items.items():
         if key not in fields:
-            _refuse(key_place, f"{place}: {key!r} is none of: {', '.join(fields)}")
+            _refuse(key_place, f"{place}: {key!r} is not one of: {', '.join(fields)}")
     for key in needed:
         if key not in items:
             _refuse(node, f"{place} has no {key!r}")
@@ -167,7 +167,7 @@ def _one_of(*words: str) -> _Reader:
 
     def read(node: Item, place: str) -> str:
         if (value := text(node, place)) not in words:
-            _refuse(node, f"{place}: {value!r} is none of: {', '.join(words)}")
+            _refuse(node, f"{place}: {value!r} is not one of: {', '.join(words)}")
         return value
 
     return read
@@ -322,7 +322,7 @@ def _pdo(node: Item, place: str) -> definition.PdoEntry:
 
 
 def _cob_id(node: Item, place: str) -> int:
-    """Read a CAN-ID of a PDO, with bit 31 if it is off, with bit 30 if nobody may request it."""
+    """Read a CAN-ID of a PDO, with bit 31 if it is off, with bit 30 without remote requests."""
     flags = INVALID | FLAG_30
     ids = definition.PDO_CAN_IDS
     number = whole(ids.start, flags | ids.stop - 1)(node, place)
@@ -361,7 +361,7 @@ def _sdo(node: Item, place: str, ids: Collection[int]) -> definition.SdoEntry:
     entry = definition.SdoEntry(**_read_table(node, place, fields, fields))
     _check_known(node, place, entry.node, ids)
     if entry.size not in _SIZES:
-        _refuse(node, f"{place}: size {entry.size} is none of: 1, 2, 4, 8")
+        _refuse(node, f"{place}: size {entry.size} is not one of: 1, 2, 4, 8")
     if not -(1 << 8 * entry.size - 1) <= entry.value < 1 << 8 * entry.size:
         _refuse(node, f"{place}: {entry.value} does not fit into size {entry.size}")
     return entry
@@ -410,4 +410,6 @@ def _check_number(node: Item, place: str, pdo: str) -> None:
 
 def _check_known(node: Item, place: str, node_id: int, ids: Collection[int]) -> None:
     if node_id not in ids:
-        _refuse(node, f"{place}: node {node_id} is none of: {', '.join(map(str, ids)) or 'none'}")
+        _refuse(
+            node, f"{place}: node {node_id} is not one of: {', '.join(map(str, ids)) or 'none'}"
+        )

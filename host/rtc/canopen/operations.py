@@ -32,7 +32,7 @@ _CONTROLWORD: Final = 0x6040
 _STATUSWORD: Final = 0x6041
 _FAULT_RESET: Final = 0x80
 _LOOK_US: Final = 10_000
-"""How often the statusword is looked at."""
+"""Polling interval of the statusword."""
 
 _STATE_BITS: Final = 0x6F
 _ENABLING: Final = ((0x06, 0x21), (0x07, 0x23), (0x0F, 0x27))
@@ -47,7 +47,7 @@ def _confirm_us(entry: NodeEntry) -> int:
 
 @dataclass(frozen=True, slots=True)
 class _LifeCycleScripts:
-    """What is said to a node for each operation on its proxy."""
+    """The SDO and NMT requests to a node for each operation on its proxy."""
 
     activate: Callable[[NodeEntry], Script[None]]
     deactivate: Callable[[NodeEntry], Script[None]]
@@ -78,7 +78,7 @@ def _disable(entry: NodeEntry) -> Script[None]:
 
 
 def _reset_drive(entry: NodeEntry) -> Script[None]:
-    """Reset the fault, which takes SDO, so not Stopped; then the node, come of it what may."""
+    """Reset the fault by SDO, so not in Stopped; then reset the node, whatever the result."""
     try:
         yield from _enter_pre_operational(entry)
         yield from download_number(_CONTROLWORD, 0, 0, 2)
@@ -146,7 +146,7 @@ class _RestartCounter:
         self.pending = self.to_activate = self.was_active = False
 
     def leave(self) -> None:
-        """Do nothing about it if somebody was faster; a restart that has begun goes on."""
+        """Skip this if a person has already acted; a running restart continues."""
         if self.pending:
             self.forget()
 
@@ -179,19 +179,19 @@ _STATES: Final = {
 
 
 class NodeOperations:
-    """Says on the bus what the RT side asks for, and follows what the device says.
+    """Executes the requests of the RT side on the bus, and follows the state of the device.
 
     Args:
         entry: the node.
-        dialogue: what is said with it.
-        notify: takes events.
+        dialogue: the dialogue with the node.
+        notify: called with events.
 
     Attributes:
         proxy: the RT component, None without.
-        nmt_state: what the device reported last, None before.
-        now_us: the present.
-        resetting: between a reset that the RT side asked for and its result.
-        restart: how often it is brought back by itself.
+        nmt_state: last reported state of the device, None before the first report.
+        now_us: the current time.
+        resetting: whether a reset requested by the RT side is not finished.
+        restart: how many automatic restarts are left.
     """
 
     def __init__(self, entry: NodeEntry, dialogue: Dialogue, notify: Notify) -> None:
@@ -209,7 +209,7 @@ class NodeOperations:
         return self.proxy is not None and self.proxy.state is LifeCycleState.INACTIVE
 
     def carry_out(self, *, lost: bool) -> None:
-        """Say on the bus what was asked for, unless the device is there already."""
+        """Execute a request on the bus, unless the device is already in that state."""
         if self.proxy is None or (requested := self.proxy.take_request()) is NOTHING:
             return
         state = None if self._dialogue.moves else self.nmt_state
@@ -253,7 +253,7 @@ class NodeOperations:
         self._run("command", _say(command))
 
     def begin(self) -> None:
-        """Forget what was asked for: the device begins anew."""
+        """Drop the request: the device starts again."""
         self._stopping = False
 
     def booted(self) -> None:
@@ -275,7 +275,7 @@ class NodeOperations:
         self.restart.lose(self.now_us, active=active)
 
     def go_on(self) -> None:
-        """Reset a node that was lost and is heard again, if a restart is left."""
+        """Reset a node that was lost and sends again, if an automatic restart is left."""
         proxy, busy = self.proxy, self._dialogue.moves or self.resetting or self._stopping
         if proxy is None or busy or proxy.requested is not NOTHING:
             return
@@ -295,7 +295,7 @@ class NodeOperations:
         return bool(which)
 
     def _left_to_do(self) -> str:
-        """Say what a person has to do, as it is not restarted; nothing if it is as it was."""
+        """Report what a person has to do if there is no restart; nothing after a recovery."""
         entry, was_active = self._entry, self.restart.was_active
         hint = "no restart is left" if entry.restart else f"{_AUTOMATIC} does so by itself"
         if self.proxy is not None and self.proxy.state is LifeCycleState.ERROR:

@@ -22,9 +22,9 @@ True
 # so that the node has it after each boot, and a saved definition contains it.
 #
 # Afterwards the node is set up again by the same script as at its boot: its ports follow from its
-# PDOs, so its proxy is made anew, connections and links are restored, and a node that was Active
-# is activated. Many devices take a mapping in Pre-operational only, so the node is brought there
-# first, in the way of its role (a drive is switched off before).
+# PDOs, so it gets a new proxy, connections and links are restored, and a node that was Active is
+# activated. Many devices accept a mapping in Pre-operational only, so the node enters this state
+# first, as its role requires (a drive is switched off before).
 
 from __future__ import annotations
 
@@ -243,7 +243,7 @@ def _changes(there: PdoDescription, wanted: PdoDescription) -> definition.PdoEnt
 
 
 def _difference(wanted: PdoDescription, found: PdoDescription | None) -> str:
-    """Say in what a node differs from what was written."""
+    """Return in what a node differs from the written values."""
     if found is None:
         return "a multiplexed PDO"
     if found.mapping != wanted.mapping:
@@ -292,7 +292,7 @@ class Rewrite:
         self._was_active = proxy is not None and proxy.state is LifeCycleState.ACTIVE
 
     def begin(self) -> Script[None]:
-        """Return the script; a node that is lost meanwhile has the old values at its next boot."""
+        """Return the script; a node that is lost during it has the old values at its next boot."""
         self._keep(self._wanted, self._before)
         return self._script()
 

@@ -189,7 +189,7 @@ def lay_out(
     mapping: tuple[MappedObject, ...],
     data_types: Mapping[tuple[int, int], int],
 ) -> PdoLayout:
-    """Lay a PDO out by its mapping; objects below 20h are dummies, which nobody sees."""
+    """Lay a PDO out by its mapping; objects below 20h are dummies without a port."""
     fields, unknown, shift = list[_PdoField](), list[MappedObject](), 0
     for mapped in mapping:
         data_type = data_types.get((mapped.index, mapped.sub), 0)
@@ -224,9 +224,9 @@ _LETTERS: Final[Mapping[tuple[DataType, int], str]] = {
 
 
 def pdo_decoder(layout: PdoLayout) -> _PdoDecoder:
-    """Return what decodes as the layout does; four objects take a ninth of the time.
+    """Return a decoder for the layout; it takes a ninth of the time for four objects.
 
-    That is so where the objects lie as those of a C struct do.
+    This holds if the objects are aligned like the fields of a C struct.
 
     >>> mapping = (MappedObject(0x6401, 1, 16), MappedObject(0x6401, 2, 16))
     >>> types = {(0x6401, 1): DataType.INTEGER16, (0x6401, 2): DataType.INTEGER16}

@@ -298,7 +298,7 @@ _OK: Final = ReturnCode.RTC_OK
 
 
 class ProxyRequest(Enum):
-    """What the RT side asked for and the bus has not been told yet."""
+    """A request of the RT side that was not yet sent to the bus."""
 
     NOTHING = auto()
     ACTIVATE = auto()
@@ -312,11 +312,10 @@ NOTHING: Final = ProxyRequest.NOTHING
 
 
 class ProxyRtc(RtComponent):
-    """An ordinary RT component that stands for a device.
+    """An ordinary RT component that represents a device.
 
-    Its callbacks note what they ask for; the server says it on the bus after the
-    period. A reset is refused by on_reset until the device has booted anew, so
-    Error lasts until then.
+    Its callbacks record requests; the server executes them on the bus after the period. on_reset
+    refuses until the device has booted again, so Error lasts until then.
 
     Not emulated: a CANopen node of its own on the bus (`visible_proxies` of K1).
 
@@ -331,10 +330,10 @@ class ProxyRtc(RtComponent):
         sinks: RPDOs of the device, which take data from InPorts.
         sdo_sources: objects of the device whose values go to OutPorts.
         sdo_sinks: objects of the device that take values from InPorts.
-        requested: what the callbacks asked for.
-        passing: between on_activated and on_deactivated: data of the device pass.
-        confirmed: the device has reported that it is Operational: data for it pass as well.
-        ready: the device is fit to leave Error.
+        requested: the request of the callbacks.
+        passing: true between on_activated and on_deactivated: data from the device pass.
+        confirmed: whether the device has reported Operational: then data to it pass as well.
+        ready: whether the device can leave Error.
     """
 
     spec = ModuleSpec("ProxyRTC", "A CANopen device", category="RTC-CANopen")

@@ -67,11 +67,11 @@ _LOG: Final = log_of(__name__)
 
 
 class WheeledBase(RtComponent, ABC):
-    """Turns a velocity into wheel speeds, and what the wheels did into a pose.
+    """Converts a velocity into wheel speeds, and wheel movements into a pose.
 
-    A velocity to the side, or one with a number that is none, is refused: it is passed over
-    with a line in the log. Without a velocity for `timeout` the wheels stop. Where a wheel
-    would be too fast, both sides are slowed down alike.
+    A lateral velocity, or one with an invalid number, is ignored with a line in the log. Without a
+    velocity for `timeout` the wheels stop. If a wheel would be too fast, both sides slow down by
+    the same factor.
 
     Not emulated: acceleration limits; the drives have their own.
 
@@ -82,9 +82,9 @@ class WheeledBase(RtComponent, ABC):
 
     Attributes:
         velocity: InPort; m/s, rad/s.
-        position: OutPort; where it thinks it is, from where it was activated.
+        position: OutPort; the estimated position relative to that of activation.
         pose: the same.
-        refused: how many velocities were.
+        refused: number of ignored velocities.
     """
 
     def __init__(self, instance_name: str, radius_m: float, tread_m: float) -> None:
@@ -101,7 +101,7 @@ class WheeledBase(RtComponent, ABC):
     @property
     @abstractmethod
     def fastest(self) -> float:
-        """The speed that a wheel can be told, rad/s."""
+        """The highest wheel speed that can be commanded, rad/s."""
 
     @abstractmethod
     def command(self, tm: rtc.Time, left: float, right: float) -> None:
@@ -187,7 +187,7 @@ class Beego(WheeledBase):
 
     @property
     def fastest(self) -> float:
-        """The speed that a wheel can be told, rad/s."""
+        """The highest wheel speed that can be commanded, rad/s."""
         return _FASTEST_RPM / 60 * tau / self.gear.value
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
@@ -251,7 +251,7 @@ class FourX(WheeledBase):
 
     @property
     def fastest(self) -> float:
-        """The speed that a wheel can be told, rad/s."""
+        """The highest wheel speed that can be commanded, rad/s."""
         return radians(self.full_scale.value)
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:

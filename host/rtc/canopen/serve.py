@@ -34,7 +34,7 @@ def serve(
 
 
 class ServerRunner:
-    """Runs a server on a link until somebody stops it.
+    """Runs a server on a link until `stop` is called.
 
     Args:
         server: the server.
@@ -42,12 +42,12 @@ class ServerRunner:
 
     Attributes:
         running: False once `stop` was called.
-        late_ticks: how many ticks began more than 1 ms after they were due.
-        worst_late_us: by how much the worst of them was late, us.
+        late_ticks: number of ticks that began more than 1 ms late.
+        worst_late_us: the largest delay of a tick, us.
         after_tick: called with the time after each tick.
-        serve: called between the ticks with the time in us that it may take, every
-            `pause_us` at least; a control socket, say.
-        pause_us: 20 ms; as long waits who is served.
+        serve: called between the ticks with the time in us that it may take, at least every
+            `pause_us`; for example a control socket.
+        pause_us: 20 ms; the longest time that a served client waits.
     """
 
     def __init__(self, server: RtcCanopenServer, link: StampedLink) -> None:
@@ -58,7 +58,7 @@ class ServerRunner:
         self.pause_us = PAUSE_US
 
     def run(self, until_us: int = NEVER) -> None:
-        """Let the server work until a time on the link's clock, or until somebody calls `stop`.
+        """Run the server until a time on the link's clock, or until `stop` is called.
 
         Raises:
             LinkClosed: the bus is gone.
@@ -80,7 +80,7 @@ class ServerRunner:
 
 
 def _step(server: RtcCanopenServer, link: StampedLink, until_us: int) -> int:
-    """Wait for what is heard or due, tick the server, send; return how late that was, us."""
+    """Wait for frames or the next due time, tick the server, send; return the delay, us."""
     due_us = min(server.due_us, until_us)
     now_us, received = link.receive_stamped(max(0, due_us - link.now_us))
     if sent := server.tick(now_us, received):

@@ -26,31 +26,31 @@ _NEARER: Final = 4
 """So many times nearer to one time than to the other is a heartbeat that belongs to it."""
 
 _STEADY: Final = 10
-"""A heartbeat is in time within one part in so many of the producer time."""
+"""A heartbeat is in time within the producer time divided by this number."""
 
 _APART: Final = 100
-"""Times that part by less than one part in so many of the producer time are the same."""
+"""Times that differ by less than the producer time divided by this number are equal."""
 
 CROWDED: Final = 10
-"""Two heartbeats in each of so many producer times are of two nodes, or 1017h was changed."""
+"""Two heartbeats in each of this many producer times mean two nodes, or a changed 1017h."""
 
 _CREDIT: Final = 3
-"""Commands that are kept in mind for a state that a node has not told yet."""
+"""Number of recent commands kept for a state that a node has not reported yet."""
 
 _IDENTITY: Final = frozenset({0x1000, 0x1018})
 """Objects whose values no node changes."""
 
 
 class DuplicateNodeDetector:
-    """Listens to what comes from a node-ID, by the time stamps of the bus.
+    """Monitors the frames of a node-ID, by the time stamps of the bus.
 
-    Two nodes show by what one alone cannot say:
+    Two nodes with one node-ID show by frames that one alone cannot send:
 
-    - a boot-up, and heartbeats that go on at the times of before;
-    - Operational, or Pre-operational after Stopped, that nobody commanded, twice;
-    - two answers to a question for the identity, as for the serial number.
+    - a boot-up, and heartbeats that continue at the previous times;
+    - Operational, or Pre-operational after Stopped, without a command, twice;
+    - two answers to a request for the identity, such as the serial number.
 
-    A count shows nothing: a node that was held up sends all at once what it owes. Two
+    The number of frames alone shows nothing: a delayed node sends all pending frames at once. Two
     heartbeats in each producer time are a suspicion.
 
     Not seen: nodes that send the very same frames at the very same time.
@@ -59,9 +59,9 @@ class DuplicateNodeDetector:
         period_us: producer heartbeat time.
 
     Attributes:
-        sure_us: when a node that has booted has no twin, if there was no sign of one.
-        sign: what shows that there are two, empty while nothing does.
-        suspicion: what hints at it, empty while nothing does.
+        sure_us: the time from which a booted node has no twin, if there was no sign of one.
+        sign: the evidence for two nodes, empty without one.
+        suspicion: the hint at two nodes, empty without one.
     """
 
     def __init__(self, period_us: int) -> None:
@@ -73,7 +73,7 @@ class DuplicateNodeDetector:
         self.forget()
 
     def forget(self) -> None:
-        """Begin anew: something may have been missed, or its producer time was written."""
+        """Restart the detection: frames may have been missed, or the producer time was written."""
         self._old_us, self._steady = 0, False
         self._clear()
 
@@ -84,12 +84,12 @@ class DuplicateNodeDetector:
         self._double = _DoubleHeartbeats(self._period_us)
 
     def command(self, command: int) -> None:
-        """Hear an NMT command of anybody to the node."""
+        """Process an NMT command of any master to the node."""
         if (state := COMMANDED.get(command)) is not None:
             self._commanded[state] = min(self._commanded[state] + 1, _CREDIT)
 
     def answer(self, data: bytes) -> None:
-        """Hear an SDO response."""
+        """Process an SDO response."""
         try:
             answer = parse_response(data)
         except WireError:
@@ -175,7 +175,7 @@ class _DoubleHeartbeats:
 
 
 def _goes_by_itself(before: NmtState | None, state: NmtState) -> bool:
-    """Say whether a node may go there without a command (CiA 301: 1029h, and after its boot-up)."""
+    """Return whether a node may enter a state by itself (CiA 301: 1029h, after its boot-up)."""
     if before in (None, NmtState.INITIALISING) or state is NmtState.STOPPED:
         return True
     return before is NmtState.OPERATIONAL
@@ -206,7 +206,7 @@ _WATCHED: Final = (NodePhase.READY, NodePhase.DUPLICATE)
 """Phases in which heartbeats are awaited."""
 
 _LIVING: Final = (NodePhase.LISTENING, NodePhase.BOOTING, NodePhase.READY)
-"""Phases in which a twin is looked for."""
+"""Phases in which the server looks for a twin."""
 
 
 class NodeServer(Protocol):
@@ -229,26 +229,26 @@ class NodeServer(Protocol):
 
 
 class ServedNode:
-    """A node: sees it come and go, sets it up, keeps its proxy and it together.
+    """A node: detects that it comes and goes, sets it up, keeps it and its proxy in step.
 
     Args:
-        entry: what the System Definition says of it.
-        file: what its EDS says.
+        entry: its entry in the System Definition.
+        file: the content of its EDS.
         writes: values that are written while it boots.
-        remove_us: after how long without heartbeat its proxy is removed.
+        remove_us: time without a heartbeat after which its proxy is removed.
         server: the server.
 
     Attributes:
         entry, file, writes: as given.
         phase: how far it has come.
-        received_us: when it was heard last.
-        lost: its heartbeat is late.
-        problem: why it is refused, for people.
+        received_us: time of its last frame.
+        lost: whether its heartbeat is late.
+        problem: why it is refused, in words.
         layouts: its PDOs.
-        to_start: it is to be activated in its turn.
-        dialogue: what is said with it.
+        to_start: whether it is to be activated in its turn.
+        dialogue: the dialogue with the node.
         operations: its proxy, and its NMT state.
-        due_us: when `tick` has something to do.
+        due_us: when to call `tick` next.
     """
 
     def __init__(
@@ -297,7 +297,7 @@ class ServedNode:
         self._plan()
 
     def restart(self, now_us: int) -> None:
-        """Reset the node, from whatever it is in, as somebody asks for it by hand.
+        """Reset the node from any state, on request of a user.
 
         Its proxy is removed; it is set up when it boots, and activated again if it was Active,
         or lost while it was.
@@ -320,14 +320,14 @@ class ServedNode:
         self.phase, self.problem = NodePhase.REFUSED, problem
 
     def pause(self, now_us: int, span_us: int) -> None:
-        """Take note that nobody looked for so long: it may have spoken all the same."""
+        """Record that no frames were received for some time: the node may have sent some."""
         self._watched_us, self._blind_us = now_us, self._blind_us + span_us
         self.dialogue.defer(span_us)
         self._duplicates.forget()
         self._plan()
 
     def on_error_control(self, now_us: int, at_us: int, data: bytes) -> None:
-        """Take a boot-up or heartbeat of a time on the bus; anything else is passed over."""
+        """Process a boot-up or heartbeat with its time on the bus; ignore other frames."""
         try:
             (number,) = data
             state = NmtState(number)
@@ -356,7 +356,7 @@ class ServedNode:
             self._foreign_reset_us = at_us
 
     def run(self, now_us: int, job: QueuedScript) -> None:
-        """Run a job of somebody else."""
+        """Run a job of another object."""
         self.operations.now_us = now_us
         self.dialogue.start(now_us, job)
         self._plan()
@@ -372,7 +372,7 @@ class ServedNode:
         self._plan()
 
     def carry_out(self, now_us: int) -> None:
-        """Say on the bus what the RT side asked for."""
+        """Execute the requests of the RT side on the bus."""
         self.operations.now_us = now_us
         operations, restart = self.operations, self.operations.restart
         operations.carry_out(lost=self.lost)
@@ -431,7 +431,7 @@ class ServedNode:
             self._boot()
 
     def _found(self) -> None:
-        """Set it up though its boot-up was not heard; a Stopped one answers no SDO."""
+        """Set it up although its boot-up was not received; a Stopped node does not answer SDO."""
         if self.nmt_state is NmtState.STOPPED:
             self.dialogue.clear()
             self.operations.say(NmtCommand.RESET_NODE)
@@ -473,7 +473,7 @@ class ServedNode:
             self.phase = NodePhase.REFUSED
 
     def _judge(self) -> bool:
-        """See whether it has a twin: then both are stopped; a suspicion is told once."""
+        """Check for a twin: then stop both; report a suspicion once."""
         duplicates = self._duplicates
         if duplicates.sign and self.phase in _LIVING:
             self._refuse_duplicate(duplicates.sign)

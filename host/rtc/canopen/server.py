@@ -11,31 +11,31 @@
 #   Active    Operational      on_activated          a heartbeat that says so
 #   Error     Stopped          on_aborting           a heartbeat that says so, and silence
 #
-# Both sides may move first. The callbacks of a proxy cannot wait for a bus: they note a request
-# (`ProxyRequest`), and `_carry_out` says it on the bus after the period, as a script of SDO and NMT
-# (operations.py). A state that a heartbeat reports moves the proxy, unless a script that moves the
-# device is under way or a request is not carried out yet: then the heartbeat is of the past. Error
-# ends when the device was reset and has booted again: on_reset refuses until then (`ready`).
+# Both sides may move first. The callbacks of a proxy cannot wait for a bus: they record a request
+# (`ProxyRequest`), and `_carry_out` executes it on the bus after the period, as a script of SDO and
+# NMT (operations.py). A state that a heartbeat reports changes that of the proxy, unless a script
+# that changes the state of the device is running or a request is pending: then the heartbeat is
+# outdated. Error ends when the device was reset and has booted again: on_reset refuses until then
+# (`ready`).
 #
-# A PDO is a port, or one for each object if their types differ; an object may be a port by SDO.
-# What a frame of a TPDO carries is written to OutPorts as the frame comes. What comes to InPorts
-# leaves at the end of the tick, one frame for each value. `passing` opens the way from the device
-# with on_activated; `confirmed` opens the way to it when the script of the activation has ended.
+# A PDO is one port, or one port per object if their types differ; an object may be a port by SDO.
+# The values of a TPDO are written to OutPorts when the frame arrives. The values of InPorts are
+# sent at the end of the tick, one frame per value. `passing` opens the way from the device with
+# on_activated; `confirmed` opens the way to it when the script of the activation has ended.
 #
-# The order within `tick` is what the rest relies on:
+# The rest relies on the order within `tick`:
 #
-#   1. frames in the order of the bus: PDOs to ports, all else to nodes;
+#   1. frames in the order of the bus: PDOs to ports, others to nodes;
 #   2. nodes that are due: time-outs of scripts and heartbeats;
-#   3. a period of the context begins: connections whose ports came are made, components run;
-#   4. what proxies asked for is said, the next node of the start order is activated;
+#   3. a period of the context begins: pending connections are made, components run;
+#   4. requests of proxies are executed, the next node of the start order is activated;
 #   5. PDOs of InPorts, SDO transfers, SYNC and the server's own heartbeat.
 #
-# So components have the value of a TPDO in the tick in which it came, if a period begins in it, and
-# their answer is in what this tick returns. `due_us` is when something of it is due; `wake` makes
-# it earlier.
+# So components have the value of a TPDO in the tick in which it arrives, if a period begins in it,
+# and this tick returns their answer. `due_us` is the next due time; `wake` makes it earlier.
 #
-# A server that looks too late (`_be_late`) does not know what the nodes sent meanwhile: it must not
-# take that for silence of theirs.
+# A server that ticks too late (`_be_late`) does not know what the nodes sent before: it must not
+# count them as lost.
 
 from __future__ import annotations
 
@@ -61,13 +61,13 @@ from tickrig.wire.errors import WireError
 from tickrig.wire.instant import NEVER
 from tickrig.wire.rtc_types.idl import Struct
 
-# What the server hears on the bus beside PDOs, and who is told.
+# The frames that the server receives besides PDOs, and their receivers.
 
 _DEVICE_TYPE: Final = 460
 """A marker of ours: the number of the profile whose text is not public."""
 
 _CONSUMERS: Final = 3
-"""A heartbeat may be so many producer times late."""
+"""A heartbeat may be late by this many producer times."""
 
 _SYNC_COB_ID: Final = 0x080
 """The default of 1005h (CiA 301, SYNC)."""
@@ -78,7 +78,7 @@ _Table = Mapping[tuple[int, int], bytes]
 
 
 class ServerObjects:
-    """Answers who reads the server's objects by SDO.
+    """Answers SDO reads of the server's own objects.
 
     | object | what |
     |---|---|
@@ -87,12 +87,12 @@ class ServerObjects:
     | 1005h, 1006h | COB-ID SYNC, with bit 30 if it sends it; communication cycle period, us |
     | 1016h | consumer heartbeat time of each node |
     | 1017h | producer heartbeat time |
-    | 1018h | identity: vendor-ID 0, which is nobody's |
+    | 1018h | identity: vendor-ID 0, which is not assigned |
 
     Not emulated: writing, segments and blocks; every object has at most four bytes.
 
     Args:
-        definition: what the server was told.
+        definition: settings of the server.
     """
 
     def __init__(self, definition: SystemDefinition) -> None:
@@ -113,7 +113,7 @@ class ServerObjects:
         self._indices = frozenset(index for index, _ in self._table)
 
     def answer(self, data: bytes) -> bytes | None:
-        """Return the answer to a request; None to an abort, and to what is no request."""
+        """Return the answer to a request; None to an abort, and to any other frame."""
         try:
             request = sdo.parse_request(data)
         except WireError:
@@ -158,15 +158,15 @@ _ERROR_CONTROL: Final = range(0x700, 0x780)
 """What nodes send, by node-ID; node 0 is none."""
 
 _QUIET_US: Final = 1_000_000
-"""Another master that was not heard for so long is told of anew."""
+"""After this time without frames, another master is reported again."""
 
 
 class _FrameDispatcher:
-    """Tells nodes what they sent, and the log what others did.
+    """Passes frames to their nodes, and logs those of other nodes.
 
     Args:
         nodes: by node-ID.
-        definition: what the server was told.
+        definition: settings of the server.
         server: the server.
     """
 
@@ -239,32 +239,32 @@ class _FrameDispatcher:
 
 
 _LATE_US: Final = 100_000
-"""A server that looks so much later than it wanted to knows nothing of the nodes meanwhile."""
+"""A server that ticks this much later than planned does not know what the nodes sent."""
 
 
 class RtcCanopenServer:
-    """Runs the nodes of a System Definition; it has no clock and no bus, it is ticked.
+    """Runs the nodes of a System Definition; without a clock or bus, driven by `tick`.
 
-    `tick` takes the time and what was heard, and returns what is to be sent, as
-    devices do: the same server runs in virtual time on a rig and on a real bus.
+    `tick` takes the time and the received frames, and returns the frames to send, as devices do:
+    the same server runs in virtual time on a rig and on a real bus.
 
     Not emulated: flying master, TIME, program download, a CANopen node for
     each proxy on the bus.
 
     Args:
         definition: what it manages.
-        files: what the EDS files say, by their names in the definition.
-        manager: has the proxies and all other components; an own one if left out.
+        files: contents of the EDS files, by their names in the definition.
+        manager: holds the proxies and all other components; by default a new one.
 
     Attributes:
         manager: as given.
         nodes: by node-ID.
-        log: what happened.
+        log: the events.
         connections: connectors through the PC.
         links: PDO links.
-        findings: what is wrong in the EDS files.
-        now_us: the time it was told last.
-        due_us: when `tick` has something to do.
+        findings: the findings in the EDS files.
+        now_us: time of the last tick.
+        due_us: when to call `tick` next.
     """
 
     def __init__(
@@ -337,7 +337,7 @@ class RtcCanopenServer:
         return out
 
     def bus_state(self, state: ErrorState, /) -> None:
-        """Tell what its CAN controller reports; it is seen to in the next tick."""
+        """Process a report of the CAN controller; the next tick handles it."""
         self._bus_states.append(state)
         self.due_us = self.now_us
 
@@ -412,7 +412,7 @@ class RtcCanopenServer:
             node.search(self.now_us)
 
     def _be_late(self, late_us: int) -> None:
-        """Say so, at most once a second, and take no node for silent in that time."""
+        """Report the delay, at most once a second, and do not count nodes as lost in that time."""
         self._late_us = max(self._late_us, late_us)
         for node in self.nodes.values():
             node.pause(self.now_us, late_us)

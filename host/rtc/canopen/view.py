@@ -51,11 +51,11 @@ class PortView:
 
 @dataclass(frozen=True, slots=True)
 class PdoView:
-    """A PDO of a device that is on.
+    """An enabled PDO of a device.
 
     Attributes:
         name: as `16.tpdo2`.
-        cob_id: its CAN-ID; an RPDO that is linked has that of its source meanwhile.
+        cob_id: its CAN-ID; while an RPDO is linked, that of its source.
         bits: its length.
         index: of its communication parameter in the device.
         proxy_index: of the same in the proxy.
@@ -73,11 +73,11 @@ class NodeView:
     """A node and its proxy.
 
     Attributes:
-        nmt_state: as `OPERATIONAL`, empty before it was heard.
-        heartbeat_age_us: since it was heard, `NOT_HEARD` before.
-        late: its heartbeat is missing.
-        proxy_state: as `ACTIVE`, empty without a proxy.
-        problem: why it is refused, empty while all is well.
+        nmt_state: such as `OPERATIONAL`, empty before its first frame.
+        heartbeat_age_us: time since its last frame, `NOT_HEARD` before the first.
+        late: whether its heartbeat is missing.
+        proxy_state: such as `ACTIVE`, empty without a proxy.
+        problem: why it is refused, empty if it is not.
     """
 
     node_id: int
@@ -122,13 +122,13 @@ _T = TypeVar("_T")
 
 
 class PendingTransfer(Generic[_T]):
-    """SDO transfers that somebody waits for.
+    """SDO transfers with a waiting caller.
 
     Args:
-        empty: the result until there is another.
+        empty: the result before the end.
 
     Attributes:
-        done: they have ended.
+        done: whether they have ended.
         data: what was read; `empty` after a write.
         problem: why they failed, empty if they did not.
     """
@@ -152,9 +152,9 @@ class PendingTransfer(Generic[_T]):
 
 
 class ServerView:
-    """Looks at a server and commands it, between its ticks and in its thread.
+    """Reads the state of a server and sends it commands, between its ticks and in its thread.
 
-    Commands return at once; what comes of them shows in the states and events.
+    Commands return at once; their results appear in the states and events.
 
     Args:
         server: the server.
@@ -220,7 +220,7 @@ class ServerView:
         self._server.start()
 
     def boot(self, node_id: int) -> None:
-        """Set a node up again, one that was refused, too; its proxy is made anew."""
+        """Set up a node again, also a refused one; it gets a new proxy."""
         self._node(node_id).boot(self._server.now_us)
 
     def restart(self, node_id: int) -> None:
@@ -309,7 +309,7 @@ class ServerView:
     def _node(self, node_id: int) -> ServedNode:
         if (node := self._server.nodes.get(node_id)) is None:
             known = ", ".join(map(str, self._server.nodes))
-            raise ServerRefused(f"node {node_id} is none of: {known}")
+            raise ServerRefused(f"node {node_id} is not one of: {known}")
         return node
 
     def _transfer(

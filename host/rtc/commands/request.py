@@ -23,7 +23,7 @@ ERROR: Final = "ERROR"
 
 
 def default_path() -> Path:
-    """Return where a system is if nobody says: `tickrig-rtc`, in a folder of this user."""
+    """Return the default address of a system: `tickrig-rtc`, in a folder of this user."""
     folder = os.environ.get("XDG_RUNTIME_DIR")
     if folder:
         return Path(folder, "tickrig-rtc")

@@ -47,10 +47,10 @@ class _SystemOptions:
 
 
 def run_system(lite_boot: str, **given: Any) -> None:
-    """Run the system of a command line until somebody stops it.
+    """Run the system of a command line until it is stopped.
 
     Raises:
-        Refused: the command line asks for something that cannot be done.
+        Refused: the command line is not possible.
     """
     engines, boot_us = take_engines(given), time_us("--lite-boot", lite_boot)
     options = _SystemOptions(lite_boot_us=boot_us, engines=engines, **given)
@@ -95,12 +95,12 @@ def _restore(manager: Manager, system: System, options: _SystemOptions) -> None:
         restore(manager, replace(system, components=made))
         proxies = there.intersection(entry.name for entry in system.components if entry.active)
         manager.activate(*sorted(proxies))
-    except Exception as error:  # a constructor of somebody's component may raise anything
+    except Exception as error:  # the constructor of a user's component may raise anything
         raise Refused(f"system {options.system}: {explain_error(error)}") from None
 
 
 def _serve(stack: ExitStack, manager: Manager, options: _SystemOptions) -> None:
-    """Run until somebody stops it, then save."""
+    """Run until stopped, then save."""
     clock = ServingClock()
     runner = RealTime(manager, clock)
     control = SystemControl(manager, runner)

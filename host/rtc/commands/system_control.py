@@ -23,13 +23,13 @@ from tickrig.host.text.user_file import explain_error
 from tickrig.wire.instant import NEVER
 from tickrig.wire.rtc_types.idl import Struct
 
-# Ports of somebody who looks at a running system: they show values, and put values in.
+# Ports for observers of a running system: they display values, and inject values.
 
 HELD: Final = 1_000
 """So many values of a port are held; of more the oldest are lost."""
 
 LEASE_US: Final = 5_000_000
-"""An OutPort whose values nobody asked for this long is watched no more."""
+"""An OutPort whose values were not requested for this long is no longer watched."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,11 +154,11 @@ class _Runner(Protocol):
 
 
 class SystemControl(RequestDispatcher):
-    """Answers requests about one system; it must not be ticking meanwhile.
+    """Answers requests about one system; it must not tick during a request.
 
     Args:
         manager: the system.
-        runner: who runs it.
+        runner: runs the system.
     """
 
     def __init__(self, manager: Manager, runner: _Runner) -> None:

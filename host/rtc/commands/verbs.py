@@ -28,7 +28,7 @@ from tickrig.host.rtc.commands.request import (
 from tickrig.host.text.page_text import json_text
 from tickrig.host.text.values import format_time
 
-# Descriptions of components as people read them.
+# Descriptions of components as text.
 
 
 def _component_row(component: Any) -> str:
@@ -336,7 +336,7 @@ def inject(at: Path, port: str, value: str) -> None:
 
 @click.command("print")
 @click.argument("port", shell_complete=complete_port)
-@click.option("-n", "count", type=click.IntRange(1), help="End after so many values.")
+@click.option("-n", "count", type=click.IntRange(1), help="End after this many values.")
 @click.option("--for", "duration", metavar="TIME", help="End after this time, as 2s.")
 @click.option("--jsonl", "--json", "as_json", is_flag=True, help="One JSON object a value.")
 @at

@@ -169,7 +169,7 @@ def neighbour(places: Mapping[str, _Place], name: str, right: int, down: int) ->
 
 
 def _shown(name: str, width: int) -> str:
-    r"""Return a name as it is written into so many cells; a cut one ends with `…`.
+    r"""Return a name as it is written into `cells` cells; a cut one ends with `…`.
 
     >>> _shown("ロボット0", 6), _shown("a\x1b[1m\u0301b", 20)
     ('ロボ…', 'a␛[1m�b')
@@ -323,7 +323,7 @@ class _Layout:
         return cells
 
     def _is_dense(self, box: Box) -> bool:
-        """Say whether a box may have a port on each line: it has one side, across from no port."""
+        """Return whether a box may have a port on each line: it has one side, across from no port."""
         if box.ins and box.outs:
             return False
         row, column = self._cells[box.name]

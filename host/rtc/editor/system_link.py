@@ -14,7 +14,7 @@ from tickrig.host.control.client import ControlClient, ControlRefused
 from tickrig.host.control.requests import Object
 
 _PERIOD_S: Final = 0.2
-"""How often the system is described anew."""
+"""Interval at which the system is described again."""
 
 
 @dataclass(frozen=True, slots=True)

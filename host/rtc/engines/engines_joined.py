@@ -30,14 +30,14 @@ def engines_joined(
     """Join a system with others until the end.
 
     Args:
-        options: which engines, and how.
+        options: the engines and their settings.
         manager: of the system; it is not running yet.
-        attach: has the calls of other threads made in the one that runs the manager.
-        stop: ends the command, where a peer asks for that.
-        fixed: components come and go as the command decides: peers neither create nor end any.
+        attach: makes the calls of other threads run in the manager's thread.
+        stop: ends the command, if a peer requests that.
+        fixed: only the command creates and ends components, peers cannot.
 
     Raises:
-        Refused: an engine lacks its extra, or cannot be as it is asked for.
+        Refused: an engine lacks its extra, or does not support the options.
     """
     with ExitStack() as stack:
         calls = CallQueue()

@@ -255,7 +255,7 @@ class _OutPortConsumer(Protocol[_P_co]):
 
 
 class _InPortConnector(connector.Connector[T], Generic[T, P]):
-    """Decodes what comes from a peer; the first of what cannot be decoded is logged."""
+    """Decodes values from a peer; logs the first one that cannot be decoded."""
 
     def __init__(self, port: InPort[T], end: PeerEnd, codec: Codec[T, P], calls: CallQueue) -> None:
         push, flush = connector.DataflowType.PUSH, connector.SubscriptionType.FLUSH
@@ -329,12 +329,11 @@ class InPortPushConnector(_InPortConnector[T, P]):
 
 
 class _PulledBuffer(RingBuffer[T]):
-    """A ring buffer that asks for more as soon as it is empty.
+    """A ring buffer that requests more values as soon as it is empty.
 
     Args:
-        options: how it behaves.
-        request: called whenever somebody looks for a value that is not there, and after the
-            last one was read.
+        options: its settings.
+        request: called on each read of the empty buffer, and after the last value was read.
     """
 
     __slots__ = ("_request",)
@@ -443,24 +442,23 @@ class _InPortConsumer(Protocol[_P_contra]):
 class OutPortPushConnector(connector.Connector[Any], Generic[T, P]):
     """Pushes values from an OutPort to a peer, in the thread of that peer.
 
-    `write` encodes, and puts what passes into a buffer; nothing waits. A value that the peer
-    gave no answer to is put again after the time of the thread's `retry_s`, and the
-    buffer's policy holds meanwhile.
+    `write` encodes values and buffers them; it does not block. A value without an answer of the
+    peer is sent again after the thread's `retry_s`; until then the policy of the buffer applies.
 
     Args:
-        port: of ours.
-        end: what was agreed with the peer.
-        codec: makes what passes.
+        port: the local port.
+        end: the settings agreed with the peer.
+        codec: encodes the values.
         consumer: reaches the peer's InPort.
         thread: makes the calls.
 
     Attributes:
-        buffer: what waits for the peer; its `dropped` counts what was lost.
-        sent: values that the peer took.
-        refused: values that the peer did not take, as with a full buffer.
+        buffer: values for the peer; its `dropped` counts lost ones.
+        sent: number of values that the peer accepted.
+        refused: number of values that the peer refused, for example with a full buffer.
 
     Raises:
-        RtcRefused: the port has a connector of this ID, or properties that cannot be.
+        RtcRefused: the port has a connector with this ID, or the properties are not possible.
     """
 
     buffer: _SendBuffer[P]

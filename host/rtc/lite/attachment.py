@@ -60,23 +60,23 @@ _LOG: Final = log_of(__name__)
 
 @dataclass(slots=True)
 class Attachment:
-    """Sends the PINGs of a proxy, removes it when its device is lost, and looks for the device.
+    """Sends the PINGs of a proxy, removes it if its device is lost, and searches for the device.
 
-    The manager ticks it. A proxy that somebody else deletes ends it.
+    The manager ticks it. It ends if its proxy is deleted elsewhere.
 
     Attributes:
         manager: of the system.
         link: the line to the device; it stays open.
         base_name: of the proxy, without its number.
-        settings: waits, and whether the device is looked for.
+        settings: time limits, and whether to search for the device.
         listener: called with events.
-        context: execution context of the proxy; None for one of its own.
-        rate_hz: of its own one.
+        context: execution context of the proxy; None for its own.
+        rate_hz: rate of its own context.
         proxy: the latest one.
 
     Raises:
         RtcRefused: the device does not start up.
-        ValueError: a rate that no execution context can have.
+        ValueError: a rate that an execution context cannot have.
     """
 
     manager: Manager
@@ -128,7 +128,7 @@ class Attachment:
             self.manager.defer(lambda: self._remove(proxy))
 
     def _remove(self, proxy: RtcLiteProxy) -> None:
-        """Take a proxy out of the system (DECISION L15), unless somebody just did."""
+        """Remove a proxy from the system (DECISION L15), unless it was just removed."""
         if not proxy.alive:
             return
         self.manager.delete(proxy.instance_name)
@@ -205,11 +205,11 @@ def attach_lite(
         manager: of the system.
         word: `NAME=URL[@BAUD][,rtno][,boot=TIME]`; the proxy is `NAME0`.
         stack: closes the line.
-        boot_us: silence after the line was opened, unless the word has `boot`.
+        boot_us: pause after the line is opened, unless the word has `boot`.
         rate_hz: of the proxy; 10 Hz if None.
 
     Raises:
-        Refused: no such word, no such line, or nobody answers there.
+        Refused: the word or the line is invalid, or no device answers.
     """
     name, url, baud, settings = _parse_lite(word, boot_us)
     try:

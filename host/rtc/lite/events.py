@@ -59,21 +59,21 @@ class PingStatistics:
 
 @dataclass(slots=True)
 class PingMonitor:
-    """Counts PINGs. It sends nothing, and is told the time.
+    """Schedules and counts PINGs. It sends nothing, and has no clock.
 
-    A PING is due each `period_us` from `start` on, whatever else is on the line. One that is
-    sent late, as the line was not free, does not shift the next one; nor does a burst, and what
-    falls due inside a burst is part of it.
+    A PING is due each `period_us` from `start` on, regardless of other traffic. A PING delayed by a
+    busy line does not shift the next one. Neither does a burst, and PINGs that fall due inside a
+    burst are part of it.
 
     Args:
         period_us: from one PING to the next.
         wait_us: how long an answer may take.
-        most: so many unanswered ones in a row, and the device is lost.
+        most: number of unanswered PINGs in a row after which the device is lost.
 
     Attributes:
-        awaiting: a PING waits for its answer.
-        doubted: a reply is missing, and no PING was answered since.
-        lost: the device does not answer any more; it stays so.
+        awaiting: whether a PING waits for its answer.
+        doubted: whether a reply is missing and no PING was answered since.
+        lost: whether the device no longer answers; this is final.
     """
 
     period_us: int
@@ -218,11 +218,11 @@ class ProxyEvent:
 
 
 ProxyListener = Callable[[ProxyEvent], None]
-"""Told of events; what it raises is logged, and nothing else comes of it."""
+"""Called with events; an exception in it is logged and has no other effect."""
 
 
 def notify(listener: ProxyListener | None, event: ProxyEvent) -> None:
-    """Log an event, and tell whoever listens."""
+    """Log an event, and call the listener."""
     _LOG.info("%s", event)
 
     def listen() -> ReturnCode:

@@ -22,7 +22,7 @@ from tickrig.wire.rtc_lite.values import PORT_TYPES, LitePortType
 from tickrig.wire.rtc_types import rtc
 from tickrig.wire.rtc_types.rtc import Time
 
-# What is said before a proxy is an RT component: state, profile, execution context, initialize.
+# The dialogue before a proxy is an RT component: state, profile, execution context, initialize.
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,8 +186,8 @@ _PORTS_LOG: Final = log_of(__name__)
 class PortBridges:
     """The ports of a proxy, made from the profile of its device.
 
-    A value that does not fit the device, and data that fit no port, are logged
-    and dropped: they are no reason to stop.
+    A value that does not fit the device, and data that fit no port, are logged and dropped: they do
+    not stop the proxy.
 
     Args:
         ins: the in-ports of the device.
@@ -197,7 +197,7 @@ class PortBridges:
         dropped: how many values were dropped.
 
     Raises:
-        DeviceRefused: a port of a type that nobody knows.
+        DeviceRefused: a port has an unknown type.
     """
 
     def __init__(
@@ -266,25 +266,24 @@ _LOG: Final = log_of(__name__)
 
 
 class RtcLiteProxy(RtComponent):
-    """Stands for an RTC-Lite component (Suzuki et al., RSJ 2007).
+    """Represents an RTC-Lite component (Suzuki et al., RSJ 2007).
 
-    Each callback asks the device for the same, and waits for the reply in the
-    period itself, 100 ms at most: data that go in come out in the same period.
-    Somebody calls `tick` when `due_us` has come, so that PINGs are sent;
-    `attach` sees to that.
+    Each callback sends the same request to the device, and waits for the reply within the period,
+    100 ms at most: input data affect the output of the same period. Call `tick` at `due_us`, so
+    that PINGs are sent; `attach` does so.
 
-    Not emulated: service ports and configuration sets, which RTC-Lite has not.
+    Not emulated: service ports and configuration sets, which RTC-Lite does not have.
 
     Args:
         instance_name: unique in a system.
-        link: the line to the device. The time on its clock is the proxy's.
-        settings: waits and checksum.
+        link: the line to the device. Its clock is that of the proxy.
+        settings: time limits and checksum.
         listener: called with events.
 
     Attributes:
-        device: what the device says of itself; None before `on_initialize`.
+        device: the profile of the device; None before `on_initialize`.
         relays: its ports; there are none before `on_initialize`.
-        fatal_us: when the device was found to be lost; None as long as it is there.
+        fatal_us: when the device was lost; None while it answers.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec(
@@ -305,7 +304,7 @@ class RtcLiteProxy(RtComponent):
         self.relays = PortBridges()
         self.fatal_us: int | None = None
         self._failed = False  # a callback failed, so that Error comes next
-        self._unreported = False  # an error of which nobody knows whether it is a fatal one
+        self._unreported = False  # an error that may or may not be fatal
         self._mirrored = -1  # in which ten ticks its state was asked
         self._unanswered = 0  # how often in vain
         self._why: tuple[str, tuple[str, ...]] = "", ()  # it went to Error, and the last frames
@@ -317,7 +316,7 @@ class RtcLiteProxy(RtComponent):
 
     @property
     def device_state(self) -> LiteState | None:
-        """State of the device as it said last; None if nobody knows."""
+        """Last reported state of the device; None if unknown."""
         return self._channel.state
 
     @property
@@ -373,7 +372,7 @@ class RtcLiteProxy(RtComponent):
         return self._optional(LiteCommand.SHUTDOWN)
 
     def on_rate_changed(self, ec: ExecutionContext) -> ReturnCode:
-        """Give the nearest whole rate to a device that executes by its own timer."""
+        """Set the nearest whole rate in a device that executes by its own timer."""
         if not self._by_timer:
             return _OK
         rate_hz = min(max(1, round(ec.rate_hz)), _MAX_RATE_HZ)
@@ -404,7 +403,7 @@ class RtcLiteProxy(RtComponent):
         """Let the device follow into Error, if it is not there."""
         self._unreported = self.fatal_us is None
         if self._unreported:
-            self._why = self._channel.trouble or "it was told to abort", self._channel.frames
+            self._why = self._channel.trouble or "it was commanded to abort", self._channel.frames
         self._notify_passive()
         return self._follow()
 
@@ -446,7 +445,7 @@ class RtcLiteProxy(RtComponent):
         return _OK
 
     def _known_state(self) -> LiteState | None:
-        """Return the state of the device; ask for it if nobody knows."""
+        """Return the state of the device; request it if it is unknown."""
         if self._channel.state is None:
             self._channel.request(LiteCommand.STATE)
         return self._channel.state
@@ -486,7 +485,7 @@ class RtcLiteProxy(RtComponent):
             self.relays.give(at_us, data)
 
     def _notify_passive(self) -> None:
-        """Tell of an error once it is known that the device is there."""
+        """Report an error once it is known that the device answers."""
         if self._unreported and not self._channel.ping_monitor.doubted:
             self._unreported = False
             self._notify(events.ProxyEventType.PASSIVE_ERROR)

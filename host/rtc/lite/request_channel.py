@@ -26,19 +26,19 @@ from tickrig.wire.rtc_lite.rtno import LETTERS, RtnoReplies, encode_request
 
 @dataclass(frozen=True, slots=True)
 class ProxySettings:
-    """How a proxy talks to its device, and what becomes of it when the device is lost.
+    """How a proxy talks to its device, and what happens if the device is lost.
 
     Attributes:
         framing: frames of RTC-Lite, or packets of RTno (bridge mode).
-        checksum: how frames are summed up (DECISION L5); packets of RTno always by `sum8`.
-        boot_us: silence after the link was opened; 3 s for boards that an open port resets.
+        checksum: checksum of frames (DECISION L5); packets of RTno always use `sum8`.
+        boot_us: pause after the link was opened; 3 s for boards that reset when the port is opened.
         reply_us: how long a reply may take, 1 us or more (DECISION L13).
-        ping_period_us: from one PING to the next, whatever else is on the line, 1 us or more
+        ping_period_us: from one PING to the next, regardless of other traffic, 1 us or more
             (DECISION L14).
-        pings: how many are unanswered when a device is lost, 1 or more.
+        pings: number of unanswered PINGs after which a device is lost, 1 or more.
         linger_us: how long a proxy stays in Error after that (DECISION L15).
-        rediscover: whether the device is looked for afterwards.
-        search_period_us: how often, 1 us or more.
+        rediscover: whether to search for the device afterwards.
+        search_period_us: interval of the search, 1 us or more.
 
     Raises:
         ValueError: a number that is too small, or another sum for packets of RTno.
@@ -55,7 +55,7 @@ class ProxySettings:
     search_period_us: int = 1_000_000
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be."""
+        """Refuse invalid settings."""
         if self.framing is Framing.RTNO and self.checksum is not Checksum.SUM8:
             raise ValueError(f"checksum is {self.checksum}, packets of RTno have sum8")
         at_least = {"boot_us": 0, "linger_us": 0}
@@ -102,13 +102,13 @@ class _ReplyDecoder(Protocol):
 class _FrameLink:
     """A `Link[LiteFrame]`, one way requests, the other way replies.
 
-    A line that is gone is as silent as a device without power. What is no
-    frame is left out; after an unknown command the next header is looked for
-    at once, as the checksum tells what is a frame.
+    A line that is gone behaves like a device without power. Bytes that are not a frame are skipped;
+    after an unknown command the search for the next header starts at once, because the checksum
+    identifies a frame.
 
     Args:
         link: the line.
-        encode: writes a request.
+        encode: encodes a request.
         decoder: reads the replies.
 
     Attributes:
@@ -142,7 +142,7 @@ class _FrameLink:
         try:
             data = self._link.receive(timeout_us)
         except LinkError as error:
-            _FRAMES_LOG.debug("not heard: %s", error)
+            _FRAMES_LOG.debug("not received: %s", error)
             return None
         if data:
             self._byte_us = self.now_us
@@ -159,9 +159,9 @@ class _FrameLink:
 
 
 class _RtnoLink(_FrameLink):
-    """Says what RTno has a letter for, and makes up for the rest.
+    """Sends what RTno has a letter for, and replaces the rest.
 
-    | asked for | said instead |
+    | request | replacement |
     |---|---|
     | PING | `X`, the state; its answer is that to the PING, too |
     | abort | `D`, deactivate: the device is Inactive then, and only its proxy in Error |
@@ -210,7 +210,7 @@ class _RtnoLink(_FrameLink):
 
 
 POLL_US: Final = 1_000
-"""How often the answer to a PING is looked for."""
+"""Polling interval for the answer to a PING."""
 
 _PROFILE_US: Final = 10_000_000
 """How long all frames of a profile may take (RTnoProxy)."""
@@ -237,25 +237,24 @@ _LOG: Final = log_of(__name__)
 
 
 class RequestChannel:
-    """What a proxy says and hears.
+    """The requests of a proxy, and their replies.
 
-    `request` waits for a reply, for `reply_us` at most. A reply that does not come
-    begins a burst of PINGs, which nobody waits for: `tick` goes on with it.
-    While it lasts, and after a device was lost, nothing else is sent. As the
-    device answers in order, an answered PING also means that no late reply is
-    on its way.
+    `request` waits for a reply, for `reply_us` at most. A missing reply starts a burst of PINGs,
+    which does not block: `tick` continues it. While it lasts, and after a device was lost, nothing
+    else is sent. The device answers in order, so an answered PING also means that no late reply can
+    follow.
 
     Args:
         link: the line to the device.
-        settings: how long to wait, how to sum up.
+        settings: time limits and checksum.
 
     Attributes:
-        ping_monitor: counts the PINGs.
-        state: of the device, as far as its replies tell; None if nobody knows.
+        ping_monitor: schedules and counts the PINGs.
+        state: state of the device according to its replies; None if unknown.
         pushed: data of out-ports, not yet taken, with the time at which they arrived.
-        in_ports: in-ports that the device has described.
-        out_ports: out-ports that it has described.
-        trouble: why the last request was not done, empty if it was.
+        in_ports: in-ports that the device described.
+        out_ports: out-ports that it described.
+        trouble: why the last request failed, empty if it succeeded.
     """
 
     def __init__(self, link: Link[bytes], settings: ProxySettings) -> None:
@@ -337,7 +336,7 @@ class RequestChannel:
         self._receive(0)
 
     def listen(self, duration_us: int) -> None:
-        """Take what arrives meanwhile."""
+        """Process frames that arrive."""
         until_us = self.now_us + duration_us
         while self.now_us < until_us and self._receive(until_us - self.now_us):
             continue
@@ -355,7 +354,7 @@ class RequestChannel:
 
     def _exchange(self, command: codes.LiteCommand, data: bytes = b"") -> messages.LiteReply | None:
         """Send a request and wait for its reply."""
-        self.poll()  # what nobody waits for any more
+        self.poll()  # late replies
         self._awaited, self._reply = command, None
         self.in_ports, self.out_ports = [], []
         if command in WITH_STATE:

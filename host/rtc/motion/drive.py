@@ -67,19 +67,19 @@ def drive(
     watch: OnSample = lambda sample: None,
     timeout_us: int | None = None,
 ) -> MotionRun:
-    """Let a cart go to a goal, or along a path of several points.
+    """Drive a cart to a goal, or along a path of several points.
 
     It ends half a second after the goal is reached, when a component is in Error, or with
     the time-out.
 
     Args:
-        connection: its components are active.
+        connection: connection to the cart, with active components.
         points: one is a goal.
         watch: called with each sample.
-        timeout_us: when to give up; three times the least time and half a minute if left out.
+        timeout_us: time limit; by default three times the shortest time and half a minute.
 
     Raises:
-        ValueError: no point, or a number that is none.
+        ValueError: no point, or an invalid number.
     """
     entered, start_us = connection.chain.position_input, connection.now_us
     finished = entered.finished

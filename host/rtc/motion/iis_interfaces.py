@@ -209,11 +209,11 @@ class RunningInformation(RtComponent):
 
 
 class GoalInterface(RtComponent):
-    """Takes goals as IIS has them: the first pose counts, no pose clears the goal.
+    """Accepts goals as IIS defines them: the first pose counts, an empty list clears the goal.
 
-    A new goal takes the place of the old one. A cleared goal becomes an empty path, so the
-    cart stops on the spot, as IIS recommends. A goal with a number that is none is passed
-    over. Join `position` with OmniTo2WD.goal and `min_path` with Navigation.min_path.
+    A new goal replaces the old one. A cleared goal becomes an empty path, so the
+    cart stops on the spot, as IIS recommends. A goal with an invalid number is ignored. Join
+    `position` with OmniTo2WD.goal and `min_path` with Navigation.min_path.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("GoalInterface", "IIS goals for RH3")
@@ -263,11 +263,11 @@ class _WayPoint(NamedTuple):
 
 
 class PathInterface(RtComponent):
-    """Tracks paths as IIS has them, and reports which way points were passed.
+    """Follows paths as IIS defines them, and reports passed way points.
 
     | rule | here |
     |---|---|
-    | a new list takes the place of the old one | without a stop, from where the cart is |
+    | a new list replaces the old one | without a stop, from where the cart is |
     | no way point | the cart stops on the spot |
     | the first is the start | one alone does not move: the cart stops |
     | speeds | vx holds on the line to its way point; `max_vel` at most, and for none or 0 |
@@ -275,9 +275,9 @@ class PathInterface(RtComponent):
     | running state | each way point when it is passed, the last once more with `STOPPED` |
 
     Lines are straight, with turns on the spot between them. The headings of all but the last,
-    vy and va are not obeyed; IIS allows that. A list with a number that is none is passed
-    over. It stands in the place of OmniTo2WD and Navigation: join `target_path` with
-    PathFollower.target_path, whose set should be `tuned`.
+    vy and va are not obeyed; IIS allows that. A list with an invalid number is ignored. It replaces
+    OmniTo2WD and Navigation: join `target_path` with PathFollower.target_path, whose set should be
+    `tuned`.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("PathInterface", "IIS paths for RH3")

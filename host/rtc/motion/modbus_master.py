@@ -89,7 +89,7 @@ class ModbusMaster:
         return answer
 
     def close(self) -> None:
-        """Give the line back."""
+        """Release the line."""
         self._link.close()
 
     def _send(self, request: modbus.Request) -> None:

@@ -15,7 +15,7 @@ FARTHEST_M: Final = 1_000
 
 
 def within_reach(goal: Pose) -> bool:
-    """Return whether a goal is so near that somebody may mean it."""
+    """Return whether a goal is near enough to be plausible."""
     return goal.distance(Pose()) <= FARTHEST_M
 
 

@@ -40,7 +40,7 @@ class Umbmark:
         return max(hypot(*_centre(self.clockwise)), hypot(*_centre(self.counter_clockwise)))
 
     def corrected(self, wheels: Wheels, side_m: float = SIDE_M) -> Wheels:
-        """Return the geometry that makes up for the errors; the mean radius stays."""
+        """Return the geometry that compensates the errors; the mean radius stays."""
         (x_cw, _), (x_ccw, _) = _centre(self.clockwise), _centre(self.counter_clockwise)
         alpha = (x_cw + x_ccw) / (-4 * side_m)
         beta = (x_cw - x_ccw) / (-4 * side_m)

@@ -128,7 +128,7 @@ class _Reader:
         try:
             return default if text is None else convert(text)
         except ValueError:
-            raise RtcRefused(f"dataport.{key}: {text!r} is none of: {allowed}") from None
+            raise RtcRefused(f"dataport.{key}: {text!r} is not one of: {allowed}") from None
 
     def word(self, key: str, default: E) -> E:
         return self.value(key, default, type(default), ", ".join(type(default)))

@@ -1,7 +1,7 @@
-"""Values of ports as people write them: JSON, of which nothing is evaluated.
+"""Values of ports as text: JSON, which is parsed without evaluating code.
 
-A struct is an object with its fields; what is no object with `data` stands
-for the `data` of a struct that has a time, and the time is the present:
+A struct is an object with its fields; any other value stands for the `data` of a struct with a
+time, which is set to the current time:
 
 >>> from tickrig.wire.rtc_types.rtc import TimedLong
 >>> read_literal(TimedLong, 5, now_us=1_500_000)

@@ -94,7 +94,7 @@ class ServiceConnector(port.ConnectorBase):
         self._pairs = pairs
 
     def begin(self) -> None:
-        """Give the consumers their providers, then notify the listeners of both ports."""
+        """Connect the consumers with their providers, then notify the listeners of both ports."""
         for consumer, provider in self._pairs:
             consumer.take(provider)
         super().begin()

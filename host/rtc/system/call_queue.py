@@ -1,4 +1,4 @@
-"""What peers brought, let in at each tick: nobody wakes the manager's thread for it."""
+"""Calls from peers, executed at each tick without waking the manager's thread."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tickrig.host.rtc.states import ReturnCode, RtcRefused
 from tickrig.host.text.log import log_of
 from tickrig.wire.instant import NEVER
 
-# Calls of other threads, made in the thread that runs a manager: nobody else touches it.
+# Calls of other threads, executed in the thread of the manager: no other thread may touch it.
 
 _R = TypeVar("_R")
 
@@ -84,7 +84,7 @@ class CallQueue:
         self._enter((None, function))
 
     def make(self) -> None:
-        """Make the calls that wait now; those that come meanwhile wait for the next time."""
+        """Execute the waiting calls; calls added during this time wait for the next call."""
         self._owner = threading.get_ident()
         for future, function in self._taken():
             if future is None:
@@ -135,7 +135,7 @@ def _ended() -> RtcRefused:
 def _logged(function: Callable[[], object]) -> None:
     try:
         function()
-    except Exception:  # whoever posted it is gone; the others go on
+    except Exception:  # the caller is gone; continue with the others
         _LOG.exception("a call from another thread raised")
 
 
@@ -149,13 +149,13 @@ def _fulfil(future: Future[_R], function: Callable[[], _R]) -> None:
 
 
 class Arrivals:
-    """Calls that are made at the begin of the next tick; an item of a schedule.
+    """Calls executed at the beginning of the next tick; an item of a schedule.
 
-    Nobody looks at a value before the next tick; to wake the thread of the manager for each would
-    take three times the processor time.
+    No code reads a value before the next tick; waking the manager's thread for each would take
+    three times the processor time.
 
     Attributes:
-        due_us: it makes no tick come earlier.
+        due_us: never; it does not make a tick earlier.
     """
 
     due_us: Final = NEVER
@@ -168,6 +168,6 @@ class Arrivals:
         self._calls.append(call)
 
     def tick(self, now_us: int, /) -> None:
-        """Make the calls that wait; those that come meanwhile, too."""
+        """Execute the waiting calls, and those added during this time."""
         while self._calls:
             self._calls.popleft()()

@@ -191,10 +191,10 @@ DEFAULT_RATE_HZ: Final = 1_000.0
 class Manager(Schedule):
     """Creates components, names them, joins their ports and runs them (OpenRTM-aist 1.x, Manager).
 
-    It has no clock: `run_for` and `run_to` pass virtual time, in us; in real time somebody
-    waits for `due_us` and calls `tick` (`RealTime`).
+    It has no clock: `run_for` and `run_to` pass virtual time, in us; in real time `RealTime` waits
+    for `due_us` and calls `tick`.
 
-    Not emulated: loading of modules from files, and managers that command others. Component
+    Not emulated: loading of modules from files, and master managers. Component
     types are registered, or found by the name that an installed package gives them.
 
     Args:
@@ -202,8 +202,7 @@ class Manager(Schedule):
 
     Attributes:
         names: its components, such as `localhost/ConsoleIn0.rtc`.
-        path_uris: by instance name, where a name server of others has components; RTSProfiles
-            say so.
+        path_uris: by instance name, paths of components in other name servers, from RTSProfiles.
         remotes: components that run elsewhere, which an engine joins with those here.
         on_added: called with each component that is added, once it has its name.
         on_removed: called with each component that ended, once its name is free.
@@ -324,7 +323,7 @@ class Manager(Schedule):
         self.defer(lambda: self._end(component))
 
     def find(self, name: str) -> RtComponent:
-        """Look a component up.
+        """Find a component.
 
         Args:
             name: its instance name or path, as `ConsoleIn0` or `localhost/ConsoleIn0.rtc`.
@@ -333,7 +332,7 @@ class Manager(Schedule):
             The component.
 
         Raises:
-            RtcRefused: there is none of that name.
+            RtcRefused: there is no component with that name.
         """
         if "/" in name:
             return self.names.resolve(name)
@@ -536,7 +535,7 @@ class Manager(Schedule):
                 raise RtcRefused(f"{what} {name}: {code.name}, it is {state}", code)
 
     def _end(self, component: RtComponent) -> None:
-        """End a component, unless that happened meanwhile."""
+        """End a component, unless it has already ended."""
         name = component.instance_name
         if self._components.get(name) is component:
             contexts = tuple(component.own_contexts)

@@ -1,4 +1,4 @@
-"""Threads for the calls of many connectors into peers: one does, until somebody hangs."""
+"""Threads that call peers for many connectors: one thread, until a peer hangs."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from typing import Final, Protocol
 from tickrig.host.links.ready import WaitingQueue
 from tickrig.host.text.log import log_of
 
-# A thread for the calls into one peer: whoever hangs there delays nobody else.
+# A thread for the calls into one peer: a peer that hangs delays no other.
 
 _PeerCall = Callable[[], float | None]
 """Returns after how many seconds it wants to be made again, None if it does not."""
@@ -28,16 +28,16 @@ class _CallingThread(threading.Thread):
     """The thread of a `PeerThread`; it does not keep the process alive.
 
     Attributes:
-        ending: it was told to end, and does after its present call.
+        ending: whether it ends after its current call.
     """
 
     ending = False
 
 
 def calls_run() -> bool:
-    """Return whether a thread that was told to end still makes a call.
+    """Return whether a thread that should end is still in a call.
 
-    A process that ends in the middle of one may abort, or never end: the call is in code of C++.
+    A process that ends during a call may abort or hang: the call is in C++ code.
     """
     threads = threading.enumerate()
     return any(isinstance(thread, _CallingThread) and thread.ending for thread in threads)
@@ -103,11 +103,11 @@ class PeerThread:
 
 
 _PATIENCE_S: Final = 0.005
-"""Nobody waits longer for another one's call; then there is one thread more."""
+"""The longest wait for the call of another connector; then a further thread starts."""
 
 _LANES: Final = 2
-"""So many threads make calls that are answered: two hide that each answer wakes somebody up, and
-more than that wait for each other."""
+"""Number of threads for calls that are answered: two hide the wake-up time of each answer, and more
+than two wait for each other."""
 
 _IDLE_S: Final = 5.0
 """So long a thread waits for something to do; who hangs is called again each second."""

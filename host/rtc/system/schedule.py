@@ -22,12 +22,11 @@ class ScheduledItem(Protocol):
 
 
 class Schedule:
-    """Runs what is due. It has no clock: `tick` takes the time.
+    """Executes due items. It has no clock: `tick` takes the time.
 
-    In one tick other items go on first, then the execution contexts run in the
-    order in which they were added, then connectors push, then what was deferred
-    is called. In virtual time `run_to` ticks; in real time somebody else waits
-    for `due_us` and ticks.
+    In one tick other items run first, then the execution contexts in the order in which they were
+    added, then connectors push, then deferred calls run. In virtual time `run_to` ticks; in real
+    time `RealTime` waits for `due_us` and ticks.
 
     Attributes:
         now_us: the time of the latest tick, in us.
@@ -127,13 +126,13 @@ class Schedule:
             self._publishing.append(connector)
 
 
-# A schedule in real time: somebody waits for what is due, and ticks.
+# A schedule in real time: wait until an item is due, then tick.
 
 LATE_US: Final = 1_000
 """A tick that begins later than this counts as late."""
 
 PAUSE_US: Final = 20_000
-"""The longest wait: so soon something is noticed that came to be due meanwhile, or a stop."""
+"""The longest wait, so that items that become due earlier, or a stop, are noticed."""
 
 
 class Clock(Protocol):
@@ -145,20 +144,20 @@ class Clock(Protocol):
 
 
 class RealTime:
-    """Runs a schedule by a clock; what is late is made up for, no period is skipped.
+    """Runs a schedule by a clock; late periods are caught up, none is skipped.
 
     Periods that are late run one after the other, each with the time at which
-    it was due. A system that always takes longer than its periods falls behind
-    for good, and `worst_late_us` says so.
+    it was due. A system that always takes longer than its periods falls behind more and more, as
+    `worst_late_us` shows.
 
     Args:
-        schedule: what is run, from its present on.
-        clock: waits, and may serve somebody meanwhile.
+        schedule: the schedule, from its current time on.
+        clock: waits, and may serve clients while it waits.
 
     Attributes:
         running: False once `stop` was called.
-        late_ticks: how many ticks began more than `LATE_US` late.
-        worst_late_us: by how much the worst of them was late.
+        late_ticks: number of ticks that began more than `LATE_US` late.
+        worst_late_us: the largest delay of a tick.
         after_tick: called with the time in us after each tick.
     """
 
@@ -169,7 +168,7 @@ class RealTime:
         self.after_tick: list[Callable[[int], None]] = []
 
     def run(self) -> None:
-        """Run until somebody calls `stop`: a callback, a listener, or what the clock serves."""
+        """Run until `stop` is called: by a callback, a listener, or a client of the clock."""
         while self.running:
             self.step()
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Generic, Protocol, TypeVar
 
-# Where information about ucodes comes from, later than it is asked for.
+# Asynchronous sources of information about ucodes.
 
 
 class SourceStatus(Enum):
@@ -16,7 +16,7 @@ class SourceStatus(Enum):
 
     FOUND = "found"
     UNKNOWN = "unknown"  # there is nothing under this address
-    FAILED = "failed"  # no answer, or one that is none
+    FAILED = "failed"  # no answer, or an invalid one
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +48,7 @@ class Source(Protocol):
         ...
 
     def close(self) -> None:
-        """End; what is asked for then never comes."""
+        """End; pending requests get no answer."""
 
 
 OpenSource = Callable[[str, tuple[str, ...]], Source]
@@ -60,14 +60,14 @@ _V = TypeVar("_V")
 
 @dataclass(frozen=True, slots=True)
 class CacheLimits:
-    """How much a cache holds, and for how long.
+    """Size of a cache, and life times of its entries.
 
     Attributes:
-        entries: at most so many; the one that was not used for the longest time goes first.
-        fresh_us: an entry that is older is asked for again, and serves meanwhile.
-        keep_us: an entry that is older serves no more.
-        unknown_us: so long what is not there is not asked for again.
-        retry_us: so long after a request that failed.
+        entries: largest number of entries; the least recently used one is removed first.
+        fresh_us: an older entry is requested again; until the answer it remains in use.
+        keep_us: an older entry is not used.
+        unknown_us: time before an unknown ucode is requested again.
+        retry_us: time before a failed request is repeated.
     """
 
     entries: int

@@ -36,16 +36,16 @@ class Contents:
 
 
 class ContentsInterpretation(Lookup[Contents]):
-    """Reads the information of places: where they are, and what they are like.
+    """Reads the information about places: position and properties.
 
     Ports: `addresses` in, as `UcodeSettlement` writes them; out `position`, a point for each
     ucode, in m, and `place`: its ucode, then `name=value` of each property. The information
-    is a JSON object with the numbers `x_m` and `y_m`; all else in it are properties. The report
-    (Fig. 123) names it and its cache; all else is ours.
+    is a JSON object with the numbers `x_m` and `y_m`; its other members are properties. The report
+    (Fig. 123) names the component and its cache; the rest is an addition.
 
     Args:
         instance_name: of the component.
-        open_source: makes what gets the information; HTTP unless given.
+        open_source: creates the source of the information; HTTP by default.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec(

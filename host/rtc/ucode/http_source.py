@@ -20,14 +20,14 @@ MOST_OCTETS: Final = 8_192
 
 
 class HttpSource:
-    """Asks by GET, one request after the other, in a thread; a service that hangs delays nobody.
+    """Sends GET requests one after the other, in a thread: a service that hangs does not block.
 
-    An answer takes a second at most, however it comes, and has 8192 octets at most. Nobody is
-    asked but the hosts that are named, redirections are not followed, and there is no HTTPS.
+    An answer may take one second and have 8192 octets at most. Only the named hosts get requests,
+    redirections are not followed, and HTTPS is not supported.
 
     Args:
-        name: who asks; for people.
-        hosts: that addresses may name.
+        name: name of the client, for messages.
+        hosts: the allowed hosts.
         timeout_s: for a whole answer.
     """
 

@@ -85,7 +85,7 @@ class UcodeReaderClient:
         return rounds
 
     def close(self) -> None:
-        """Let it listen no more, and give the line back."""
+        """Stop listening, and release the line."""
         self._link.send(b"\nOFF\n")
         self._link.close()
 

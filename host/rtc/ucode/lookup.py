@@ -31,25 +31,25 @@ class WantedUcode(NamedTuple):
 
 
 class Lookup(RtComponent, Generic[_V]):
-    """Finds something for each ucode that arrives: in its cache, else at a service.
+    """Looks up each ucode that arrives: in its cache, else in a service.
 
-    No period waits for the service. What is found later is written later, with the time at
-    which the ucode arrived. An entry older than `fresh` is asked for again, and serves
-    meanwhile; up to `keep` it serves while the service does not answer. The cache is in memory: it
-    outlives Inactive and Error, not the component.
+    No period waits for the service. A later result is written later, with the time at which the
+    ucode arrived. An entry older than `fresh` is requested again and remains in use, up to `keep`
+    while the service does not answer. The cache is in memory: it survives Inactive and Error, not
+    the component.
 
-    After each look-up and each answer the port `cache` tells hits, hits that were not fresh,
+    After each look-up and each answer the port `cache` gives hits, hits that were not fresh,
     misses, misses of what is unknown to the service, requests that failed, entries, and the age
     in ms of the entry that answered last.
 
     Args:
         instance_name: of the component.
         in_port: name of its InPort.
-        cache: of what is found.
-        open_source: makes what asks the service.
+        cache: settings of the cache.
+        open_source: creates the client of the service.
 
     Attributes:
-        cache: what was found.
+        cache: the cached results.
     """
 
     def __init__(
@@ -76,7 +76,7 @@ class Lookup(RtComponent, Generic[_V]):
 
     @abstractmethod
     def _wanted(self, value: TimedStringSeq) -> Iterable[WantedUcode]:
-        """Say what is wanted for a value that arrived."""
+        """Return the request for a value that arrived."""
 
     @abstractmethod
     def _write(self, found: list[tuple[WantedUcode, _V]]) -> None:

@@ -23,15 +23,16 @@ class UcodeSettlement(Lookup[str]):
     """Resolves ucodes to the addresses of their information, at a resolution service.
 
     Ports: `ucodes` in; `addresses` out: a ucode, its address, a ucode, its address, ... Under
-    `SERVICE/ucodes/UCODE` the service has the address as text. What is no ucode is counted
-    in `invalid_ucodes`. The report (Fig. 123) names it and its cache; all else is ours.
+    `SERVICE/ucodes/UCODE` the service has the address as text. Invalid ucodes are counted in
+    `invalid_ucodes`. The report (Fig. 123) names the component and its cache; the rest is an
+    addition.
 
     Args:
         instance_name: of the component.
-        open_source: makes what asks the service; HTTP unless given.
+        open_source: creates the client of the service; HTTP by default.
 
     Attributes:
-        invalid_ucodes: words that arrived and are none.
+        invalid_ucodes: number of invalid words that arrived.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("UcodeSettlement", "Addresses of ucodes, cached")

@@ -87,7 +87,7 @@ PDO: Final = "{:<9} {:<9} {:<5} {}"
 
 
 def _summary(profile: rtc_canopen.RtcProfile, *, every: bool = False) -> Iterator[str]:
-    """Give the lines: objects of the ports, or `every` object, then the PDOs."""
+    """Return the lines: objects of the ports, or `every` object, then the PDOs."""
     rows = [
         row
         for row in rtc_canopen.object_table(profile)

@@ -32,7 +32,7 @@ _C_KEYWORDS: Final = frozenset(
         *("delete", "new", "operator", "private", "public", "template", "this", "throw", "virtual"),
     )
 )
-"""Words that C keeps for itself, and those of C++ that somebody might call a port."""
+"""Reserved words of C, and those of C++ that may occur as names of ports."""
 
 COMPONENT_NAMES: Final = frozenset(
     (

@@ -39,12 +39,12 @@ _NOT_HERE: Final = ("create", "delete", "save")
 
 
 class ServerControl(SystemControl):
-    """Answers requests about one server: those of a system, and of its nodes by node-ID.
+    """Answers requests about one server: those for a system, and those for its nodes by node-ID.
 
     Args:
-        server: what is controlled. It must not be ticking meanwhile.
-        runner: who runs it.
-        bus: how the bus is called.
+        server: the server; it must not tick during a request.
+        runner: runs the server.
+        bus: name of the bus.
     """
 
     def __init__(self, server: RtcCanopenServer, runner: ServerRunner, bus: str) -> None:
@@ -88,9 +88,9 @@ STANDARD_OUTPUT: Final = Path("-")
 
 
 def read_server(file: Path, components: Sequence[str]) -> RtcCanopenServer:
-    """Make the server of a System Definition, with components; Refused if one cannot be used.
+    """Make the server of a System Definition, with components; Refused if one is not usable.
 
-    What is wrong in its EDS files, and not used, is told on standard error.
+    Findings in its EDS files that do not matter for it are printed to standard error.
     """
     try:
         server = open_server(file)

@@ -57,7 +57,7 @@ _GOOD: Final = (
 
 
 def _event_lines(event: ServerEvent, width: int) -> list[Line]:
-    """Return an event as lines of so many columns, which cut no word."""
+    """Return an event as lines of at most `width` columns, wrapped between words."""
     at, _, rest = str(event).partition(" ")
     style = "" if event.kind in _GOOD else _ALARM
     stamps = chain([f"{at:>{_STAMP}} "], repeat(" " * (_STAMP + 1)))
@@ -94,11 +94,11 @@ _ASK: Final[dict[str, Callable[[ServerView, str], None]]] = {
 
 
 class SystemEditor(FramedApp):
-    """Shows a server and commands it by keys and mouse.
+    """Shows a server and controls it by keys and mouse.
 
     Args:
-        session: the server; it is started by whoever runs the app.
-        bus: how the bus is called.
+        session: the server; the caller of the app starts it.
+        bus: name of the bus.
     """
 
     TITLE = "RTC-CANopen System Editor"
@@ -337,7 +337,7 @@ class SystemEditor(FramedApp):
         self.push_screen(QuestionScreen(text, str(self.session.path)), answered)
 
     def _command(self, command: _Command) -> bool:
-        """Give the server a command; if it is refused, say why."""
+        """Send a command to the server; if it refuses, show the reason."""
 
         def give() -> None:
             with self.session.lock:

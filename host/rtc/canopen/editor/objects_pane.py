@@ -38,18 +38,18 @@ _ObjectRow = CursorRow[Entry]
 
 
 class _NodeObjects:
-    """Reads objects of a node by SDO while somebody looks, and writes them.
+    """Reads the visible objects of a node by SDO, and writes them.
 
-    Each is read once when it comes into view; if it is live, again and again.
-    One that could not be read is not asked for again until somebody wants it.
+    Each is read once when it becomes visible, or repeatedly if the pane is live. An object that
+    could not be read is read again only on request.
 
     Args:
         node_id: the node.
-        eds: what its EDS says.
+        eds: the content of its EDS.
 
     Attributes:
         node_id: the node.
-        live: those in view are read again and again.
+        live: whether visible objects are read repeatedly.
     """
 
     def __init__(self, node_id: int, eds: EdsObjects) -> None:
@@ -71,12 +71,12 @@ class _NodeObjects:
         return [self._kept_row(entry, text) for entry, text in texts if entry[0] >= _FIRST_INDEX]
 
     def look(self, view: ServerView, seen: Collection[Entry], *, answers: bool) -> None:
-        """Take what has come, and ask for what is missing.
+        """Process results, and request missing values.
 
         Args:
-            view: commands the server.
-            seen: the objects that somebody looks at.
-            answers: the node answers SDO requests.
+            view: sends commands to the server.
+            seen: the visible objects.
+            answers: whether the node answers SDO requests.
         """
         self._take_written()
         for entry, transfer in tuple(self._reading.items()):
@@ -115,13 +115,13 @@ class _NodeObjects:
         return "" if data is None else _words_of(self.text_of(entry), data)
 
     def forget(self) -> None:
-        """Forget all values: the node has begun anew."""
+        """Drop all values: the node has started again."""
         self._values.clear()
         self._problems.clear()
         self._changed.clear()
 
     def _due(self, seen: Collection[Entry]) -> list[Entry]:
-        """Return what is to be read of what somebody looks at, the oldest first."""
+        """Return the visible objects to read, the oldest value first."""
         due = [
             entry
             for entry in seen
@@ -151,7 +151,7 @@ class _NodeObjects:
                 self.read(entry)
 
     def _kept_row(self, entry: Entry, text: ObjectText) -> _ObjectRow:
-        """Return the row of an object, written anew if something changed."""
+        """Return the row of an object, formatted again if something changed."""
         known = self._values.get(entry), self._problems.get(entry), entry in self._changed
         kept = self._rows.get(entry)
         if kept is None or kept[0] != known:
@@ -179,7 +179,7 @@ def _tail(name: str) -> str:
 
 
 def _encode_words(text: ObjectText, words: str) -> bytes:
-    """Return the bytes of a value as an EDS writes it; ValueError if it is none of its type.
+    """Return the bytes of a value in EDS notation; ValueError if it does not fit its type.
 
     >>> _encode_words(ObjectText("mode", DataType.INTEGER8), "-2").hex()
     'fe'
@@ -226,7 +226,7 @@ class ObjectsPane(CursorView[Entry]):
         self.forget()
 
     def forget(self) -> None:
-        """Begin anew, with another system."""
+        """Start with another system."""
         self.objects: _NodeObjects | None = None
         self._of: dict[int, _NodeObjects] = {}
 
@@ -237,7 +237,7 @@ class ObjectsPane(CursorView[Entry]):
         self.objects = self._of.get(node_id)
 
     def look(self, view: ServerView) -> None:
-        """Read those in view; the server waits meanwhile."""
+        """Read the visible objects; the server waits during this time."""
         if (objects := self.objects) is None:
             self.title = "objects"
             return

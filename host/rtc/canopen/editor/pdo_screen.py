@@ -473,7 +473,7 @@ class PdoScreen(ModalScreen[None]):
 
     def _change(self, index: int, change: Callable[[PdoDescription], PdoDescription]) -> None:
         """Change a PDO here; the node has it when it is written."""
-        if index not in self.pdos:  # read anew meanwhile
+        if index not in self.pdos:  # removed by a later read
             return
         try:
             pdo = change(self.wanted.get(index, self.pdos[index]))

@@ -1,4 +1,4 @@
-"""A server that runs in a thread while somebody looks at it."""
+"""A server that runs in a thread while a user interface displays it."""
 
 from __future__ import annotations
 
@@ -24,20 +24,20 @@ AddComponents = Callable[[RtcCanopenServer], None]
 
 
 class EditorSession:
-    """Runs the server of a System Definition; another definition is another server.
+    """Runs the server of a System Definition; another definition needs another server.
 
-    Whoever looks at it or commands it holds `lock`.
+    Hold `lock` to access the server.
 
     Args:
         server: the server.
         path: its System Definition.
         link: the bus.
-        add_components: puts more components into each server that is loaded.
+        add_components: adds components to each server that is loaded.
         listeners: called with the events of each server.
 
     Attributes:
         lock: of the server.
-        path: where the System Definition was read or saved last.
+        path: where the System Definition was last read or saved.
         server: the server.
     """
 
@@ -99,7 +99,7 @@ class EditorSession:
         self.server.bus_state(state)
 
     def turn(self, until_us: int) -> None:
-        """Wait for what is heard or due, not beyond a time, and let the server do it."""
+        """Wait for frames or the next due time, not beyond a time, and tick the server."""
         link = self._link
         due_us = min(self.server.due_us, until_us)
         now_us, received = link.receive_stamped(max(0, due_us - link.now_us))

@@ -245,7 +245,7 @@ class SystemPane(CursorView[Item]):
         self.forget()
 
     def forget(self) -> None:
-        """Begin anew, with another system."""
+        """Start with another system."""
         self.folded: set[str] = set()
         self.marked: _SystemRow | None = None
         self.node_id, self.cursor = 0, 0

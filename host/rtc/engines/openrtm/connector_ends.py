@@ -56,7 +56,7 @@ def changed(properties: _Properties, values: Mapping[str, str]) -> _Properties:
 
 
 def completed(properties: _Properties) -> _Properties:
-    """Return properties of a connector with the byte orders, if nobody named one."""
+    """Return properties of a connector, with the default byte orders if none are given."""
     return properties if ENDIAN in texts(properties) else changed(properties, {ENDIAN: _BOTH})
 
 
@@ -69,16 +69,16 @@ def agreed_endian(text: str) -> Endian:
     words = [word.strip().lower() for word in text.split(",") if word.strip()] or [Endian.LITTLE]
     known = [endian for word in words for endian in Endian if endian == word]
     if not known:
-        raise RtcRefused(f"{ENDIAN}: {text!r} is none of: {', '.join(Endian)}")
+        raise RtcRefused(f"{ENDIAN}: {text!r} is not one of: {', '.join(Endian)}")
     return known[0]
 
 
 def _agreed(port: DataPort[Any], values: dict[str, str]) -> dict[str, str]:
-    """Return what holds for a connector of a data port with a peer.
+    """Return the settings of a connector of a data port with a peer.
 
     Raises:
-        RtcRefused: another interface type than corba_cdr, another data type than the port's, or
-            a byte order that nobody knows.
+        RtcRefused: another interface type than corba_cdr, another data type than the port's, or an
+            unknown byte order.
     """
     if (interface := values.get(INTERFACE, CORBA_CDR)) != CORBA_CDR:
         raise RtcRefused(f"{INTERFACE}: {interface!r} is not {CORBA_CDR}")
@@ -131,10 +131,10 @@ class ConnectorPlace:
 
 
 class ConnectorEnd(ABC):
-    """Our end of a connector; all this is in the manager's thread.
+    """The local end of a connector; it belongs to the manager's thread.
 
     Attributes:
-        thread: calls the peer, one call after the other; None as long as nobody does.
+        thread: calls the peer, one call after the other; None until it is started.
     """
 
     def __init__(self, place: ConnectorPlace) -> None:
@@ -168,7 +168,7 @@ class ConnectorEnd(ABC):
         """
 
     def close(self) -> None:
-        """Serve nobody any more."""
+        """Stop serving peers."""
         for reference in self._served:
             self._place.orb.withdraw(reference)
         self._served.clear()
@@ -207,7 +207,7 @@ class ConnectorEnd(ABC):
 _LOG: Final = log_of(__name__)
 
 _GONE: Final = (CORBA.TRANSIENT, CORBA.TIMEOUT, CORBA.COMM_FAILURE, CORBA.OBJECT_NOT_EXIST)
-"""With these a peer gave no answer; all else that it raises is one."""
+"""Exceptions that mean no answer of a peer; all others are answers."""
 
 _EMPTY: Final = (PortStatus.BUFFER_EMPTY, PortStatus.BUFFER_TIMEOUT)
 

@@ -57,7 +57,7 @@ class ServantReferences:
         return reference
 
     def remove(self, thing: RtComponent | ExecutionContext) -> None:
-        """Let nobody call it any more."""
+        """Stop accepting calls for it."""
         if (entry := self._by_id.pop(id(thing), None)) is not None:
             del self._by_key[self.orb.key(entry.reference)]
             self.orb.withdraw(entry.reference)
@@ -103,17 +103,17 @@ def _calling(name: str) -> Callable[[AttachedContexts, int], Any]:
 
 
 class AttachedContexts:
-    """Answers for the execution contexts of a component; its methods are operations of the IDL.
+    """The execution contexts of a component, for peers; its methods are operations of the IDL.
 
-    A peer attaches an execution context of its own and then calls `on_activated`,
-    `on_execute` and so on with the handle it was given. To the callback that context has the
-    time of the manager; its rate and the states in it are the peer's matter. Nobody
-    calls the callbacks of contexts that are here: PRECONDITION_NOT_MET.
+    A peer attaches an execution context of its own and then calls `on_activated`, `on_execute` and
+    so on with the handle that it received. The callback sees this context with the time of the
+    manager; the peer manages its rate and states. Peers cannot call callbacks for local contexts:
+    PRECONDITION_NOT_MET.
 
     Args:
-        component: whose contexts they are.
-        manager: tells the time.
-        references: of the execution contexts that are here.
+        component: the owner of the contexts.
+        manager: provides the time.
+        references: of the local execution contexts.
     """
 
     def __init__(
@@ -277,10 +277,10 @@ INTERFACE = "RTC.ExecutionContextService"
 
 
 class ExecutionContextServant:
-    """Answers for an execution context; its methods are the operations of the IDL.
+    """An execution context, for peers; its methods are the operations of the IDL.
 
-    Activating, deactivating and resetting wait until it is so, up to 1 s, as OpenRTM does.
-    Components of other processes cannot take part: UNSUPPORTED.
+    Activating, deactivating and resetting wait for the new state, up to 1 s, as in OpenRTM.
+    Components of other processes cannot join it: UNSUPPORTED.
 
     Args:
         context: the execution context.

@@ -2,29 +2,29 @@
 
 # Theory of operation
 #
-# omniORB speaks GIOP; this room has the servants that it calls, and the calls into peers. Three
-# kinds of threads meet, and one rule keeps them apart: components, ports and the manager belong to
-# the manager's thread alone.
+# omniORB speaks GIOP; this package has the servants that it calls, and the calls to peers. There
+# are three kinds of threads, and one rule: only the manager's thread accesses components, ports and
+# the manager.
 #
 #   threads of the ORB    run the servants (manager, rt_object, context, configuration,
-#                         port_service). A servant does its work by `calls.call(...)`: the manager's
-#                         thread carries it out between two ticks. What takes too long is TIMEOUT.
+#                         port_service). A servant works by `calls.call(...)`: the manager's thread
+#                         executes it between two ticks. A call that takes too long is TIMEOUT.
 #   the manager's thread  ticks, and serves those calls while it waits. It never calls a peer.
 #   threads for peers     make all calls into peers (system/peer_thread.py): `submit` returns at
-#                         once. A peer that hangs holds up itself, for the 1 s of a CORBA call.
+#                         once. A peer that hangs delays only itself, for the 1 s of a CORBA call.
 #
 # The exception is connecting: `notify_connect` is a call that goes from port to port and comes back
-# with what each added. A thread of the ORB makes it, and nothing is locked meanwhile, because the
-# peer may call back before it answers. So a connector has two steps: `reserve` checks it and serves
-# what the peer is to call; `keep` joins it with what the peer answered. If anything fails in
-# between, `drop` takes the first step back and the peer is told.
+# with what each added. A thread of the ORB makes it without holding a lock, because the peer may
+# call back before it answers. So a connector takes two steps: `reserve` checks it and serves the
+# objects for the peer; `keep` joins it with the peer's answer. If a step fails, `drop` reverts the
+# first one and notifies the peer.
 #
-# Who is first in the list of ports asks the other one and tells it of the end. Two ports of ours
-# are found by their object keys and joined here, without CORBA between them.
+# The first port in the list connects the other one and notifies it of the end. Two local ports are
+# recognized by their object keys and joined directly, without CORBA.
 #
 # Data are bytes of CDR (`InPortCdr`, `OutPortCdr`): encoded in the manager's thread when a port is
-# written, decoded in the thread of the ORB in which they come. They do not wake the manager:
-# nobody looks before the next tick, at whose begin `Arrivals` lets them in.
+# written, decoded in the thread of the ORB in which they come. They do not wake the manager: no
+# code reads them before the next tick, at whose beginning `Arrivals` delivers them.
 #
 # Stubs are compiled from our IDL files (stubs.py), so an installation without omniORB has all but
 # this room. An ORB is one in a process: what this engine opened it closes, in the reverse order.

@@ -100,7 +100,7 @@ class ManagerServant:
     get_loaded_modules = get_master_managers = get_slave_managers = get_loadable_modules
 
     def is_master(self) -> bool:
-        """Return True: nobody commands it."""
+        """Return True: there is no master manager."""
         return True
 
     def shutdown(self) -> Any:

@@ -25,19 +25,19 @@ _LOG: Final = log_of(__name__)
 
 
 class NameServer:
-    """Keeps names bound in a name server, in a thread of its own: who asks waits for nobody.
+    """Keeps names bound in a name server, in its own thread, so that callers do not wait.
 
-    All names are bound again every 10 s, and as soon as a name server that did not answer
-    answers again; that it does not, and that it does again, is a line in the log.
+    All names are bound again every 10 s, and as soon as a name server that did not answer answers
+    again; both events are logged.
 
     Args:
         orb: of this process.
         address: of the name server.
-        renew_us: how often all names are bound.
-        look_us: how often it is asked again while it does not answer.
+        renew_us: interval at which all names are bound.
+        look_us: retry interval while it does not answer.
 
     Attributes:
-        answers: whether the name server took the latest names.
+        answers: whether the name server accepted the latest names.
     """
 
     def __init__(
@@ -52,7 +52,7 @@ class NameServer:
         self._thread.submit(self._look)
 
     def bind(self, path: str, reference: Reference) -> None:
-        """Give a name to an object, from now on; whoever has it loses it.
+        """Bind a name to an object, from now on; another object with this name loses it.
 
         Args:
             path: such as `robot.host_cxt/ConsoleIn0.rtc`.

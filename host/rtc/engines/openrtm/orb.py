@@ -38,7 +38,7 @@ _REFUSALS: Final = {
 }
 
 _REASONS: Final = {
-    "connectfailed": "nobody is there",
+    "connectfailed": "not reachable",
     "timedout": f"no answer within {_CALL_TIMEOUT_MS / 1_000:g} s",
     "comm_failure": "the connection broke",
     "object_not_exist": "it has ended",
@@ -79,15 +79,15 @@ class Orb:
             raise _OrbFailed(f"cannot listen at {endpoint}: no address or free port here") from None
 
     def serve(self, skeleton: type, *answers: object) -> Reference:
-        """Let peers call an object.
+        """Make an object callable by peers.
 
         Args:
             skeleton: class of its interface, of a `..__POA` module.
-            answers: have a method for each operation, named as in the IDL, the first that has
-                it; one that none has is NO_IMPLEMENT. They are called in threads of the ORB.
-                What they raise becomes an answer: TimeoutError is TIMEOUT, RtcRefused BAD_PARAM
-                and the like, an exception of CORBA itself, and all else INTERNAL, with a line
-                in the log.
+            answers: objects with a method per operation, named as in the IDL; the first one that
+                has it is used, and a missing operation is NO_IMPLEMENT. They are called in threads
+                of the ORB. Exceptions become answers: TimeoutError is TIMEOUT, RtcRefused is
+                BAD_PARAM or similar, a CORBA exception is passed on, and any other is INTERNAL,
+                with a line in the log.
 
         Returns:
             Its reference; the same calls in this process take no socket.
@@ -115,7 +115,7 @@ class Orb:
         self._poa.deactivate_object(self._poa.reference_to_id(reference))
 
     def reference(self, text: str) -> Reference:
-        """Return the reference that an IOR or a corbaloc stands for; nobody is asked.
+        """Return the reference for an IOR or a corbaloc; this sends no request.
 
         Raises:
             ValueError: it is neither.
@@ -185,7 +185,7 @@ def carried(name: str, text: str) -> str:
 
 
 def explain(error: Exception) -> str:
-    """Say in a few words why a call had no answer."""
+    """Return in a few words why a call had no answer."""
     text = str(error)
     found = (words for mark, words in _REASONS.items() if mark in text.lower())
     return next(found, text or type(error).__name__)

@@ -22,7 +22,7 @@ from tickrig.host.rtc.system.peer_thread import PeerThread
 from tickrig.host.text.log import log_of
 
 _LOOK_US: Final = 1_000_000
-"""So often a connector is looked at."""
+"""Interval at which a connector is checked."""
 
 _LOG: Final = log_of(__name__)
 
@@ -34,19 +34,18 @@ _USUAL: Final = {
 
 
 class Peers:
-    """Keeps the connectors of a system with components that run elsewhere.
+    """Maintains the connectors of a system with components that run elsewhere.
 
-    Each is looked at once a second, in a thread of its own. One that cannot be made is tried
-    again; one whose peer was started again is made again. One that somebody ended while the peer
-    lived is left so.
+    Each is checked once a second, in its own thread. One that cannot be made is tried again; one
+    whose peer restarted is made again. One that was ended while the peer ran is not made again.
 
     Args:
         ports: of the system.
-        manager: of the system; its `remotes` say what is wanted.
-        look_us: how often each is looked at.
+        manager: of the system; its `remotes` list the wanted connectors.
+        look_us: interval at which each is checked.
 
     Raises:
-        RtcRefused: a path that leads nowhere.
+        RtcRefused: a path that names no port.
     """
 
     def __init__(self, ports: SystemPorts, manager: Manager, look_us: int = _LOOK_US) -> None:
@@ -80,7 +79,7 @@ class _Kept:
         try:
             if self._made and self._peer is not None:
                 if not self._is_there():
-                    _LOG.info("%s: somebody has ended the connector; it is left so", self.name)
+                    _LOG.info("%s: the connector was ended; it is not made again", self.name)
                     return None
             else:
                 self._make()

@@ -34,12 +34,12 @@ _CONNECTIONS_LOG: Final = log_of(__name__)
 
 
 class _PortSystem(Protocol):
-    """The ports of the same system, and its orb.
+    """The ports of the same system, and its ORB.
 
     Attributes:
         threads: call peers, for all data ports.
-        arrivals: what came, until the next tick.
-        ending: connectors that have ended, by ID, as long as their peers are being told.
+        arrivals: received values, until the next tick.
+        ending: connectors that have ended, by ID, until their peers are notified.
     """
 
     orb: Orb
@@ -68,17 +68,17 @@ class _PortSystem(Protocol):
 
 
 class _PeerConnection:
-    """A connector of a port of ours with a port of a peer.
+    """A connector of a local port with a port of a peer.
 
     Attributes:
         connector_id: of the connector.
-        place: of our port in its list of ports.
+        place: position of the local port in the list of ports.
         peer: the peer's port.
-        peer_name: how that is called, for people.
-        end: our end.
-        additions: properties that the peer is to have.
+        peer_name: its name, for messages.
+        end: the local end.
+        additions: properties for the peer.
         profile: as peers and tools see it; None until it is joined.
-        peer_knows: whether the peer knows, or need not be told, that it ends.
+        peer_knows: whether the peer knows that it ends, or need not know.
     """
 
     def __init__(
@@ -99,7 +99,9 @@ class _PeerConnection:
         try:
             self.peer.notify_disconnect(self.connector_id)
         except CORBA.Exception as error:
-            _CONNECTIONS_LOG.info("%s was not told of the end: %s", self.peer_name, explain(error))
+            _CONNECTIONS_LOG.info(
+                "%s could not be notified of the end: %s", self.peer_name, explain(error)
+            )
 
 
 class _PeerConnections:
@@ -155,15 +157,15 @@ class _PeerConnections:
         return connection
 
     def keep(self, connection: _PeerConnection, profile: _Profile, values: dict[str, str]) -> None:
-        """Join what was begun.
+        """Complete a reserved connector.
 
         Args:
             connection: what `reserve` returned.
-            profile: as it is after the peer was asked.
+            profile: as returned by the peer.
             values: its properties.
 
         Raises:
-            RtcRefused: it cannot be, or the port is gone.
+            RtcRefused: it is not possible, or the port is gone.
         """
         if self._closed or self._by_id.get(connection.connector_id) is not connection:
             message = f"{self._port.full_name} has ended"
@@ -173,7 +175,7 @@ class _PeerConnections:
         self._system.schedule(connector)
 
     def drop(self, connection: _PeerConnection) -> None:
-        """Leave nothing of what was begun and cannot be joined."""
+        """Undo a reserved connector that cannot be completed."""
         connection.peer_knows = True
         self.end(connection.connector_id)
 
@@ -185,9 +187,9 @@ class _PeerConnections:
             self._end(connection)
 
     def look(self, connector_id: str) -> tuple[_PeerConnection | None, bool]:
-        """Return the connector with a peer of an ID, and whether there is, or was just now, any.
+        """Return the connector with this ID, and whether there is one, or was a moment ago.
 
-        Its peer need not be told of the end from now on.
+        From now on its peer need not be notified of the end.
         """
         if (connection := self._by_id.get(connector_id)) is not None:
             connection.peer_knows = True
@@ -200,7 +202,7 @@ class _PeerConnections:
         return [profile for profile in found if profile is not None]
 
     def close(self) -> None:
-        """End all connectors with peers, who are told; the port is no more."""
+        """End all connectors with peers, and notify them; the port is gone."""
         self._closed = True
         for connection in tuple(self._by_id.values()):
             self.end(connection.connector_id)
@@ -211,7 +213,7 @@ class _PeerConnections:
             raise RtcRefused(f"a connector joins two ports, not {len(profile.ports)}")
         found = [self._system.find(reference) for reference in profile.ports]
         if self._port not in found:
-            raise RtcRefused(f"{self._port.full_name} is none of the ports of the connector")
+            raise RtcRefused(f"{self._port.full_name} is not a port of the connector")
         place = found.index(self._port)
         return place, found[1 - place]
 
@@ -229,7 +231,7 @@ class _PeerConnections:
         return self._system.describe(connector) if connection is None else connection.profile
 
     def _ended(self, profile: ConnectorProfile) -> None:
-        """Take the end of a connector, whoever ended it."""
+        """Process the end of a connector, from either side."""
         if (connection := self._by_id.get(profile.connector_id)) is not None:
             self._end(connection)
 
@@ -269,11 +271,11 @@ _NAME_LENGTH: Final = 100
 class _PortAnswers:
     """The operations of PortService, in threads of the ORB.
 
-    What concerns the port is done in the manager's thread; peers are called here, and nothing is
-    locked meanwhile: the call that goes round may come back.
+    The manager's thread does everything that concerns the port; peers are called here, without a
+    lock, because the call may come back.
 
     Args:
-        port: of ours.
+        port: the local port.
         connections: its connectors with peers.
         calls: those of the manager's thread.
         describe: returns the PortProfile, in the manager's thread.
@@ -426,7 +428,7 @@ def _line(text: str) -> str:
 
 
 _CLOSE_S: Final = 1.5
-"""So long peers are told at the end: a call, and its time-out."""
+"""Time limit to notify peers at the end: a call and its time-out."""
 
 _POLL_US: Final = 10_000
 
@@ -443,9 +445,9 @@ class SystemPorts:
         orb: as given.
         calls: as given.
         references: the PortService of each port.
-        ending: connectors that have ended, by ID, as long as their peers are being told.
+        ending: connectors that have ended, by ID, until their peers are notified.
         components: those that are served.
-        arrivals: what peers brought, until the next tick.
+        arrivals: values from peers, until the next tick.
         threads: call peers, for all data ports.
     """
 
@@ -468,7 +470,7 @@ class SystemPorts:
         self._by_key[self.orb.key(reference)] = port
 
     def remove(self, port: AnyPort) -> None:
-        """Let nobody call a port any more."""
+        """Stop accepting calls for a port."""
         reference = self.references.pop(port)
         del self._by_key[self.orb.key(reference)]
         self.orb.withdraw(reference)
@@ -499,13 +501,13 @@ class SystemPorts:
         )
 
     def close(self) -> None:
-        """End all connectors with peers; who does not answer is not told."""
+        """End all connectors with peers; peers that do not answer are not notified."""
         for component in tuple(self.components):
             component.close()
         self._manager.remove_item(self.arrivals)
         end_s = time.monotonic() + _CLOSE_S
         while self.ending and time.monotonic() < end_s:
-            self.calls.serve(_POLL_US)  # who is told may call back
+            self.calls.serve(_POLL_US)  # a notified peer may call back
         self.threads.close()
 
     def schedule(self, connector: ConnectorBase) -> None:
@@ -533,7 +535,7 @@ class ComponentPorts:
         return self._system.calls.call(self._services)
 
     def close(self) -> None:
-        """End all connectors with peers, who are told, and serve nobody any more."""
+        """End all connectors with peers, notify them, and stop serving."""
         self._system.calls.call(self._end)
 
     def _begin(self) -> None:

@@ -21,7 +21,7 @@ class _Ports(Protocol):
         ...
 
     def close(self) -> None:
-        """Let nobody call them any more."""
+        """Stop accepting calls for them."""
         ...
 
 

@@ -81,7 +81,7 @@ def stubs() -> Stubs:
     try:
         if cached.is_dir():
             return _imported(cached)
-    except Exception:  # whatever somebody left of it
+    except Exception:  # incomplete files of an earlier run, for example
         shutil.rmtree(cached, ignore_errors=True)
     return _imported(_compiled(files, cached))
 
@@ -111,7 +111,7 @@ def compile_idl(files: Iterable[Path], folder: Path, package: str = _PACKAGE) ->
 
 
 def _preprocessor() -> list[str]:
-    """Say where omniidl finds its preprocessor: the wheel has it in a folder of its own."""
+    """Return where omniidl finds its preprocessor: the wheel has it in a folder of its own."""
     found = importlib.util.find_spec("jeteve_omniorb")
     for folder in (found and found.submodule_search_locations) or ():
         return [f"-Y{Path(folder) / 'bin' / 'omnicpp'}"]

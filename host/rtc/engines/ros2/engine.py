@@ -53,7 +53,7 @@ _TYPE: Final = "diagnostic_msgs/msg/DiagnosticArray"
 
 _WARN: Final = 1
 _LEVELS: Final = {LifeCycleState.ACTIVE: 0, LifeCycleState.ERROR: 2}
-"""OK and ERROR of DiagnosticStatus; whoever is neither Active nor in Error is WARN."""
+"""OK and ERROR of DiagnosticStatus; a component neither Active nor in Error is WARN."""
 
 
 class _Diagnostics:
@@ -199,7 +199,7 @@ class _Ros2Engine:
         self._in.submit(self._foreign.look)
 
     def join(self, component: RtComponent) -> None:
-        """Join the ports of a component; what cannot be is logged in a line."""
+        """Join the ports of a component; log failures in one line."""
         name = component.instance_name
         entries = self._table.entries
         if entries is None:

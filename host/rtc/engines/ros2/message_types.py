@@ -21,18 +21,18 @@ _FAR_US: Final = 1_000_000
 """A value that is farther from the present counts its time on another clock, or not at all."""
 
 _ASTRAY_NS: Final = 10_000_000_000
-"""A system that is so late, or a clock that was set, has the times related anew."""
+"""If a system is this late, or a clock was set, the offset between the times is updated."""
 
 
 class Stamps:
     """Converts between the time of a system and that of the machine.
 
-    Values of one time have one stamp, so a pose and its transform do. A value whose time is
-    more than 1 s off that of the system gets the present one. What a late system makes up for
-    has the time at which it was due.
+    Values of one time have one stamp, so a pose and its transform do. A value whose time differs by
+    more than 1 s from that of the system gets the current time. Values that a late system writes
+    have the time at which they were due.
 
     Args:
-        now_us: tells the time of the system.
+        now_us: returns the time of the system.
         clock: nanoseconds since 1970.
     """
 

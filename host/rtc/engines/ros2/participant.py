@@ -35,7 +35,7 @@ _FATAL: Final = 1
 """Of the categories of its log (dds/ddsrt/log.h): what it writes to standard error."""
 
 _MOST_MESSAGES: Final = 100
-"""Kinds of lines that are known; of more nothing is said."""
+"""Kinds of messages that are logged; further ones are not."""
 
 _DESCRIPTORS: Final = "/dev/fd"
 _DDS_LOG: Final = log_of(__name__)
@@ -84,7 +84,7 @@ def _read(descriptor: int) -> None:
 
 _LOOPBACK: Final = "127.0.0.1"
 _MOST_PARTICIPANTS: Final = 32
-"""On loopback nobody can call all: so many are looked for, as ROS 2 does."""
+"""Multicast does not work on loopback: this many participants are searched, as in ROS 2."""
 
 HISTORY: Final = 10
 
@@ -158,7 +158,7 @@ def dds_topic(name: str) -> str:
 
 
 def _qos_of(entry: TopicEntry) -> Qos:
-    """Return what is offered and asked for; a peer that takes nothing holds up nobody."""
+    """Return the found readers and writers; a peer that does not accept data delays no other."""
     reliability = (
         Policy.Reliability.Reliable(0) if entry.reliable else Policy.Reliability.BestEffort
     )
@@ -181,7 +181,7 @@ def _place(interface: str) -> tuple[str, str]:
         return f'address="{_LOOPBACK}" multicast="false"', _PEERS
     known = [name for _, name in socket.if_nameindex()]
     if interface not in known:
-        raise ValueError(f"interface {interface!r} is none of this machine: {', '.join(known)}")
+        raise ValueError(f"interface {interface!r} does not exist here: {', '.join(known)}")
     return f'name="{interface}"', ""
 
 
@@ -242,7 +242,7 @@ class ForeignEndpoints:
         self._awaited: dict[int, tuple[float, OwnEndpoint, str]] = {}
 
     def look(self) -> float | None:
-        """Say what is new; return when to look again, in s."""
+        """Log news; return when to call again, in s."""
         for reader, ours, reads in self._sides:
             try:
                 endpoints = reader.take(_MOST)
@@ -281,7 +281,7 @@ class ForeignEndpoints:
             self._awaited[handle] = time.monotonic() + MATCH_S, own, text
 
     def _look_for_unmatched(self) -> None:
-        """Say who has the right names, and was not joined in all that time."""
+        """Log peers with a matching name that were not joined in all that time."""
         for handle, (until_s, own, text) in tuple(self._awaited.items()):
             if time.monotonic() > until_s:
                 del self._awaited[handle]

@@ -15,10 +15,10 @@ from tickrig.host.rtc.engines.ros2.topic_entry import TopicEntry
 from tickrig.wire.rtc_types.rtc import Point2D, Pose2D, RangeData, Time, Velocity2D
 
 _UNKNOWN: Final = [0.0] * 36
-"""A covariance that nobody knows."""
+"""An unknown covariance."""
 
 _STRAIGHT: Final = 1e-9
-"""A turn that is none, rad."""
+"""A turn below this counts as none, rad."""
 
 
 def odometry_out(entry: TopicEntry, stamps: Stamps) -> Callable[[Any], Any]:

@@ -1,4 +1,4 @@
-"""The table of ports and topics, in TOML: all that is wrong with it is told at once.
+"""The table of ports and topics, in TOML; all errors are reported at once.
 
 >>> text = '''
 ... [[topic]]

@@ -53,7 +53,7 @@ class TopicEntry:
 
 
 def usual_entry(port: str, topic: str, kind: str) -> TopicEntry:
-    """Return an entry with the frames and the stop that hold where nobody names others."""
+    """Return an entry with the default frames and stop if it has none."""
     stop_after_us = _STOP_AFTER_US * (kind in _VELOCITIES)
     child_frame = "base_link" if kind in PLACED else ""
     frame = FRAMES.get(kind, "")
@@ -62,13 +62,13 @@ def usual_entry(port: str, topic: str, kind: str) -> TopicEntry:
 
 @dataclass(frozen=True, slots=True)
 class TopicTable:
-    """Which ports have topics.
+    """The ports that have topics.
 
     Attributes:
-        entries: for each port of each topic one; None has every port that a message fits joined
-            with a topic of its name.
+        entries: one per port of each topic; None joins every port with a matching message type to a
+            topic of its name.
         diagnostics: topic for the states of the components, empty for none.
-        period_us: how often these are told.
+        period_us: interval at which these are published.
     """
 
     entries: tuple[TopicEntry, ...] | None = None

@@ -41,7 +41,7 @@ class TopicWriter:
         self._failed = self._closed = False
 
     def open(self) -> None:
-        """Be there for peers; what cannot be is logged in a line."""
+        """Announce the endpoint to peers; log failures in one line."""
         try:
             if not (self._failed or self._closed):
                 self._writer = self._participant.writer(self.entry)
@@ -130,7 +130,7 @@ class TopicReader:
         self._heard_s, self._stop_s = 0.0, entry.stop_after_us / 1e6
 
     def open(self) -> None:
-        """Be there for peers; what cannot be is logged in a line."""
+        """Announce the endpoint to peers; log failures in one line."""
         try:
             if not self._closed:
                 self._reader = self._participant.reader(
@@ -149,17 +149,17 @@ class TopicReader:
         self._reader, self._closed = None, True
 
     def _take(self) -> float | None:
-        """Take what has come, one by one: a message that is none costs no other."""
+        """Process received messages one by one: an invalid one does not affect others."""
         for _ in range(HISTORY):
             if self._reader is None or (found := self._take_one(self._reader)) is None:
                 return None
             for message in found:
-                if not isinstance(message, InvalidSample):  # nothing but that somebody is gone
+                if not isinstance(message, InvalidSample):  # only reports that a peer is gone
                     self._hand_on(message)
         return 0
 
     def _take_one(self, reader: Any) -> list[Any] | None:
-        """Return what came next, nothing for what is no message; None at the end."""
+        """Return the next message, nothing for an invalid one; None at the end."""
         try:
             return reader.take(1) or None
         except DDSException as error:
@@ -199,10 +199,10 @@ class TopicReader:
 
 
 def _odd_number(message: object, path: str = "") -> str:
-    """Return which number of a message no sender can mean, with its value; empty if none.
+    """Return the first impossible number of a message, with its value; empty if there is none.
 
-    That is one that is not finite, or so small that it is a whole number in the bits of a float.
-    Sequences are passed over: a range without an echo is infinite (REP 117).
+    Such a number is not finite, or so small that it is an integer reinterpreted as a float.
+    Sequences are not checked: a range without an echo is infinite (REP 117).
     """
     for name, value in vars(message).items():
         if isinstance(value, float):

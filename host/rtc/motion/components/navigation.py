@@ -28,16 +28,16 @@ _TUNED = {
 class Navigation(RtComponent):
     """The state machine of the reference hardware's navigation (rh3-control, state machine).
 
-    It is judged once for each new pose. The parameters behind `max_vel` are ours; their
-    defaults are what the reference hardware had as constants. With `braking` above 0 it
-    commands a speed for each pose, so that the cart can stop at the end of the line with
-    that deceleration; `latency` is the time from a pose to the effect of the command.
+    It is evaluated once for each new pose. The parameters after `max_vel` are additions; their
+    defaults are the constants of the reference hardware. With `braking` above 0 it commands a speed
+    for each pose, so that the cart can stop at the end of the line with that deceleration;
+    `latency` is the time from a pose to the effect of the command.
 
-    An empty list means stop and FINISH. A new list takes the place of the old one without
-    a stop. A list with a number that is none is passed over.
+    An empty list means stop and FINISH. A new list replaces the old one without a stop. A list with
+    an invalid number is ignored.
 
     Attributes:
-        state: as it is written to the port each period.
+        state: the state that is written to the port each period.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Navigation", "Relay points, one at a time")

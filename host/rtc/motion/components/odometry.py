@@ -17,13 +17,13 @@ _CONF_LINE: Final = re.compile(r"conf\.([^.\s:=]+)\.([^\s:=]+)\s*[:=]\s*(.*)")
 
 
 class Odometry(RtComponent):
-    """Adds up the way of both wheels on exact arcs, for the middle of the drive axle.
+    """Integrates the movement of both wheels on exact arcs, for the middle of the drive axle.
 
-    The port LocalizedPosition is there and unused, as in the specification. Angles that
-    are no numbers, or fewer than the wheels' ids ask for, are passed over.
+    The port LocalizedPosition exists and is unused, as in the specification. Angles that are not
+    numbers, or fewer than the ids of the wheels, are ignored.
 
     Attributes:
-        pose: where the cart is thought to be.
+        pose: the estimated pose of the cart.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Odometry", "Pose from wheel angles")

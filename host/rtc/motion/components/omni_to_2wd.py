@@ -22,12 +22,12 @@ _LOG: Final = log_of(__name__)
 class OmniTo2WD(RtComponent):
     """Plans for a cart that cannot go sideways; it never goes backward.
 
-    A step from one point to the next that is no way is left out. A goal or a path with a
-    number that is none is passed over with a line in the log. FINISH is written when it is
-    reached, not while it lasts: what an earlier command left behind answers no later one.
+    A step of zero length is left out. A goal or a path with an invalid number is ignored with a
+    line in the log. FINISH is written once when it is reached, so that the end of an earlier
+    command does not answer a later one.
 
     Attributes:
-        refused: how many goals and paths were passed over.
+        refused: number of ignored goals and paths.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("OmniTo2WD", "Plans turns and lines to a goal")
@@ -78,7 +78,7 @@ class OmniTo2WD(RtComponent):
             self._waiting = plausible
         else:
             self.refused += 1
-            _LOG.warning("%s: passed over what is no number: %s", self.instance_name, message)
+            _LOG.warning("%s: ignored an invalid number: %s", self.instance_name, message)
         self._points = []
 
     def _plan(self, ec: ExecutionContext, pose: Pose) -> None:

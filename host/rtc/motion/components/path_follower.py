@@ -23,16 +23,15 @@ class PathFollower(RtComponent):
 
     Modes: free and stop (both towards standstill), line, to-point, circle (centre x, y,
     radius r, to the left if positive), spin, velocity (v, w), wheel velocity (v left, w
-    right, rad/s, by `tread` and `radius`). A message with a number that is none means stop.
-
-    The parameters behind `max_w` are ours: `acc_cycle` is the time for which `max_acc_*`
-    are given, `law` the way the regulator steps, `spin` the way it turns, `latency` the
-    time from a pose to the effect of the command. Without a pose for `pose_timeout` the
-    cart is to stand: nobody knows where it is.
+    right, rad/s, by `tread` and `radius`). A message with an invalid number means stop. The
+    parameters after `max_w` are additions: `acc_cycle` is the time for which `max_acc_*` are given,
+    `law` the way the regulator steps, `spin` the way it turns, `latency` the time from a pose to
+    the effect of the command. Without a pose for `pose_timeout` the cart stops, because its
+    position is unknown.
 
     Attributes:
         twist: the command of the latest period.
-        path: what it does.
+        path: the current path.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("PathFollower", "Velocity along lines and arcs")

@@ -27,17 +27,16 @@ USAGE: Final = "goal X Y DEG; path FILE; path X Y, X Y DEG; path; end"
 
 
 class PositionInput(RtComponent):
-    """Sends one command after the other; the next when the last one has finished.
+    """Sends one command after the other, each after the previous one has finished.
 
-    The original waits at its console in on_execute; here nothing waits: whoever has the
-    console calls `typed` with each line, and a program calls `goal`, `path` and `end`. Its
-    configuration is declared and unused, as there.
+    The original waits at its console in on_execute; here nothing blocks: the owner of the console
+    calls `typed` with each line, and a program calls `goal`, `path` and `end`. Its configuration is
+    declared and unused, as in the original.
 
     Attributes:
-        finished: how many commands have finished.
+        finished: number of finished commands.
         defined_path: the path of the command `path` without a file or points.
-        prompt: called with what can be typed each time that it wants a command; the console
-            prints it.
+        prompt: called with the possible inputs whenever it needs a command; the console prints it.
         report: called with each command that it sends, and with FINISH.
     """
 
@@ -67,10 +66,10 @@ class PositionInput(RtComponent):
         return not (self._commands or self._running)
 
     def goal(self, pose: Pose) -> None:
-        """Enter a goal; it waits for those before it.
+        """Enter a goal; it runs after those before it.
 
         Raises:
-            ValueError: a number that is none.
+            ValueError: an invalid number.
         """
         self._commands.append((_point(pose),))
 
@@ -78,15 +77,15 @@ class PositionInput(RtComponent):
         """Enter a path of two points or more.
 
         Raises:
-            ValueError: fewer points, or a number that is none.
+            ValueError: fewer points, or an invalid number.
         """
         self._commands.append(_points(poses))
 
     def replace(self, *poses: Pose) -> None:
-        """Enter a goal, or a path of several points, in the place of what runs and waits.
+        """Enter a goal, or a path of several points, in place of the running and waiting ones.
 
         Raises:
-            ValueError: no point, or a number that is none; what runs goes on.
+            ValueError: no point, or an invalid number; the running command continues.
         """
         command = (_point(*poses),) if len(poses) == 1 else _points(poses)
         self._commands.clear()

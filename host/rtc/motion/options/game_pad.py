@@ -26,7 +26,7 @@ class _GamePadDevice(Protocol):
         ...
 
     def close(self) -> None:
-        """Give the device back."""
+        """Release the device."""
 
 
 _GamePadOpener = Callable[[str], _GamePadDevice]
@@ -85,9 +85,9 @@ def open_pad(name: str) -> _GamePadDevice:
 
 
 class GamePad(DeviceComponent[_GamePadDevice]):
-    """Writes a velocity each period while a hand pushes, and one of 0 when it lets go.
+    """Writes a velocity each period while a stick is deflected, and one of 0 when it is released.
 
-    The specification only names it; ports and parameters are ours.
+    The specification only names it; ports and parameters are additions.
 
     Args:
         instance_name: of the component.
@@ -121,7 +121,7 @@ class GamePad(DeviceComponent[_GamePadDevice]):
         self._pushed = pushed
 
     def release(self, ec: ExecutionContext) -> None:
-        """Let go of the sticks."""
+        """Release the sticks."""
         if self._pushed:
             self._write(ec, StickPosition())
         self._pushed = False

@@ -102,7 +102,7 @@ class ObstacleMonitor(RtComponent):
 
 
 class _WatchedDistance:
-    """Blocked below one distance, free above another, and blocked when nothing is heard.
+    """Blocked below one distance, free above another, and blocked without a distance.
 
     Args:
         port: where distances arrive.
@@ -115,7 +115,7 @@ class _WatchedDistance:
         self._port, self.free, self._received_us = port, False, 0
 
     def forget(self) -> None:
-        """Begin anew."""
+        """Start again."""
         self._port.clear()
         self.free, self._received_us = False, 0
 
@@ -183,9 +183,9 @@ class ObstaclesAvoidance(RtComponent):
 class CollisionDetection(RtComponent):
     """Calls Stop when something is nearer than `stop_distance`, Go when the way is free again.
 
-    Without a distance for `timeout` it calls Stop: nobody looks. When it is deactivated it
-    calls Go, if it had called Stop. Join `BumpRefHard` with RefHardRh3.BumpRefHard. The
-    specification only names it; ports and parameters are ours.
+    Without a distance for `timeout` it calls Stop, because there may be an obstacle. When it is
+    deactivated it calls Go, if it had called Stop. Join `BumpRefHard` with RefHardRh3.BumpRefHard.
+    The specification only names it; ports and parameters are additions.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("CollisionDetection", "Stops the base at once")

@@ -14,12 +14,11 @@ _LOG: Final = log_of(__name__)
 
 
 class SwitchInput(RtComponent):
-    """The joystick wins; the planner resumes `hold` after the hand has let go.
+    """The joystick has priority; the planner resumes `hold` after the stick is released.
 
-    In between the cart stands. A joystick that says nothing for `stale` while it is pushed
-    counts as let go, and a velocity with a number that is none as 0.
-
-    The specification only names it (SwitchInputRTC); ports and parameters are ours.
+    In between the cart stands. A deflected joystick without a message for `stale` counts as
+    released, and a velocity with an invalid number as 0. The specification only names it
+    (SwitchInputRTC); ports and parameters are additions.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("SwitchInputRTC", "Joystick or planner")
@@ -45,7 +44,7 @@ class SwitchInput(RtComponent):
         return ReturnCode.RTC_OK
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
-        """Pass the velocity of whoever drives on."""
+        """Pass on the velocity of the active input."""
         planned = read_newest(self.automatic)
         self._listen(ec)
         self._switch(ec)

@@ -96,7 +96,7 @@ def test_a_node_that_is_not_there_is_refused(bench: Bench) -> None:
     view = ServerView(bench.server)
     with pytest.raises(ServerRefused, match="node 16 is not ready"):
         view.write_pdos(16, there, {0x1800: MAPPED})
-    with pytest.raises(ServerRefused, match="node 9 is none of: 16, 32"):
+    with pytest.raises(ServerRefused, match="node 9 is not one of: 16, 32"):
         view.read_pdos(9)
 
 

@@ -121,7 +121,7 @@ def test_requests_of_a_system_are_answered_and_all_nodes_started() -> None:
 @pytest.mark.parametrize(
     ("do", "fields", "error"),
     [
-        ("restart", {"node": 5}, "node 5 is none of: 16, 32"),
+        ("restart", {"node": 5}, "node 5 is not one of: 16, 32"),
         ("restart", {"node": "16"}, 'node is a whole number, not "16"'),
         ("restart", {"node": 128}, "node 128 is not in 1..127"),
         ("delete", {"name": "Palette0"}, 'no request "delete"; known: describe, connect'),

@@ -172,7 +172,7 @@ def test_a_refused_node_can_be_set_up_again() -> None:
     view.boot(32)
     bench.run_ms(50)
     assert len(bench.events(ServerEventType.WRONG_IDENTITY)) == 2
-    with pytest.raises(ServerRefused, match="node 5 is none of: 16, 32"):
+    with pytest.raises(ServerRefused, match="node 5 is not one of: 16, 32"):
         view.boot(5)
 
 

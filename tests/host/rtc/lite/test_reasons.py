@@ -98,7 +98,7 @@ def test_an_abort_that_somebody_asked_for_is_told_as_such() -> None:
     bench, proxy = recorder_bench()
     bench.context.abort_component(proxy)
     bench.run_for(PERIOD_US)
-    assert only_event(bench).reason == "it was told to abort"
+    assert only_event(bench).reason == "it was commanded to abort"
 
 
 class StoppedLink(SpyLink):

@@ -92,7 +92,7 @@ def test_a_goal_with_a_number_that_is_none_is_passed_over(
     on = bench()
     assert on.after("min_path", "goal", at(nan)) == []
     assert on.component.refused == 1
-    assert "OmniTo2WD0: passed over what is no number" in caplog.text
+    assert "OmniTo2WD0: ignored an invalid number" in caplog.text
 
 
 def test_a_path_with_a_number_that_is_none_is_passed_over_as_a_whole() -> None:

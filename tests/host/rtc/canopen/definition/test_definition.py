@@ -73,7 +73,7 @@ def test_json_is_read_as_well() -> None:
         ("bus: {}", "line 1: the file has no 'nodes'"),
         ("nodes: 3", "line 1: nodes is a list, this is not"),
         (ONE + "nodes: []", "line 2: 'nodes' is there twice: line 1"),
-        (ONE + "port: 1", "line 2: the file: 'port' is none of: bus, master, nodes, sdo"),
+        (ONE + "port: 1", "line 2: the file: 'port' is not one of: bus, master, nodes, sdo"),
         ("nodes:\n- {id: 0, name: A, eds: a}", "line 2: id: 0 is not a whole number in 1..127"),
         ("nodes:\n- {id: no, name: A, eds: a}", "line 2: id: False is not a whole number"),
         ("nodes:\n- {id: [], name: A, eds: a}", "line 2: id: 'a list' is not a whole"),
@@ -91,7 +91,7 @@ def test_json_is_read_as_well() -> None:
         ),
         (
             "nodes:\n- {id: 1, name: A, eds: a, role: robot}",
-            "line 2: role: 'robot' is none of: device_rtc, device, drive",
+            "line 2: role: 'robot' is not one of: device_rtc, device, drive",
         ),
         (
             "nodes:\n- {id: 1, name: A, eds: a, ports: {pdo1: x}}",
@@ -115,7 +115,7 @@ def test_json_is_read_as_well() -> None:
         ),
         (
             "nodes:\n- {id: 1, name: A, eds: a, sdo_ports: {x: {index: 0x2100, direction: up}}}",
-            "line 2: direction: 'up' is none of: in, out",
+            "line 2: direction: 'up' is not one of: in, out",
         ),
         (
             "nodes:\n- {id: 1, name: A, eds: a, sdo_ports: {1x: {index: 0x2100, direction: in}}}",
@@ -135,11 +135,11 @@ def test_json_is_read_as_well() -> None:
         (ONE + "master: {node: 1}", "line 2: master: node 1 is one of the nodes"),
         (
             ONE + "sdo:\n- {node: 2, index: 1, sub: 1, value: 1, size: 1}",
-            "line 3: sdo: node 2 is none of: 1",
+            "line 3: sdo: node 2 is not one of: 1",
         ),
         (
             ONE + "sdo:\n- {node: 1, index: 1, sub: 1, value: 1, size: 3}",
-            "line 3: sdo: size 3 is none of: 1, 2, 4, 8",
+            "line 3: sdo: size 3 is not one of: 1, 2, 4, 8",
         ),
         (
             ONE + "sdo:\n- {node: 1, index: 1, sub: 1, value: 256, size: 1}",
@@ -152,7 +152,7 @@ def test_json_is_read_as_well() -> None:
         ),
         (
             ONE + "pdo_links: [{from: 1.tpdo1, to: 2.rpdo1}]",
-            "line 2: to: node 2 is none of: 1",
+            "line 2: to: node 2 is not one of: 1",
         ),
         (
             ONE + "rt_connections: [{from: A, to: B.in}]",
@@ -168,7 +168,7 @@ def test_json_is_read_as_well() -> None:
         ),
         ("[" * 20_000, "line 1: not YAML: lists or mappings nest too deep"),
         (ONE + "start: {order: [1, 1]}", "line 2: order: node 1 is there twice"),
-        (ONE + "start: {order: [1, 2]}", "line 2: order: node 2 is none of: 1"),
+        (ONE + "start: {order: [1, 2]}", "line 2: order: node 2 is not one of: 1"),
         (ONE + "start: {on: 1}", "line 2: start: YAML reads a key as True; put it into quotes"),
         (ONE + "start: 1", "line 2: start is written 'key: value', this is not"),
     ],

@@ -119,7 +119,7 @@ def test_a_name_server_that_is_not_there_is_told_in_one_line_and_found_when_it_c
         eventually(lambda: names.answers, "nobody noticed that it is there")
         assert resolve(orb, omni_names) is not None
     where = f"name server {omni_names.address}"
-    assert caplog.messages[0] == f"{where}: nobody is there; asked again every 0.02 s"
+    assert caplog.messages[0] == f"{where}: not reachable; asked again every 0.02 s"
     assert len(caplog.messages) == 2
 
 

@@ -103,7 +103,7 @@ def test_what_cannot_be_joined_is_refused_in_a_line(folder: Path, words: str, er
 @CYCLONE
 def test_an_interface_that_is_not_there_is_refused(folder: Path) -> None:
     text = refusal("--ros2", "--ros2-interface", "nix0")
-    assert text.startswith("Error: --ros2: interface 'nix0' is none of this machine: lo")
+    assert text.startswith("Error: --ros2: interface 'nix0' does not exist here: lo")
 
 
 @CYCLONE

@@ -66,7 +66,7 @@ def test_a_killed_peer_is_lost_in_a_line_and_found_again(
     assert [received[2] for received in lasting.ask("received")] == [2]
     lost, found = (record.getMessage() for record in caplog.records)
     assert lost.startswith("ConsoleIn0.out to Peer0.in: the peer does not answer: NoAnswerError: ")
-    assert lost.endswith(("nobody is there", "the connection broke"))
+    assert lost.endswith(("not reachable", "the connection broke"))
     assert "the peer answers again" in found
 
 

@@ -171,11 +171,11 @@ def test_a_connector_is_looked_up_by_its_id(system: Served) -> None:
         ),
         (
             {"serializer.cdr.endian": "middle"},
-            "dataport.serializer.cdr.endian: 'middle' is none of: little, big",
+            "dataport.serializer.cdr.endian: 'middle' is not one of: little, big",
         ),
         (
             {"dataflow_type": "sideways"},
-            "dataport.dataflow_type: 'sideways' is none of: push, pull",
+            "dataport.dataflow_type: 'sideways' is not one of: push, pull",
         ),
         ({"buffer.length": "0"}, "dataport.inport.buffer: buffer length 0 is not in 1..1000000"),
     ],
@@ -227,5 +227,5 @@ def test_a_peer_that_is_not_there_costs_a_line(
     peer.kill()
     assert system.connect(out, theirs)[0] == "RTC_ERROR"
     (record,) = caplog.records
-    assert record.getMessage() == "ConsoleIn0.out is not connected: the peer: nobody is there"
+    assert record.getMessage() == "ConsoleIn0.out is not connected: the peer: not reachable"
     assert system.console_in.out.connectors == ()
