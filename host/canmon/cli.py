@@ -13,22 +13,25 @@ _HERE: Final = "tickrig.host.canmon.verbs"
 _VERBS: Final = {
     "dump": (f"{_HERE}.dump:dump", "Show frames as they come, and what they mean."),
     "conv": (f"{_HERE}.dump:conv", "Write what SOURCE holds into the file LOG."),
-    "info": (f"{_HERE}.info:command", "Say what log files are."),
+    "info": (f"{_HERE}.info:command", "Show what log files hold."),
     "top": (f"{_HERE}.top:command", "Show all identifiers: counts, rates, gaps, jitter."),
     "stats": (f"{_HERE}.stats:command", "Count a log: rates, gaps, jitter, missed cycles."),
-    "check": (f"{_HERE}.check:command", "Say what is wrong on a bus or in a log."),
-    "report": (f"{_HERE}.report:command", "Write what was on a bus as one HTML page."),
-    "conform": (f"{_HERE}.conform:command", "Judge one CANopen node, clause by clause."),
-    "eds": ("tickrig.host.canmon.cli:eds", "Check, mend, compare and show EDS files."),
+    "check": (f"{_HERE}.check:command", "Report what is wrong on a bus or in a log."),
+    "report": (
+        f"{_HERE}.report:command",
+        "Write the traffic of a bus as one self-contained HTML page.",
+    ),
+    "conform": (f"{_HERE}.conform:command", "Test one CANopen node, clause by clause."),
+    "eds": ("tickrig.host.canmon.cli:eds", "Check, fix, compare and show EDS files."),
     "net": ("tickrig.host.canmon.net.group:command", "Set up a CANopen network."),
     "gateway": (
         "tickrig.host.canmon.gateway:command",
-        "Give other programs SOURCE in lines of text: CiA 309-3, ASCII mapping.",
+        "Serve SOURCE to other programs in lines of text: CiA 309-3, ASCII mapping.",
     ),
     "graph": (f"{_HERE}.graph:command", "Draw curves of SOURCE: in the terminal, or to files."),
     "nodes": (f"{_HERE}.nodes:command", "Show all nodes: NMT state, heartbeat, boot-ups."),
     "send": (f"{_HERE}.send:command", "Send frames on BUS."),
-    "seq": (f"{_HERE}.seq:command", "Carry out the sequence FILE on BUS."),
+    "seq": (f"{_HERE}.seq:command", "Run the sequence FILE on BUS."),
     "play": (f"{_HERE}.play:command", "Send the frames of LOG again."),
     "tui": (f"{_HERE}.tui_verb:command", "Show all there is in tabs."),
 }
@@ -38,7 +41,7 @@ class _Verbs(LazyGroup):
     """The verbs of canmon."""
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run a verb; it ends when nobody reads what it prints."""
+        """Run a verb; it ends when its output is no longer read."""
         with until_unread():
             return super().invoke(ctx)
 
@@ -66,8 +69,8 @@ def main() -> None:
 
 _EDS: Final = "tickrig.host.canmon.eds_verbs"
 _EDS_VERBS: Final = {
-    "check": (f"{_EDS}:check_all", "Tell all that is wrong in EDS files."),
-    "fix": (f"{_EDS}:mend", "Mend an EDS."),
+    "check": (f"{_EDS}:check_all", "Check EDS files and print all findings."),
+    "fix": (f"{_EDS}:mend", "Fix an EDS."),
     "diff": (f"{_EDS}:compare", "Compare the devices of two EDS files."),
     "show": (f"{_EDS}:show", "Show the device of an EDS."),
 }
@@ -75,11 +78,11 @@ _EDS_VERBS: Final = {
 
 @click.group(cls=LazyGroup, commands=_EDS_VERBS)
 def eds() -> None:
-    """Check, mend, compare and show EDS files: EDS, DCF, XDD, XDC.
+    """Check, fix, compare and show EDS files: EDS, DCF, XDD, XDC.
 
     \b
     canmon eds check drive.eds                    all findings, with line, clause and fix
-    canmon eds fix drive.eds -o mended.eds        what needs no knowledge of the device
-    canmon eds diff old.eds new.xdd               what is another device
+    canmon eds fix drive.eds -o fixed.eds         what needs no knowledge of the device
+    canmon eds diff old.eds new.xdd               the differences
     canmon eds show drive.eds 6040                an object; without it, all of them
     """  # noqa: D301 - click wants the backspace

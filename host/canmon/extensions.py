@@ -57,10 +57,10 @@ def make_decoder(eds: Mapping[int, EdsObjects], dbc: Sequence[Path] = ()) -> Dec
 
 
 def load_rule(name: str) -> Callable[[], Rule]:
-    """Return what makes the check rule of an installed package.
+    """Return the factory of a check rule of an installed package.
 
     Raises:
-        ExtensionError: there is none of this name, or it cannot be used.
+        ExtensionError: there is no such rule, or it cannot be used.
     """
     try:
         found = _DECODERS.load(name)

@@ -41,11 +41,11 @@ _ERROR: Final = "] ERROR:"
 def command(
     *, source: str | None, listen: str | None, path: Path | None, net: int, **options: Any
 ) -> None:
-    """Give other programs SOURCE in lines of text: CiA 309-3, ASCII mapping.
+    """Serve SOURCE to other programs in lines of text: CiA 309-3, ASCII mapping.
 
-    Commands come from standard input, or from clients of --listen or --socket, as
-    CANopenNode's cocomm is one; each line is answered by one. SOURCE is a bus, or a
-    rig file in virtual time. Whoever can connect can command all nodes.
+    Commands come from standard input, or from clients of --listen or --socket,
+    such as CANopenNode's cocomm; each line has one answer. SOURCE is a bus, or a
+    rig file in virtual time. Every client that can connect can command all nodes.
 
     \b
     canmon gateway can0 --listen 60000
@@ -56,7 +56,7 @@ def command(
     \b
     Exit status  0 all is done              2 usage
                  1 a command from standard  3 the bus failed, or nothing can
-                   input was not carried out  be served at the address
+                   input was not executed     be served at the address
     """  # noqa: D301 - click wants the backspace
     if listen is not None and path is not None:
         raise Refused("--listen and --socket: give one of them")
@@ -129,7 +129,7 @@ def _listening(
 
 
 def _serve(listener: socket.socket, bus: NodeBus, net: int, greeting: str) -> None:
-    """Answer clients until Ctrl-C; meanwhile the bus is listened to, so that no queue fills."""
+    """Answer clients until Ctrl-C; read the bus in between, so that no queue fills."""
     stopped: list[bool] = []
 
     def begin() -> Answer:

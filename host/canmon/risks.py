@@ -30,7 +30,7 @@ _SEVERAL: Final = 0xFFFF
 
 
 def write_risk(is_drive: bool, entries: Iterable[Entry]) -> str:
-    """Say what writing objects may move at a node, a drive of CiA 402 or another one."""
+    """Return what writing objects may move at a node, a CiA 402 drive or another one."""
     indices = [index for index, _ in entries]
     profile = [index for index in indices if index in _DRIVE_AREA]
     told = [name for index in profile if (name := _COMMANDS.get((index - 0x6000) % _AXIS))]
@@ -45,11 +45,11 @@ def write_risk(is_drive: bool, entries: Iterable[Entry]) -> str:
 
 
 def nmt_risk(command: NmtCommand, device_type: int | None) -> str:
-    """Say what an NMT command may move at one node.
+    """Return what an NMT command may move at one node.
 
     Args:
-        command: what is commanded.
-        device_type: 1000h of the node, None if it does not say it.
+        command: the command.
+        device_type: 1000h of the node, None if unknown.
     """
     profile = _SEVERAL if device_type is None else device_type & 0xFFFF
     may_turn = profile in (_DRIVE_PROFILE, _SEVERAL)
@@ -60,7 +60,7 @@ def nmt_risk(command: NmtCommand, device_type: int | None) -> str:
     if command is NmtCommand.ENTER_PRE_OPERATIONAL:
         return "It obeys RPDOs no more: what moves may go on as it is"
     if may_turn:
-        return "A drive may let go of its motor: what hangs on it may fall"
+        return "A drive may release its motor: a suspended load may fall"
     return "Its outputs may switch to their error values"
 
 

@@ -1,8 +1,8 @@
 """The workspace: one TOML file for the settings of all panels.
 
-It is read whole and written whole, by way of a file beside it, so that no half
-of it is ever there. What nobody here knows stays in it, comments too. A file
-that somebody else has changed meanwhile is left alone.
+It is read and written as a whole, by way of a temporary file, so a partial file
+never exists. Unknown settings and comments stay in it. A file that another
+program has changed is not overwritten.
 
 Settings of a panel in a workspace, checked one by one.
 
@@ -38,7 +38,7 @@ _MOST: Final = 200_000
 
 
 class SettingError(ValueError):
-    """A setting that is none.
+    """An invalid setting.
 
     Attributes:
         path: keys and indices to it, below the panel's own table.
@@ -120,7 +120,7 @@ class Workspace:
         return WorkspaceError(f"{self.path}, line {place}: {name}")
 
     def put(self, name: str, settings: Mapping[str, Any]) -> None:
-        """Set the settings of a section; a key that is None is taken out, other keys stay."""
+        """Set the settings of a section; a None value removes its key, other keys stay."""
         if settings:
             _merge(self._document, {name: settings})
 
@@ -143,7 +143,7 @@ class Workspace:
             return False
         try:
             if not over and self._differs(path):
-                raise WorkspaceError(f"{path} was changed by somebody else: not saved")
+                raise WorkspaceError(f"{path} was changed by another program: not saved")
             write_whole(path, text)
         except OSError as error:
             raise WorkspaceError(f"{path}: {error.strerror}: not saved") from None
@@ -151,7 +151,7 @@ class Workspace:
         return True
 
     def _differs(self, path: Path) -> bool:
-        """Say whether a file is not as it was last read or written."""
+        """Return whether a file differs from what was last read or written."""
         try:
             return path.read_bytes() != self._text.encode()
         except FileNotFoundError:
@@ -304,7 +304,7 @@ def _folder(workspace: Workspace) -> Path:
 
 
 def _is_text(value: object) -> TypeGuard[str]:
-    """Say whether a value is a text as a command line may have it: without NUL."""
+    """Return whether a value is a text that a command line may have: without NUL."""
     return isinstance(value, str) and "\0" not in value
 
 
@@ -399,7 +399,7 @@ class PanelSettings:
                 raise self.workspace.wrong(error, panel.section) from None
 
     def unknown(self) -> list[str]:
-        """Return what of the workspace nobody here knows; it stays in the file."""
+        """Return the unknown settings of the workspace; they stay in the file."""
         known = {panel.section: set(panel.save()) for panel in self._panels}
         words = [name for name in self.workspace.sections() if name not in (*_FRAME, *known)]
         for name, keys in known.items():
@@ -407,9 +407,9 @@ class PanelSettings:
         return words
 
     def save(self) -> str:
-        """Write what has changed; return what went wrong, once.
+        """Write what has changed; return an error once.
 
-        A file that somebody else has changed is not touched until it is exported.
+        A file that another program has changed is not written until it is exported.
         """
         self._put()
         try:
@@ -457,10 +457,10 @@ def text_of(settings: Mapping[str, Any], name: str, default: str) -> str:
 
 
 def choice(settings: Mapping[str, Any], name: str, default: str, known: Sequence[str]) -> str:
-    """Return one of some texts; SettingError if it is none of them."""
+    """Return one of some texts; SettingError if it is not one of them."""
     value = settings.get(name, default)
     if value not in known:
-        raise SettingError((name,), f"{value!r} is none of {', '.join(known)}")
+        raise SettingError((name,), f"{value!r} is not one of {', '.join(known)}")
     return str(value)
 
 
@@ -482,9 +482,9 @@ def texts_of(settings: Mapping[str, Any], name: str) -> tuple[str, ...]:
 
 @contextmanager
 def below(*path: str | int) -> Iterator[None]:
-    """Let what is wrong with a setting inside be told with the whole path to it.
+    """Report errors of nested settings with the whole path.
 
-    Any other ValueError is told of the path itself.
+    Any other ValueError is reported for the path itself.
     """
     try:
         yield
@@ -502,5 +502,5 @@ def checked_bus(buses: Collection[str], settings: Mapping[str, Any]) -> str:
     """
     bus = text_of(settings, "bus", "")
     if bus and buses and bus not in buses:
-        raise SettingError(("bus",), f"{bus!r} is none of {', '.join(buses)}")
+        raise SettingError(("bus",), f"{bus!r} is not one of {', '.join(buses)}")
     return bus

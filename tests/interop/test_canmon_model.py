@@ -65,7 +65,7 @@ def test_check_finds_nothing_wrong_with_our_slave(vcan: Bus, tmp_path: Path) -> 
 
 def test_nodes_shows_our_slave(vcan: Bus) -> None:
     nodes = Terminal("nodes", vcan.channel)
-    nodes.wait_for("no node was heard")
+    nodes.wait_for("no node has sent a frame")
     with running(vcan, "--eds", str(EDS), "--node-id", "5"):
         nodes.wait_for("pre-operational")
         run("cansend", vcan.channel, "000#0105")

@@ -73,10 +73,10 @@ def write_png(  # noqa: PLR0913, PLR0917 - what is drawn, and how
     height: int = 400,
     title: str = "",
 ) -> None:
-    """Write a picture of so many pixels.
+    """Write a picture of this size in pixels.
 
     Raises:
-        ImportError: matplotlib is not there.
+        ImportError: matplotlib is not installed.
     """
     from matplotlib.figure import Figure  # noqa: PLC0415 - an extra, and slow
 

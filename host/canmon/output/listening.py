@@ -58,10 +58,10 @@ _PATIENCE_S: Final = 0.02
 
 
 class _Screen:
-    """The controlling terminal, also where standard input is a pipe.
+    """The controlling terminal, also if standard input is a pipe.
 
-    On leaving, however that comes about, the terminal is as it was before. One that is stuck
-    holds nobody up: nothing is painted until it has taken the last picture.
+    The end restores the terminal, also after errors. A terminal that is stuck does not block:
+    nothing is painted until it has accepted the last picture.
 
     Raises:
         OSError: there is no terminal.
@@ -223,11 +223,11 @@ class _FramesLost(click.ClickException):
 
 
 def report(source: AnySource[object], strict: bool, more: Iterable[str] = ()) -> None:
-    """Say what was lost or no frame, and what else there is to say, then close the source.
+    """Report lost frames, invalid frames and other notes, then close the source.
 
     Raises:
-        SourceFailed: it ended before its time.
-        _FramesLost: frames were lost or could not be taken, and the caller is strict.
+        SourceFailed: it ended early.
+        _FramesLost: frames were lost or could not be read, and the caller is strict.
     """
     source.close()
     for word in (*source.messages(), *more):
@@ -296,7 +296,7 @@ _Item = TypeVar("_Item", bound="AnyRecord")
 _POLL_US: Final = 20_000
 _NOT_COME: Final = 1
 _PATIENCE_US: Final = 5_000_000
-"""How long a bus is heard where nothing else ends it."""
+"""How long to listen to a bus if nothing else ends it."""
 
 
 span_option: Final = time_option(
@@ -329,15 +329,15 @@ def follow(  # noqa: PLR0913 - how, on a screen and without
     *,
     press: Callable[[str], None] = lambda key: None,
 ) -> None:
-    """Take what comes until the source ends, the time is over or somebody interrupts it.
+    """Read until the source ends, the time is over or the user interrupts.
 
     Args:
         source: where frames come from.
         words: its SOURCE words.
-        take: takes what comes.
-        span_us: for how long; None where nobody said it.
-        lines: what is shown meanwhile of a live source, where there is a terminal.
-        press: acts on keys that are pressed there.
+        take: called with the records.
+        span_us: for how long; None if not given.
+        lines: status lines of a live source, shown if there is a terminal.
+        press: called with keys pressed there.
     """
     with until_interrupted():
         if lines is not None and source.live and sys.stdout.isatty():
@@ -365,21 +365,21 @@ def listen(
 
 
 def say_marks(source: AnySource[object]) -> None:
-    """Say on standard error which bus went away, or is back."""
+    """Report on standard error which bus went away, or is back."""
     for mark in () if source.recorded else source.marks:
         click.echo(mark.text, err=True)
 
 
 def take_blocks(log: BlockLog, take: Callable[[Columns], None], span_us: int | None = None) -> bool:
-    """Take all blocks of a log, or until somebody interrupts it.
+    """Read all blocks of a log, or until the user interrupts.
 
     Args:
         log: the log.
-        take: takes a block.
+        take: called with each block.
         span_us: for how long by the times of the log; None for all of it.
 
     Returns:
-        False where it holds CAN FD: then all of it is to be read frame by frame.
+        False if it holds CAN FD: then all of it must be read frame by frame.
     """
     last_us: int | None = None
     with until_interrupted():
@@ -405,12 +405,12 @@ def count_blocks(log: BlockLog | None, span_us: int | None) -> TrafficSnapshot |
 
 
 def patience_us(source: AnySource[object], words: Sequence[str]) -> int | None:
-    """Return how long to listen where nobody says it; a file and a pipe have an end."""
+    """Return how long to listen if no time is given; a file and a pipe have an end."""
     return None if not source.live or list(words) == ["-"] else _PATIENCE_US
 
 
 def _is_over(begin_s: float, span_us: int | None) -> bool:
-    """Say whether a time has passed by the clock of this machine."""
+    """Return whether a time has passed by the clock of this machine."""
     return span_us is not None and time.monotonic() >= begin_s + span_us / 1e6
 
 
@@ -418,7 +418,7 @@ _PAINT_S: Final = 0.1
 _QUIT: Final = "q"
 
 _Lines = Callable[[int, int, int], list[str]]
-"""Returns what is shown at a time on a screen with so many columns and lines."""
+"""Returns the lines to show at a time, for a screen of this size."""
 
 
 def _paint(

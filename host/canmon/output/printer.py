@@ -39,19 +39,19 @@ else:  # slow; seldom wanted; numpy
 # What frames mean, and which of them are wanted.
 
 DecodedFrame = tuple["AnyRecord", "Decoded | None"]
-"""A frame or a line of a serial port, and what it means where somebody asked."""
+"""A frame or a line of a serial port, and its meaning if it is decoded."""
 
 
 class FilteredDecoder:
-    """Decodes frames and passes on those that are wanted.
+    """Decodes frames and passes on the wanted ones.
 
     Args:
-        decoder: tells what frames mean; None where nobody asks.
+        decoder: decodes frames; None for no decoding.
         wanted: which frames pass; None for all. It needs a decoder.
 
     Attributes:
-        taken: how many frames came.
-        passed: any of them passed.
+        taken: number of frames.
+        passed: whether any frame passed.
     """
 
     def __init__(self, decoder: Decoder | None, wanted: Filter | None) -> None:
@@ -88,9 +88,9 @@ class FilteredDecoder:
         return self._wanted is not None and self.taken > 0 and not self.passed
 
     def messages(self) -> list[str]:
-        """Say which signals and kinds the filter asks for that never came, one line each.
+        """Return the signals and kinds in the filter that never came, one line each.
 
-        Where none is missing, say that no frame passed.
+        If none is missing, say that no frame passed.
         """
         said = [] if self._missing is None else self._missing.messages()
         if not said and self.nothing_passed and self._wanted is not None:
@@ -206,7 +206,7 @@ def csv_printer(record: AnyRecord, decoded: Decoded | None) -> str:
 
 
 def _plain(value: object) -> object:
-    """Return a value as JSON has it: bytes are hex, and what is no number is null."""
+    """Return a value for JSON: bytes are hex, and a NaN or infinity is null."""
     if isinstance(value, float) and not isfinite(value):
         return None
     return value.hex().upper() if isinstance(value, bytes | bytearray) else value
@@ -219,12 +219,12 @@ def _cell(text: str) -> str:
 
 
 class BlockPrinter:
-    """Writes the lines of many frames at once, the same as `printer_of` one by one.
+    """Writes the lines of many frames at once, with the same result as `printer_of`.
 
     Args:
         output: text, or a log.
-        lines: writes single lines of text; it goes on where this ends, and the other way round.
-        decoder: tells what frames mean; it is fed by others in between. None where nobody asks.
+        lines: writes single lines of text; both continue where the other ended.
+        decoder: decodes frames; others may feed it in between. None for no decoding.
     """
 
     def __init__(self, output: DumpFormat, lines: DumpLines, decoder: Decoder | None) -> None:

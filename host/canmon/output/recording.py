@@ -50,19 +50,19 @@ else:  # slow
 
 
 class LogFile:
-    """A recording under way.
+    """A running recording.
 
     Args:
-        plan: what it shall be; where it is one file, one that exists is replaced.
-        source: SOURCE words of what is read meanwhile.
-        live: time goes on while no frame comes.
-        triggers: what it waits for, where the plan has it wait.
+        plan: its settings; a single file replaces an existing one.
+        source: SOURCE words of what is read.
+        live: whether time passes without frames.
+        triggers: what it waits for, if the plan has a trigger.
         wanted: which frames are recorded; None for all.
-        kept: what is written stays there if it cannot be written on.
+        kept: whether the file stays if writing fails.
 
     Raises:
-        Refused: the name tells no format, the format needs what is not there, or the file is
-            read meanwhile.
+        Refused: the name has no known format, the format needs a missing package, or the file is
+            being read.
         SourceFailed: it cannot be written, now or later.
     """
 
@@ -125,7 +125,7 @@ class LogFile:
 
     @property
     def _now_us(self) -> int:
-        """The time at the source: that of this machine until a frame has told it."""
+        """The time at the source: that of this machine until a frame has a time."""
         if not self._live:
             return self._watch.latest_us
         return self._watch.now_us if self._watch.latest_us else time.time_ns() // 1_000
@@ -133,13 +133,13 @@ class LogFile:
 
 @contextmanager
 def whole_log(path: Path, source: Sequence[str]) -> Iterator[Path]:
-    """Give where a log is written: a new file, which takes the place of `path` in the end.
+    """Open a log for writing: a new file, which replaces `path` at the end.
 
-    Where something else than files is read, this may be long, and somebody may read on: then it is
-    `path` itself.
+    If the source is not a file, this may take long, and others may read the log: then it is `path`
+    itself.
 
     Raises:
-        Refused: its name tells no format, or it is read meanwhile.
+        Refused: its name has no known format, or it is being read.
         SourceFailed: it cannot be written.
     """
     _check_not_read(path, source)
@@ -159,7 +159,7 @@ def whole_log(path: Path, source: Sequence[str]) -> Iterator[Path]:
 
 
 def _check_not_read(path: Path, source: Sequence[str]) -> None:
-    """Refuse a file that is read meanwhile."""
+    """Refuse a file that is being read."""
     read = (parsed.path for word in source if isinstance(parsed := parse_source(word), FileSpec))
     if path.exists() and any(one.exists() and one.samefile(path) for one in read):
         raise Refused(f"{path} is read, so it cannot be written")
@@ -245,22 +245,22 @@ class RecordingOptions:
         self.decodes = any(trigger.decodes for trigger in self.triggers)
 
     def open(self, source: Sequence[str], live: bool, wanted: FilterTrigger | None) -> LogFile:
-        """Begin it.
+        """Start the recording.
 
         Args:
             source: SOURCE words of what is recorded.
-            live: time goes on while no frame comes.
+            live: whether time passes without frames.
             wanted: which frames are recorded; None for all.
 
         Raises:
-            Refused: the format cannot be written here, or the file is read meanwhile.
+            Refused: the format cannot be written here, or the file is being read.
             SourceFailed: it cannot be written.
         """
         return LogFile(self.plan, source, live, self.triggers, wanted)
 
 
 def read_recording(words: str, bit_rate: int | None) -> RecordingOptions:
-    """Read a recording in parts as people write it: a file and options; Refused if it is none."""
+    """Parse the arguments of a recording in parts: a file and options; Refused if invalid."""
     try:
         command = click.Command("record", params=_params())
         context = command.make_context("record", shlex.split(words))

@@ -145,17 +145,17 @@ _DATED_US: Final = 1_000_000_000_000_000
 def _who(rows: Iterable[NodeStatus]) -> str:
     present = [row for row in rows if row.present]
     if not present:
-        return "No CANopen node was heard."
+        return "No CANopen node sent a frame."
     groups: dict[str, list[str]] = {}
     for row in present:
-        told = "in no state that they told" if row.state is None else row.state_text
+        told = "in no state that they reported" if row.state is None else row.state_text
         groups.setdefault(told, []).append(str(row.node))
     parts = [
         f"{', '.join(nodes)} {'is' if len(nodes) == 1 else 'are'} {state}"
         for state, nodes in groups.items()
     ]
     were = "node was" if len(present) == 1 else "nodes were"
-    return f"{len(present)} {were} heard; at the end {'; '.join(parts)}."
+    return f"{len(present)} {were} present; at the end {'; '.join(parts)}."
 
 
 def _wrong(verdict: Verdict, first_us: int) -> str:

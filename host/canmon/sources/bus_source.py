@@ -1,9 +1,9 @@
 """Buses of python-can as a source.
 
-The kernel counts frames for which a socket's queue had no room, and tells the
-count with each frame that is read (socket(7), SO_RXQ_OVFL). Frames of CAN FD and
-CAN XL it shows to sockets alone that want them (linux, networking/can). Here all is
-asked for; CAN FD is read, and CAN XL is counted.
+The kernel counts frames for which a socket's queue had no room, and passes the
+count with each frame that is read (socket(7), SO_RXQ_OVFL). It passes frames of CAN FD
+and CAN XL only to sockets that enable them (linux, networking/can). This source enables
+both; it reads CAN FD and counts CAN XL.
 """
 
 from __future__ import annotations
@@ -60,12 +60,12 @@ class SocketReader:
     """The socket of an open SocketCAN bus of python-can.
 
     Args:
-        bus: the bus; nobody else reads from it.
-        name: what it is called in what is heard.
+        bus: the bus; no other code reads from it.
+        name: its channel name in records.
 
     Attributes:
         lost: frames that the kernel dropped because its queue was full.
-        tally: what was no frame.
+        tally: counts what was not a frame.
         stepped: never.
     """
 
@@ -185,14 +185,14 @@ class BusReader:
     """Any bus of python-can.
 
     Args:
-        bus: an open bus; nobody else reads from it.
+        bus: an open bus; no other code reads from it.
         interface: its interface.
-        name: what it is called in what is heard.
+        name: its channel name in records.
 
     Attributes:
         reads: reads the bus, and counts what its driver could not read.
-        lost: 0, for python-can does not tell.
-        tally: what was no frame.
+        lost: 0, because python-can does not report it.
+        tally: counts what was not a frame.
         stepped: its time passes while it is read.
     """
 
@@ -261,7 +261,7 @@ class OpenBus:
         return _reader_of(self.bus, self._interface, self.name)
 
     def open_again(self) -> Reader[Record]:
-        """Open it once more; whoever used it has closed it."""
+        """Open it again; the previous user has closed it."""
         self.bus, _, _ = open_bus(self._options)
         try:
             return self.reader
@@ -358,7 +358,7 @@ class Transmitter:
         return records
 
     def check_reads(self) -> None:
-        """Raise SourceFailed if the last 100 reads of the bus have failed: nothing can be heard."""
+        """Raise SourceFailed if the last 100 reads of the bus failed."""
         try:
             if self._reads is not None:
                 self._reads.check()

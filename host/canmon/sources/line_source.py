@@ -40,9 +40,9 @@ from tickrig.wire.rtc_lite.frame import (
 
 _LITE_KIND: Final = "rtc-lite"
 _FRAME_GAP_US: Final = 100_000
-"""After so long a silence a frame that has begun is forgotten (DECISION L7)."""
+"""After this pause, an incomplete frame is dropped (DECISION L7)."""
 _LOST_GAP_US: Final = 20_000
-"""After so long a silence a header is looked for again."""
+"""After this pause, the search for a header starts again."""
 _UNASKED: Final = (LiteCommand.DATA, LiteCommand.IN_PROFILE, LiteCommand.OUT_PROFILE)
 
 
@@ -242,9 +242,9 @@ class LineReader:
 
     Attributes:
         name: of its port.
-        lost: 0, for a serial port does not tell.
-        tally: empty; what is no line is told as one.
-        stepped: False, its time passes by itself.
+        lost: 0, because a serial port does not report it.
+        tally: empty; invalid bytes are reported as lines.
+        stepped: False: its time is real time.
 
     Raises:
         LinkClosed: the port cannot be opened.

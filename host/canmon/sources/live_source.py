@@ -100,7 +100,7 @@ class LiveSource(AnySource[_Item]):
 
     @property
     def ended(self) -> bool:
-        """Say that a bus is gone, and all that came was fetched."""
+        """Report that a bus is gone, and that all received frames were read."""
         return (bool(self.failed) or self._stop) and not self._queue
 
     @property
@@ -141,12 +141,12 @@ class LiveSource(AnySource[_Item]):
         return [self._queue.popleft() for _ in range(len(self._queue))]  # type: ignore[misc]
 
     def messages(self) -> list[str]:
-        """Say what was no frame or got lost."""
+        """Report invalid and lost frames."""
         remarks = (text for name, tally in self.tallies() for text in tally.remarks(name))
         return [*self.losses(), *remarks]
 
     def losses(self) -> list[str]:
-        """Say what got lost or could not be taken."""
+        """Report lost and unreadable frames."""
         said = super().losses() + [text for one in self._reopening() for text in one.losses()]
         said += [
             f"{one.name}: its driver lost {one.lost} frames" for one in self._readers if one.lost
@@ -220,23 +220,23 @@ def _monotonic_us() -> int:
 
 
 class ReopeningReader(Generic[_Item]):
-    """A reader over readers of which each is used until its bus is gone.
+    """A reader over readers, each of which is used until its bus is gone.
 
-    Until somebody sets `wanted` it is as the first of them. A bus is back when it was opened and
+    Until `wanted` is set, it acts like the first reader. A bus is back when it was opened and
     read without an error: one of SocketCAN that is down can be opened.
 
     Args:
         reader: the first; it is open.
         open_reader: opens the next.
         clock: microseconds, of any origin.
-        wait: sleeps for so many seconds.
+        wait: sleeps for a number of seconds.
 
     Attributes:
         name: that of the first.
-        tally: what was no frame in any of them.
+        tally: counts what was not a frame in any of them.
         stepped: never.
-        wanted: whether it shall be opened again.
-        gaps: how often it went away.
+        wanted: whether to open the bus again.
+        gaps: number of times that it went away.
     """
 
     stepped = False
@@ -265,10 +265,10 @@ class ReopeningReader(Generic[_Item]):
         return self._gone_us is not None
 
     def read(self, timeout_us: int, /) -> Sequence[_Item | Mark]:
-        """Wait for a first frame; tell by a mark that the bus went, or is there again.
+        """Wait for a first frame; mark the times at which the bus goes away and is back.
 
         Raises:
-            LinkClosed: the bus is gone, and nobody wants it to be opened again.
+            LinkClosed: the bus is gone, and `wanted` is not set.
         """
         try:
             reader = self._reader or self._opened(timeout_us)
@@ -284,7 +284,7 @@ class ReopeningReader(Generic[_Item]):
         return [back(time.time_ns() // 1_000, self.name, away_us), *records]
 
     def losses(self) -> list[str]:
-        """Say for how long it was away."""
+        """Return how long it was away."""
         if not self.gaps:
             return []
         now_away_us = 0 if self._gone_us is None else self._clock() - self._gone_us

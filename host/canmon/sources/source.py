@@ -92,7 +92,7 @@ class AnySource(Generic[_Taken_co]):
 
     @property
     def lost(self) -> int:
-        """Frames that were there and did not get here, as far as anybody told."""
+        """Frames that were lost before they were read, as far as it is reported."""
         return sum(tally.lost for _, tally in self.tallies())
 
     @property
@@ -105,15 +105,15 @@ class AnySource(Generic[_Taken_co]):
         return []
 
     def messages(self) -> list[str]:
-        """Say what was no frame or got lost, one line each."""
+        """Report invalid and lost frames, one line each."""
         return [text for name, tally in self.tallies() for text in tally.messages(name)]
 
     def losses(self) -> list[str]:
-        """Say what of it got lost or could not be taken: not what is no frame by its nature."""
+        """Report lost and unreadable frames, without what is not a frame by nature."""
         return [text for name, tally in self.tallies() for text in tally.losses(name)]
 
     def errors(self) -> list[str]:
-        """Say what of it tells of errors on the bus beside error frames."""
+        """Report bus errors that are not error frames."""
         return [text for name, tally in self.tallies() for text in tally.errors(name)]
 
     @property
@@ -274,7 +274,7 @@ class LogCut:
     earlier: Callable[[Record], object] | None = None
 
     def __bool__(self) -> bool:
-        """Say whether any frame can be left out."""
+        """Return whether a frame may be left out."""
         return self.begin is not None or self.end is not None
 
     def __str__(self) -> str:
@@ -355,7 +355,7 @@ class _CutLog:
         return self._origin_us is not None and not self._passed
 
     def messages(self) -> list[str]:
-        """Say that nothing was in the part, and where the log lies; nothing if something was."""
+        """Report that the part is empty, and the range of the log; nothing if it is not empty."""
         if not self.empty:
             return []
         span_s = (self._last_us - self._first_us) / 1e6
@@ -378,7 +378,7 @@ _BATCH: Final = 1_024
 
 
 class _LoggedSource(AnySource[Record]):
-    """What somebody recorded: frames up to the next marks at a time."""
+    """A log: frames up to the next marks at a time."""
 
     recorded = True
 
@@ -398,11 +398,11 @@ class _LoggedSource(AnySource[Record]):
         return self._cut is not None and self._cut.empty
 
     def messages(self) -> list[str]:
-        """Say what was no frame or got lost, and that nothing is in the part that is wanted."""
+        """Report invalid and lost frames, and an empty part."""
         return [*super().messages(), *(self._cut.messages() if self._cut else ())]
 
     def _read(self, timeout_us: int) -> Sequence[Item]:
-        """Return what is next, or none; `_no_more` says whether that was all."""
+        """Return the next records, or none; `_no_more` is set at the end."""
         return []
 
     def poll(self, timeout_us: int, /) -> list[Record]:
@@ -495,7 +495,7 @@ class FileSource(_LoggedSource):
         return super().nothing_passed or (self._no_more and self._silent == {*self._names})
 
     def messages(self) -> list[str]:
-        """Say what was no frame or got lost, and which filters let nothing pass."""
+        """Report invalid and lost frames, and filters that let nothing pass."""
         silent = [name for name in self._names if self._no_more and name in self._silent]
         return [
             *super().messages(),
@@ -525,7 +525,7 @@ _READ_BYTES: Final = 1 << 16
 
 
 class StdinSource(_LoggedSource):
-    """A pipe, a terminal or a file that somebody feeds."""
+    """A pipe, a terminal or a file that another program feeds."""
 
     live = True
 
@@ -584,7 +584,7 @@ class BlockLog(AnySource["Columns"]):
         return self._cut is not None and self._cut.empty
 
     def messages(self) -> list[str]:
-        """Say what was no frame or got lost, and that nothing is in the part that is wanted."""
+        """Report invalid and lost frames, and an empty part."""
         return [*super().messages(), *(self._cut.messages() if self._cut else ())]
 
     def poll(self, timeout_us: int, /) -> list[Columns]:

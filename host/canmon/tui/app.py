@@ -49,7 +49,7 @@ if TYPE_CHECKING:
 else:  # python-can is slow
     bus_source = LazyModule("tickrig.host.canmon.sources.bus_source")
 
-# A task that records what the session hears, while somebody wants it.
+# A task that records the traffic on request.
 
 _LOOK_US: Final = 100_000
 """How often it is called while no frame comes."""
@@ -63,15 +63,15 @@ _Light = tuple[str, str]
 
 
 class RecorderTask(Task):
-    """Records in parts, so that no file of before is overwritten.
+    """Records in parts, so that no earlier file is overwritten.
 
     Args:
-        session: what is heard.
+        session: the source of the traffic.
 
     Attributes:
         section: its table in the workspace.
-        words: what is recorded, as behind `canmon dump -l`.
-        recorder: what records, or did last; None before the first.
+        words: arguments of the recording, as for `canmon dump -l`.
+        recorder: the current or last recorder; None before the first.
     """
 
     section: Final = "record"
@@ -387,13 +387,13 @@ class MonitorApp(FramedApp):
     """Tabs, keys, help and the status line.
 
     Args:
-        session: what is heard, and how to send; it is started by whoever runs the app.
+        session: the traffic, and how to send; the caller of the app starts it.
         panels: the tabs.
-        panel_settings: keeps their settings; without one nothing is kept until it is exported.
-        recorder: what records; a new one unless given.
+        panel_settings: stores their settings; None stores them only on export.
+        recorder: the recorder; by default a new one.
 
     Attributes:
-        reopens: buses that go away are opened again.
+        reopens: whether buses that go away are opened again.
     """
 
     TITLE = "canmon"

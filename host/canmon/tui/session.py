@@ -51,52 +51,51 @@ else:  # python-can is slow
 # Theory of operation
 # ===================
 #
-# One thread reads the source, decodes, counts and sends; the other paints the screen. They
-# share the model and the tasks under one lock (`Session.lock`), which whoever reads the
-# model or touches a task must hold. `armed` is the exception: it is a plain flag that is
-# looked at again before each frame leaves, and that the end of the program clears without
-# the lock, so that it need not wait for a session that is busy.
+# One thread reads the source, decodes, counts and sends; the other paints the screen. They share
+# the model and the tasks under one lock (`Session.lock`): hold it to read the model or to use a
+# task. `armed` is the exception: it is a plain flag that is checked again before each frame is
+# sent, and that the end of the program clears without the lock, so that it does not wait for a busy
+# session.
 #
-# A step: wait for a frame, or until a task is due; then, under the lock, frames go to the
-# model and to every task in the order of arrival, tasks say what they want to send, and
-# outside the lock it is sent. Sending may block on a slow bus, and the screen must not.
+# A step: wait for a frame, or until a task is due; then, under the lock, frames go to the model and
+# to every task in the order of arrival, and tasks return frames to send; these are sent outside the
+# lock. Sending may block on a slow bus, and the screen must not.
 #
-# What this program sends comes back as a record of the next step (`_echo`), with the time
-# of the source, because a bus does not give a program its own frames. Tasks hear it, too.
+# Frames that this program sends are added to the records of the next step (`_echo`), with the time
+# of the source, because a bus does not return a program's own frames. Tasks receive them, too.
 #
-# Two times: `now_us` of the session, on a monotonic clock, is for tasks; `model.now_us` is
-# the time at the source, that of the frames, and goes on by itself while a live source is
-# silent.
+# Two times: `now_us` of the session, on a monotonic clock, is for tasks; `model.now_us` is the time
+# at the source, that of the frames, and continues while a live source has no frames.
 #
-# Nothing is sent before `arm`, and `disarm` stops all tasks, so arming again sends nothing
-# by itself. What was wanted meanwhile is counted as withheld. A bus that fails to send
-# disarms, and says why.
+# Nothing is sent before `arm`, and `disarm` stops all tasks, so arming again sends nothing by
+# itself. Frames that tasks return while disarmed are counted as withheld. A bus that fails to send
+# disarms, and reports why.
 
 DecodedFrame = tuple[Record, Decoded]
 """A frame and what it means."""
 
 
 class Model:
-    """What was heard, decoded and counted.
+    """The traffic, decoded and counted.
 
     Args:
-        eds: what files say, by node-ID.
+        eds: contents of EDS files, by node-ID.
         dbc: DBC files.
         bit_rate: of the buses, None if it is not known.
         data_bit_rate: of data of CAN FD frames with BRS, likewise.
 
     Attributes:
         eds: what files say, by node-ID.
-        decoder: decodes all that is taken here.
+        decoder: decodes all frames.
         board: the nodes.
         top: the traffic, and how the statistics show it.
         trace: the latest frames.
-        frames: how many were taken, error frames among them.
+        frames: number of frames, including error frames.
         now_us: the time at the source.
-        lost: frames that were there and did not get here.
-        unread: what came and is no frame of CAN or CAN FD.
-        failed: why the source ended before its time; empty if it did not.
-        ended: no more will come.
+        lost: frames that were lost before they were read.
+        unread: what was not a frame of CAN or CAN FD.
+        failed: why the source ended early; empty if it did not.
+        ended: whether the source has ended.
         away: buses that went away and are not back.
     """
 
@@ -117,7 +116,7 @@ class Model:
         self.away: Sequence[str] = ()
 
     def take(self, records: Sequence[AnyRecord]) -> list[DecodedFrame]:
-        """Take what was heard; return the frames with what they mean."""
+        """Process records; return the frames with their meanings."""
         decoded_frames: list[DecodedFrame] = []
         for record in records:
             if isinstance(record, Record):
@@ -158,7 +157,7 @@ class Task(Protocol):
         return NEVER
 
     def tick(self, now_us: int, records: Sequence[DecodedFrame], /) -> AnyFrames:
-        """Take what was heard, those that this program sent among it; return what to send.
+        """Process records, including frames of this program; return the frames to send.
 
         Args:
             now_us: the session's time, not that of the frames.
@@ -171,27 +170,27 @@ class Task(Protocol):
 
 
 class Session:
-    """Reads a source, feeds the model and the tasks, and sends what these want to send.
+    """Reads a source, feeds the model and the tasks, and sends the frames of the tasks.
 
-    Nothing is sent while it is not armed: such frames are withheld, and counted.
-    Whoever reads the model or touches a task holds `lock`.
+    Nothing is sent while it is not armed: such frames are withheld, and counted. Hold `lock` to
+    read the model or to use a task.
 
     Args:
         source: where frames come from.
-        model: takes them.
-        buses: what sends, by channel; empty for a log.
+        model: processes them.
+        buses: the buses to send on, by channel; empty for a log.
         clock: the session's time in microseconds.
 
     Attributes:
         lock: of the model and the tasks.
-        tasks: what hears and sends.
+        tasks: process records and return frames to send.
         marks: which buses went away or came back, until a task takes them.
-        armed: frames are sent.
-        sent: how many were.
-        withheld: how many were not, because it was not armed.
+        armed: whether frames are sent.
+        sent: number of sent frames.
+        withheld: number of frames not sent because it was not armed.
         trouble: why a frame could not be sent; empty if all could.
-        notes: lines for people, until they are shown.
-        stamp: how all tabs write times.
+        notes: messages for the user, until they are shown.
+        stamp: time format of all tabs.
         words: options and SOURCE words that name the buses on a command line.
     """
 
@@ -286,7 +285,7 @@ class Session:
             self.start()
 
     def feed(self, records: Sequence[AnyRecord]) -> None:
-        """Take frames that were heard before."""
+        """Process frames that were received before."""
         with self.lock:
             self._take(records)
 
@@ -300,7 +299,7 @@ class Session:
             self._thread.result()
 
     def close(self) -> None:
-        """End the thread, and send no more; the source stays open for whoever reports on it."""
+        """End the thread, and stop sending; the source stays open for the final report."""
         self.armed = False  # else a slow bus would take all that is due first
         self._stop.set()
         self._pool.shutdown()
@@ -344,7 +343,7 @@ class Session:
         return []
 
     def _send(self, channel: str, frame: CanFrame | FdFrame) -> None:
-        if not self.armed:  # somebody has stopped all meanwhile
+        if not self.armed:  # all was stopped in between
             self.withheld += 1
             return
         name = channel or next(iter(self.buses))
@@ -358,7 +357,7 @@ class Session:
         self._echo.append(Record(self._source_us(), name, frame, sent=True))
 
     def _source_us(self) -> int:
-        """Return the time at the source: that of this machine until a frame has told it."""
+        """Return the time at the source: that of this machine until a frame has a time."""
         return self._watch.now_us if self._watch.latest_us else time.time_ns() // 1_000
 
 

@@ -99,7 +99,7 @@ class MonitorSettings:
 
 @contextmanager
 def of_field(name: str) -> Iterator[None]:
-    """Let what goes wrong in the block be told of a field."""
+    """Report errors of the block for a field."""
     try:
         yield
     except InputError:

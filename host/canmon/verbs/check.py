@@ -67,16 +67,16 @@ class _FindingPrinter:
     """Findings, shown as they come.
 
     Args:
-        jsonl: show them as JSON.
+        jsonl: whether to show them as JSON.
         stamp: how times are shown as text; None for seconds of the epoch.
-        kept: a report will want them.
+        kept: whether a report needs them.
         rules: the names of all rules.
 
     Attributes:
-        counts: how many there are, by rule.
-        findings: all of them, where they are kept.
-        frames: how many were held against the rules.
-        unjudged: what the rules could not judge, once all is over.
+        counts: number of findings, by rule.
+        findings: all of them, if they are kept.
+        frames: number of checked frames.
+        unjudged: what the rules could not judge, known at the end.
     """
 
     unjudged = Unjudged({})
@@ -121,7 +121,7 @@ class _FindingPrinter:
                 click.echo("\n".join(map(self._text, new)))
 
     def nothing_judged(self) -> str:
-        """Say why no rule judged anything; empty if one did."""
+        """Return why no rule judged anything; empty if one did."""
         none = self.none_judged
         if any(name not in none for name in self._rules):
             return ""
@@ -133,14 +133,14 @@ class _FindingPrinter:
         return {name: why for name, why in self.unjudged.rules.items() if name not in self.counts}
 
     def doubts(self) -> list[str]:
-        """Say what was judged and what was not, one line each."""
+        """Report what was judged and what was not, one line each."""
         held = [name for name in self._rules if name not in self.none_judged]
         none = [f"judged: {', '.join(held)}"] * bool(held)
         none += [f"{name} judged nothing: {why}" for name, why in self.none_judged.items()]
         return none + [f"not judged: {text}" for text in self.unjudged.notes]
 
     def summary(self) -> str:
-        """Say how it ended."""
+        """Report how it ended."""
         if self.counts:
             counts = ", ".join(f"{rule}: {count}" for rule, count in sorted(self.counts.items()))
             return f"{counted(self.counts.total(), 'finding')}: {counts}"
@@ -176,9 +176,9 @@ _TEXTS: Final = {
     "no_emcy": "No EMCY but error reset.",
     "no_sdo_abort": "No aborted SDO transfer.",
     "no_error_frames": "No error frame.",
-    "no_reboot": "No node that was heard boots without an NMT reset.",
+    "no_reboot": "No node boots again without an NMT reset.",
     "no_lost_heartbeat": "No node that sent heartbeats stops, or misses one; periods are learnt.",
-    "no_loss": "No frame lost, no line of a log that is none.",
+    "no_loss": "No frame lost, no invalid line in a log.",
 }
 
 _rule_options: Final[Decorator] = add_options(
@@ -193,7 +193,7 @@ _rule_options: Final[Decorator] = add_options(
         metavar="NODE=TIME±OFF",
         help="Its period, as 3=100ms±20% or 3=100ms+-5ms.",
     ),
-    click.option("--nodes", multiple=True, metavar="NODES", help="Heard at all, as 3,16-18."),
+    click.option("--nodes", multiple=True, metavar="NODES", help="Present on the bus, as 3,16-18."),
     click.option(
         "--max-gap", multiple=True, metavar="CAN-ID=TIME", help="Comes again, as 181=20ms."
     ),
@@ -212,7 +212,7 @@ def _read_rules(files: Sequence[Path], options: Mapping[str, object]) -> Rules:
     """Return the rules of files and options together.
 
     Raises:
-        Refused: a rule that is none, a file that cannot be read or has no rule.
+        Refused: an invalid rule, a file that cannot be read or has no rule.
     """
     words: RuleValues = {}
     for path in files:
@@ -249,7 +249,7 @@ def _read_learnt(
             text = path.read_text("utf-8")
             found = learnt.parse_learnt(text) or found
         except OSError:
-            return None  # told by who reads it as other rules, as what is no TOML
+            return None  # reported by the reader of other rules, like invalid TOML
         except ValueError as error:
             if read_toml(text).mistakes:
                 return None
@@ -336,19 +336,19 @@ def command(  # noqa: PLR0913 - options
     strict: bool,
     **options: Any,
 ) -> None:
-    """Say what is wrong on a bus or in a log; exit status 1 if anything is.
+    """Report what is wrong on a bus or in a log; exit status 1 if anything is.
 
-    Without a rule, all that need no parameter are held: what is usual is learnt
-    from the frames. A bus is heard until Ctrl-C, or for --for. Findings are
-    grouped by rule and node, each with its frames. The rules that were held are
+    Without a rule, all rules that need no parameter are checked: they learn from
+    the frames what is usual. A bus is recorded until Ctrl-C, or for --for. Findings
+    are grouped by rule and node, each with its frames. The checked rules are
     listed on standard error. Exit status 5 if nothing could be judged.
 
     --init learns what is usual in a good log: nodes, identities, CAN-IDs,
-    lengths, periods, load, order of boot-ups, EMCYs. Given to the next check,
-    its file is held beside the rules that need no parameter, with -b, --eds and
-    no other rule.
+    lengths, periods, load, order of boot-ups, EMCYs. If you pass its file to the
+    next check, these rules are checked besides those that need no parameter, with
+    -b, --eds and no other rule.
 
-    With other rules, only these are held. They are options, or a TOML file with the
+    With other rules, only these are checked. They are options, or a TOML file with the
     same names: no_emcy = true, heartbeat = ["3=100ms±20%"].
 
     \b
@@ -423,7 +423,7 @@ _MOST_FRAMES: Final = 20_000_000
 """Frames of a bus that are kept: 700 MB."""
 _SHOWN: Final = 20
 _SHOWN_FRAMES: Final = 3
-"""Findings, and frames of each, that are shown where nobody says how many."""
+"""Default number of findings, and of frames of each, that are shown."""
 
 
 class _Usual:
@@ -456,7 +456,7 @@ class _Usual:
         self.source: AnySource[Columns] | Source
 
     def listen(self, span_us: int | None) -> None:
-        """Take all that comes, until somebody interrupts it or the time is over."""
+        """Read until the user interrupts or the time is over."""
         log = block_log(self._words, self._cut)
         if log is not None:
             with closing(log):
@@ -538,7 +538,7 @@ class _Usual:
         return "" if self._found.frames else _no_frame(self.source, self._words)
 
     def end(self, strict: bool) -> None:
-        """Say what was judged, and end with the exit status."""
+        """Report what was judged, and end with the exit status."""
         found, nothing = self._found, self._nothing()
         said = [*self._said, f"judged: {', '.join(found.judged)}"]
         by_reason: dict[str, list[str]] = {}
@@ -613,13 +613,13 @@ class _NothingJudged(click.ClickException):
 
 
 def _no_frame(source: AnySource[object], words: Sequence[str]) -> str:
-    """Say why nothing was judged."""
+    """Report why nothing was judged."""
     where = "no frame came" if source.live else f"no frame in {' '.join(words)}"
     return f"nothing was judged: {where}"
 
 
 def _bit_rate(rules: Rules, words: Sequence[str], bus: BusOptions) -> int | None:
-    """Return the bit rate; Refused if a rule needs it and nobody names it."""
+    """Return the bit rate; Refused if a rule needs it and it is not given."""
     bit_rate = listening.bit_rate_of(words, bus)
     with refusing():
         rules.load(bit_rate)

@@ -115,17 +115,17 @@ _reports: Final[Decorator] = add_options(
 @bus_options
 @click.pass_context
 def command(context: click.Context, /, source: str | None, **options: Any) -> None:
-    """Judge one CANopen node, clause by clause.
+    """Test one CANopen node, clause by clause.
 
-    The node is a black box: what counts is what it says on its bus.
+    The node is a black box: only its frames on the bus count.
 
-    SOURCE is a bus, or a rig file in virtual time. In place of it -i and -c name
-    interface and channel of a bus, as python-can does; other options of a bus go
-    with both. Without --node it says which nodes are heard. By default the node is
+    SOURCE is a bus, or a rig file in virtual time. Alternatively -i and -c name
+    interface and channel of a bus, as in python-can; other options of a bus apply to
+    both. Without --node it lists the nodes that send. By default the node is
     only read: --communication and --intrusive do more, restore what they changed,
-    and ask first (--yes). What could move something, objects 6000h to 9FFFh, is
-    written with --allow only; an object of the maker that could, as a set
-    pressure, is named with --never.
+    and ask first (--yes). Objects 6000h to 9FFFh, which could move something,
+    are only written with --allow; exclude manufacturer objects that could, such as
+    a set pressure, with --never.
 
     \b
     canmon conform can0 --node 5 --eds drive.eds
@@ -138,7 +138,7 @@ def command(context: click.Context, /, source: str | None, **options: Any) -> No
 
     \b
     --stimulus CMD is called as CMD input 6000:01 01, CMD output 6200:01,
-    CMD emergency 5000 01, CMD power off; exit status 77: it has no such input.
+    CMD emergency 5000 01, CMD power off; exit status 77: no such input.
     control:PATH is the control socket of an emulator, ask a person here.
 
     \b

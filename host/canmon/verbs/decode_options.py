@@ -90,9 +90,9 @@ filter_option: Final = click.option(
 
 
 def read_eds_files(eds: EdsOptions) -> eds_folder.EdsFiles:
-    """Read what `--eds` names; Refused if there is no such node, file or folder, or it is no EDS.
+    """Read the files of `--eds`; Refused if a node, file or folder is missing or invalid.
 
-    Files of the folders are chosen when a node tells its identity, and each choice is said.
+    Files of a folder are chosen when a node sends its identity, and each choice is reported.
     """
     return eds_document.read_eds_paths(
         eds_document.eds_paths(eds.words), eds.folders, _say_beside_pictures
@@ -100,7 +100,7 @@ def read_eds_files(eds: EdsOptions) -> eds_folder.EdsFiles:
 
 
 def _say_beside_pictures(text: str) -> None:
-    """Say something on standard error; where the verb paints a screen, after that."""
+    """Print a message on standard error; if the verb paints a screen, after that."""
     context = click.get_current_context(silent=True)
     if context is not None and context.info_name in _PAINTED and sys.stdout.isatty():
         context.call_on_close(functools.partial(say, text))

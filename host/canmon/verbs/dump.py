@@ -71,10 +71,10 @@ _STDIN: Final = 0
 
 
 class _TriggerKeys:
-    """Waits for Enter on standard input, where that is a terminal, and for SIGUSR1.
+    """Waits for Enter on standard input, if it is a terminal, and for SIGUSR1.
 
     Args:
-        typed: somebody may type; not where standard input is what is recorded.
+        typed: whether to wait for Enter; not if standard input is recorded.
     """
 
     def __init__(self, typed: bool) -> None:
@@ -107,7 +107,7 @@ class _TriggerKeys:
             typed = os.read(_STDIN, 1_024)
         except OSError:
             typed = b""
-        self._typed = bool(typed)  # at its end nobody types any more
+        self._typed = bool(typed)  # at its end no more input comes
         return _KEY if b"\n" in typed else ""
 
     def _signalled(self, number: int, frame: FrameType | None) -> None:
@@ -170,9 +170,9 @@ def dump(  # noqa: PLR0913 - options
 ) -> None:
     """Show frames as they come, and what they mean.
 
-    It listens only. What frames mean is told by the CANopen standard, by
-    --eds and --dbc, and by the SDO traffic that is heard. Frames are on
-    standard output; what was lost or is no frame is said on standard error.
+    It only listens. Frames are decoded by the CANopen standard, by --eds and
+    --dbc, and by the SDO traffic on the bus. Frames go to standard output;
+    lost and invalid frames are reported on standard error.
 
     \b
     canmon dump can0 -t z
@@ -185,9 +185,9 @@ def dump(  # noqa: PLR0913 - options
     canmon dump run.log --from 2.5 --to 3 -t a
     ssh robot canmon dump can0 --jsonl | canmon top -
 
-    A recording in parts has an index, as run.index.jsonl, which is gone on with
-    when the same is recorded again. One that waits for a trigger takes Enter and
-    SIGUSR1 for one, too. A recording waits for a bus that goes away.
+    A recording in parts has an index, such as run.index.jsonl; the same command
+    continues it. One that waits for a trigger also accepts Enter and SIGUSR1. A recording waits for
+    a bus that goes away.
 
     {source}
     """  # noqa: D301 - click wants the backspace
@@ -345,8 +345,8 @@ def conv(  # noqa: PLR0913 - options
 ) -> None:
     """Write what SOURCE holds into the file LOG; its name says the format.
 
-    Several files are merged by time. What a format cannot hold is said on
-    standard error. Of files LOG is written whole, or stays as it was.
+    Several files are merged by time. What a format cannot hold is reported on
+    standard error. From files, LOG is written completely or not at all.
 
     \b
     canmon conv a.blf b.log

@@ -71,17 +71,17 @@ _RANGE: Final = re.compile(r"([1-9])=((?:(?!\.\.)[0-9.eE+-])++)\.\.([0-9.eE+-]+)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _GraphRequest:
-    """The options of the verb `graph`, read.
+    """The parsed options of the verb `graph`.
 
     Attributes:
         files: files to write.
-        begin: of the view, None for all.
-        end: of it, likewise.
-        at: what is read out, likewise.
+        begin: beginning of the view, None for all.
+        end: end of the view, None for all.
+        at: the time of the cursor, None for none.
         ranges: of axes.
         size: of a picture in pixels.
-        window_us: what is shown of a bus.
-        span_us: how long a bus is heard, None where it was not said.
+        window_us: length of the window of a bus.
+        span_us: how long to listen to a bus, None if not given.
         title: of a picture.
     """
 
@@ -96,11 +96,11 @@ class _GraphRequest:
     title: str
 
     def view(self, series: Sequence[Series], first_us: int | None) -> View:
-        """Return the view that is asked for; Refused if it is none.
+        """Return the view; Refused if it is invalid.
 
         Args:
-            series: what is seen.
-            first_us: when the first frame came: there times begin.
+            series: the curves.
+            first_us: time of the first frame, from which times count.
         """
         whole = View.of(series)
         origin_us = whole.from_us if first_us is None else first_us
@@ -178,11 +178,11 @@ def command(source: str, signals: Sequence[str], **options: Any) -> None:
     """Draw curves of SOURCE: in the terminal, or to files; without SIGNAL, list what there is.
 
     A SIGNAL is an object, as 3.velocity_actual_value or 3.statusword.fault
-    (names of the EDS or DBC file, or of what SDO traffic told), or a slice, as
+    (names from the EDS or DBC file, or from SDO traffic), or a slice, such as
     ID[BYTES]TYPE*FACTOR+OFFSET: BYTES is 2, 2:6, bit 2.3 or bits 2.3+5; TYPE
-    is u, s or f, with b behind it big-endian. LABEL= before it names it, @2
-    behind it takes another axis. A spike never vanishes: each column shows its
-    least and greatest value. load, nmt, emcy, sdo and 'sync jitter' are curves
+    is u, s or f, with the suffix b big-endian. The prefix LABEL= names it, the suffix @2 puts it on
+    another axis. A spike never vanishes: each column shows its smallest and
+    largest value. load, nmt, emcy, sdo and 'sync jitter' are curves
     or states of the bus and its nodes, as 3.nmt; a statusword is its states.
 
     \b
@@ -359,7 +359,7 @@ def _show(source: str, collector: Collector, request: _GraphRequest) -> bool:
 
 
 def _missed(series: Sequence[Series], view: View) -> str:
-    """Say that all samples lie outside a view; empty if one is in it, or there is none at all."""
+    """Return that all samples lie outside a view; empty if one is inside, or there are none."""
     whole = View.of(series)
     if not any(series) or (whole.from_us <= view.to_us and view.from_us <= whole.to_us):
         return ""

@@ -105,10 +105,10 @@ def _last_us(path: Path) -> int | None:
 @click.argument("log", nargs=-1, required=True, type=PATH)
 @click.option("--jsonl", is_flag=True, help="One JSON object a file.")
 def command(log: Sequence[Path], jsonl: bool) -> None:
-    """Say what log files are: format, size, buses, first and last time.
+    """Show what log files hold: format, size, buses, first and last time.
 
-    The beginning of a file is read, and the end of one in text; nothing is
-    scanned. `canmon stats` reads all of it.
+    Only the beginning of a file is read, and the end of a text file.
+    `canmon stats` reads all of it.
 
     \b
     canmon info run.log run.blf

@@ -40,7 +40,7 @@ else:  # numpy
     column_meanings = LazyModule("tickrig.host.canmon.model.columns.column_meanings")
 
 _MANY: Final = 1_000
-"""Lines, and columns where nobody's terminal sets them."""
+"""Default lines and columns without a terminal."""
 
 
 @source_command(
@@ -112,7 +112,7 @@ class _NodesView:
         self._columns.take(columns)
 
     def take(self, records: Sequence[Record]) -> None:
-        """Take what was heard."""
+        """Process records."""
         for record in records:
             self._board.take(record, self.decoder.take(record))
         self._watch.take(records)

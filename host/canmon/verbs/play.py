@@ -153,7 +153,7 @@ class Lateness:
             self._above[bucket_of(late_us)] += 1
 
     def percentile_us(self, percent: float) -> int:
-        """Return what so many percent, 0 to 100, are not later than; 0 if none were counted."""
+        """Return the delay that a percentage, 0 to 100, does not exceed; 0 if none were counted."""
         left = self.count * percent / 100
         for late_us, count in self._counts():
             left -= count
@@ -168,7 +168,7 @@ class Lateness:
             yield middle_us(bucket), self._above[bucket]
 
     def __str__(self) -> str:
-        """Say it to people."""
+        """Return it in words."""
         p50, p99 = self.percentile_us(50), self.percentile_us(99)
         return f"late p50 {p50} us, p99 {p99} us, max {self.max_us} us; last {self.last_us} us"
 
@@ -287,7 +287,7 @@ def _loops(text: str) -> int:
 
 
 def _can_id(text: str | None) -> CanFrame | None:
-    """Return a frame with the CAN-ID that is waited for."""
+    """Return a frame with the awaited CAN-ID."""
     if text is None:
         return None
     with refusing("--wait-rx", WireError):

@@ -80,7 +80,7 @@ def command(  # noqa: PLR0913 - options
     strict: bool,
     **options: Any,
 ) -> None:
-    """Write what was on a bus as one HTML page that needs nothing else.
+    """Write the traffic of a bus as one self-contained HTML page.
 
     The page has a summary, the findings of the rules with the frames around
     them, a timeline with a lane for each node and signal, the nodes and the
@@ -94,8 +94,8 @@ def command(  # noqa: PLR0913 - options
     canmon report run.log --from 2.5 --to 30 -o part.html
     canmon report can0 --for 60s -o bus.html --pdf bus.pdf
 
-    A bus is recorded first, until Ctrl-C or for --for. A file that canmon check
-    --init wrote is held against the log, as good.toml.
+    A bus is recorded first, until Ctrl-C or for --for. The log is checked against the rules of a
+    file that canmon check --init wrote, such as good.toml.
 
     {source}
     """  # noqa: D301 - click wants the backspace
@@ -258,18 +258,18 @@ class _Seen:
 class _Reading:
     """A source that is read to its end; a bus is recorded into a file first.
 
-    Frame by frame it is read a second time for the frames around findings.
+    It is read a second time, frame by frame, for the frames around findings.
 
     Args:
         words: its SOURCE words.
         bus: the options of buses.
-        folder: for what is recorded.
-        span_us: how long a bus is heard; None until somebody interrupts it.
+        folder: folder for the recording.
+        span_us: how long to listen to a bus; None until the user interrupts.
         cut: which part of a log is read.
 
     Attributes:
-        source: what was read first, closed at its end.
-        messages: what it says of frames that were lost or are none.
+        source: the source of the first reading, closed at its end.
+        messages: its messages about lost and invalid frames.
     """
 
     def __init__(
@@ -365,5 +365,5 @@ class _FramePiece:
 
 
 def _in_columns(decoder: Decoder) -> bool:
-    """Say whether nothing but DBC files decodes before the standard does."""
+    """Return whether only DBC files decode before the standard does."""
     return all(isinstance(one, DbcFile) for one in decoder.first)

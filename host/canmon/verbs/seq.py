@@ -41,10 +41,10 @@ else:  # python-can is slow
 
 
 class ConditionDecoder:
-    """Decodes all that is heard, for conditions on it.
+    """Decodes all frames, for conditions on them.
 
     Attributes:
-        eds: what files say, by node-ID.
+        eds: contents of EDS files, by node-ID.
     """
 
     def __init__(self, eds: Mapping[int, EdsObjects]) -> None:
@@ -73,11 +73,11 @@ _FAILED: Final = 1
 @bus_options
 @click.pass_context
 def command(context: click.Context, /, words: Sequence[str], **options: Any) -> None:
-    """Carry out the sequence FILE on BUS; exit status 1 if an expectation was missed.
+    """Run the sequence FILE on BUS; exit status 1 if an expectation was missed.
 
-    Without a BUS it is that of -c. A TOML file has steps that send, wait,
-    expect and repeat; any other file has lines as '+10 123#DEADBEEF': so many
-    ms after the line above.
+    Without a BUS, -c names it. A TOML file has steps that send, wait, expect and
+    repeat; any other file has lines such as '+10 123#DEADBEEF': 10 ms after the
+    line above.
 
     \b
     [vars]

@@ -87,7 +87,7 @@ def bus_lines(bus: BusRow, bit_rate: int | None) -> list[str]:
         f"  error frames: {bus.errors.frames}",
     ]
     if bus.fd:
-        rest = f"; {bus.unrated} have BRS to a rate that nobody told: the load is less"
+        rest = f"; {bus.unrated} have BRS with an unknown rate: the load is lower"
         lines.insert(2, f"  CAN FD: {bus.fd} frames{rest * bool(bus.unrated)}")
     lines += [f"    {count} x {kind}" for kind, count in bus.errors.kinds]
     if bus.errors.state is not None:
@@ -222,9 +222,9 @@ def command(  # noqa: PLR0913 - options
 ) -> None:
     """Count a log: rates, gaps, jitter, missed cycles, exact load, error frames.
 
-    Gaps are of all frames; p99 is at most 1/64 too long. A cycle is told where
-    most gaps are near the median; missed are its frames that did not come.
-    Jitter is how much a gap differs from the one before, on average. Loads
+    Gaps are of all frames; p99 is at most 1/64 too long. A cycle is shown if
+    most gaps are near the median; missed counts its missing frames.
+    Jitter is the average difference between successive gaps. Loads
     count stuff bits and are a share of the bit rate that -b gives.
 
     \b

@@ -169,7 +169,7 @@ def neighbour(places: Mapping[str, _Place], name: str, right: int, down: int) ->
 
 
 def _shown(name: str, width: int) -> str:
-    r"""Return a name as it is written into `cells` cells; a cut one ends with `…`.
+    r"""Return a name as it is written into `width` cells; a cut one ends with `…`.
 
     >>> _shown("ロボット0", 6), _shown("a\x1b[1m\u0301b", 20)
     ('ロボ…', 'a␛[1m�b')

@@ -28,7 +28,7 @@ def tell(bus: can.BusABC, state: int) -> None:
 
 def test_a_node_is_shown_and_the_board_stays_in_the_terminal(bus: can.BusABC) -> None:
     terminal = Terminal("nodes", *BUS)
-    terminal.wait_for("no node was heard")
+    terminal.wait_for("no node has sent a frame")
     tell(bus, 0x7F)
     terminal.wait_for("pre-operational")
     tell(bus, 0x05)
@@ -41,7 +41,7 @@ def test_a_node_is_shown_and_the_board_stays_in_the_terminal(bus: can.BusABC) ->
 
 def test_ctrl_c_ends_it_without_a_traceback(bus: can.BusABC) -> None:
     terminal = Terminal("nodes", *BUS)
-    terminal.wait_for("no node was heard")
+    terminal.wait_for("no node has sent a frame")
     terminal.child.sendintr()
     assert terminal.end() == 0
     assert "Traceback" not in terminal.written

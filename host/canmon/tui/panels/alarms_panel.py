@@ -1,4 +1,4 @@
-"""The tab of the alarms: rules that are held against the traffic while it goes on."""
+"""The alarms tab: rules that are checked against the traffic as it comes."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class AlarmTask(Task):
         self._due_us = NEVER if rules == Rules() else 0
 
     def tick(self, now_us: int, records: Sequence[DecodedFrame], /) -> Frames:
-        """Take what was heard."""
+        """Process records."""
         if self._due_us == NEVER:
             return ()
         for one in records:
@@ -76,7 +76,7 @@ _USUAL: Final = {
     "no_lost_heartbeat": True,
     "no_loss": True,
 }
-"""What is held where nobody has written rules; bus-off is an error frame, too."""
+"""Default rules; bus-off is an error frame, too."""
 _USUAL_LOAD: Final = {"max_load": 90}
 """Beside it where the bit rate is known."""
 LEAST_WIDTH, INDENT = 40, 4
@@ -202,7 +202,7 @@ class AlarmsPanel(Panel):
         self.rules_text, self._own = _rules_toml(words), True
 
     def save(self) -> dict[str, Any]:
-        """Return those that somebody wrote; None takes one out of a workspace."""
+        """Return the rules of the user; None removes a rule from a workspace."""
         if not self._own:
             return {}
         rules = dict.fromkeys((*SWITCHES, *VALUES))
@@ -213,7 +213,7 @@ class AlarmsPanel(Panel):
         self.change(self.held.alarms.acknowledge)
 
     def action_clear(self) -> None:
-        """Begin anew."""
+        """Start again."""
         self.change(self.held.alarms.clear)
 
     def action_edit(self) -> None:

@@ -43,16 +43,16 @@ _WATCH_US: Final = 1_000_000
 class DictionaryTask(Task):
     """A client of the default SDO of one node at a time (1200h).
 
-    What is shown comes from the traffic alone: answers are heard as those to others are.
+    The displayed values come from the traffic alone, including answers to other clients.
 
     Args:
-        decoder: knows the nodes.
+        decoder: has the nodes.
 
     Attributes:
-        channel: the bus it sends on; empty for the first.
+        channel: the bus on which it sends; empty for the first.
         result: how the latest transfer ended, in words.
-        left: transfers that have not ended.
-        watched: objects that are read again and again.
+        left: pending transfers.
+        watched: objects that are read repeatedly.
     """
 
     def __init__(self, decoder: Decoder) -> None:
@@ -158,7 +158,7 @@ _MARK: Final = "* "
 
 
 class DictionaryPanel(Panel):
-    """Objects that the EDS names or that were heard, with their latest values."""
+    """Objects of the EDS or of the traffic, with their latest values."""
 
     title = "objects"
     section = "objects"
@@ -234,7 +234,7 @@ class DictionaryPanel(Panel):
         return {"node": self._wanted_node, "filter": self.filter_text}
 
     def action_next_node(self, steps: int) -> None:
-        """Show the next node that was heard or has an EDS."""
+        """Show the next node that has sent a frame or has an EDS."""
         if self._known:
             place = self._known.index(self.node) if self.node in self._known else -steps
             self.show_node(self._known[(place + steps) % len(self._known)])
@@ -313,7 +313,7 @@ class DictionaryPanel(Panel):
 
     def _title(self) -> str:
         if self.node is None:
-            return "no node was heard"
+            return "no node has sent a frame"
         wanted = f"   filter {self.filter_text}" if self.filter_text else ""
         return f"{self.node[0]} node {self.node[1]}{wanted}"
 

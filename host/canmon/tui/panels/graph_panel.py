@@ -57,7 +57,7 @@ class GraphTask(Task):
         self._graph = graph
 
     def tick(self, now_us: int, records: Sequence[DecodedFrame], /) -> Frames:
-        """Take what was heard."""
+        """Process records."""
         if self._graph.words:
             for one, decoded in records:
                 self._graph.take(one, decoded)
@@ -191,7 +191,7 @@ class GraphPanel(panel.Panel):
 
     def _remove(self, text: str) -> None:
         if text not in self._texts:
-            raise ValueError(f"{text!r} is none of {', '.join(self._texts)}")
+            raise ValueError(f"{text!r} is not one of {', '.join(self._texts)}")
         number = self._texts.index(text)
         with self.session.lock:
             self.graph.remove(number)

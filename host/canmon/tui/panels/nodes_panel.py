@@ -41,7 +41,7 @@ _STATE_STYLES: Final[dict[int | None, str]] = {
 FULL, EMPTY = "█", "░"
 _GAP: Final = "  "
 MIDDLE, WIDE = 110, 160
-"""From so many columns on, the board has more of them."""
+"""From this number of columns on, the board has more of them."""
 _LEAST_ERRORS: Final = 12
 
 
@@ -50,10 +50,10 @@ class _BoardColumn(NamedTuple):
 
     Attributes:
         title: its head.
-        cell: what it says of a node at a time, in a board so wide.
-        least: it is there from so many columns of the screen on.
-        most: characters; what is longer is cut.
-        kept: it is there even if it says nothing of any node.
+        cell: its text for a node at a time, in a board of this width.
+        least: the smallest screen width that shows it, in columns.
+        most: its width in characters; longer texts are cut.
+        kept: whether it is shown even if it is empty for all nodes.
     """
 
     title: str
@@ -64,11 +64,11 @@ class _BoardColumn(NamedTuple):
 
 
 def board_lines(rows: Sequence[node_board.NodeStatus], now_us: int, width: int) -> list[Line]:
-    """Return a head, and a line for each node, as wide as the screen where there is so much.
+    """Return a head, and a line for each node, as wide as the screen if possible.
 
     Args:
         rows: the nodes.
-        now_us: the time for which ages are told.
+        now_us: the time to which ages refer.
         width: columns of the screen.
     """
     several = len({row.channel for row in rows}) > 1
@@ -115,7 +115,7 @@ def _joined(columns: Sequence[Sequence[Line]], widths: Sequence[int]) -> Iterato
 
 
 def _cut(line: Line, width: int) -> Line:
-    """Return a line of at most so many characters; what is cut ends with an ellipsis.
+    """Return a line of at most `most` characters; a cut line ends with an ellipsis.
 
     >>> _cut((("pre-", "bold"), ("operational", "")), 8)
     (('pre-', 'bold'), ('ope…', ''))
@@ -150,7 +150,7 @@ def heartbeat_line(row: node_board.NodeStatus, now_us: int, width: int) -> Line:
     """Write how old the heartbeat is: a bar that is full after a period, and numbers."""
     age_us, period_us = row.age_us(now_us), row.period_us
     if age_us is None:
-        return plain("never heard", BAD) if period_us else ()
+        return plain("never seen", BAD) if period_us else ()
     if row.doubled:
         return plain(node_board.FROM_TWO_NODES + " LATE" * row.is_late(now_us), BAD)
     if period_us is None:
@@ -171,7 +171,7 @@ def _boots(row: node_board.NodeStatus, now_us: int, width: int) -> Line:
 
 
 def _error_line(row: node_board.NodeStatus, now_us: int, width: int) -> Line:
-    """Say in words what is wrong with a node, the worst first; empty for nothing."""
+    """Return what is wrong with a node in words, the worst first; empty for nothing."""
     pieces = [("two nodes have this node-ID", BAD)] * row.doubled
     if row.error_code:
         pieces.append((f"{row.error_code:04X}h {describe(row.error_code)}", BAD))
@@ -252,7 +252,7 @@ _NOW: Final = 0
 
 
 class _NodeTask(Task):
-    """Sends what it is told to; what comes of it, the traffic says."""
+    """Sends NMT commands and requests; the traffic shows their results."""
 
     def __init__(self) -> None:
         self.channel = ""
@@ -311,7 +311,7 @@ def _upload(node: int, index: int, sub: int) -> CanFrame:
 
 
 def _answers(record: Record, node: int) -> bool:
-    """Say whether a frame is a response to the read of 1000h."""
+    """Return whether a frame is a response to the read of 1000h."""
     frame = record.frame
     return (
         isinstance(frame, CanFrame)
@@ -408,8 +408,8 @@ class NodesPanel(Panel):
         if self.master.scans:
             return "all node-IDs are asked..."
         if not self.session.can_send:
-            return "no node was heard"
-        return f"no node was heard; f asks all node-IDs, as {self.session.scan_command}"
+            return "no node has sent a frame"
+        return f"no node has sent a frame; f queries all node-IDs, as {self.session.scan_command}"
 
     @property
     def _bus(self) -> str:

@@ -53,7 +53,7 @@ class ChoiceView(LineView):
     """
 
     class Chosen(Message):
-        """Somebody has chosen a line."""
+        """A line was selected."""
 
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("up", "choose(-1)", "up", show=False),
@@ -134,12 +134,12 @@ class PromptLine(Vertical):
         yield Static(id="wrong", markup=False)
 
     def prompt(self, question: str, answer: str, take: _Take) -> None:
-        """Ask something.
+        """Ask the user for a text.
 
         Args:
-            question: for people.
-            answer: which they may change.
-            take: is told the answer.
+            question: the question.
+            answer: the default answer.
+            take: called with the answer.
         """
         if not self.display:
             self._back = self.screen.focused
@@ -151,7 +151,7 @@ class PromptLine(Vertical):
         field.focus()
 
     def on_input_submitted(self, event: Input.Submitted) -> None:
-        """Give the answer; say what is wrong with it."""
+        """Pass on the answer; show what is wrong with it."""
         event.stop()
         assert self._take is not None, "something was asked"
         try:
@@ -174,10 +174,10 @@ class PictureView(LineView, inherit_bindings=False):
     """Shows a picture; its keys are those of the panel."""
 
     class Pointed(Message):
-        """Somebody has clicked on it.
+        """It was clicked.
 
         Attributes:
-            x: in which column of characters.
+            x: the column in characters.
         """
 
         def __init__(self, x: int) -> None:
@@ -213,20 +213,19 @@ class FrameWanted(Message):
 class Panel(Vertical):
     """A tab.
 
-    While it is shown, the frame calls `refresh_view` ten times a second; so may the
-    panel itself after a key. Keys are Textual `BINDINGS`, each with a
-    description; `HELP` is Markdown. Both are shown by F1.
+    While it is visible, the app calls `refresh_view` ten times a second; the panel may call it
+    after a key. Keys are Textual `BINDINGS`, each with a description; `HELP` is Markdown. Both are
+    shown by F1.
 
-    A panel that hears every frame, or sends, puts a `Task` into
-    `session.tasks` when it is made.
+    A panel that needs every frame, or sends, adds a `Task` to `session.tasks` when it is created.
 
     Args:
-        session: what is heard, and how to send.
+        session: the traffic, and how to send.
 
     Attributes:
         title: of the tab.
         section: its table in the workspace, and the id of its widget.
-        session: what is heard, and how to send.
+        session: as given.
     """
 
     title: ClassVar[str] = ""
@@ -250,30 +249,30 @@ class Panel(Vertical):
         self.paint()
 
     def change(self, act: Callable[[], object]) -> None:
-        """Do something to the model or a task, and show what comes of it."""
+        """Change the model or a task, and show the result."""
         with self.session.lock:
             act()
         self.refresh_view()
 
     def may_send(self) -> bool:
-        """Say whether frames are sent; where they are not, tell people why."""
+        """Return whether frames are sent; if not, tell the user why."""
         if not self.session.armed:
             self.notify("not armed: nothing is sent; A arms", markup=False)
         return self.session.armed
 
     def snapshot(self, model: Model) -> None:
-        """Keep what of the model is painted; the session waits meanwhile, so be quick."""
+        """Copy what is painted from the model; the session waits, so be quick."""
 
     def paint(self) -> None:
         """Show what the snapshot kept; the panel is on the screen."""
 
     def load(self, settings: Mapping[str, Any]) -> None:
-        """Take settings of the workspace, before the panel is on a screen.
+        """Apply settings of the workspace, before the panel is on a screen.
 
-        Keys that are not its own it leaves alone: they survive in the file.
+        It ignores unknown keys: they stay in the file.
 
         Raises:
-            SettingError: a value that is none; says which.
+            SettingError: an invalid value; the message names it.
         """
 
     def save(self) -> dict[str, Any]:
@@ -288,7 +287,7 @@ class SendingPanel(Panel):
     """A tab that sends on one bus at a time.
 
     Args:
-        session: what is heard, and how to send.
+        session: the traffic, and how to send.
         sender: the task that sends.
     """
 

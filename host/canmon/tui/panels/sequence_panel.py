@@ -140,7 +140,7 @@ class SequenceTask(Task):
         self._begin_us, self._run = None, SequenceRun(sequence)
 
     def tick(self, now_us: int, records: Sequence[DecodedFrame], /) -> Frames:
-        """Take what was heard; return what the sequence sends."""
+        """Process records; return the frames that the sequence sends."""
         run = self._run
         if run is None:
             return ()

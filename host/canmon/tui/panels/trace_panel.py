@@ -335,7 +335,7 @@ class TracePanel(Panel):
         self.refresh_view()
 
     def action_pause(self) -> None:
-        """Hold the picture, or go on; frames are taken meanwhile."""
+        """Hold the display, or continue; frames are recorded in both cases."""
         with self.session.lock:
             held = self._display_filter.passed.copy(), self._display_filter.latest()
         self.paused, self._cursor = (None, None) if self.paused else (held, None)
@@ -456,7 +456,7 @@ class TracePanel(Panel):
             self._go(self._passed().first + view.top + row)
 
     def action_clear(self) -> None:
-        """Begin anew."""
+        """Start again."""
         with self.session.lock:
             self._display_filter.clear()
         self.paused = self._cursor = None
@@ -498,7 +498,7 @@ class TracePanel(Panel):
 
 
 def _passes(row: TraceRow, wanted: Filter) -> bool:
-    """Say whether a frame passes a filter; a line of a serial port that means nothing does not."""
+    """Return whether a frame passes a filter; an undecoded line of a serial port does not."""
     return row.decoded is not None and wanted.matches(row.record, row.decoded)
 
 

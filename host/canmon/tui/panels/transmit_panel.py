@@ -44,7 +44,7 @@ def _row_settings(words: transmit.RowText) -> dict[str, Any]:
 
 
 _NOW: Final = 0
-"""When frames are due that somebody sends by hand."""
+"""Due time of frames that are sent by hand."""
 
 
 class TransmitTask(Task):
@@ -196,7 +196,7 @@ class TransmitPanel(panel.SendingPanel):
         self.query_one(panel.PromptLine).prompt(_QUESTION, "", self._add)
 
     def action_edit(self) -> None:
-        """Write the chosen row anew."""
+        """Write the selected row again."""
         number = self.chosen
         if number < len(self.transmit.words):
             self.query_one(panel.PromptLine).prompt(

@@ -127,7 +127,7 @@ def test_the_bar_is_full_when_a_period_has_passed(age_us: int, text: str, style:
 
 def test_a_heartbeat_that_is_expected_and_never_came_is_told() -> None:
     row = board("0.9 605#2B17100064000000\n1.0 585#6017100000000000", eds=False).rows()[0]
-    assert line_text(heartbeat_line(row, 2_000_000, 80)) == "never heard"
+    assert line_text(heartbeat_line(row, 2_000_000, 80)) == "never seen"
 
 
 @pytest.mark.parametrize(

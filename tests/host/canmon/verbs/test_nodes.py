@@ -67,7 +67,7 @@ def test_without_nodes_there_is_no_json(tmp_path: Path) -> None:
     path = tmp_path / "run.log"
     path.write_text("(1.000000) can0 7FF#00\n")
     assert nodes(str(path), "--jsonl").stdout == ""
-    assert nodes(str(path)).stdout == "no node was heard\n"
+    assert nodes(str(path)).stdout == "no node has sent a frame\n"
 
 
 def test_standard_input_is_read_to_its_end() -> None:

@@ -73,7 +73,7 @@ def data(log: str, tmp_path: Path) -> dict[str, Any]:
 def test_three_sentences_say_what_there_was(log: str, tmp_path: Path) -> None:
     lines = report(log, "-o", tmp_path / "run.html", "-b", "500k").stdout.splitlines()
     assert lines[0].startswith("run.log holds 358 frames of can0 in 5.90 s, from 2020-09-13 12:26")
-    assert lines[1] == "1 node was heard; at the end 3 is operational."
+    assert lines[1] == "1 node has sent a frame; at the end 3 is operational."
     assert re.match(r"[0-9]+ faults found; the first, at 0\.", lines[2])
     page = unescape((tmp_path / "run.html").read_text("utf-8"))
     assert " ".join(lines) in page
@@ -309,7 +309,7 @@ def test_an_empty_log_and_one_without_canopen_have_a_page(tmp_path: Path) -> Non
     (path := tmp_path / "run.log").write_text("")
     assert report(path, "-o", tmp_path / "run.html").stdout.startswith("run.log holds no frame.")
     path.write_text("(1.0) can0 18FF0001#01\n")
-    assert "No CANopen node was heard." in report(path, "-o", tmp_path / "run.html").stdout
+    assert "No CANopen node sent a frame." in report(path, "-o", tmp_path / "run.html").stdout
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -60,7 +60,7 @@ def test_the_board_of_a_drive_reads_like_this() -> None:
 
 @pytest.mark.parametrize("frame", ["080#", "201#00", "601#4000100000000000", "181#R", "7E5#00"])
 def test_no_node_is_said_to_be_none(frame: str) -> None:
-    assert render_board(board_of(frame), 0, WIDE, 10) == ["no node was heard"]
+    assert render_board(board_of(frame), 0, WIDE, 10) == ["no node has sent a frame"]
 
 
 @pytest.mark.parametrize("can_id", ["189", "289", "389", "489"])

@@ -49,7 +49,7 @@ def test_without_the_data_bit_rate_the_load_is_at_most_what_is_said() -> None:
         sum(fd_bits(one)) for one in (SLOW, WIDE, WIDE._replace(data=bytes(64)))
     )
     assert bus.unrated == 2
-    told = "  CAN FD: 3 frames; 2 have BRS to a rate that nobody told: the load is less"
+    told = "  CAN FD: 3 frames; 2 have BRS with an unknown rate: the load is lower"
     assert bus_lines(bus, 500_000)[2] == told
     assert json.loads(bus_json(bus, 500_000))["fd_unrated"] == 2
 

@@ -75,7 +75,7 @@ def test_all_that_is_shown_is_read_and_a_watched_object_is_marked() -> None:
 def test_nodes_are_shown_in_turn_or_by_their_number() -> None:
     async def act(desk: Desk[DictionaryPanel]) -> None:
         await desk.press("n", "enter")
-        assert desk.static("#node") == "no node was heard"
+        assert desk.static("#node") == "no node has sent a frame"
         await desk.press("g")
         await desk.answer("128")
         assert desk.static("#wrong") == "'128' is no node-ID 1 to 127"

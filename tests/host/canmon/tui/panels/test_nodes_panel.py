@@ -91,7 +91,7 @@ def test_a_capital_commands_all_nodes(key: str, frame: str) -> None:
 
 def test_nothing_is_sent_without_a_yes_or_before_it_is_armed() -> None:
     async def act(desk: Desk[NodesPanel]) -> None:
-        await desk.press("s")  # no node was heard yet
+        await desk.press("s")  # no node has sent a frame yet
         desk.session.run(10_000)
         desk.lines()
         await desk.press("s")
@@ -167,7 +167,7 @@ def test_arrows_choose_a_node_and_enter_shows_its_objects() -> None:
 
 def test_where_there_is_no_node_or_no_objects_tab_enter_does_nothing() -> None:
     async def act(desk: Desk[NodesPanel]) -> None:
-        assert desk.lines()[0].startswith("no node was heard")
+        assert desk.lines()[0].startswith("no node has sent a frame")
         await desk.press("enter")
         desk.session.run(10_000)
         desk.lines()
