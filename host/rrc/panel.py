@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import threading
 from collections.abc import Callable
 from contextlib import ExitStack, closing
@@ -54,6 +55,9 @@ class ChairPanel(FramedApp):
     Args:
         pilot: what the keys act on.
         url: what is shown of the port.
+
+    Attributes:
+        interrupted: Ctrl-C ended it. The terminal sends it as a key, not as a signal.
     """
 
     ENABLE_COMMAND_PALETTE = False
@@ -95,10 +99,12 @@ class ChairPanel(FramedApp):
         ],
         Binding("b", "beep", "beep"),
         Binding("P", "power_off", "power off"),
+        Binding("ctrl+c", "interrupt", "interrupt", show=False, priority=True),
     ]
 
     def __init__(self, pilot: Pilot, url: str) -> None:
         super().__init__()
+        self.interrupted = False
         self._pilot, self._url = pilot, url
         self._shown: dict[str, Text] = {}  # what each pane shows: drawing is dear
 
@@ -161,6 +167,11 @@ class ChairPanel(FramedApp):
     def action_beep(self) -> None:
         """Sound the buzzer."""
         self._pilot.beep()
+
+    def action_interrupt(self) -> None:
+        """End as by the signal of Ctrl-C."""
+        self.interrupted = True
+        self.end()
 
     def action_power_off(self) -> None:
         """Force VR2 to stop."""
@@ -249,6 +260,8 @@ def run() -> None:
             if ended.number:  # it came while the port was opened
                 panel.end()
             panel.run()
+            if panel.interrupted:
+                ended.received(signal.SIGINT, None)
         stepper.raise_failure()
 
 

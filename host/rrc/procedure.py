@@ -112,7 +112,7 @@ class Procedure:
         if not self.operator.confirms("Are the wheels off the ground, and is the chair empty?"):
             raise Quit("lift the wheels first: two samples let the motors run")
         for stable in (False, True):
-            self._step("VR2 starts", None, self._power_on)
+            self._start("VR2 starts")
             if stable:
                 self._step("CHECK is wanted, no OK", cmd.StableMode(1), self._stablemode)
             limit = cmd.Limit(50, 50)
@@ -125,10 +125,16 @@ class Procedure:
             tones = cmd.Beep((100,) * 4 + (10,) * 6)
             self._step("two long tones, three short ones", tones, self._beep)
             self._step("stop after 1 s of silence", cmd.Watchdog(100), self._watchdog)
-            self._step("VR2 starts again", None, self._power_on)
+            self._start("VR2 starts again")
             if stable:
                 self.chair.client.stablemode()
             self._step("VR2 is stopped by force", cmd.PowerOff(), self._power_off)
+
+    def _start(self, step: str) -> None:
+        """Have VR2 switched on; Quit if it stays off, as all other steps need it."""
+        self._step(step, None, self._power_on)
+        if not self.results[-1].passed:
+            raise Quit("VR2 is off, and all other steps need it: press its power button, try again")
 
     def _step(self, step: str, command: Command | None, act: Callable[[], None]) -> None:
         line = b"" if command is None else command.encode().removesuffix(b"\n")

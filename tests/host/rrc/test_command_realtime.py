@@ -280,7 +280,7 @@ def test_mistakes_are_said_and_the_port_is_not_opened(words: str, said: str) -> 
     assert "Traceback" not in err
 
 
-@pytest.mark.parametrize(("end", "status"), [(leave_by_key, 0), *ENDINGS[:1], *ENDINGS[2:]])
+@pytest.mark.parametrize(("end", "status"), [(leave_by_key, 0), *ENDINGS])
 def test_the_end_of_the_panel_stops_the_chair(
     end: Callable[[pexpect.spawn[bytes]], None], status: int, bench: Bench
 ) -> None:

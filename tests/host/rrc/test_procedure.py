@@ -104,6 +104,21 @@ def test_wheels_on_the_ground_begin_nothing() -> None:
         run(Willing(bench(), answer=False))
 
 
+def test_a_chair_that_stays_off_ends_the_procedure() -> None:
+    class Idle(Willing):
+        def waits(self) -> None:
+            """Press nothing."""
+
+    off = Idle(bench())
+    found: list[StepResult] = []
+    with (
+        off.bench.chair,
+        pytest.raises(Quit, match="VR2 is off, and all other steps need it: press its power"),
+    ):
+        Procedure(off.bench.chair, off, found.append).run()
+    assert [(each.step, each.passed) for each in found] == [("VR2 starts", False)]
+
+
 def test_a_chair_that_does_something_else_fails_the_step() -> None:
     on = bench()
     on.link.spoil = lambda line: line.replace(b"limit3232", b"limit6464")
