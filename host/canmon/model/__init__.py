@@ -1,1 +1,1 @@
-"""A monitor of a CAN bus: frames in, rows out; pure, told the time by its frames."""
+"""A monitor of a CAN bus: frames in, rows out; pure, with the time of its frames."""

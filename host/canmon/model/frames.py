@@ -66,11 +66,11 @@ class LineRecord(NamedTuple):
     """A message of a serial line, beside `Record` in one trace; filters take both.
 
     Attributes:
-        at_us: when its last byte was heard.
+        at_us: time of its last byte.
         channel: name of the line.
-        sent: the host sent it, to the device.
+        sent: whether the host sent it to the device.
         data: its bytes, without line end or header.
-        decoded: what it says.
+        decoded: its meaning.
     """
 
     at_us: int
@@ -170,7 +170,7 @@ def node_of(ident: int) -> int | None:
 
 
 def sender_of(ident: int) -> int | None:
-    """Return the node-ID that sends with an identifier; None where others do, or nobody by default.
+    """Return the node-ID that sends with an identifier by default; None if there is none.
 
     >>> sender_of(0x181), sender_of(0x581), sender_of(0x201), sender_of(0x701 | REMOTE)
     (1, 1, None, None)
@@ -226,7 +226,7 @@ class CandumpFilter:
         return cls(tuple(rules), error_mask, joined)
 
     def passes(self, flagged: int) -> bool:
-        """Say whether a frame is wanted, by its identifier with flags."""
+        """Return whether a frame is wanted, by its identifier with flags."""
         if flagged & ERROR_FLAG and not flagged & EXTENDED:
             return bool(flagged & self.error_mask & ~ERROR_FLAG)
         held = ((flagged & mask == ident & mask) != inverse for ident, mask, inverse in self.rules)
@@ -357,7 +357,7 @@ class DumpLines:
         return f"{stamp}  {record.channel}{direction}  {ident:>{self.width}}  {data}"
 
     def stamp(self, at_us: int) -> str:
-        """Return what stands before what was heard at this time."""
+        """Return the prefix of a line for this time."""
         if self.form is Stamp.NONE:
             return ""
         if self.first_us is None:
@@ -440,12 +440,12 @@ _EPOCH_S: Final = 1_000_000_000
 
 
 def parse_log_time(text: str) -> LogTime:
-    """Read a moment of a log: a time after its first frame, a date, or seconds of the epoch.
+    """Parse a moment of a log: a time after its first frame, a date, or seconds of the epoch.
 
-    A date without a zone is one of this machine's zone, as it is shown.
+    A date without a zone is in the zone of this machine, as displayed.
 
     Raises:
-        ValueError: it is none of them.
+        ValueError: it is not one of these.
 
     >>> parse_log_time("2.5"), parse_log_time("300ms").us
     (LogTime(us=2500000, dated=False, text='2.5'), 300000)

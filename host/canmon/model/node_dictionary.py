@@ -1,4 +1,4 @@
-"""The objects of one node with the latest values that were heard.
+"""The objects of one node with their latest values in the traffic.
 
 >>> encode_value(ObjectText("target_velocity", DataType.INTEGER32), "-2").hex()
 'feffffff'
@@ -55,11 +55,11 @@ class ObjectRow(NamedTuple):
 
     @property
     def kind(self) -> str:
-        """Its data type, empty where nobody said it."""
+        """Its data type, empty if unknown."""
         return "" if self.text.kind is None else self.text.kind.name
 
     def matches(self, wanted: str) -> bool:
-        """Say whether a part of its name, or the begin of its index, is wanted.
+        """Return whether a part of its name, or the beginning of its index, matches.
 
         >>> row = ObjectRow((0x6041, 0), ObjectText("statusword"))
         >>> [row.matches(wanted) for wanted in ("", "604", "Status", "6041h:00", "word 6", "41")]
@@ -84,10 +84,10 @@ class _Observed(NamedTuple):
 
 
 class NodeDictionary:
-    """Keeps what was heard of the objects of one node.
+    """Keeps the values of the objects of one node.
 
     Args:
-        memory: what is known of them by the EDS and by SDO traffic.
+        memory: the knowledge from the EDS and from SDO traffic.
     """
 
     def __init__(self, memory: NodeMemory) -> None:
@@ -167,12 +167,12 @@ _BESIDE_NAME: Final = 60
 
 
 def render_dictionary(rows: Sequence[ObjectRow], now_us: int, width: int = 0) -> list[str]:
-    """Return a head, and a line for each object; what went wrong stands in the place of its type.
+    """Return a head, and a line for each object; an error is shown in place of its type.
 
     Args:
         rows: the objects.
-        now_us: the time for which ages are told.
-        width: columns of the screen, which say how long names may be; 0 for any.
+        now_us: the time to which ages refer.
+        width: columns of the screen, which limit the length of names; 0 for no limit.
     """
     longest = max((len(row.text.name) for row in rows), default=0)
     most = max(_SHORT_NAME, width - _BESIDE_NAME) if width else _MOST_NAME
@@ -182,7 +182,7 @@ def render_dictionary(rows: Sequence[ObjectRow], now_us: int, width: int = 0) ->
 
 
 def _shortened(name: str, width: int) -> str:
-    """Return a name of at most so many characters; its end tells entries apart, so it is kept.
+    """Return a shortened name; its end distinguishes entries, so it is kept.
 
     >>> _shortened("pre_defined_error_field.error_1", 20)
     'pre_defin…ld.error_1'

@@ -1,6 +1,6 @@
-"""Sequences: frames to send and frames to expect, step by step, told the time.
+"""Sequences: frames to send and frames to expect, step by step; the caller passes the time.
 
-A sequence as it is carried out, and what it waits for: frames by a pattern or a filter.
+The execution of a sequence, and its conditions: frames by a pattern or a filter.
 
 >>> from tickrig.wire.can import CanFrame
 >>> frames = map(CanFrame.parse, ("585#6041", "585#60F1AA", "585#6042"))
@@ -150,25 +150,24 @@ def _digits(number: int, digits: int) -> str:
 # ===================
 #
 # A sequence is a tree of steps (host/text/steps.py), read from TOML or from plain lines,
-# and a run of it is a generator: it yields a pause and is sent whether the pause was met.
-# `SequenceRun.tick` is told the time and the frames and returns what to send; it sleeps and
-# reads nothing, so the same run serves `canmon seq`, the screen and tests in virtual time.
+# and a run of it is a generator: it yields a pause and receives whether its condition was met.
+# `SequenceRun.tick` takes the time and the frames and returns frames to send; it does not sleep or
+# read, so the same run serves `canmon seq`, the screen and tests in virtual time.
 #
 # Time. Waits count from when the step before was due, not from when `tick` was called, so a
-# loop of +10 lines keeps its rate however late the caller is. An expectation that is met
-# goes on from the time of this call, because its frame has no due time. Within one `tick`
-# frames are looked at before the time runs out: a frame that came in time is never missed
-# because the caller was late.
+# loop of +10 lines keeps its rate however late the caller is. After an expectation is met, time
+# counts from this call, because its frame has no due time. Within one `tick` frames are processed
+# before time-outs: a frame that came in time is never missed because the caller was late.
 #
-# An expectation waits for several frames in any order; each frame meets one condition, the
-# first that fits, and is used up by it. Frames that this program sent are passed over. Only
-# one pause is open at a time, so frames that come while nothing is expected are gone.
+# An expectation waits for several frames in any order; each frame meets one condition, the first
+# that matches. Frames that this program sent are ignored. Only one pause is open at a time, so
+# frames that come while nothing is expected are dropped.
 #
 # `forever` needs a step that takes time in it, or one tick would never end: both readers
 # refuse it.
 #
-# Places. A step knows its path in the document and not its line; `locate` finds the line
-# when somebody asks. So the run costs nothing for messages that nobody sees.
+# Places. A step knows its path in the document and not its line; `locate` finds the line on
+# request. So messages that are not shown cost nothing.
 
 _NOTATION: Final = re.compile(
     r"([0-9A-Fa-f?]{3}|[0-9A-Fa-f?]{8})#(R[0-8]?|(?:[0-9A-Fa-f?]{2}\.?){0,8}\*?)"
@@ -222,10 +221,10 @@ _FrameStep = Step[Frames, Record]
 
 @dataclass(frozen=True, slots=True)
 class Sequence:
-    """Steps, and how a place in them is told.
+    """Steps, and the function that locates them.
 
     Attributes:
-        steps: in their order.
+        steps: in order.
         locate: returns `FILE:LINE` of a place.
     """
 
@@ -260,19 +259,19 @@ _Play = Generator[_Pause, bool, bool]
 
 
 class SequenceRun:
-    """Carries out a sequence as time passes.
+    """Executes a sequence as time passes.
 
-    Waits are counted from when the step before was due, so they do not drift. Frames that one
-    call brings are taken before its time runs out.
+    Waits are counted from when the step before was due, so they do not drift. The frames of a call
+    are processed before its time-outs.
 
     Args:
         sequence: what to do.
 
     Attributes:
-        done: it has ended.
-        met: how many expectations were met.
-        missed: how many were not.
-        events: what happened; whoever shows them may take them out.
+        done: whether it has ended.
+        met: number of expectations that were met.
+        missed: number of expectations that were missed.
+        events: what happened; the code that shows them may remove them.
     """
 
     def __init__(self, sequence: Sequence) -> None:
@@ -291,11 +290,11 @@ class SequenceRun:
         return self._pause.until_us
 
     def tick(self, now_us: int, records: Iterable[Record] = ()) -> Frames:
-        """Take in what was heard, carry out what is due, and return what to send.
+        """Process received frames, do what is due, and return the frames to send.
 
         Args:
             now_us: the time; the first call begins the sequence.
-            records: frames since the last call; those that this program sent are passed over.
+            records: frames since the last call; those that this program sent are ignored.
         """
         if not self._begun:
             self._begun, self._at_us = True, now_us

@@ -209,16 +209,16 @@ class Mark(NamedTuple):
 
 @dataclass(slots=True)
 class _NodeLane:
-    """What one node did, and when.
+    """The history of one node.
 
     Attributes:
-        states: NMT states that it told, or was sent to.
+        states: NMT states that it reported or that were commanded.
         boots: boot-ups.
         commands: NMT commands to it.
         emcys: EMCYs.
         transfers: SDO transfers that ended well.
         failures: those that did not.
-        gaps: without a heartbeat that was due: from the last one on.
+        gaps: times without a due heartbeat, from the last one on.
     """
 
     states: _Bands = field(default_factory=_Bands)

@@ -79,7 +79,7 @@ def _heats(changed: traffic.BitRow, frames: int) -> list[str]:
 
 
 def _heat(count: int, frames: int) -> str:
-    """Return the character of a bit that changed so often in so many frames, 2 or more."""
+    """Return the character for the number of changes of a bit in a number of frames, 2 or more."""
     return _HEAT[-(-count * len(_HEAT) // (frames - 1)) - 1]
 
 
@@ -152,7 +152,7 @@ class _IdText(NamedTuple):
 
 
 def _fitting(width: int) -> tuple[_TopColumn, ...]:
-    """Return the columns that fit beside each other into so many characters."""
+    """Return the columns that fit side by side into a width in characters."""
     kept = list(_COLUMNS)
     while len(kept) > 1 and sum(column.width + 1 for column in kept) > width:
         kept.remove(max(kept, key=lambda column: column.rank))
@@ -432,8 +432,8 @@ class TopModel:
         rates: bit rates of the buses.
 
     Attributes:
-        traffic: what was heard.
-        view: how it is shown.
+        traffic: the counted traffic.
+        view: the settings of its display.
     """
 
     def __init__(self, rates: traffic.BitRates = traffic.NO_RATES) -> None:

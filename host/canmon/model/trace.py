@@ -91,7 +91,7 @@ class Ring:
         return found
 
     def clear(self) -> None:
-        """Begin anew."""
+        """Start again."""
         self._rows.clear()
         self._count = 0
 
@@ -136,7 +136,7 @@ class FrameTrace(Ring):
         return row
 
     def clear(self) -> None:
-        """Begin anew."""
+        """Start again."""
         super().clear()
         self._latest.clear()
         self._last_us = self.origin_us = None
@@ -203,7 +203,7 @@ class DisplayFilter:
         return [self._latest[key] for key in sorted(self._latest)]
 
     def clear(self) -> None:
-        """Begin anew, the trace too."""
+        """Start again, with an empty trace."""
         self._trace.clear()
         self.passed.clear()
         self._latest.clear()

@@ -350,7 +350,7 @@ class _IdTally:
 
 
 class BitRates(NamedTuple):
-    """Bit rates in bit/s; None where nobody told.
+    """Bit rates in bit/s; None if unknown.
 
     Attributes:
         nominal: of arbitration, and of all of a classic frame.
@@ -361,7 +361,7 @@ class BitRates(NamedTuple):
     fast: int | None = None
 
     def tells(self, frame: can.FdFrame) -> bool:
-        """Say whether the rates of all parts of a frame are known."""
+        """Return whether the rates of all parts of a frame are known."""
         return not frame.brs or bool(self.nominal and self.fast)
 
     def bits(self, frame: can.FdFrame) -> int:
@@ -385,15 +385,15 @@ _PASSIVE: Final = can.ControllerFlag.RECEIVE_PASSIVE | can.ControllerFlag.TRANSM
 
 
 class _ErrorRow(NamedTuple):
-    """What the error frames of a bus were.
+    """The error frames of a bus.
 
     Attributes:
-        frames: how many.
-        state: of our controller as the latest of them says; None if none says it.
-        tec: its transmit error counter, None if never told.
-        rec: its receive error counter, None if never told.
-        overflows: how often its receive buffer ran over: frames were lost.
-        kinds: what they said and how often, the most frequent first.
+        frames: number of error frames.
+        state: state of the local controller in the latest of them; None if unknown.
+        tec: its transmit error counter, None if unknown.
+        rec: its receive error counter, None if unknown.
+        overflows: number of overflows of its receive buffer, which lose frames.
+        kinds: their kinds with counts, the most frequent first.
     """
 
     frames: int = 0
@@ -437,7 +437,7 @@ class ErrorStatistics:
 
 
 def _is_overflow(frame: can.ErrorFrame) -> bool:
-    """Say whether our controller lost frames."""
+    """Return whether the local controller lost frames."""
     return bool(
         frame.error_class & can.ErrorClass.CONTROLLER
         and frame.data[can.CONTROLLER_BYTE] & _OVERFLOW
@@ -472,7 +472,7 @@ class BusSecond(NamedTuple):
 
 
 class _LoadRow(NamedTuple):
-    """How busy a bus was. Error frames and broken frames are not in it: nobody tells their length.
+    """The load of a bus, without error frames and broken frames: their length is unknown.
 
     Attributes:
         bits: of all frames.
@@ -548,18 +548,18 @@ def _busier(first: BusSecond, second: BusSecond) -> BusSecond:
 
 
 class BusRow(NamedTuple):
-    """What one bus did.
+    """The traffic of one bus.
 
     Attributes:
         channel: its name.
         frames: data and remote frames.
-        first_us: when the first came, or the first error frame.
-        last_us: when the latest came.
-        load: how busy it was.
-        errors: what error frames said.
-        went_back: how many frames had an earlier time than the one before.
-        fd: how many of the frames are of CAN FD.
-        unrated: how many of these have data at a bit rate that nobody told: the load is less.
+        first_us: time of the first frame or error frame.
+        last_us: time of the latest one.
+        load: its load.
+        errors: its error frames.
+        went_back: number of frames with an earlier time than the one before.
+        fd: number of CAN FD frames.
+        unrated: number of these with data at an unknown bit rate: the load is too low.
     """
 
     channel: str
@@ -646,9 +646,9 @@ class _BusTally:
 
 
 class Traffic:
-    """Counts all frames of all buses; what it keeps grows with identifiers, not with frames.
+    """Counts all frames of all buses; its memory grows with identifiers, not with frames.
 
-    Not counted: what was lost before it was heard; see `Loss`.
+    Not counted: frames lost before they were read; see `Loss`.
 
     Args:
         rates: bit rates of all buses, for CAN FD.

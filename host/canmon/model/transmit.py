@@ -1,4 +1,4 @@
-"""Frames that somebody at a panel sends: one by one, or cyclically, and only while it is armed.
+"""Frames that a user of a panel sends: one by one, or cyclically, and only while it is armed.
 
 >>> words = parse_row_text("123#00 --every 10ms --counter 0:0..14 --name alive")
 >>> words.every, words.counters, words.name, str(words)
@@ -111,7 +111,7 @@ class FrameFields:
     checksums: tuple[_ChecksumField, ...] = ()
 
     def check(self, size: int) -> None:
-        """Raise ValueError where a field is not in data of so many bytes."""
+        """Raise ValueError if a field lies outside of data of this length."""
         places = [counter.byte for counter in self.counters]
         for checksum in self.checksums:
             places += checksum.byte, checksum.last or 0
@@ -216,7 +216,7 @@ class PdoFrames:
             raise ValueError(f"{pdo!r} is neither a frame as 123#DEADBEEF nor a PDO as 5.rpdo1")
         node, number = int(match[1]), int(match[3])
         if node not in self._eds:
-            raise ValueError(f"{pdo}: nobody described node {node}; give --eds {node}=FILE")
+            raise ValueError(f"{pdo}: no description of node {node}; give --eds {node}=FILE")
         memory = NodeMemory(self._eds[node])
         if not 1 <= number <= PDOS:
             raise ValueError(f"{pdo}: PDOs are numbered 1 to {PDOS}")
@@ -275,7 +275,7 @@ def _named(places: list[_Place], name: str, pdo: str) -> _Place:
 
 
 def _number(place: _Place, value: Setting) -> int:
-    """Return the bits of a value; FieldError if it is none of the object's type."""
+    """Return the bits of a value; FieldError if it does not fit the object's type."""
     kind, bits = place.text.kind, place.mapped.bits
     if kind is None or kind.bits != bits:
         kind = None
@@ -291,26 +291,26 @@ def _number(place: _Place, value: Setting) -> int:
 AnyFrames = tuple[CanFrame | FdFrame, ...]
 
 _ONCE: Final = 0
-"""As a period: a row that is sent when somebody says so."""
+"""In place of a period: a row that is sent on request."""
 
 
 @dataclass(slots=True)
 class TransmitRow:
-    """A frame that is sent by hand, or each period; the deadlines are absolute: it does not drift.
+    """A frame that is sent by hand, or each period; deadlines are absolute, so it does not drift.
 
-    A period that has passed whole is not made up for, it is counted.
+    A completely missed period is not caught up, only counted.
 
     Args:
-        name: what people call it.
-        frame: what is sent.
+        name: its name.
+        frame: the frame to send.
         period_us: of a cyclic row, else `_ONCE`.
-        fields: what changes in it each time.
-        due_us: when it is sent next, `NEVER` while it is not enabled.
-        count: how often it is sent, 0 for ever.
+        fields: fields that change each time.
+        due_us: time of the next transmission, `NEVER` while it is not enabled.
+        count: number of transmissions, 0 for no limit.
 
     Attributes:
-        sent: how often it was.
-        missed: how many periods passed without it.
+        sent: number of transmissions so far.
+        missed: number of periods without it.
 
     Raises:
         ValueError: a period below 0, or a field that is not in the frame.
@@ -466,10 +466,10 @@ class RowText:
         return " ".join(words)
 
     def row(self, pdos: PdoFrames) -> TransmitRow:
-        """Return what is sent.
+        """Return the frame to send.
 
         Raises:
-            ValueError: a frame, time or field that is none.
+            ValueError: an invalid frame, time or field.
         """
         is_frame = "#" in self.frame
         frame = CanFrame.parse(self.frame) if is_frame else pdos.frame(self.frame)

@@ -323,7 +323,7 @@ class _Layout:
         return cells
 
     def _is_dense(self, box: Box) -> bool:
-        """Return whether a box may have a port on each line: it has one side, across from no port."""
+        """Return whether a box may have a port on each line: one side, across from no port."""
         if box.ins and box.outs:
             return False
         row, column = self._cells[box.name]

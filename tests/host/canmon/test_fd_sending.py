@@ -105,9 +105,7 @@ def test_bit_rates_of_the_command_line_are_read_with_k_and_m(tmp_path: Path) -> 
     path = tmp_path / "run.log"
     path.write_text(LOG)
     without = canmon("stats", str(path), "-b", "500k").stdout.splitlines()
-    assert (
-        without[2] == "  CAN FD: 2 frames; 2 have BRS with an unknown rate: the load is lower"
-    )
+    assert without[2] == "  CAN FD: 2 frames; 2 have BRS with an unknown rate: the load is lower"
     words = ("-b", "500k", "--data-bitrate", "2M")
     assert canmon("stats", str(path), *words).stdout.splitlines()[2] == "  CAN FD: 2 frames"
     wrong = canmon("stats", str(path), "-b", "fast")

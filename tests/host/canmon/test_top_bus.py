@@ -54,7 +54,7 @@ def test_a_bus_is_checked_for_a_time(heartbeats: None) -> None:
     )
     ran = canmon(*words, "3-4")
     assert (ran.returncode, ran.stderr) == (1, "judged: no-loss, nodes\n1 finding: nodes: 1\n")
-    assert ran.stdout.endswith(" nodes: node 4 was never heard\n")
+    assert ran.stdout.endswith(" nodes: node 4 was never seen\n")
 
 
 def test_a_bus_that_is_not_there_ends_with_3() -> None:

@@ -30,7 +30,7 @@ else:  # an extra
     column_frames = LazyModule("tickrig.host.canmon.model.columns.columns")
 
 _MANY: Final = 50_000
-"""From so many frames on numpy is worth its import."""
+"""The number of frames from which importing numpy pays off."""
 
 _DATA_BYTES: Final = 8
 _SPIKE_FRAMES: Final = 3
@@ -263,5 +263,5 @@ class FrameKeeper:
         return first, [record for _, record in sorted(found, key=lambda one: one[0])]
 
     def __iter__(self) -> Iterator[BusFrames]:
-        """Give the buses by name."""
+        """Return the buses by name."""
         return (bus for _, bus in sorted(self.buses.items()))

@@ -39,30 +39,28 @@ if TYPE_CHECKING:
 # Theory of operation
 # ===================
 #
-# There are three kinds of rules and two ways to hold them against traffic.
+# There are three kinds of rules and two ways to check traffic.
 #
 # Kinds: `Rule` sees frames (rule.py, frame_rules.py, time_rules.py), `MaxLoad` sees seconds
 # of a bus, `ExpressionRule` sees decoded frames (demands.py). Ways: `Checker` takes frames
-# one by one, live or from a log; `ColumnChecker` takes a log in blocks of numpy and lets
-# rules of the first two kinds see only the frames that they ask for. Both must find the
-# same, in the same order: for a frame the load first, then the rules in the order of
-# `Rules.make`, last the expressions, which `Checker` alone holds. So a rule may keep state
-# only from frames that its `selection` names; whatever else it looks at must not change
-# what it finds.
+# one by one, live or from a log; `ColumnChecker` takes a log in blocks of numpy and passes rules of
+# the first two kinds only the frames that they select. Both must report the same findings, in the
+# same order: for a frame the load first, then the rules in the order of `Rules.make`, last the
+# expressions, which only `Checker` checks. So a rule may keep state only from frames that its
+# `selection` names; other frames must not change its findings.
 #
-# A rule is asked three times. `judge` at each frame that it `wants`. `end` at the end, for
-# what is missing; it changes nothing, because a live check asks it again and again
-# (`missing`). `unjudged` at last: a rule that judged nothing is no rule that holds, and a
-# report must not count it as passed. A new rule answers all three; the base class answers
-# `unjudged` from `wants` and `end` alone.
+# A rule has three methods. `judge` at each frame that it `wants`. `end` at the end, for
+# what is missing; it changes nothing, because a live check calls it repeatedly (`missing`).
+# `unjudged` last: a rule that judged nothing is no rule that holds, and a report must not count it
+# as passed. A new rule needs all three; the base class derives `unjudged` from `wants` and `end`.
 #
-# Time is that of the frames. `advance` says what has not come in time where no frame tells
-# the time; it is called with the time of the next frame before that frame is judged, so a
-# deadline that has passed is told before the frame that came too late.
+# Time is that of the frames. `advance` reports what has not come in time; it is called with the
+# time of the next frame before that frame is judged, so a missed deadline is reported before the
+# late frame.
 #
 # What is kept grows with identifiers and not with frames: `_seen` has first and last time
-# and a count. A gap is never below 0, since clocks of loggers go back; the statistics say
-# how often.
+# and a count. A gap is never below 0, since clocks of loggers go back; the statistics count how
+# often.
 #
 # Text of findings is read by people and by tests, and is the same for both ways.
 
@@ -393,7 +391,7 @@ class DecodedCheck:
         return self._checker.unjudged(end_us, without_errors)
 
 
-# Rules held against traffic while it goes on: what is broken now, and what was.
+# Rules checked against live traffic: which are broken now, and which were.
 
 
 RECENT_US: Final = 2_000_000
@@ -414,7 +412,7 @@ class AlarmState(StrEnum):
 
     HOLDS = "holds"
     BROKEN = "BROKEN"
-    WAS_BROKEN = "was broken"  # until somebody acknowledges it
+    WAS_BROKEN = "until it is acknowledged"  # until somebody acknowledges it
 
 
 @dataclass(slots=True)
@@ -424,9 +422,9 @@ class Alarm:
     Attributes:
         rule: its name.
         count: findings, a lasting one counted once.
-        finding: the latest.
-        lasting: it is broken by what is missing.
-        acknowledged: somebody has seen how it was broken last.
+        finding: the latest one.
+        lasting: whether it is broken by something missing.
+        acknowledged: whether the user has acknowledged the latest finding.
     """
 
     rule: str
@@ -446,16 +444,16 @@ class Alarm:
 
 @dataclass(slots=True)
 class Alarms:
-    """Holds frames against rules as they come.
+    """Checks frames against rules as they come.
 
     Args:
-        rules: what must hold.
+        rules: the rules.
         bit_rate: bits a second, for the load.
         data_bit_rate: of data of CAN FD frames with BRS.
 
     Attributes:
         findings: the latest, oldest first.
-        judged: a frame was held against the rules.
+        judged: whether a frame was checked.
 
     Raises:
         ValueError: a limit of the load without a bit rate.
@@ -476,7 +474,7 @@ class Alarms:
         self.clear()
 
     def clear(self) -> None:
-        """Begin anew."""
+        """Start again."""
         self._checker = Checker(self.rules, self.bit_rate, self.data_bit_rate)
         self._alarms = {name: Alarm(name) for name in self.rules.names()}
         self.findings = deque(maxlen=KEPT)
@@ -499,7 +497,7 @@ class Alarms:
             self._lost = lost
         # Before the first frame the time is this machine's; the first frame may have an
         # earlier one.
-        if self._begin_us is None or now_us < self._begin_us:  # until a frame has told its time
+        if self._begin_us is None or now_us < self._begin_us:  # until a frame has a time
             self._begin_us = now_us
         if lost > self._lost and self.rules.no_loss:
             self._found(TrafficFinding(now_us, NO_LOSS, f"{lost - self._lost} frames were lost"))

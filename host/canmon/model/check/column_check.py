@@ -180,7 +180,7 @@ class _BusSelection:
         return rows, np.concatenate((np.full(len(found), NO_GAP_US), gaps_us[places]))
 
     def seen(self) -> Iterable[tuple[int, Seen]]:
-        """Give each identifier and when it was heard."""
+        """Return the identifiers with the times of their frames."""
         idents = self._idents
         values = zip(
             idents.first_us.tolist(), idents.last_us.tolist(), self._frames.tolist(), strict=True
@@ -213,7 +213,7 @@ class _BusSelection:
             self._above_us[number] = min(self._above_us[number], above_us)
 
     def _selected(self, runs: Runs, payload: npt.NDArray[np.uint64]) -> _Flags:
-        """Say which frames are selected, in the order of the runs."""
+        """Return which frames are selected, in the order of the runs."""
         numbers, lengths = runs.numbers, runs.lengths
         selected = np.repeat(self._all[numbers], lengths)
         selected |= runs.gaps_us < np.repeat(self._below_us[numbers], lengths)

@@ -3,25 +3,25 @@
 # Theory of operation
 # ===================
 #
-# Nobody tells the period of an identifier: it is learnt from all of its frames at once, and a
-# source without a rhythm must give no finding. So the gaps are looked at in windows of eight.
-# The middle of a window (its median) tells the period there, the distance of its quartiles how
-# steady it is; neither notices one or two odd gaps. Three kinds of windows follow:
+# The period of an identifier is not given: it is learnt from all of its frames at once, and a
+# source without a rhythm must give no finding. So the gaps are evaluated in windows of eight. The
+# median of a window is the period there, the distance of its quartiles the spread; one or two odd
+# gaps affect neither. Three kinds of windows follow:
 #
-#     steady   the quartiles are close: the middle is a period
+#     steady   the quartiles are close: the median is a period
 #     noisy    they are not
 #
-# A run of steady windows with the same middle is a level. Most windows on one level: that is the
-# period, and what differs from it is judged. Few levels that follow each other: the period
-# changed. Neither: frames come with events, and nothing is said.
+# A run of steady windows with the same median is a level. Most windows on one level: that is the
+# period, and deviations from it are judged. Few levels that follow each other: the period changed.
+# Neither: frames come with events, and there is no finding.
 #
-# On a level a gap of about two periods is a missing frame, unless the gap beside it makes up for
-# it: then the frame was late. A short gap whose neighbour fills it up to one period has a frame
-# too many between two that are right; a short gap before a whole period is the event of a
-# transmission that begins its event timer anew, and right.
+# On a level a gap of about two periods is a missing frame, unless the next gap compensates it: then
+# the frame was late. A short gap whose neighbour fills it up to one period has a frame too many
+# between two that are right; a short gap before a whole period is an event that restarts the event
+# timer of a transmission, which is correct.
 #
 # Noisy windows that stand together in a log whose other windows are quiet are a jitter that
-# changed; noisy windows all over the log are how the source is.
+# changed; noisy windows all over the log are normal for the source.
 
 from __future__ import annotations
 
@@ -199,12 +199,12 @@ def _ranked(values: Sequence[int], place: int) -> int:
 
 
 def _alike(one: float, other: float, usual: int) -> bool:
-    """Say whether two periods are the same, where gaps usually have a spread."""
+    """Return whether two periods are the same, given the usual spread of gaps."""
     return abs(one - other) <= max(_SAME * max(one, other), min(_FLOOR_US, other / 4), 2 * usual)
 
 
 def _are_alike(periods: Any, other: float, usual: int) -> Any:
-    """Say of each of an array of periods whether it is as `_alike` says."""
+    """Return for each of an array of periods what `_alike` returns."""
     least = max(min(_FLOOR_US, other / 4), 2 * usual)
     return np.abs(periods - other) <= np.maximum(_SAME * np.maximum(periods, other), least)
 
@@ -368,7 +368,7 @@ def _noisy(
 
 
 def _both_ways(gaps: Sequence[int], begin: int, end: int, period: int, limit: float) -> bool:
-    """Say whether gaps are longer as often as they are shorter: events make them shorter only."""
+    """Return whether gaps are longer as often as shorter: events only make them shorter."""
     part = [int(gap) for gap in gaps[begin:end]]
     longer = sum(gap > period + limit / 3 for gap in part)
     shorter = sum(gap < period - limit / 3 for gap in part)

@@ -22,11 +22,11 @@ class RuleEvent:
     """Frames that pass a filter.
 
     Attributes:
-        text: as it is written.
-        matches: says whether a frame is one.
+        text: as written.
+        matches: returns whether a frame passes.
         paths: the signals that it names.
-        is_signal: it is one signal, and nothing that this is compared with.
-        has_node: it names a node.
+        is_signal: whether it is a single signal without a comparison.
+        has_node: whether it names a node.
     """
 
     text: str
@@ -36,7 +36,7 @@ class RuleEvent:
     has_node: bool = False
 
     def carriers(self) -> Callable[[Decoded], bool]:
-        """Return what says whether a frame carries a signal that is named."""
+        """Return a function that tells whether a frame carries a given signal."""
         finders = [signal_reader(path) for path in self.paths]
         return lambda decoded: any(find(decoded) is not None for find in finders)
 
@@ -104,25 +104,25 @@ class RuleDemand:
     doubt: str = "no frame came while it was in force"
 
     def begin(self, at_us: int) -> None:
-        """Begin, or begin anew after a pause."""
+        """Start, or start again after a pause."""
 
     def pause(self) -> None:
         """Demand nothing until `begin`."""
 
     def judge(self, record: Record, decoded: Decoded) -> str | None:
-        """Say what is wrong with a frame."""
+        """Return what is wrong with a frame."""
         return None
 
     def expire(self) -> Iterable[RuleBreach]:
-        """Say what has not come until `due_us`, once."""
+        """Return what has not come until `due_us`, once."""
         return ()
 
     def end(self, end_us: int, running: bool) -> Iterable[str]:
-        """Say what is missing.
+        """Return what is missing.
 
         Args:
-            end_us: when listening ended, or the time where it goes on.
-            running: the scope holds.
+            end_us: the end of the traffic, or the current time if it continues.
+            running: whether the scope holds.
         """
         return ()
 
@@ -134,9 +134,9 @@ MOST_COUNTED: Final = 10_000
 
 
 class Truth(RuleDemand):
-    """A condition on signals never holds, or always.
+    """A condition on signals that must never hold, or always.
 
-    It is told when it begins to be wrong, not with each frame.
+    It is reported when it starts to be wrong, not with each frame.
 
     Args:
         event: the condition.
@@ -167,7 +167,7 @@ class Truth(RuleDemand):
 
 
 class Never(RuleDemand):
-    """No such frame comes; each one is told.
+    """No such frame may come; each one is reported.
 
     Args:
         event: the frames.
@@ -183,12 +183,12 @@ class Never(RuleDemand):
 
 
 class Count(RuleDemand):
-    """So many frames come.
+    """The number of frames is limited.
 
     Args:
         event: the frames.
-        least: at least so many; told at the end.
-        most: at most so many; what comes too much is told, once. None for any number.
+        least: smallest number; reported at the end.
+        most: largest number; an excess is reported once. None for any number.
     """
 
     def __init__(self, event: RuleEvent, least: int, most: int | None) -> None:
@@ -207,18 +207,18 @@ class Count(RuleDemand):
         )
 
     def end(self, end_us: int, running: bool) -> Iterable[str]:
-        """Say that too few came."""
+        """Report that too few came."""
         if self._count < self._least:
             came = f"{self._event.text} came {counted(self._count, 'time')}"
             yield f"{came}, at least {self._least} is right"
 
 
 class Rate(RuleDemand):
-    """At most so many frames come in any span of time.
+    """The number of frames in any span of time is limited.
 
     Args:
         event: the frames.
-        most: how many, up to `MOST_COUNTED`.
+        most: largest number, up to `MOST_COUNTED`.
         span_us: the span.
     """
 
@@ -229,7 +229,7 @@ class Rate(RuleDemand):
         self._times_us: deque[int] = deque(maxlen=most + 1)
 
     def judge(self, record: Record, decoded: Decoded) -> str | None:
-        """Look how long ago the frame was that must be out of the span; then count anew."""
+        """Check the time since the frame that must be outside of the span; then count again."""
         self.judged = True
         if not self._event.matches(record, decoded):
             return None
@@ -264,9 +264,9 @@ _NodeOnBus = tuple[str, int | None]
 
 
 class Dlc(RuleDemand):
-    """Frames are as long as CiA 301, or the mapping of a PDO, says; remote frames are free.
+    """Frames have the length of CiA 301 or of the mapping of a PDO; remote frames are free.
 
-    A PDO whose mapping nobody told is not judged.
+    A PDO with an unknown mapping is not judged.
 
     Args:
         event: the frames.
@@ -300,11 +300,11 @@ _UNASKED: Final = 2
 
 @dataclass(slots=True)
 class _Guarding:
-    """What is known of the guarding of a node.
+    """The state of node guarding of a node.
 
     Attributes:
         last: toggle bit of its latest answer; None before the first.
-        requested: a request waits for its answer; None where none was heard.
+        requested: whether a request waits for its answer; None before the first request.
     """
 
     last: int | None = None
@@ -356,7 +356,7 @@ class Toggle(RuleDemand):
             self._nodes[key] = _Guarding(1, requested)
 
     def _is_answer(self, key: _NodeOnBus, node: _Guarding | None, toggle: int) -> bool:
-        """Say whether a frame with this bit answers a request; the request is gone then."""
+        """Return whether a frame with this bit answers a request; the request is then done."""
         requested = False if node is None else node.requested
         if node is not None and requested:
             node.requested = False
@@ -414,7 +414,7 @@ class Every(RuleDemand):
         return self._wrong(gap_us, decoded.node, "after the one before")
 
     def end(self, end_us: int, running: bool) -> Iterable[str]:
-        """Say that it stopped or never came."""
+        """Report that it stopped or never came."""
         if not running or self._high_us is None:
             return
         if not self.came:
@@ -466,13 +466,13 @@ class FirstWithin(RuleDemand):
         return None
 
     def expire(self) -> Iterable[RuleBreach]:
-        """Say that it has not."""
+        """Report that it has not come."""
         due_us, self.due_us, self.judged = self.due_us, NEVER, True
         yield RuleBreach(due_us, f"no {self._event.text} in {ms_text(self._most_us)} ms")
 
 
 _Pair = tuple[str, int | None]
-"""A bus, and a node where those that belong together are told by it."""
+"""A bus, and a node if it relates the events."""
 
 
 class DeadlineDemand(RuleDemand):
@@ -497,7 +497,7 @@ class DeadlineDemand(RuleDemand):
         self._close_all()
 
     def expire(self) -> Iterable[RuleBreach]:
-        """Say what has not come."""
+        """Report what has not come."""
         due_us, self.judged = self.due_us, True
         late = [pair for pair, (record, _) in self._open.items() if self._due(record) <= due_us]
         for pair in late:
@@ -527,12 +527,12 @@ class DeadlineDemand(RuleDemand):
 class Latency(DeadlineDemand):
     """One event follows another in time.
 
-    Where the first comes again meanwhile, the time since the earlier one counts. Events that
-    name no node belong together by the nodes of their frames.
+    If the first event occurs again before the second, the time since the earlier one counts. Events
+    that name no node are related by the nodes of their frames.
 
     Args:
-        first: what begins it.
-        second: what must follow.
+        first: the event that starts the time.
+        second: the event that must follow.
         most_us: how long it may take.
     """
 
@@ -590,11 +590,11 @@ _EMCY: Final = "emcy"
 
 @dataclass(frozen=True, slots=True)
 class Values:
-    """Values that are right.
+    """A set of valid values.
 
     Attributes:
-        text: as they are written.
-        holds: says whether a signal has one of them.
+        text: as written.
+        holds: returns whether a signal has one of them.
     """
 
     text: str
@@ -602,14 +602,14 @@ class Values:
 
 
 class In(RuleDemand):
-    """A value is one of those that are right.
+    """A value is one of the valid ones.
 
-    A signal is told when it begins to be wrong; of other events each frame is. An EMCY of code
-    0000h takes an error back, and is right.
+    A signal is reported when it starts to be wrong; for other events, each frame is. An EMCY with
+    code 0000h clears an error, and is valid.
 
     Args:
         event: a signal, or frames of a kind, whose first value counts.
-        values: what is right.
+        values: the valid values.
     """
 
     def __init__(self, event: RuleEvent, values: Values) -> None:
@@ -655,7 +655,7 @@ class Follow(RuleDemand):
         self._last.clear()
 
     def judge(self, record: Record, decoded: Decoded) -> str | None:
-        """Compare it; a boot-up begins anew."""
+        """Compare it; a boot-up restarts the comparison."""
         if decoded.kind == "boot-up":
             self._last = {
                 sender: last
@@ -712,10 +712,10 @@ class Steps(Follow):
 
 
 class Changes(RuleDemand):
-    """A value does not stay the same for too long; it is told once.
+    """A value does not stay the same for too long; reported once.
 
     Args:
-        event: as of `In`.
+        event: as for `In`.
         most_us: how long it may stay the same.
     """
 

@@ -10,25 +10,24 @@
 # Theory of operation
 # ===================
 #
-# The checker (checker.py) holds each frame against rules that somebody gave. Here nobody gave
-# any: what is usual is learnt from the log itself, so all frames are kept (35 bytes each) and
-# judged at the end. A bus is judged in four steps:
+# The checker (checker.py) checks each frame against given rules. The diagnosis has no given rules:
+# it learns from the log itself what is usual, so it keeps all frames (35 bytes each) and judges
+# them at the end. A bus is judged in four steps:
 #
-# 1. Times. A single time that is out of order is a finding and gets that of its neighbour; a
-#    clock that was set back cuts the log in two.
-# 2. Is it CANopen (`is_canopen`)? If not, only what holds for every bus is judged: error frames,
-#    times, load. Nobody knows what the identifiers of other protocols mean.
+# 1. Times. A single time that is out of order is a finding and is replaced by that of its
+#    neighbour; a clock that was set back cuts the log in two.
+# 2. Is it CANopen (`is_canopen`)? If not, only properties of every bus are judged: error frames,
+#    times, load. The meaning of identifiers of other protocols is unknown.
 # 3. Services (node_events.py): NMT, error control, EMCY and SDO frames, one by one, decoded as
 #    everywhere; of a client that polls a node the first and the last exchange of a row where numpy
-#    finds them (`exchanges`). They also tell the *cuts*: moments after which frames come in
-#    another way because somebody wanted it, as an NMT command or a write to 1800h. No rhythm is
-#    judged across one.
+#    finds them (`exchanges`). They also give the *cuts*: times at which the rhythm changes on
+#    purpose, such as an NMT command or a write to 1800h. No rhythm is judged across a cut.
 # 4. Rhythms (cycles.py): all frames of an identifier at once, heartbeats, SYNC and PDOs; with
-#    numpy where a log is large. Where all of a bus is silent, that is one finding, and not one for
-#    each identifier.
+#    numpy where a log is large. If a whole bus is silent, that is one finding, and not one for each
+#    identifier.
 #
-# What is found (`Hit`) has rows; hits of one rule, bus and node, or CAN-ID where no node is known,
-# are one `BusFault`.
+# A finding (`Hit`) has rows; hits of one rule, bus and node (or CAN-ID if no node is known) are one
+# `BusFault`.
 
 from __future__ import annotations
 
@@ -102,18 +101,18 @@ _TIMED: Final = (
 )
 """Rules that a log without times cannot break."""
 _SURE_SHARE: Final = 0.9
-"""Frames have a period to be learnt if so many gaps have it."""
+"""Number of gaps from which the period of frames can be learnt."""
 _NEAR_US: Final = 100_000
 _KEPT_TEXTS: Final = 3
 _LOST_AFTER: Final = 1.5
-"""A heartbeat is lost after so many of its periods, as on the node board."""
+"""A heartbeat is lost after this many of its periods, as on the node board."""
 _MOST_STATES: Final = 64
 """A statusword has no more values."""
 _LOAD_US: Final = 500_000
 _LOAD_STEP_US: Final = 50_000
 _STOPPED: Final = 5
 _STOPPED_US: Final = 250_000
-"""Frames stop if they do not come for so many periods, and so long, at the end of a log."""
+"""Frames stop if they miss this many periods, and this long, at the end of a log."""
 _SURE_FRAMES: Final = 50
 _LONG_US: Final = 1_000_000
 _LEAST_FRAMES: Final = 100
@@ -208,12 +207,12 @@ class Diagnoser:
     def diagnosis(
         self, lost: Iterable[str] = (), errors: Iterable[str] = (), end_us: int = 0
     ) -> Diagnosis:
-        """Judge what has come until now.
+        """Judge the frames so far.
 
         Args:
-            lost: what the source says was lost.
-            errors: what the source says of errors beside its error frames.
-            end_us: until when a bus was heard, by the time of its frames; 0 for the last frame.
+            lost: losses that the source reports.
+            errors: errors that the source reports besides error frames.
+            end_us: end of the traffic, in the time of the frames; 0 for the last frame.
         """
         faults: list[BusFault] = []
         judged: set[str] = set()
@@ -306,7 +305,8 @@ class _BusJudge:
         decoder, self._events = self._decoder, events
         if not canopen:
             self.unjudged = (
-                dict.fromkeys(RULES.keys() - _ANY_BUS, "no CANopen was heard") | self.unjudged
+                dict.fromkeys(RULES.keys() - _ANY_BUS, "no CANopen traffic was found")
+                | self.unjudged
             )
             return self._grouped(events.hits)
         events.end(self._end_us)
@@ -347,7 +347,7 @@ class _BusJudge:
         return rows[np.concatenate((found.requests[found.inner], found.answers[found.inner]))]
 
     def _without(self) -> dict[str, str]:
-        """Say why rules have nothing to judge."""
+        """Return why rules have nothing to judge."""
         heard, nodes = self._rows.keys(), self._events.nodes.values()
         have = {
             "pdo-": ("no PDO came", any(ident in node_events.PDO_IDS for ident in heard)),
@@ -548,7 +548,7 @@ class _BusJudge:
         return {ident & node_events.NODE_MASK for ident in self._rows if ident <= STANDARD_MAX}
 
     def _pieces(self, ident: int, rows: Sequence[int]) -> list[Sequence[int]]:
-        """Cut the rows of an identifier where somebody changes how its frames come."""
+        """Cut the rows of an identifier where the rhythm of its frames changes on purpose."""
         times = _plain_times(self._times, rows)
         places = {bisect_right(times, cut) for cut in self._cuts_of(ident)}
         ends = sorted({0, len(rows), *places})
@@ -600,7 +600,7 @@ class _BusJudge:
                 self._hit(f"{kind}-missing", ident, text, [piece[-1]])
 
     def _is_silent(self, ident: int, begin: int, end: int, period: int) -> bool:
-        """Say whether all of the bus is silent in a gap, and note it."""
+        """Return whether the whole bus is silent in a gap, and record it."""
         at = bisect_left(self._quiet, (begin, 0, 0))
         for start, stop, row in self._quiet[max(0, at - 1) : at + 2]:
             inside = min(stop, end) - max(start, begin)
@@ -726,7 +726,7 @@ class _BusJudge:
         return True
 
     def _is_statusword(self, ident: int, rows: Sequence[int], values: Sequence[int]) -> bool:
-        """Say whether TPDO1 begins with a statusword: all of its states are, and one is enabled."""
+        """Return whether TPDO1 begins with a statusword: all values are states, one enabled."""
         if any(self._bus.dlc[row] < 2 for row in rows[: learnt.KEPT_FRAMES]):
             return False
         if len(set(values)) > _MOST_STATES:

@@ -80,11 +80,11 @@ class FrameSummary(NamedTuple):
 
 
 class NodeSummary(NamedTuple):
-    """What was heard of a node.
+    """The traffic of a node.
 
     Attributes:
         row: of its first frame.
-        identity: what SDO traffic tells of 1018h, None for what it does not.
+        identity: the values of 1018h in SDO traffic, None for unknown ones.
         emcy: error codes, as 8130h.
         answers: rows of the SDO answers with it, by sub-index.
     """
@@ -171,7 +171,7 @@ class LearntBus:
     others: bool = False
 
     def is_usual(self, hit: Hit) -> bool:
-        """Say whether a finding is usual."""
+        """Return whether a finding is usual."""
         if hit.rule == "no-emcy" and hit.node is not None:
             codes = self.nodes.get(hit.node, _LearntNode()).emcy
             if any(hit.text.startswith(f"EMCY {code} ") for code in codes):
@@ -349,7 +349,7 @@ def _frame(value: object, place: str) -> _LearntFrame:
     kind, required = words.get("kind", _EVENT), words.get("required", False)
     required = _truth(required, f"{place}.required")
     if kind not in _KINDS:
-        raise ValueError(f"{place}.kind = {kind!r} is none of {', '.join(_KINDS)}")
+        raise ValueError(f"{place}.kind = {kind!r} is not one of {', '.join(_KINDS)}")
     period = _period(words["period"], f"{place}.period") if "period" in words else None
     jitter = _us(words["jitter"], f"{place}.jitter") if "jitter" in words else None
     return _LearntFrame(lengths, kind, period, jitter, required)
@@ -382,7 +382,7 @@ def _known(words: Mapping[str, Any], known: Sequence[str], place: str) -> None:
     for name in words:
         if name not in known:
             meant = "".join(f"; did you mean {word!r}?" for word in closest(name, known))
-            raise ValueError(f"{place}: {name!r} is none of {', '.join(known)}{meant}")
+            raise ValueError(f"{place}: {name!r} is not one of {', '.join(known)}{meant}")
 
 
 def _table(value: object, place: str) -> Mapping[str, Any]:

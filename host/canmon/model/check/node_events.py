@@ -1,4 +1,4 @@
-"""What the services of CANopen tell of nodes in a log: NMT, error control, EMCY and SDO."""
+"""The services of CANopen nodes in a log: NMT, error control, EMCY and SDO."""
 
 from __future__ import annotations
 
@@ -81,16 +81,16 @@ class Cut(NamedTuple):
 
 @dataclass(slots=True)
 class NodeEvents:
-    """What was heard of one node.
+    """The traffic of one node.
 
     Attributes:
-        heartbeats: rows of error control that no remote frame asked for, without boot-ups.
-        answers: rows of those that one asked for.
+        heartbeats: rows of error control without a request, without boot-ups.
+        answers: rows of error control after a request.
         requested: rows of remote frames of error control.
         boots: rows of boot-ups.
-        toggled: a frame had the toggle bit.
-        state: the NMT state that it told last; None before.
-        identity: what was read of 1018h and the row that told it first, by sub-index.
+        toggled: whether a frame had the toggle bit.
+        state: the last reported NMT state; None before the first.
+        identity: values read from 1018h and the row of their first answer, by sub-index.
     """
 
     heartbeats: list[int] = field(default_factory=list)
@@ -111,10 +111,10 @@ class NodeEvents:
 
 
 def is_canopen(bus: BusFrames, rows: Mapping[int, Sequence[int]]) -> bool:
-    """Say whether what is spoken on a bus is CANopen.
+    """Return whether the protocol of a bus is CANopen.
 
-    Other protocols use the same CAN-IDs for other things, so each kind of identifier is looked
-    at: frames of the right length and content speak for it, others against it.
+    Other protocols use the same CAN-IDs for other purposes, so each kind of identifier is checked:
+    frames of the right length and content count for it, others against it.
     """
     good: Counter[str] = Counter()
     bad = 0
@@ -155,7 +155,7 @@ def is_canopen(bus: BusFrames, rows: Mapping[int, Sequence[int]]) -> bool:
 
 
 def _answers(bus: BusFrames, requests: Sequence[int], responses: Sequence[int]) -> bool:
-    """Say whether a response names the object of a request."""
+    """Return whether a response names the object of a request."""
     objects = {bus.payload[row] >> 8 & 0xFF_FFFF for row in requests}
     return any(
         bus.payload[row] >> 8 & 0xFF_FFFF in objects and bus.dlc[row] == sdo_frame.FRAME_BYTES
@@ -164,19 +164,19 @@ def _answers(bus: BusFrames, requests: Sequence[int], responses: Sequence[int]) 
 
 
 class BusEvents:
-    """Walks through the frames of services, and keeps what they tell.
+    """Walks through the frames of services, and collects their content.
 
     Args:
         bus: the frames.
         times: their times.
-        decoder: puts SDO transfers together, and learns from them.
+        decoder: reassembles SDO transfers, and learns from them.
         rows: rows of each identifier.
 
     Attributes:
-        nodes: what was heard, by node-ID.
-        hits: what is wrong.
-        cuts: what changes how frames come.
-        commanded: an NMT command came.
+        nodes: the traffic by node-ID.
+        hits: the findings.
+        cuts: changes of the rhythm of frames.
+        commanded: whether an NMT command came.
     """
 
     def __init__(
@@ -426,7 +426,7 @@ class BusEvents:
         one.fault = fault
 
     def _judge_silent(self) -> None:
-        """Tell of requests without an answer; those to nodes that nobody heard are one finding."""
+        """Report unanswered requests; those to nodes without any frame are one finding."""
         absent: dict[int, int] = {}
         for node, text, row in self._silent:
             if node in self._first:
@@ -452,13 +452,13 @@ def first_rows(rows: Mapping[int, Sequence[int]]) -> dict[int, int]:
 
 
 def _sends(ident: int) -> bool:
-    """Say whether a node sends with an identifier of the pre-defined connection set."""
+    """Return whether a node sends with an identifier of the pre-defined connection set."""
     tpdo = ident in PDO_IDS and (ident >> 7) % 2 == 1
     return tpdo or any(ident in ids for ids in (EMCY_IDS, RESPONSE_IDS, ERROR_CONTROL_IDS))
 
 
 def is_event(ident: int) -> bool:
-    """Say whether each frame of an identifier is looked at by itself."""
+    """Return whether each frame of an identifier is processed individually."""
     can_id = ident & ~REMOTE
     return bool(ident & ERROR and not ident >> 30) or (
         can_id <= STANDARD_MAX

@@ -29,14 +29,14 @@ if TYPE_CHECKING:
 
 
 class TrafficFinding(NamedTuple):
-    """What is wrong, where and when.
+    """A violation of a rule, with place and time.
 
     Attributes:
         at_us: when it was seen.
         rule: name of the rule.
         text: what is wrong, in words.
         record: the frame that shows it, None if none does.
-        around: the frames around that time, with what they mean, where somebody asked for them.
+        around: the frames around that time, decoded, if they were requested.
     """
 
     at_us: int
@@ -53,8 +53,8 @@ class TrafficFinding(NamedTuple):
     def line(self) -> str:
         """One line, time and frame as candump does.
 
-        >>> TrafficFinding(1_500_000, "nodes", "node 3 was never heard").line
-        '(1.500000) nodes: node 3 was never heard'
+        >>> TrafficFinding(1_500_000, "nodes", "node 3 was never seen").line
+        '(1.500000) nodes: node 3 was never seen'
         """
         seconds, micros = divmod(self.at_us, 1_000_000)
         return self._line(f"({seconds}.{micros:06d})")
@@ -142,7 +142,7 @@ class CheckedTraffic(NamedTuple):
 
     @property
     def without_canopen(self) -> str:
-        """Say that no frame can be one of CANopen; empty if some can."""
+        """Return why no frame can be one of CANopen; empty if some can."""
         if any(not ident & ~(REMOTE | STANDARD_MAX) for _, ident in self.seen):
             return ""
         return "no classic frame with an 11-bit CAN-ID came"
@@ -161,19 +161,20 @@ class Rule:
     name = ""
 
     def wants(self, ident: int, /) -> bool:
-        """Say whether frames of an identifier matter; error frames have `ident.ERROR`."""
+        """Return whether frames of an identifier matter; error frames have `ident.ERROR`."""
         raise NotImplementedError
 
     def selection(self, ident: int, /) -> FrameSelection:
-        """Say which frames of an identifier that it wants it must see."""
+        """Return which frames of a wanted identifier the rule must see."""
         return FrameSelection()
 
     def judge(self, record: Record, gap_us: int | None, /) -> str | None:
-        """Say what is wrong with a frame.
+        """Return what is wrong with a frame.
 
         Args:
             record: the frame.
-            gap_us: since the one before it with this identifier on this bus; None for the first.
+            gap_us: time since the previous one with this identifier on this bus; None for the
+                first.
         """
         raise NotImplementedError
 
@@ -181,10 +182,10 @@ class Rule:
         """Take the time of the first frame of all, before any is judged."""
 
     def unjudged(self, evidence: CheckedTraffic, /) -> str:
-        """Say why it has judged nothing, so that nobody takes it for one that holds.
+        """Return why it has judged nothing, so that it does not count as passed.
 
-        A rule judges each frame that it wants, error frames also by their absence; one with an
-        `end` of its own judges what is missing.
+        A rule judges each frame that it wants, error frames also by their absence; a rule with its
+        own `end` judges what is missing.
 
         Args:
             evidence: at least one frame, or error frame.
@@ -198,15 +199,15 @@ class Rule:
         return "no frame that it is about came"
 
     def notes(self, evidence: CheckedTraffic, /) -> Iterable[str]:
-        """Say what it could not judge beside what it has judged."""
+        """Return what it could not judge besides what it has judged."""
         return ()
 
     def end(self, latest_us: Mapping[int, int], end_us: int, /) -> Iterable[str]:
-        """Say what is missing.
+        """Return what is missing.
 
         Args:
-            latest_us: when each identifier was heard last, on any bus.
-            end_us: when listening ended.
+            latest_us: time of the last frame of each identifier, on any bus.
+            end_us: end of the traffic.
         """
         return ()
 
@@ -231,7 +232,7 @@ class MaxLoad:
         self._percent, self._bit_rate = percent, bit_rate
 
     def judge(self, channel: str, window: BusSecond) -> str | None:
-        """Say that a second is too busy."""
+        """Report a second with too high a load."""
         percent = window.bits * 100_000_000 / (self._bit_rate * WINDOW_US)
         if percent <= self._percent:
             return None
@@ -299,14 +300,14 @@ class Heartbeat(Rule):
         return None
 
     def end(self, latest_us: Mapping[int, int], end_us: int, /) -> Iterable[str]:
-        """Say that it stopped or never came."""
+        """Report that it stopped or never came."""
         if self._ident not in latest_us:
             yield f"no heartbeat of node {self._times.node} came"
         elif end_us - latest_us[self._ident] > self._times.high_us:
             yield self._said(end_us - latest_us[self._ident], "at most", self._times.high_us)
 
     def unjudged(self, evidence: CheckedTraffic, /) -> str:
-        """Say that no gap was there to be compared: those around boot-ups are free."""
+        """Report that there was no gap to compare: those around boot-ups do not count."""
         if evidence.untimed:
             return ONE_TIME
         gaps = 0
@@ -325,7 +326,7 @@ class Heartbeat(Rule):
 _GUARD_TOGGLE: Final = 0x80
 _NODE_MASK: Final = 0x7F
 _LOST_AFTER: Final = 1.5
-"""A heartbeat is lost after so many of its periods, as on the node board."""
+"""A heartbeat is lost after this many of its periods, as on the node board."""
 _SURE_GAPS: Final = 2
 """So many gaps tell a period, where a heartbeat comes after all; silence wants one."""
 
@@ -384,7 +385,7 @@ class _Watched:
         return said
 
     def _lost_before(self, at_us: int) -> str | None:
-        """Say that a heartbeat is lost before one: what is heard goes before what an EDS says."""
+        """Report the heartbeats lost before this one: traffic takes precedence over an EDS."""
         beats = self._heartbeats
         said = self.overdue(at_us)
         if beats.by_sdo or len(beats.gaps) >= _SURE_GAPS:
@@ -399,7 +400,7 @@ class _Watched:
         return doubted if keeps_eds else None
 
     def overdue(self, at_us: int) -> str | None:
-        """Say that its heartbeat is lost at a time."""
+        """Report that its heartbeat is lost at a time."""
         beats = self._heartbeats
         period_us = None if self.guarded else beats.period_us
         if period_us is None or beats.since_us is None:
@@ -415,7 +416,7 @@ class _Watched:
 
     @property
     def watched(self) -> bool:
-        """Whether it was heard, or SDO traffic says what its period is."""
+        """Whether it sent a heartbeat, or SDO traffic contains its period."""
         return self.has_sent or self._heartbeats.by_sdo
 
     @property
@@ -429,14 +430,14 @@ class _Watched:
 
 
 class NoLostHeartbeat(Rule):
-    """No heartbeat of any node that sends one is lost.
+    """No heartbeat of a node that sends one is lost.
 
-    The period is what SDO traffic says of 1017h, else as heard, else as an EDS says, as on the
-    node board. A boot-up begins anew. Answers to guarding requests are none: these have a toggle
-    bit.
+    The period is that of 1017h in SDO traffic, else the measured one, else that of an EDS, as on
+    the node board. A boot-up restarts the supervision. Answers to guarding requests are not
+    heartbeats: they have a toggle bit.
 
     Args:
-        periods_ms: what EDS files say of 1017h, by node-ID: these nodes must be heard.
+        periods_ms: values of 1017h in EDS files, by node-ID: these nodes must be present.
     """
 
     name = "no-lost-heartbeat"
@@ -469,7 +470,7 @@ class NoLostHeartbeat(Rule):
         return None
 
     def end(self, latest_us: Mapping[int, int], end_us: int, /) -> Iterable[str]:
-        """Name the nodes that fell silent, and those with an EDS that were never heard."""
+        """Name the nodes whose heartbeat stopped, and those with an EDS that sent none."""
         for _, node in sorted(self._nodes.items()):
             if (text := node.overdue(end_us)) is not None:
                 yield text
@@ -483,7 +484,7 @@ class NoLostHeartbeat(Rule):
                 yield f"node {node_id}: no heartbeat for {since} ms, its EDS says {period_ms} ms"
 
     def unjudged(self, evidence: CheckedTraffic, /) -> str:
-        """Say that no period was known, or none has passed."""
+        """Report that no period was known, or none has passed."""
         if evidence.untimed:
             return ONE_TIME
         doubts = self._doubts()
@@ -534,14 +535,14 @@ class MaxGap(Rule):
         return None if gap_us is None or gap_us <= self._most_us else self._said(gap_us)
 
     def end(self, latest_us: Mapping[int, int], end_us: int, /) -> Iterable[str]:
-        """Say that it stopped or never came."""
+        """Report that it stopped or never came."""
         if self._ident not in latest_us:
             yield f"{ident_text(self._ident)} never came"
         elif end_us - latest_us[self._ident] > self._most_us:
             yield self._said(end_us - latest_us[self._ident])
 
     def unjudged(self, evidence: CheckedTraffic, /) -> str:
-        """Say that it came once."""
+        """Report that it came once."""
         if evidence.untimed:
             return ONE_TIME
         if any(seen.has_gaps for seen in evidence.on(self._ident)):
@@ -560,14 +561,14 @@ _EMCY_IDS: Final = range(0x081, 0x100)
 _CODE_BYTES: Final = 2
 _EMCY_BYTES: Final = 8
 _NAMED_BYTES: Final = 4
-"""An SDO frame of so many bytes names its object."""
+"""An SDO frame of at least this many bytes names its object."""
 
 
 class CanopenRule(Rule):
     """A rule about frames that should not be there, among those that may be of CANopen."""
 
     def unjudged(self, evidence: CheckedTraffic, /) -> str:
-        """Say that no frame can be one of CANopen."""
+        """Return why no frame can be one of CANopen."""
         return evidence.without_canopen
 
 
@@ -597,7 +598,7 @@ class NoEmcy(CanopenRule):
         return f"node {node}: EMCY {code:04X}h {describe(code)}{length}"
 
     def notes(self, evidence: CheckedTraffic, /) -> Iterable[str]:
-        """Say how many frames are too short to have an error code."""
+        """Return how many frames are too short for an error code."""
         if self._cut:
             yield f"{counted(self._cut, 'frame')} of EMCY without a whole error code"
 
@@ -644,18 +645,18 @@ class NoErrorFrames(Rule):
         return ident == ERROR
 
     def judge(self, record: Record, gap_us: int | None, /) -> str | None:
-        """Say what failed."""
+        """Report what failed."""
         frame = record.frame
         assert isinstance(frame, ErrorFrame)
         return describe_error_frame(frame)
 
     def unjudged(self, evidence: CheckedTraffic, /) -> str:
-        """Say that the source has no error frames whatever happened."""
+        """Report that the source cannot contain error frames."""
         return evidence.without_errors
 
 
 class KnownIds(Rule):
-    """No other identifiers than these; each other one is told once a bus.
+    """No identifiers except these; each other one is reported once per bus.
 
     Args:
         idents: see `ident_of`.
@@ -679,7 +680,7 @@ class KnownIds(Rule):
         return None if gap_us is not None else f"{_text(record)} is not expected"
 
     def unjudged(self, evidence: CheckedTraffic, /) -> str:
-        """Say that there was no identifier."""
+        """Report that there was no identifier."""
         return "" if evidence.seen else "no frame with a CAN-ID came"
 
 
@@ -692,7 +693,7 @@ _RESETS: Final = frozenset([nmt.NmtCommand.RESET_NODE, nmt.NmtCommand.RESET_COMM
 
 
 class NodesPresent(Rule):
-    """These nodes are heard: each has sent anything on one of its default COB-IDs."""
+    """These nodes are present: each has sent a frame with one of its default COB-IDs."""
 
     name = "nodes"
 
@@ -708,17 +709,17 @@ class NodesPresent(Rule):
         return None
 
     def end(self, latest_us: Mapping[int, int], end_us: int, /) -> Iterable[str]:
-        """Name those that were never heard."""
+        """Name those that were never seen."""
         present = set(map(sender_of, latest_us))
         for node in self._nodes:
             if node not in present:
-                yield f"node {node} was never heard"
+                yield f"node {node} was never seen"
 
 
 class NoReboot(CanopenRule):
-    """No node that was heard before boots without an NMT reset.
+    """No node that was seen before boots without an NMT reset.
 
-    A boot-up is what begins with 0: some nodes send more than its one byte.
+    A frame that begins with 0 is a boot-up: some nodes send more than one byte.
     """
 
     name = "no-reboot"
@@ -732,7 +733,7 @@ class NoReboot(CanopenRule):
         return ident == nmt.NMT_COB_ID or sender_of(ident) is not None
 
     def selection(self, ident: int, /) -> FrameSelection:
-        """Suspect resets and boot-ups; the first frame of anything else tells of its node."""
+        """Process resets and boot-ups; the first other frame marks its node as seen."""
         if ident == nmt.NMT_COB_ID:
             return FrameSelection(first_bytes=_RESETS)
         boot_up = frozenset(_BOOT_UP) if ident in _ERROR_CONTROL_IDS else frozenset()

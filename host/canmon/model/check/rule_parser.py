@@ -1,4 +1,4 @@
-"""Rules as people write them: an event in the words of `-F`, what is demanded of it, and when.
+"""Rules as text: an event in the words of `-F`, what it must do, and when.
 
 ```
 rule   = event demand (scope) ...
@@ -34,7 +34,7 @@ from tickrig.host.text.names import closest
 from tickrig.host.text.values import parse_time_us
 from tickrig.wire.can import ErrorFrame
 
-# A rule that was written as an expression, held against decoded frames one by one.
+# A rule written as an expression, checked against decoded frames one by one.
 
 
 # When a rule is in force: after something, before it, or while a condition holds.
@@ -50,7 +50,7 @@ class RuleScope:
     text = ""
 
     def holds(self, record: Record, decoded: Decoded) -> bool:
-        """Take each frame; say whether it is judged."""
+        """Process each frame; return whether it is judged."""
         raise NotImplementedError
 
 
@@ -170,14 +170,14 @@ def _plain(value: float) -> float:
     return int(value) if float(value).is_integer() else value
 
 
-# A rule that was written as an expression, held against decoded frames one by one.
+# A rule written as an expression, checked against decoded frames one by one.
 
 _MOST_NAMES: Final = 1_000
-"""So many names of signals are kept, to tell what a misspelt one may mean."""
+"""Number of signal names kept, for the suggestion after a misspelt one."""
 
 
 _UNMAPPED: Final = "unmapped"
-_NO_MAPPING: Final = "; PDOs came that nobody mapped: name them by --eds"
+_NO_MAPPING: Final = "; PDOs without a known mapping came: describe them by --eds"
 
 
 class ExpressionRule:
@@ -252,7 +252,7 @@ class ExpressionRule:
         return [TrafficFinding(end_us, self.name, text + hint) for text in texts]
 
     def unjudged(self, evidence: CheckedTraffic) -> str:
-        """Say why it has judged nothing; empty if it has."""
+        """Return why it has judged nothing; empty if it has."""
         if not self._forced:
             return f"it was never in force: {' '.join(scope.text for scope in self._scopes)}"
         if self._demand.timed and evidence.untimed:
@@ -276,7 +276,7 @@ class ExpressionRule:
         return running
 
     def _look(self, record: Record, decoded: Decoded) -> None:
-        """See which signals come, until all have, and whether PDOs come that nobody mapped."""
+        """Watch which signals come, until all have, and whether PDOs without a mapping come."""
         if self._mapped and decoded.kind == _UNMAPPED:
             self._unmapped = True
         self._missing.take(record, decoded)
@@ -316,13 +316,13 @@ def _tolerance_us(text: str, period_us: int) -> int | None:
 
 
 def _values_of(parts: Sequence[tuple[str, ...]]) -> Callable[[Signal], bool]:
-    """Return what says whether a signal has one of some values.
+    """Return a function that tells whether a signal has one of some values.
 
     Args:
         parts: a value each, or the ends of a range, of which one may be empty.
 
     Raises:
-        ValueError: an end is no number, or the lower one is above the other.
+        ValueError: an end is not a number, or the lower one is above the other.
 
     >>> holds = _values_of([("7",), ("", "5")])
     >>> [holds(Signal("speed", value)) for value in (5, 6, 7)]
@@ -337,7 +337,7 @@ def _values_of(parts: Sequence[tuple[str, ...]]) -> Callable[[Signal], bool]:
 def _within(low: str, high: str) -> Callable[[Signal], bool]:
     least, most = filters.number(low or "-inf"), filters.number(high or "inf")
     for text, end in ((low, least), (high, most)):
-        if end is None or end != end:  # noqa: PLR0124 - what is no number
+        if end is None or end != end:  # noqa: PLR0124 - not a number
             raise ValueError(f"{text!r} is no number, as an end of a range is")
     assert least is not None
     assert most is not None
@@ -384,7 +384,7 @@ class _QuantityParser(SliceParser):
 
     def _number(self) -> float:
         found = filters.number(self._next.text)
-        if found is None or found != found:  # noqa: PLR0124 - what is no number
+        if found is None or found != found:  # noqa: PLR0124 - not a number
             raise self._error(f"{self._came()} is no number")
         del self._tokens[0]
         return found
@@ -403,7 +403,7 @@ class _QuantityParser(SliceParser):
         return found
 
     def _blank(self) -> str:
-        """Say so where a blank stands between a number and its unit."""
+        """Report a blank between a number and its unit."""
         value, unit = self._tokens[0].text, self._tokens[1:2]
         if filters.number(value) is None or not unit or unit[0].text not in _UNITS:
             return ""

@@ -1,4 +1,4 @@
-"""All rules of a check: as values, and as people write them on a command line or in TOML."""
+"""All rules of a check: as values, and as text of a command line or of TOML."""
 
 from __future__ import annotations
 
@@ -30,24 +30,24 @@ NO_EDS: Final[EdsHeartbeats] = MappingProxyType({})
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rules:
-    """What traffic must keep.
+    """The rules for the traffic.
 
     Attributes:
         max_load: percent of the bit rate in any second, None for no limit.
-        bit_rate: bits a second, where nothing else tells it; no rule by itself.
+        bit_rate: bits per second, if it is not known otherwise; not a rule by itself.
         no_emcy: no EMCY but error reset.
         no_sdo_abort: no aborted SDO transfer.
         no_error_frames: no error frame.
-        no_reboot: no boot-up of a node that was heard, without an NMT reset.
-        no_lost_heartbeat: no node that sent heartbeats falls silent.
-        no_loss: no frame lost, no line of a log that is none.
-        heartbeats: when those of some nodes come.
-        nodes: nodes that must be heard.
+        no_reboot: no second boot-up of a node without an NMT reset.
+        no_lost_heartbeat: no node stops sending heartbeats.
+        no_loss: no frame lost, no invalid line in a log.
+        heartbeats: periods of the heartbeats of some nodes.
+        nodes: nodes that must be present.
         max_gaps: identifiers and the longest gap of each, microseconds.
         known: all identifiers that may come, None for any.
-        others: what makes further rules, those of installed packages.
-        expressions: rules about what frames mean. `Checker` holds them where it is given decoded
-            frames; a whole log at once is not held against them.
+        others: factories of further rules, from installed packages.
+        expressions: rules about decoded frames. `Checker` checks them if it gets decoded frames;
+            the block-wise check does not.
     """
 
     max_load: float | None = None
@@ -148,7 +148,7 @@ def parse_rules(words: RuleValues, load_rule: _LoadRule = _no_rule) -> Rules:
     for name in words:
         if name not in known:
             meant = "".join(f"; did you mean {word!r}?" for word in closest(name, known))
-            raise ValueError(f"rule {name!r} is none of {', '.join(known)}{meant}")
+            raise ValueError(f"rule {name!r} is not one of {', '.join(known)}{meant}")
     switches = {name: _switch(name, words[name]) for name in SWITCHES if name in words}
     gaps = (text.partition("=") for text in _texts("max_gap", words))
     idents = [ident for text in _lists("known", words) for ident in _idents(text)]
@@ -279,7 +279,7 @@ def _idents(text: str) -> Iterator[int]:
             yield ident | REMOTE
 
 
-# A file of rules, in TOML: all that is wrong with it is told at once.
+# A file of rules, in TOML: all errors are reported at once.
 
 
 def parse_rule_file(text: str, load_rule: _LoadRule) -> RuleValues:
@@ -305,7 +305,7 @@ def parse_rule_file(text: str, load_rule: _LoadRule) -> RuleValues:
 
 
 def _mistakes(text: str, load_rule: _LoadRule) -> list[str]:
-    """Try each rule alone; of text that is no TOML nothing else is said."""
+    """Try each rule alone; report only the syntax error of invalid TOML."""
     document = read_toml(text)
     found = [(line, reason) for line, reason in document.mistakes]
     for path, words in () if found else _alone(document.values):

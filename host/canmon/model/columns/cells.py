@@ -175,7 +175,7 @@ class TextTable:
 
 
 def widened(rows: Cells, width: int) -> Cells:
-    """Return rows of at least so many characters."""
+    """Return rows of at least this many characters."""
     if rows.shape[1] >= width:
         return rows
     wide = np.zeros((len(rows), width), np.uint8)

@@ -35,13 +35,14 @@ if TYPE_CHECKING:
 
 # Frames of one CAN-ID mean the same kind of thing, so a block is sorted by identifier and each
 # group is written at once: the bits of a signal are picked out of all payloads by one numpy call,
-# and its numbers become texts by one call of `map`. What stands around them is a format string,
-# made once for a PDO or a message of a DBC file. Names of files are data in it: a percent sign
-# among them is doubled, and nothing of a file is ever run.
+# and its numbers become texts by one call of `map`. The text around them is a format string, made
+# once per PDO or DBC message. Names from files are data in it: a percent sign in them is doubled,
+# and no content of a file is executed.
 #
-# What a CAN-ID means can change: a node is told another mapping, or it boots. Frames that can do
-# this are decoded in their order. When one did, what came before it is written as it was, and what
-# comes behind is sorted anew. It takes 2 us a frame, where a frame by itself takes 10 to 20.
+# The meaning of a CAN-ID can change: a node gets another mapping, or it boots. Frames that can do
+# this are decoded in order. After such a frame, the rows before it are written with the old
+# meaning, and the rest is sorted again. It takes 2 us a frame, where a frame by itself takes 10 to
+# 20.
 
 _Payloads = npt.NDArray[np.uint64]
 _Write = Callable[[cells.Texts, Ints, _Payloads, Ints], None]
@@ -234,7 +235,7 @@ def _writer(begin: str, columns: Sequence[_Column], end: str = "") -> _Write:
 
 
 def _blank_end(text: str) -> bool:
-    """Say whether a text ends in blanks, which are left out at the end of a line."""
+    """Return whether a text ends in blanks, which are omitted at the end of a line."""
     return text != text.rstrip()
 
 
@@ -348,7 +349,7 @@ def _scaled_column(
 def _within(
     numbers: npt.NDArray[np.int64], raw: _Payloads, bits: _Bits, limit: int
 ) -> cells.Mask | None:
-    """Say which numbers are at most `limit`; None where all are."""
+    """Return which numbers are at most `limit`; None if all are."""
     if 1 << bits.length <= limit:
         return None
     right = (numbers <= limit) & (numbers >= -limit)
@@ -360,7 +361,7 @@ def _within(
 def _corrected(
     parts: Sequence[cells.Part], right: cells.Mask, raw: _Payloads, write: Callable[[int], str]
 ) -> cells.Cells:
-    """Return a text in which those that are not right are replaced."""
+    """Return a text in which wrong cells are written again."""
     wrong = np.flatnonzero(~right)
     texts = cells.of_texts(map(write, raw[wrong].tolist()))
     rows = cells.widened(cells.together(len(raw), parts), texts.shape[1])
@@ -409,7 +410,7 @@ def _field_column(field: Field) -> _Column | None:
 _FLOATS: Final = {16: "<e", 32: "<f", 64: "<d"}
 _SAMPLES: Final = 64
 _SHORT: Final = 16
-"""Numbers of at most so many bits come again, and each has its text once."""
+"""Numbers of at most this many bits repeat, so each text is cached."""
 
 
 def _message_writer(file: DbcFile, can_id: int, extended: bool) -> _Write:
@@ -443,7 +444,7 @@ def _message_writer(file: DbcFile, can_id: int, extended: bool) -> _Write:
 
 
 def _message_columns(message: DbcMessage, length: int) -> list[_Column] | None:
-    """Return the signals in so many bytes; None where cantools must find them."""
+    """Return the signals in data of this length; None if cantools must find them."""
     if message.is_multiplexed() or message.is_container or message.length > MAX_DATA_BYTES:
         return None
     columns = []
@@ -517,13 +518,13 @@ _PIECE: Final = 1 << 10
 
 
 class ColumnNodes:
-    """Feeds a node board with blocks; what it shows at their end is as frame by frame.
+    """Feeds a node board with blocks; the result at the end equals that frame by frame.
 
-    Of `NodeStatus.pdos`, which the verb does not show, only those that matter to it are there.
+    `NodeStatus.pdos`, which the verb does not show, contains only PDOs that affect the result.
 
     Args:
         decoder: it must be `standard`.
-        board: fed by nobody else.
+        board: the board; no other code feeds it.
     """
 
     def __init__(self, decoder: Decoder, board: NodeBoard) -> None:
@@ -562,13 +563,13 @@ def one_by_one(frames: Columns, rows: Ints) -> Iterator[tuple[int, Record]]:
 
 
 class Exchanges(NamedTuple):
-    """Expedited SDO transfers, each an answer right behind its request, that teach nothing.
+    """Expedited SDO transfers, each an answer right after its request, that teach nothing.
 
     Attributes:
         requests: their places.
         answers: the places of the answers.
-        inner: whether other such exchanges of the node stand right before and right behind: then
-            nobody notices that this one is left out.
+        inner: whether other such exchanges of the node are right before and right after: then this
+            one can be skipped without effect.
     """
 
     requests: Ints
@@ -652,7 +653,7 @@ def exchanges(
 
 
 def block_nodes(ident: npt.NDArray[Any], payload: npt.NDArray[np.uint64]) -> npt.NDArray[np.bool_]:
-    """Say of each node-ID whether a block transfer is asked for among SDO frames."""
+    """Return for each node-ID whether the SDO frames request a block transfer."""
     blocks = np.zeros(0x80, np.bool_)
     asks = np.isin(payload & np.uint64(_SPECIFIER), _BLOCK_COMMANDS)
     blocks[ident[asks & (ident & 0x780 == REQUEST_COB_ID)] & 0x7F] = True

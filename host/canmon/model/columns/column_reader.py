@@ -287,8 +287,7 @@ class CandumpBlock:
     Each place is read for all lines together, as words of eight bytes at any address. A table has
     turned hex digits into their values before that, and everything else into 0x80; so eight digits
     are checked by one AND. Values are put together by shifts within the words: two digits, four,
-    eight. A line of which any check fails is none of these, and is left to the parser of single
-    lines.
+    eight. A line that fails a check is left to the parser of single lines.
 
     Args:
         text: the lines, each with its LF.
@@ -484,12 +483,12 @@ class ColumnReader:
     def _piece(
         self, text: bytes, lines: log_reader.LogLines, held: int
     ) -> Iterator[Columns | Sequence[log_reader.Item]]:
-        """Give the frames of some lines: as columns, where no line holds anything else.
+        """Return the frames of some lines: as columns if the lines hold only frames.
 
         Args:
             text: the lines, each with its LF.
             lines: reads them, or counts them.
-            held: so many bytes of the text were read with what is before it.
+            held: number of bytes of the text that were read before.
         """
         block = CandumpBlock(text)
         rows = Rows(len(block.starts))

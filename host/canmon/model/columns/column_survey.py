@@ -52,8 +52,8 @@ class ColumnSurvey:
     """Feeds a survey with blocks.
 
     Args:
-        decoder: of the survey; what decodes first must be DBC files.
-        survey: fed by nobody else.
+        decoder: of the survey; only DBC files may decode before the standard.
+        survey: the survey; no other code feeds it.
     """
 
     def __init__(self, decoder: Decoder, survey: Survey) -> None:

@@ -37,7 +37,7 @@ _SLAB: Final = 1 << 12
 
 
 def fits(columns: Columns) -> bool:
-    """Say whether these lines can be written at once: not with the strangest names of buses."""
+    """Return whether these lines can be written at once: not with unusual names of buses."""
     return all(name.isascii() and name.isprintable() for name in columns.channels)
 
 

@@ -232,8 +232,8 @@ class Identifiers:
 
     Attributes:
         idents: by number.
-        first_us: when each was heard first.
-        last_us: when each was heard last.
+        first_us: time of the first frame of each.
+        last_us: time of the last frame of each.
     """
 
     def __init__(self) -> None:
@@ -284,7 +284,7 @@ class Identifiers:
 
 
 def grown(column: Numbers, count: int) -> Numbers:
-    """Return a column with so many rows; new ones are 0."""
+    """Return a column with this many rows; new rows are 0."""
     if len(column) == count:
         return column
     rows = np.zeros((count, *column.shape[1:]), column.dtype)

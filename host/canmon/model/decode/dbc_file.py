@@ -57,7 +57,7 @@ class DbcFile:
         }
 
     def names(self, can_id: int, extended: bool) -> bool:
-        """Say whether the file names a CAN-ID."""
+        """Return whether the file has a message with a CAN-ID."""
         return (can_id, extended) in self._messages
 
     def message(self, can_id: int, extended: bool) -> Message:

@@ -17,7 +17,7 @@ class TransferDirection(StrEnum):
 
     UPLOAD = "upload"
     DOWNLOAD = "download"
-    UNKNOWN = "transfer of"  # an abort alone was heard
+    UNKNOWN = "only an abort was seen"  # an abort alone was heard
 
 
 class TransferMode(StrEnum):
@@ -38,7 +38,7 @@ class TransferOutcome(StrEnum):
 
     @property
     def answered(self) -> bool:
-        """Whether the server was heard."""
+        """Whether a frame of the server was seen."""
         return self is not TransferOutcome.UNANSWERED
 
 
@@ -47,25 +47,25 @@ class Transfer:
     """One SDO transfer.
 
     Attributes:
-        at_us: when its first frame was heard.
+        at_us: time of its first frame.
         duration_us: from there to its last frame.
         node: the server.
         direction: upload reads, download writes.
-        mode: how the bytes were carried.
-        index: None where the beginning was not heard.
-        sub: likewise.
+        mode: transfer mode.
+        index: None if the beginning is missing.
+        sub: None if the beginning is missing.
         outcome: how it ended.
-        data: the bytes; None where they were not heard.
-        abort_code: why, where it was aborted.
-        by_client: the client aborted it.
-        retries: frames, and segments of a block, that were sent again.
-        partial: its beginning was not heard.
-        flaws: what does not fit: a gap, a size, a CRC.
-        sized: the number of bytes was told; of an expedited transfer without it there are four.
-        length: what is odd about it, for people.
-        name: of the object, empty where nobody named it.
+        data: the bytes; None if they are missing.
+        abort_code: the reason if it was aborted.
+        by_client: whether the client aborted it.
+        retries: number of repeated frames and segments.
+        partial: whether its beginning is missing.
+        flaws: inconsistencies: a gap, a size, a CRC.
+        sized: whether the number of bytes is indicated; an expedited transfer without it has four.
+        length: what is unusual about its length, in words.
+        name: of the object, empty if unknown.
         value: of the bytes; a number of up to 8 bytes where the type is not known.
-        text: the value for people.
+        text: the value as text.
         unit: of the value.
         source: where name and type come from.
     """
@@ -94,7 +94,7 @@ class Transfer:
 
     @property
     def entry(self) -> tuple[int, int] | None:
-        """Index and sub-index; None where they were not heard."""
+        """Index and sub-index; None if they are unknown."""
         return None if self.index is None or self.sub is None else (self.index, self.sub)
 
     def __str__(self) -> str:
@@ -106,7 +106,7 @@ class Transfer:
         return " ".join(parts)
 
     def _notes(self) -> list[str]:
-        """Say what people want to know beside the value."""
+        """Return details to show besides the value."""
         notes = (
             []
             if self.mode is TransferMode.EXPEDITED
@@ -118,7 +118,7 @@ class Transfer:
         elif self.outcome is not TransferOutcome.DONE:
             notes.append(self.outcome)
         notes += [f"{self.retries} sent again"] if self.retries else []
-        notes += ["beginning not heard"] if self.partial else []
+        notes += ["beginning missing"] if self.partial else []
         notes += [self.length] if self.length else []
         return [*notes, *self.flaws, f"{self.duration_us / 1_000:.1f} ms"]
 
@@ -144,11 +144,11 @@ class Signal(NamedTuple):
     """A value of a frame.
 
     Attributes:
-        name: of an object in lower case, a member of a record behind a dot; `6041h:00` where
-            nobody named it; as the DBC file has it.
-        value: what it is.
+        name: of an object in lower case, a member of a record behind a dot; `6041h:00` without a
+            name; or the name in the DBC file.
+        value: the value.
         unit: as the EDS or DBC file gives it, else empty.
-        text: how people read it where that is not the value itself.
+        text: the value as text, if it differs from the value.
     """
 
     name: str
@@ -162,21 +162,22 @@ class Signal(NamedTuple):
 
 
 class Decoded(NamedTuple):
-    """A frame, for people and filters.
+    """A decoded frame, for display and filters.
 
     Attributes:
         kind: nmt, sync, time, emcy, heartbeat, boot-up, guard, sdo, tpdo1.., rpdo1.., lss, dbc,
-            error, rrc, rtc-lite; unmapped for a PDO nobody described, fd for a CAN FD frame,
-            raw for all else.
-        node: whose object it is; None where it belongs to none.
-        summary: one line; None where transfers or else signals say it all.
+            error, rrc, rtc-lite; unmapped for a PDO without a description, fd for a CAN FD frame,
+            raw for all others.
+        node: the node of the object; None if there is none.
+        summary: one line; None if transfers or signals contain everything.
         signals: the values in it.
-        source: `EDS`, `SEEN`, `DBC`; empty where the standard alone says it.
+        source: `EDS`, `SEEN`, `DBC`; empty if the standard alone defines it.
         entry: index and sub-index that an SDO frame is about.
         transfers: the SDO transfers that ended with this frame.
-        asks: who sent it waits for an answer: SDO client, NMT master that guards.
-        size: bytes that a PDO must have by its mapping, None where nobody told it.
-        flaw: what does not fit with an SDO frame, where that is new in its transfer.
+        asks: whether its sender waits for an answer: an SDO client, or an NMT master with node
+            guarding.
+        size: bytes that a PDO must have by its mapping, None if unknown.
+        flaw: an inconsistency of an SDO frame that is new in its transfer.
     """
 
     kind: str

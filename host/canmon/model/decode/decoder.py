@@ -1,4 +1,4 @@
-"""All that was heard decoded, on any number of buses."""
+"""Decoding of all frames, on any number of buses."""
 
 from __future__ import annotations
 
@@ -46,39 +46,39 @@ if TYPE_CHECKING:
 # Theory of operation
 # ===================
 #
-# What a CAN-ID means is said by three voices, the later ones louder: the pre-defined
-# connection set, an EDS of the node, and SDO traffic that was heard. The decoder never asks
-# a node; it learns, and may learn in the middle of a log that it was wrong until then.
-# Nothing is decoded again: a frame means what was known when it came.
+# Three sources define the meaning of a CAN-ID, in ascending precedence: the pre-defined connection
+# set, an EDS of the node, and SDO traffic. The decoder never queries a node; it learns, and may
+# learn in the middle of a log that it was wrong so far. Nothing is decoded again: a frame is
+# decoded with what was known when it came.
 #
 # `_routes` is a cache: by CAN-ID the function that decodes its frames. `_route` fills it,
 # in this order:
 #
-# 1. `_configured`    COB-IDs of SYNC, TIME, EMCY and additional SDO servers that were told
+# 1. `_configured`    COB-IDs of SYNC, TIME, EMCY and additional SDO servers that were configured
 # 2. NMT, SYNC, TIME, LSS
-# 3. `PdoTable`       PDOs whose CAN-ID and content are told; who sends goes before who receives
+# 3. `PdoTable`       PDOs with known CAN-ID and content; the producer takes precedence over
+#    consumers
 # 4. 080h, 580h, 600h, 700h + node-ID, by the pre-defined connection set
-# 5. 181h to 57Fh with a node-ID: a PDO that nobody described (`unmapped`); all else is `raw`
+# 5. 181h to 57Fh with a node-ID: a PDO without a description (`unmapped`); all others are `raw`
 #
 # Whatever may change an answer of `_route` must take the CAN-ID out of the cache and add to
 # `changes`: `_refresh` does it for PDOs, `_configure` for the others. `changes` is how
-# `ColumnNodes` notices that it has to go on frame by frame.
+# `ColumnNodes` detects that it has to continue frame by frame.
 #
-# What is learnt, and where it takes effect:
+# What is learnt, and its effects:
 #
 # - a transfer that ended well (`_learn`): values of the communication area go into
-#   `NodeMemory`; 1400h to 1BFFh read the PDO anew, COB-ID objects are learnt, and whether a
-#   node is a drive changes the names of its objects, so all its known PDOs are read anew;
+#   `NodeMemory`; 1400h to 1BFFh define the PDO again, COB-ID objects are learnt, and whether a node
+#   is a drive changes the names of its objects, so all its known PDOs are defined again;
 # - a boot-up: the node has its power-on values again, unless it stored others (1010h);
 # - a guarding request (700h + node-ID, RTR): the next frame on this CAN-ID is an answer
-#   with a toggle bit and no heartbeat. Without a request a set bit 7 alone tells it;
+#   with a toggle bit and no heartbeat. Without a request, a set bit 7 identifies it;
 # - vendor, product or revision of 1018h: `EdsFiles` may have a file for the node. Its objects and
-#   PDOs count from then on; what traffic told goes before them, as always.
+#   PDOs count from then on; values from traffic take precedence, as always.
 #
-# `effect` must stay true to all of this: it says of which frames a block-wise reader may
-# leave some out. A new way to learn from a frame needs its line there, or `canmon nodes` of
-# a log shows something else than the same log frame by frame (test_column_nodes.py compares
-# the two).
+# `effect` must stay true to all of this: it tells a block-wise reader which frames it may skip. A
+# new way to learn from a frame needs its line there, or `canmon nodes` of a log shows something
+# else than the same log frame by frame (test_column_nodes.py compares the two).
 #
 # SDO channels are one for each server and request CAN-ID (sdo.py); imports of rare decoders
 # stand in functions because `canmon check` of three lines has to start quickly
@@ -115,19 +115,19 @@ class Effect(IntEnum):
 
 
 class BusDecoder:
-    """Decodes the frames of one bus, in the order in which they were heard.
+    """Decodes the frames of one bus, in the order in which they came.
 
-    Which CAN-ID is what, the pre-defined connection set says, until an EDS or SDO traffic
-    says otherwise (1005h, 1012h, 1014h, 1201h.., 1400h.. to 1A00h..).
+    The pre-defined connection set defines the CAN-IDs, until an EDS or SDO traffic defines others
+    (1005h, 1012h, 1014h, 1201h.., 1400h.. to 1A00h..).
 
     Args:
-        eds: what files say, by node-ID.
-        files: where files of other nodes are looked for; None if nowhere.
-        channel: what the bus is called there.
+        eds: contents of EDS files, by node-ID.
+        files: where to search files of other nodes; None for no search.
+        channel: name of the bus there.
 
     Attributes:
-        changes: how often what a CAN-ID means may have changed.
-        sdo_moved: a CAN-ID of the SDO frames of the pre-defined connection set got another meaning.
+        changes: number of possible changes of the meaning of a CAN-ID.
+        sdo_moved: whether an SDO CAN-ID of the pre-defined connection set got another meaning.
     """
 
     def __init__(
@@ -157,7 +157,7 @@ class BusDecoder:
         return route(at_us, frame)
 
     def effect(self, can_id: int) -> Effect:
-        """Say which frames with a CAN-ID can change what is known of nodes, as it is used now."""
+        """Return which frames with a CAN-ID can change the knowledge about nodes."""
         route = self._routes.get(can_id) or self._route(can_id)
         if isinstance(route, partial):
             if route.func is _unmapped:
@@ -349,9 +349,9 @@ class BusDecoder:
 
 
 def _odd_length(kind: DataType | None, data: bytes, *, sized: bool) -> str:
-    """Say that a number of bytes was not told, or is not that of the type."""
+    """Report that a number of bytes was not indicated, or is not that of the type."""
     if not sized:
-        return "" if kind is not None and kind.size == len(data) else "size not told"
+        return "" if kind is not None and kind.size == len(data) else "size not indicated"
     if kind is None or not kind.size or kind.size == len(data):
         return ""
     return f"{len(data)} B where {kind.name} has {kind.size}"
@@ -380,7 +380,7 @@ def _emcy(node: int, at_us: int, frame: CanFrame) -> Decoded:
 
 
 def _unmapped(node: int, at_us: int, frame: CanFrame) -> Decoded:
-    return Decoded("unmapped", node, "RTR" if frame.remote else "no mapping was heard")
+    return Decoded("unmapped", node, "RTR" if frame.remote else "mapping unknown")
 
 
 def _raw(at_us: int, frame: CanFrame) -> Decoded:
@@ -388,7 +388,7 @@ def _raw(at_us: int, frame: CanFrame) -> Decoded:
 
 
 def told_by_none(route: Route) -> bool:
-    """Say whether a route tells the same of all data."""
+    """Return whether a route decodes all data the same way."""
     return (route.func if isinstance(route, partial) else route) in (_unmapped, _raw)
 
 
@@ -406,21 +406,21 @@ class FrameDecoder(Protocol):
 
 
 class Decoder:
-    """Decodes what was heard, in order; each bus has its own nodes.
+    """Decodes frames, in order; each bus has its own nodes.
 
     Args:
-        eds: an EDS or DCF, or what was read of one, by node-ID. It counts on every bus. `EdsFiles`
-            with a folder has those of other nodes, by the identity that is heard.
-        dbc: DBC files; the CAN-IDs that they name mean nothing else.
-        first: asked before anything else what a frame says.
+        eds: an EDS or DCF, or its content, by node-ID. It counts on every bus. `EdsFiles` with a
+            folder has those of other nodes, by the identity in the traffic.
+        dbc: DBC files; they take precedence for their CAN-IDs.
+        first: decoders that are tried before all others.
 
     Attributes:
-        first: these, and behind them the DBC files.
+        first: these, followed by the DBC files.
 
     Raises:
         OSError: a file cannot be read.
         EdsError: an EDS is malformed.
-        DbcError: a DBC file is malformed, or cantools is not there.
+        DbcError: a DBC file is malformed, or cantools is not installed.
     """
 
     def __init__(
@@ -439,7 +439,7 @@ class Decoder:
 
     @property
     def standard(self) -> bool:
-        """Whether nothing but the standard, EDS and traffic tell what frames mean."""
+        """Whether only the standard, EDS files and traffic define the meaning of frames."""
         return not self.first
 
     def take(self, record: Record) -> Decoded:

@@ -21,19 +21,19 @@ from tickrig.wire.canopen.eds.eds_file import EdsError, EdsFile, decode_text
 # Theory of operation
 # ===================
 #
-# A folder of a vendor holds hundreds of files, so `EdsFolder` reads of each only who it is for:
+# A folder of a vendor holds hundreds of files, so `EdsFolder` reads only the identity from each:
 # the sections DeviceInfo, DeviceComissioning and 1018h of an EDS or DCF; an XDD is parsed
-# whole. It does so when a node is first looked for. A file that cannot be read, or has neither
+# whole. It does so at the first search for a node. A file that cannot be read, or has neither
 # vendor nor product, fits no node.
 #
 # A file fits a node if vendor and product are equal. Among those that fit, in this order: the
 # revision (equal; the same major half, which CiA 301 changes with the CANopen behaviour; not in
-# the file; another one), then the kind (a DCF of this node-ID has its real values; a DCF of
-# another node has those of somebody else), then the nearest revision, then the name.
+# the file; another one), then the kind (a DCF of this node-ID has its real values; a DCF of another
+# node has values of that node), then the nearest revision, then the name.
 #
-# `EdsFiles` is what a decoder is given: files by node-ID, as `--eds` names them, which always
-# count, and the folder. A decoder asks it again whenever it learns a part of 1018h, so a file is
-# chosen by vendor and product, and may change when the revision comes.
+# A decoder gets `EdsFiles`: files by node-ID, as `--eds` names them, which always count, and the
+# folder. A decoder calls it whenever it learns a part of 1018h, so a file is chosen by vendor and
+# product, and may change when the revision comes.
 
 _ENDINGS: Final = (".eds", ".dcf", ".xdd", ".xdc")
 _SECTIONS: Final = re.compile(
@@ -155,14 +155,14 @@ class EdsFolder:
 
 
 def _reason(best: _Candidate, other: _Candidate, wanted: EdsIdentity, node: int) -> str:
-    """Say in what one fits better than the next."""
+    """Return why one fits better than the next."""
     first, second = best.rank(wanted, node), other.rank(wanted, node)
     if first[0] != second[0]:
         return _REVISIONS[first[0]]
     if first[1] != second[1]:
         return f"it is the DCF of node {node}" if best.node == node else "the other is of a node"
     if wanted.revision is None and first[2] != second[2]:
-        return "it has the latest revision; the node has not told its own"
+        return "it has the latest revision; that of the node is unknown"
     return _REVISIONS[3] if first[2] != second[2] else "first by name"
 
 

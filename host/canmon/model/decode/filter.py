@@ -140,7 +140,7 @@ def _kind_test(word: str) -> Test | None:
 
 
 def _state_path(node: int) -> str:
-    """Return the name under which the NMT state of a node is waited for."""
+    """Return the name under which a filter waits for the NMT state of a node."""
     return f"state of node {node}"
 
 
@@ -188,7 +188,7 @@ def _candump_test(chosen: CandumpFilter) -> Test:
 
 
 def _never_holds(name: str, sign: str, value: float) -> bool:
-    """Say whether a field can never be compared so: somebody must have meant something else."""
+    """Return whether a field can never match this comparison: it must be a mistake."""
     numbers, compare = _RANGES[name], COMPARISONS[sign]
     if sign in _EQUALITIES:
         return value not in numbers
@@ -196,7 +196,7 @@ def _never_holds(name: str, sign: str, value: float) -> bool:
 
 
 def _is_word(name: str, value: str) -> bool:
-    """Say whether a field may have a word."""
+    """Return whether a field may have a word."""
     is_pdo = name == "kind" and _PDO.fullmatch(value) is not None and value[-1:].isdecimal()
     return name not in KNOWN_WORDS or value in KNOWN_WORDS[name] or is_pdo
 
@@ -282,7 +282,7 @@ def signal_place(path: str) -> tuple[int | None, str, int | None]:
 
 
 def number(text: str) -> float | None:
-    """Read a number as people write it; None if it is none.
+    """Parse a number in any notation; None if it is not a number.
 
     >>> number("0x10"), number("-1.5"), number("8130h"), number("fast")
     (16, -1.5, 33072, None)
@@ -346,7 +346,7 @@ class MissingSignals:
         self._words = sorted(words)
 
     def __bool__(self) -> bool:
-        """Say whether any is missing."""
+        """Return whether any is missing."""
         return bool(self._left or self._words)
 
     def take(self, record: AnyRecord, decoded: Decoded) -> None:
@@ -370,7 +370,7 @@ class MissingSignals:
         return [f"{name}={word}" for name, word in self._words]
 
     def messages(self) -> list[str]:
-        """Say what never came, one line each."""
+        """Report what never came, one line each."""
         signals = [f"the filter asks for {path!r}: no such signal came" for path in self._left]
         return signals + [
             f"the filter asks for {name}={word}: no such frame came;"
@@ -653,13 +653,13 @@ def _hexadecimal(text: str) -> int | None:
 
 @dataclass(frozen=True, slots=True)
 class Filter:
-    """A filter that was read.
+    """A parsed filter.
 
     Attributes:
-        text: as it was written.
-        matches: says whether a frame is wanted.
-        signals: names of the signals it asks for, to tell when none of them ever comes.
-        words: field and word for each word that only a decoder of an installed package can say.
+        text: as written.
+        matches: returns whether a frame passes.
+        signals: names of its signals, to report if none of them ever comes.
+        words: field and word for each word that only a decoder of an installed package can produce.
     """
 
     text: str

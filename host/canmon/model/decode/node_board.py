@@ -80,25 +80,26 @@ class NodeStatus:
     Args:
         channel: its bus.
         node: its node-ID.
-        memory: what is known of its objects.
+        memory: the known objects.
 
     Attributes:
-        state: NMT state as it told it, None while it told none.
-        commanded: where the NMT master sent it since, None once it has told its state.
-        boots: boot-up messages.
-        unrequested_boots: those that no NMT command had asked for, of a node that was heard before.
+        state: last reported NMT state, None before the first.
+        commanded: the state commanded since by the NMT master, None once it has reported its state.
+        boots: number of boot-up messages.
+        unrequested_boots: number of those without an NMT command, after an earlier frame of the
+            node.
         late: gaps between heartbeats that were longer than `LATE` periods.
         emcys: the latest, oldest first.
         emcy_count: all.
         error_code: of the latest EMCY, 0 if that took an error back.
         sdo_errors: transfers that were aborted, unanswered or broken off.
-        sdo_error: the last of them, for people.
-        drive_state: of CiA 402, empty while no statusword was heard.
-        name: the device name it told.
-        present: it has sent anything that is known to be its own.
+        sdo_error: the last of them, in words.
+        drive_state: of CiA 402, empty before the first statusword.
+        name: the device name that it reported.
+        present: whether it has sent a frame that is known to be its own.
         pdos: the latest of each of its PDOs, by kind.
-        doubled: two nodes have this node-ID, as far as their heartbeats and boot-ups say it: what
-            is shown of the node is of both, and their gaps give the period of neither.
+        doubled: whether two nodes have this node-ID, according to heartbeats and boot-ups: the row
+            then mixes both, and the gaps do not give a period.
     """
 
     channel: str
@@ -147,22 +148,22 @@ class NodeStatus:
 
     @property
     def reported_us(self) -> int | None:
-        """When it last told its state."""
+        """Time of its last reported state."""
         return self._heartbeats.last_us
 
     def age_us(self, now_us: int) -> int | None:
-        """Return how long ago it told its state."""
+        """Return the time since its last reported state."""
         return None if self.reported_us is None else now_us - self.reported_us
 
     def is_late(self, now_us: int) -> bool:
-        """Say whether a heartbeat is missing."""
+        """Return whether a heartbeat is missing."""
         if self._each_us:
             return now_us - self._beats_us[-1] > LATE * self._each_us
         return self._heartbeats.is_late(now_us)
 
     @property
     def state_text(self) -> str:
-        """The NMT state for people; where the master sent it meanwhile behind an arrow."""
+        """The NMT state as text; if the master commanded another one since, after an arrow."""
         told = "?" if self.state is None else nmt_state_name(self.state)
         if self.commanded in (None, self.state):
             return told
@@ -237,15 +238,15 @@ _ERROR_CONTROL: Final = ("heartbeat", "guard")
 
 
 class NodeBoard:
-    """Keeps the status of every node that was heard.
+    """Keeps the status of every node that sends.
 
-    A node is on the board once it has told its state, sent an EMCY, answered an SDO request
-    or sent a PDO that is known to be its own or has a CAN-ID of the pre-defined connection set
-    that nobody gave another meaning; and from the beginning where it has an EDS.
+    A node is on the board once it has reported its state, sent an EMCY, answered an SDO request or
+    sent a PDO that is known to be its own or has a CAN-ID of the pre-defined connection set without
+    another meaning. A node with an EDS is on the board from the beginning.
 
     Args:
-        decoder: decodes what is taken here, too.
-        expected: nodes with an EDS, on the first bus that is heard.
+        decoder: decodes the frames that the board processes.
+        expected: nodes with an EDS, on the first bus with a frame.
     """
 
     def __init__(self, decoder: Decoder, expected: Mapping[int, str] | None = None) -> None:
@@ -344,7 +345,7 @@ def render_board(board: NodeBoard, now_us: int, width: int, height: int) -> list
 
     Args:
         board: the board.
-        now_us: the time for which ages are told.
+        now_us: the time to which ages refer.
         width: columns of the terminal.
         height: lines that may be used.
     """
@@ -355,7 +356,7 @@ def render_board(board: NodeBoard, now_us: int, width: int, height: int) -> list
     widths = {column: max(len(line[column]) for line in cells) for column in used}
     lines = [_GAP.join(line[column].ljust(widths[column]) for column in used) for line in cells]
     if not rows:
-        lines = ["no node was heard"]
+        lines = ["no node has sent a frame"]
     lines += emcy_history(rows)
     return [_cut(line.rstrip(), width) for line in lines[:height]]
 
@@ -387,7 +388,7 @@ def _heartbeat(row: NodeStatus, now_us: int) -> str:
     """Write age, period, and how much of one and a half periods has gone."""
     age_us, period_us = row.age_us(now_us), row.period_us
     if age_us is None:
-        return "never heard" if row.period_us else ""
+        return "never seen" if row.period_us else ""
     if row.doubled:
         return FROM_TWO_NODES + " LATE" * row.is_late(now_us)
     if period_us is None:
@@ -465,11 +466,11 @@ class _PdoContent(NamedTuple):
     """A PDO that has a CAN-ID.
 
     Attributes:
-        kind: as of `Decoded`.
+        kind: as in `Decoded`.
         can_id: its own.
-        receives: the node takes it.
-        names: of the objects in it; none where the mapping is not known.
-        text: these, with their latest values where it was heard, and where they are known from.
+        receives: whether the node receives it.
+        names: of the objects in it; empty if the mapping is unknown.
+        text: these, with their latest values if the PDO was sent, and their source.
     """
 
     kind: str
@@ -493,7 +494,7 @@ def _pdos(row: NodeStatus) -> Iterator[_PdoContent]:
         source = memory.source(pdo.mapping) or memory.source(pdo.parameter)
         names: tuple[str, ...] = ()
         if count is None:
-            text = "mapping was not heard"
+            text = "mapping unknown"
         elif count in MPDO:
             text = f"multiplexed: each frame names its object ({source})"
         else:
@@ -528,7 +529,7 @@ def name_text(row: NodeStatus) -> str:
 
 def identity_words(row: NodeStatus) -> str:
     """Return profile, vendor, product, revision and serial number, as far as they are known."""
-    return told_identity(row) or "not known: no EDS, and nobody has read 1000h or 1018h"
+    return told_identity(row) or "not known: no EDS, and no read of 1000h or 1018h"
 
 
 def told_identity(row: NodeStatus) -> str:
@@ -568,7 +569,7 @@ def _hex(number: int | None) -> str:
 
 
 def profile_text(device_type: int) -> str:
-    """Say which profile a device type (1000h) names.
+    """Return the profile of a device type (1000h) in words.
 
     >>> profile_text(0x20192), profile_text(0x0), profile_text(0xFFFF0191)
     ('CiA 402 drive', 'no profile', 'CiA 401 I/O')

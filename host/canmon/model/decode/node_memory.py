@@ -1,4 +1,4 @@
-"""What SDO traffic and an EDS have told of the objects of one node.
+"""Knowledge about the objects of one node, from SDO traffic and an EDS.
 
 >>> drive_state(0x0237), drive_state(0x0250), drive_state(0x0010)
 ('operation enabled', 'switch on disabled', 'not ready to switch on')
@@ -70,14 +70,14 @@ _OTHERS: Final = re.compile(r"[^0-9a-z]+")
 
 
 class ObjectText(NamedTuple):
-    """An object as people know it.
+    """The description of an object.
 
     Attributes:
-        name: as `Signal.name`.
-        kind: its data type, None where nobody said it.
-        unit: empty where nobody said it.
-        factor: by which the number is multiplied to be in that unit.
-        source: as `Decoded.source`.
+        name: as in `Signal.name`.
+        kind: its data type, None if unknown.
+        unit: its unit, empty if unknown.
+        factor: multiply the number by it to get this unit.
+        source: as in `Decoded.source`.
         in_hex: a set of bits, or an identifier.
     """
 
@@ -89,12 +89,12 @@ class ObjectText(NamedTuple):
     in_hex: bool = False
 
     def fitted(self, data: bytes, *, sized: bool = True) -> bytes:
-        """Return the bytes that the type has, of more that an SDO carried.
+        """Return the bytes of the value, of more that an SDO carried.
 
         Args:
-            data: as they were carried.
-            sized: their number was told. Where it was not, those behind mean nothing; where it
-                was, they are left out only if they fill the value up.
+            data: as carried.
+            sized: whether their number was indicated. If not, surplus bytes have no meaning; if so,
+                they are dropped only if they are padding.
         """
         size = 0 if self.kind is None else self.kind.size
         if not 0 < size < len(data):
@@ -380,16 +380,16 @@ class NodeMemory:
         return {index for values in (self._now, self.eds.values) for index, _ in values}
 
     def number(self, index: int, sub: int) -> int | None:
-        """Return a value; None where nobody told it."""
+        """Return a value; None if unknown."""
         data = self._now.get((index, sub), self.eds.values.get((index, sub)))
         return None if data is None else int.from_bytes(data, "little")
 
     def was_received(self, entry: Entry) -> bool:
-        """Say whether traffic told a value."""
+        """Return whether traffic contained a value."""
         return entry in self._now
 
     def source(self, index: int) -> str:
-        """Say where the values of an object come from: traffic, where it told any."""
+        """Return the source of the values of an object: traffic, if it contained one."""
         entries = [(index, sub) for sub in range(MAX_MAPPED_OBJECTS + 1)]
         if any(entry in self._now for entry in entries):
             return decoded.SEEN
@@ -427,24 +427,25 @@ class NodeMemory:
 
 
 LATE: Final = 1.5
-"""A heartbeat is late after so many of its periods; the real limit is its consumer's (1016h)."""
+"""A heartbeat is late after this many of its periods; the real limit is in its consumer (1016h)."""
 _GAPS_KEPT: Final = 9
 
 
 @dataclass(slots=True)
 class Heartbeats:
-    """When the heartbeats of a node come, and the period that they keep.
+    """The times of the heartbeats of a node, and their period.
 
     Args:
-        memory: what is known of its objects.
-        from_boot: learn the period also from the gap between a boot-up and the first heartbeat.
+        memory: the known objects.
+        from_boot: whether to learn the period also from the gap between a boot-up and the first
+            heartbeat.
 
     Attributes:
-        last_us: when it told its state last, None while it told none.
-        since_us: since when one is waited for; None for never.
-        gaps: between the latest heartbeats, in us. A node that stood still sends all heartbeats
-            of that time at once: a gap shorter than half of the one before makes one with it,
-            their mean, which a burst after a silence brings back to the period.
+        last_us: time of its last reported state, None before the first.
+        since_us: time since which a heartbeat is expected; None for never.
+        gaps: between the latest heartbeats, in us. A delayed node sends all pending heartbeats at
+            once: a gap shorter than half of the previous one is averaged with it, which restores
+            the period after such a burst.
     """
 
     memory: NodeMemory = field(compare=False)
@@ -457,32 +458,32 @@ class Heartbeats:
 
     @property
     def by_sdo(self) -> bool:
-        """Whether SDO traffic says what 1017h is: that counts more than what is heard."""
+        """Whether SDO traffic contains 1017h, which takes precedence over measured gaps."""
         return self.memory.was_received(HEARTBEAT_TIME)
 
     @property
     def period_us(self) -> int | None:
-        """The period: of 1017h where it was written or read, else as heard, else by the EDS."""
+        """The period: that of 1017h in traffic, else the measured one, else that of the EDS."""
         if self.gaps and not self.by_sdo:
             return _median(self.gaps)
         period_ms = self.memory.number(*HEARTBEAT_TIME)
         return period_ms * 1_000 if period_ms else None
 
     def is_late(self, now_us: int) -> bool:
-        """Say whether one is missing."""
+        """Return whether one is missing."""
         period_us = self.period_us
         if self.since_us is None or period_us is None:
             return False
         return now_us - self.since_us > LATE * period_us
 
     def boot(self, at_us: int) -> None:
-        """Begin anew with a boot-up."""
+        """Start again with a boot-up."""
         self.gaps.clear()
         self._booted = True
         self.last_us = self.since_us = at_us
 
     def learn(self, at_us: int, transfer: decoded.Transfer) -> None:
-        """Take a transfer of 1017h that the memory has learnt: a new period begins anew."""
+        """Process a transfer of 1017h: a new period starts again."""
         if transfer.direction is decoded.TransferDirection.DOWNLOAD or self.since_us is None:
             self.gaps.clear()
             self.since_us = at_us

@@ -252,14 +252,14 @@ def _layout(pdo: NodePdo, memory: NodeMemory) -> _Layout | None:
     count, source = memory.number(mapping, 0), memory.source(mapping)
     if count is None:
         source = memory.source(pdo.parameter)
-        note = f"{UNMAPPED}: {mapping:04X}h was not heard"
+        note = f"{UNMAPPED}: {mapping:04X}h is unknown"
         return PdoDecoder((pdo.kind, pdo.node, source), note=note) if source else None
     if count in MPDO:
         return _MpdoLayout((pdo.kind, pdo.node, source), memory.describe)
     entries = mapped_objects(memory, mapping, min(count, MAX_MAPPED_OBJECTS))
     if (STATUSWORD, 16) in {((item.index, item.sub), item.bits) for item in entries}:
         memory.maps_statusword()
-    missing = f"and {mapping:04X}h:{len(entries) + 1:02X}, which was not heard"
+    missing = f"and {mapping:04X}h:{len(entries) + 1:02X}, which is unknown"
     note = missing if len(entries) < count else ""
     bits = sum(item.bits for item in entries)
     fields = _fields(memory, entries)

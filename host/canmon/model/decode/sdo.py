@@ -19,30 +19,29 @@ from tickrig.wire.errors import WireError
 # Theory of operation
 # ===================
 #
-# A third party hears both sides of an SDO dialogue, starts listening anywhere, and may miss
-# frames. So this is no client and no server, and it never refuses a frame: it holds what
-# was heard against what was expected (`_TransferPhase`) and says what does not fit in
-# `flaws`, `retries` and `partial`.
+# A monitor sees both sides of an SDO dialogue, starts anywhere, and may miss frames. So this is
+# neither a client nor a server, and it never refuses a frame: it compares each frame with the
+# expected one (`_TransferPhase`) and records differences in `flaws`, `retries` and `partial`.
 #
-# - One `SdoChannel` is one client and one server (a pair of CAN-IDs). It has at most one
-#   transfer that runs; a new initiate ends it, as `unanswered` if no answer came and
-#   `broken off` otherwise. It knows no time-outs, which are the client's own.
+# - One `SdoChannel` is one client and one server (a pair of CAN-IDs). It has at most one running
+#   transfer; a new initiate ends it, as `unanswered` if no answer came and `broken off` otherwise.
+#   It has no time-outs: they belong to the client.
 # - A repeated request (same bytes, no answer yet) is a retry and not a second transfer.
-# - Toggle bits tell a repeated segment from the next one. A segment of a download counts
+# - Toggle bits distinguish a repeated segment from the next one. A segment of a download counts
 #   when its receipt comes, one of an upload when it comes.
 # - Inside a block the first byte has no command specifier. `_is_block_segment` decides by
 #   the state alone, and by three exceptions: 80h is an abort, a frame of the other
-#   direction is none, and C1h with fill is the end once the last segment was heard.
+#   direction is none, and C1h with fill is the end once the last segment was seen.
 #   Segments are kept by number and count only up to the acknowledged one, because the
 #   others are sent again.
 # - Beginning in the middle: a segment without a transfer opens one that is `partial`, with
-#   no object; an answer without a request opens one that knows its object. A block cannot
-#   be taken up like that, because its frames cannot be told apart: they are `_ORPHAN`.
-# - An abort ends the transfer that runs only if it names its object, or none (0000h:00, as
-#   some clients send it); with another object it is a transfer of its own that was not
-#   heard.
+#   no object; an answer without a request opens one that knows its object. A block cannot be joined
+#   like that, because its frames cannot be distinguished: they are `_ORPHAN`.
+# - An abort ends the running transfer only if it names its object, or none (0000h:00, as some
+#   clients send it); with another object it is a transfer of its own whose other frames are
+#   missing.
 #
-# `done` is set by whoever sees the last frame; `SdoChannel` then closes the transfer into a
+# The code that processes the last frame sets `done`; `SdoChannel` then closes the transfer into a
 # `Transfer`, the value that everything else works with. `BusDecoder` learns only from those
 # without flaws.
 
@@ -62,28 +61,28 @@ class _TransferPhase(Enum):
 
 @dataclass(slots=True)
 class _OpenTransfer:
-    """What was heard of a transfer so far.
+    """The known part of a transfer.
 
     Args:
         at_us: when it began.
         node: the server.
         direction: which way the value goes.
         mode: as the request wants it.
-        index: None where the beginning was not heard.
-        sub: likewise.
-        begun_by: the request, to tell when it is sent again.
+        index: None if the beginning is missing.
+        sub: None if the beginning is missing.
+        begun_by: the request, to detect its repetition.
 
     Attributes:
         phase: what is expected next.
-        size: number of bytes, None if it was not said.
-        sized: what came says how many bytes it has.
-        crc: both sides can do the CRC.
-        sent: the segment of a download that has no receipt yet.
-        requested_toggle: toggle bit of the segment of an upload that was asked for.
-        taken: toggle bit of the latest segment that was taken.
-        block_last: place of the last segment in its block, once it was heard.
-        block_size: segments of a block, as its receiver wants it; 0 while it has not said so.
-        done: nothing more is expected.
+        size: number of bytes, None if not indicated.
+        sized: whether the number of bytes is indicated.
+        crc: whether both sides support the CRC.
+        sent: the segment of a download that is not confirmed yet.
+        requested_toggle: toggle bit of the requested upload segment.
+        taken: toggle bit of the latest accepted segment.
+        block_last: place of the last segment in its block, once it was seen.
+        block_size: segments of a block, as its receiver requires; 0 until it has sent this.
+        done: whether nothing more is expected.
         new_flaw: what the latest frame added to `flaws`; empty if nothing.
     """
 
@@ -113,7 +112,7 @@ class _OpenTransfer:
 
     @property
     def entry(self) -> tuple[int, int] | None:
-        """Index and sub-index; None where they were not heard."""
+        """Index and sub-index; None if they are unknown."""
         return None if self.index is None or self.sub is None else (self.index, self.sub)
 
     @property
@@ -136,7 +135,7 @@ class _OpenTransfer:
     def acknowledge_block(self, ackseq: int) -> None:
         """Take the segments that came in sequence; the others are sent again."""
         if any(seqno not in self._block for seqno in range(1, ackseq + 1)):
-            self.add_flaw("segments not heard")
+            self.add_flaw("segments missing")
         self.data += b"".join(self._block.get(seqno, b"") for seqno in range(1, ackseq + 1))
         # Segments behind the acknowledged one come again, in the next block.
         self.retries += max(self._block, default=0) > ackseq
@@ -211,7 +210,7 @@ def begin(at_us: int, node: int, request: _Initiate, data: bytes) -> _OpenTransf
 
 
 def _answers(running: _OpenTransfer, answer: _Answer) -> bool:
-    """Say whether this is the answer to the request; block upload may be switched to another."""
+    """Return whether this is the answer to the request; a block upload may fall back."""
     upload = isinstance(answer, sdo.UploadInitiateResponse)
     return (
         running.phase is _TransferPhase.ASKED
@@ -242,12 +241,12 @@ def _take_answer(running: _OpenTransfer, answer: _Answer) -> str:
         _TransferPhase.SEGMENTS,
         answer.size,
     )
-    size = "their size is not told" if answer.size is None else running.progress
+    size = "their size is not indicated" if answer.size is None else running.progress
     return f"segments follow, {size}"
 
 
 def _unheard(at_us: int, node: int, answer: _Answer) -> _OpenTransfer:
-    """Open a transfer whose request was not heard."""
+    """Open a transfer whose request is missing."""
     upload = isinstance(answer, sdo.UploadInitiateResponse)
     direction = TransferDirection.UPLOAD if upload else TransferDirection.DOWNLOAD
     opened = _OpenTransfer(at_us, node, direction, TransferMode.SEGMENTED, answer.index, answer.sub)
@@ -302,14 +301,14 @@ def _confirm_segment(running: _OpenTransfer, response: sdo.DownloadSegmentRespon
     if sent is None or sent.toggle != response.toggle or sent.toggle == running.taken:
         if sent is not None and sent.toggle != response.toggle:
             running.add_flaw(WRONG_TOGGLE)
-        return "receipt of no segment that was heard, or of one sent again"
+        return "confirmation of a missing segment, or of a repeated one"
     running.taken, running.sent = sent.toggle, None
     running.data += sent.data
     running.done = sent.last
     return f"segment confirmed, {running.progress}"
 
 
-_ORPHAN: Final = "of a block transfer whose beginning was not heard"
+_ORPHAN: Final = "of a block transfer whose beginning is missing"
 
 _END_MASK: Final = 0xE3
 
@@ -372,7 +371,7 @@ def _answer(
 
 def _end(running: _OpenTransfer, end: sdo_frame.BlockEnd) -> str:
     if running.phase is _TransferPhase.BLOCK:
-        running.add_flaw("a receipt was not heard")
+        running.add_flaw("a confirmation is missing")
     running.end_block(end)
     return f"end of the blocks, {running.progress}"
 
@@ -399,11 +398,11 @@ class SdoStep(NamedTuple):
 
 
 class SdoChannel:
-    """Follows the transfers between one client and one server, as a third party hears them.
+    """Follows the transfers between one client and one server, as a monitor sees them.
 
-    It takes up a transfer in the middle: what can be told of it is told, and marked as
-    partial. It knows no time-outs, which are the client's own: a transfer is unanswered
-    when its client begins another one or the trace ends.
+    It can start in the middle of a transfer: the known part is returned, marked as partial. It has
+    no time-outs, which belong to the client: a transfer is unanswered when its client starts
+    another one or the trace ends.
 
     Args:
         node: the server's node-ID.
@@ -445,7 +444,7 @@ class SdoChannel:
         return self._step(at_us, self._take_response(at_us, message), message)
 
     def _step(self, at_us: int, text: str, message: sdo.Request | sdo.Response) -> SdoStep:
-        """Close what is done, and tell what ended."""
+        """Close a finished transfer, and return it."""
         running, flaw = self._running, ""
         if running:
             flaw, running.new_flaw = running.new_flaw, ""
@@ -518,7 +517,7 @@ class SdoChannel:
         if latest and latest.retries and latest.entry == (message.index, message.sub):
             return "answered again"
         opened = _unheard(at_us, self.node, message)
-        text = f"{_take_answer(opened, message)}, request not heard"
+        text = f"{_take_answer(opened, message)}, request missing"
         if opened.done:
             self._ended.append(opened.close(at_us, TransferOutcome.DONE))
         elif running is None or running.partial:
@@ -526,7 +525,7 @@ class SdoChannel:
         return text
 
     def _segmented(self, at_us: int, direction: TransferDirection) -> _OpenTransfer:
-        """Return the segmented transfer that runs, or one whose beginning was not heard."""
+        """Return the running segmented transfer, or one whose beginning is missing."""
         running = self._running
         if running and running.direction is direction and running.phase is _TransferPhase.SEGMENTS:
             return running
@@ -536,7 +535,7 @@ class SdoChannel:
         return opened
 
     def _abort(self, at_us: int, message: sdo.Abort, *, by_client: bool) -> str:
-        """End the transfer that runs; an abort of another object ends one that was not heard."""
+        """End the running transfer; an abort of another object ends one without other frames."""
         running, entry, code = self._running, _named(message), message.code
         if running and (entry is None or running.entry in (None, entry)):
             if entry is not None:

@@ -95,11 +95,11 @@ class _Bar(NamedTuple):
 
 
 def decimate(series: Series, from_us: int, to_us: int, columns: int) -> list[_Bar | None]:
-    """Return what lies in each of so many columns of equal time; None where nothing does.
+    """Return the samples in each of `columns` columns of equal time; None if there are none.
 
     Args:
         series: the samples.
-        from_us: where the first column begins.
+        from_us: beginning of the first column.
         to_us: the last time of the last column.
         columns: how many, at least 1.
     """
@@ -191,7 +191,7 @@ class Chart:
 
 
 def chart(series: Sequence[Series], view: View, columns: int) -> Chart:
-    """Bring series into so many columns; a spike stays, however short it is."""
+    """Reduce series to columns; a spike stays, however short it is."""
     curves = tuple(
         Curve(one.label, one.axis, one.unit, _stops(one, view, columns))
         for one in series
@@ -215,7 +215,7 @@ def _stops(series: Series, view: View, columns: int) -> tuple[_Stop, ...]:
 
 
 def _runs(series: Series, view: View, columns: int) -> Iterator[_StateRun]:
-    """Yield the states in a view; each lasts until another one is told."""
+    """Yield the states in a view; each lasts until the next one."""
     if not series.at_us:
         return
     first = max(0, (series.before(view.from_us) or 0))
@@ -303,7 +303,7 @@ def _area_of(series: Sequence[Series], width: int, height: int, title: str = "")
 def svg(
     series: Sequence[Series], view: View, width: int = 960, height: int = 400, title: str = ""
 ) -> str:
-    """Return a picture of so many pixels; the first axis is on the left, others on the right."""
+    """Return a picture of a size in pixels; the first axis is on the left, others on the right."""
     area = _area_of(series, width, height, title)
     drawn = chart(series, view, area.width)
     height = max(height, area.top + area.height + 2 * _BAND_HEIGHT * len(drawn.bands) + _BOTTOM)
@@ -711,7 +711,7 @@ MOST: Final = 200_000
 
 _WINDOW_US: Final = 10_000_000
 _COLUMNS: Final = 200
-"""In how many columns the range of an axis is looked for."""
+"""Number of columns from which the range of an axis is computed."""
 
 
 class ViewMode(StrEnum):
@@ -723,18 +723,18 @@ class ViewMode(StrEnum):
 
 
 class LiveGraph:
-    """Takes the values of signals, and shows them.
+    """Collects the values of signals, and shows them.
 
     Args:
-        mode: what is seen at first.
+        mode: the initial view.
 
     Attributes:
         words: the signals.
-        mode: what is seen.
-        window_us: how long the window is that ends now.
-        cursor_us: a moment that is read out, None for none.
-        axis: the vertical axis that is stretched and moved.
-        now_us: the time of the frames, as it was told last.
+        mode: the view.
+        window_us: length of the window that ends now.
+        cursor_us: time of the cursor, None for none.
+        axis: the vertical axis that is zoomed and moved.
+        now_us: the latest time of the frames.
     """
 
     def __init__(self, mode: ViewMode = ViewMode.LIVE) -> None:

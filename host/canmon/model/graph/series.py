@@ -255,13 +255,13 @@ _BUS_SIGNAL: Final = re.compile(
 
 @dataclass(frozen=True, slots=True)
 class CurveSpec:
-    """A curve that is asked for.
+    """A requested curve.
 
     Attributes:
-        label: what it is called; empty where the text did not say.
-        source: what it is taken from.
+        label: its name; empty if the text has none.
+        source: the source of its values.
         axis: its vertical axis, from 1.
-        text: the signal as it was written.
+        text: the signal as written.
     """
 
     label: str
@@ -436,25 +436,25 @@ class View:
         return replace(self, from_us=self.from_us + by_us, to_us=self.to_us + by_us)
 
 
-# Series out of what was heard.
+# Series from traffic.
 
 
 class Collector:
-    """Takes the values of some signals.
+    """Collects the values of some signals.
 
-    A name that only begins an object's name takes the first object that fits, and keeps to it.
+    A name that is only the beginning of an object's name selects the first object that matches.
 
     Args:
         words: the signals.
         decoder: for objects; without one they have no values.
         most: as `Series.most`.
         rates: of the bus, for its load.
-        each_node: a signal of any node has a series for each node that has it.
+        each_node: whether a signal of any node has a series for each node that has it.
 
     Attributes:
         series: one for each word.
-        object_names: names of the objects that were heard while one was looked for.
-        first_us: when the first frame of all was heard; None before it.
+        object_names: names of the objects in the traffic during the search for one.
+        first_us: time of the first frame; None before it.
     """
 
     def __init__(
@@ -484,7 +484,7 @@ class Collector:
 
     @property
     def missing(self) -> list[str]:
-        """The objects that were not heard, as they were written."""
+        """The objects that did not occur, as they were written."""
         return [one.text for one in self._objects if not one.is_found]
 
     def join(self, other: Collector) -> None:
@@ -509,7 +509,7 @@ class Collector:
         self.take_decoded(record, wanted.take(record) if wanted else None)
 
     def take_decoded(self, record: Record, decoded: Decoded | None) -> None:
-        """Take the values in a frame that somebody has decoded, or whose objects nobody wants."""
+        """Process the values in a frame that is already decoded, or has no wanted objects."""
         at_us, _, frame, _ = record
         if not isinstance(frame, ErrorFrame) and not frame.remote:
             key = frame.can_id | EXTENDED if frame.extended else frame.can_id
@@ -626,7 +626,7 @@ class _Sampler:
                 return []
 
     def _load(self, record: Record) -> None:
-        """Count the bits of a frame; what a window had is told when it is over."""
+        """Count the bits of a frame; the value of a window is added when it is over."""
         at_us, channel, frame, _ = record
         if self._begin_us < 0:
             self._begin_us, self._channel = at_us, channel
@@ -661,7 +661,7 @@ _STATUSWORD: Final = "statusword"
 
 
 class _Object:
-    """An object that is waited for."""
+    """A requested object."""
 
     def __init__(
         self, word: CurveSpec, wanted: ObjectName, series: Series, known: dict[str, None]
@@ -673,7 +673,7 @@ class _Object:
 
     @property
     def is_found(self) -> bool:
-        """Whether it was heard."""
+        """Whether it has occurred."""
         return self._found is not None
 
     @property

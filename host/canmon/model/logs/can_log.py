@@ -1,8 +1,8 @@
 """Log files that python-can reads: BLF and, with asammdf, MF4.
 
 A BLF log is a header and objects. Most are containers, whose contents, put together,
-are the objects of interest; one may lie across two containers. python-can reads a log that was
-cut as far as it goes, in silence, and passes over two of the three kinds of error frames.
+are the objects of interest; one may lie across two containers. python-can reads a truncated log
+as far as possible without a report, and skips two of the three kinds of error frames.
 """
 
 from __future__ import annotations
@@ -40,11 +40,11 @@ from tickrig.host.links.can_link import to_error_frame, to_fd_frame, to_frame, t
 from tickrig.wire.can import STANDARD_MAX, ErrorClass, ErrorFrame
 from tickrig.wire.errors import WireError
 
-# What python-can heard.
+# Frames as python-can returns them.
 
 
 def to_record(message: can.Message, channel: str, tally: LogTally) -> Record | None:
-    """Return what was heard; None for impossible frames and times, which are counted."""
+    """Return a frame; None for impossible frames and times, which are counted."""
     try:
         at_us = log_file.to_us(message.timestamp)
     except ValueError:
@@ -166,12 +166,12 @@ def channel_name(channel: object) -> str:
 
 
 class BlfBlock(NamedTuple):
-    """What is in a container that was taken apart.
+    """The content of a container.
 
     Attributes:
-        rows: its frames, as who takes it apart has them.
-        frames: how many there are.
-        notes: place, size and type of the objects that tell of errors.
+        rows: its frames, in the form of its parser.
+        frames: number of frames.
+        notes: place, size and type of the objects that report errors.
         end: where its last whole object ends.
     """
 
@@ -196,7 +196,7 @@ _CONTAINER_TYPE: Final = 10
 _DEFLATED: Final = 2
 
 ERROR, STATISTIC, DRIVER_ERROR, FD_ERROR = 2, 4, 31, 104
-"""Types of objects that tell of errors and that python-can passes over."""
+"""Types of objects that report errors and that python-can skips."""
 BLF_FRAMES: Final = (ERROR, 73, 100, 101, FD_ERROR)
 """Types of frames that are no data or remote frames of CAN."""
 BLF_NOTES: Final = (STATISTIC, DRIVER_ERROR)
@@ -285,7 +285,7 @@ def _objects(data: bytes) -> Iterator[tuple[int, int, int]]:
 
 
 def _missing_end(file: BinaryIO) -> str:
-    """Say what is missing at the end of a log; empty where nothing is.
+    """Return what is missing at the end of a log; empty if nothing is.
 
     Args:
         file: a log that python-can has read without an error; it is read from its beginning.
@@ -305,7 +305,7 @@ def _missing_end(file: BinaryIO) -> str:
 
 
 def _has_end(file: BinaryIO) -> bool:
-    """Say whether whoever wrote a log ended it: only then its header tells the size of the file."""
+    """Return whether the writer closed a log: only then its header has the size of the file."""
     _, header_bytes, file_bytes, _ = _FILE.unpack(file.read(_FILE.size))
     return bool(file_bytes != header_bytes)
 
@@ -383,7 +383,7 @@ class _AscWriter:
         at_us = round(message.timestamp * 1e6)
         if self._begin_us is None or at_us < self._begin_us:
             self._begin(at_us)
-        assert self._begin_us is not None, "it has begun"
+        assert self._begin_us is not None, "it has started"
         seconds, micros = divmod(at_us - self._begin_us, 1_000_000)
         self._file.write(f"{seconds:4d}.{micros:06d} {_event(message)}\n")
 
@@ -401,7 +401,7 @@ class _AscWriter:
             return False
         if begin_us is None:
             self._begin(first_us)
-        assert self._begin_us is not None, "it has begun"
+        assert self._begin_us is not None, "it has started"
         self._file.write(block.asc_lines(self._begin_us, number))
         return True
 
@@ -449,7 +449,7 @@ def _event(message: can.Message) -> str:
 
 
 def _fd_event(message: can.Message, channel: int, ident: str, direction: str) -> str:
-    """Write what stands behind the time; durations, bit timings and CRC, never told, are 0."""
+    """Write the fields after the time; durations, bit timings and CRC are unknown, so 0."""
     brs, esi = int(message.bitrate_switch), int(message.error_state_indicator)
     # 1000h FDF, 2000h BRS, 4000h ESI.
     flags = _FD_FLAGS * (1 + 2 * brs + 4 * esi)
@@ -631,7 +631,7 @@ class CanLogWriter:
                 self._file.close()
 
     def messages(self) -> list[str]:
-        """Say what the format could not hold."""
+        """Report what the format could not hold."""
         named = self._path.name
         said = [f"{named}: {count} {what} left out" for what, count in self._passed_over.items()]
         said += self._numbers.messages(named)

@@ -81,24 +81,24 @@ class Mark(NamedTuple):
 
 
 def dropped(at_us: int, frames: int) -> Mark:
-    """Say that frames were lost here."""
+    """Record that frames were lost here."""
     return Mark(at_us, DROP, f"{frames} frames were lost", frames=frames)
 
 
 def gone(at_us: int, channel: str, why: str) -> Mark:
-    """Say that a bus went away; `why` may begin with its name."""
+    """Record that a bus went away; `why` may begin with its name."""
     reason = _plain(why.removeprefix(f"{channel}: "))
     return Mark(at_us, GONE, f"{_plain(channel)} is gone: {reason}", channel)
 
 
 def back(at_us: int, channel: str, away_us: int) -> Mark:
-    """Say that a bus is there again."""
+    """Record that a bus is back."""
     away = f"{away_us // 1_000_000}.{away_us % 1_000_000:06d}"
     return Mark(at_us, BACK, f"{_plain(channel)} is back after {away} s", channel, away_us=away_us)
 
 
 def triggered(at_us: int, why: str) -> Mark:
-    """Say what made somebody record this."""
+    """Record the trigger of a recording."""
     return Mark(at_us, TRIGGER, f"trigger: {_plain(why)}")
 
 
@@ -137,7 +137,7 @@ def _plain(text: str) -> str:
     return " ".join(text.split()).encode("ascii", "backslashreplace").decode("ascii")
 
 
-# What a log holds beside frames: counted, so that nothing is lost in silence.
+# What a log holds besides frames: counted, so that nothing is lost silently.
 
 _KEPT: Final = 5
 """Bad lines that are kept; the others are counted."""
@@ -153,7 +153,7 @@ ERRORS_COUNTED: Final = "that error frames were counted"
 COUNTERS_TOLD: Final = "that error counters are above 0"
 OTHER_LINES: Final = "lines with other events"
 OTHER_OBJECTS: Final = "objects that are no frames"
-NO_TIME: Final = "frames with what is no time"
+NO_TIME: Final = "frames with an invalid time"
 BAD_PACKETS: Final = "packets that are no frames"
 OTHER_PACKETS: Final = "packets of other links"
 _NO_FRAMES: Final = (SERIAL_LINES, OTHER_LINES, OTHER_OBJECTS, OTHER_PACKETS)
@@ -189,7 +189,7 @@ class _BadLines:
             self.first.append((number, line))
 
     def messages(self, name: str) -> list[str]:
-        """Say it to people, one line each; nothing if there are none."""
+        """Report the counts, one line each; nothing if there are none."""
         texts = [line for _, line in self.first]
         for begin, program in _FOREIGN.items():
             if any(begin in text for text in texts):
@@ -208,16 +208,15 @@ class LogTally:
     """What was not returned as a frame.
 
     Attributes:
-        bad_lines: lines that are none of the log.
-        passed_over: kinds of frames that are not read, as CAN XL, and of what is no
-            frame at all (`_NO_FRAMES`), and how many.
-        lost: frames that the recorder says it lost.
-        untimed: frames that have no time in the log; they got that of the frame before.
+        bad_lines: invalid lines.
+        passed_over: number of skipped items by kind: frames that are not read, such as CAN XL, and
+            items that are not frames (`_NO_FRAMES`).
+        lost: frames that the recorder reports as lost.
+        untimed: frames without a time in the log; they get that of the previous frame.
         undated: dates that could not be read; times count from 0 there.
-        shifted_us: what was added to the times of the log.
-        errors_told: what lines and objects that are no frames say of errors on the bus, and how
-            many do.
-        without_errors: why the log has no error frames whatever happened; empty if it may.
+        shifted_us: offset added to the times of the log.
+        errors_told: number of lines and objects other than frames that report bus errors, by kind.
+        without_errors: why the log cannot contain error frames; empty if it can.
     """
 
     bad_lines: _BadLines = field(default_factory=_BadLines)
@@ -236,16 +235,16 @@ class LogTally:
         return self.bad_lines.count + frames
 
     def messages(self, name: str) -> list[str]:
-        """Say it to people, one line each; nothing if all was returned."""
+        """Report the counts, one line each; nothing if all was returned."""
         return self.losses(name) + self.remarks(name)
 
     def losses(self, name: str) -> list[str]:
-        """Say what was lost or could not be taken."""
+        """Report what was lost or could not be read."""
         said = self.bad_lines.messages(name) + self._passed_over(name, no_frames=False)
         return said + ([f"{name}: its recorder lost {self.lost} frames"] if self.lost else [])
 
     def remarks(self, name: str) -> list[str]:
-        """Say what else there is to know of the log."""
+        """Report other notes about the log."""
         said = [f"{name}: {self.untimed} frames have no time"] if self.untimed else []
         said += [f"{name}: its date cannot be read: times begin at 0"] if self.undated else []
         if self.shifted_us:
@@ -254,7 +253,7 @@ class LogTally:
         return self._passed_over(name, no_frames=True) + said
 
     def errors(self, name: str) -> list[str]:
-        """Say what the log tells of errors beside its error frames, one line each."""
+        """Report bus errors in the log besides its error frames, one line each."""
         told = self.errors_told.items()
         return [f"{name}: it says {text}: {counted(count, 'time')}" for text, count in told]
 
@@ -367,12 +366,12 @@ def open_log(path: Path, mode: Literal["rb", "wb"] = "rb") -> BinaryIO:
 
 
 def read_blocks(file: BinaryIO, path: Path, block_bytes: int) -> Iterator[bytes]:
-    """Read a log in text that was opened, so many bytes or little more at a time.
+    """Read an open text log in pieces of about `size` bytes.
 
-    Of a compressed file that is cut or damaged all comes that can be read.
+    Of a truncated or damaged compressed file, everything readable is returned.
 
     Raises:
-        LogError: behind that: where it is cut or damaged.
+        LogError: after that: where it is truncated or damaged.
         OSError: it cannot be read.
     """
     pieces, held, lines = list[bytes](), 0, 0

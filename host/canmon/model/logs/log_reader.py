@@ -54,7 +54,7 @@ from tickrig.wire.errors import WireError
 
 
 HEAD: Final = 1 << 13
-"""Bytes of a text by which it is told what its stamps are."""
+"""Number of bytes of a text from which the kind of its time stamps is determined."""
 
 _LATE_US: Final = 10_000
 """Frames of several buses are shown out of order by less."""
@@ -209,7 +209,7 @@ def _printed(match: re.Match[str], clock: ScreenClock) -> Record | None:
 
 
 def _notation(length: int, shown: str) -> str:
-    """Return data in the notation of a log; what stands behind them is passed over."""
+    """Return data in the notation of a log; ignore what follows them."""
     if shown.startswith("remote request"):
         return f"R{length}"
     words = shown.split()
@@ -229,7 +229,7 @@ LONGEST: Final = 1 << 20
 
 
 class WholeLines:
-    """Holds back a line that has begun, in time and memory that do not grow with its pieces."""
+    """Holds back an incomplete line, in time and memory that do not grow with its pieces."""
 
     def __init__(self) -> None:
         self._pieces: list[bytes] = []
@@ -327,12 +327,12 @@ _USUAL: Final = re.compile(
 
 
 def is_usual(line: str) -> bool:
-    """Say whether a line holds a data frame as candump writes it."""
+    """Return whether a line holds a data frame as candump writes it."""
     return _USUAL.match(line) is not None
 
 
 def holds_frame(line: str) -> bool:
-    """Say whether a line is one of `candump -L` that has no frame of CAN FD, nor is a mark."""
+    """Return whether a line is one of `candump -L` without a CAN FD frame or a mark."""
     return "##" not in line and _LINE.fullmatch(line.strip()) is not None
 
 
@@ -418,7 +418,7 @@ def _mark(text: str) -> Mark | None:
 
 
 def among(records: Sequence[Record], marks: Sequence[tuple[int, Mark]]) -> Sequence[Item]:
-    """Return frames with marks among them, each behind so many frames."""
+    """Return frames with marks among them, each after a number of frames."""
     if not marks:
         return records
     items, begin = list[Item](), 0
@@ -559,7 +559,7 @@ class LineLogReader:
         yield from (mark._replace(at_us=at_us) for mark in marks)
 
     def _lines(self) -> Iterator[str]:
-        """Give the lines: in UTF-8, or else in Latin-1."""
+        """Return the lines: in UTF-8, or else in Latin-1."""
         whole = WholeLines()
         with log_file.open_log(self._path) as file:
             first = True

@@ -25,19 +25,19 @@ class LogWriter(Protocol):
         """Add a frame."""
 
     def mark(self, mark: log_file.Mark, /) -> None:
-        """Add what is no frame, where the format can hold it."""
+        """Add an item other than a frame, if the format can hold it."""
 
     def flush(self) -> None:
-        """Give all that was added to the operating system: it is readable if nothing follows.
+        """Pass all added items to the operating system: they are readable if nothing follows.
 
-        Where `in_blocks` says so that makes the file larger: do it seldom.
+        With `in_blocks` this makes the file larger: call it rarely.
         """
 
     def close(self) -> None:
         """End the log; closing twice is no error."""
 
     def messages(self) -> list[str]:
-        """Say what the format could not hold, one line each."""
+        """Report what the format could not hold, one line each."""
 
 
 class TextBlock(Protocol):
@@ -68,7 +68,7 @@ class TextBlock(Protocol):
 
 
 def in_blocks(path: Path) -> bool:
-    """Say whether a log is compressed, block by block."""
+    """Return whether a log is compressed, block by block."""
     return (
         path.suffix.lower() == log_file.COMPRESSED
         or log_file.log_format(path) is log_file.LogFormat.BLF
@@ -178,7 +178,7 @@ class CsvLogWriter(TextLogWriter):
         self._marks += 1
 
     def messages(self) -> list[str]:
-        """Say which buses became one, and what was left out."""
+        """Report which buses became one, and what was left out."""
         said = [f"{self._name}: {self._marks} {MARKS}"] if self._marks else []
         if len(self._channels) > 1:
             buses = ", ".join(self._channels)
@@ -206,7 +206,7 @@ class BusNumbers:
         return self._numbers[channel]
 
     def messages(self, name: str) -> list[str]:
-        """Say which bus became which number, where its name does not."""
+        """Report which bus became which number, if its name does not show it."""
         return [
             f"{name}: {channel} became can{number}"
             for channel, number in self._numbers.items()
@@ -237,7 +237,7 @@ class GvretLogWriter(TextLogWriter):
         self._left_out[MARKS] += 1
 
     def messages(self) -> list[str]:
-        """Say what was left out, and which bus has which number."""
+        """Report what was left out, and which bus has which number."""
         said = [f"{self._name}: {count} {what}" for what, count in self._left_out.items()]
         return said + self._numbers.messages(self._name)
 

@@ -23,9 +23,9 @@ _ERROR: Final = re.compile(r"([23][0-9A-Fa-f]{7})#((?:[0-9A-Fa-f]{2}){0,8})")
 
 
 def parse_frame(notation: str) -> AnyFrame:
-    """Read a frame; WireError if that is none.
+    """Parse a frame; WireError if it is invalid.
 
-    The raw length code behind eight bytes is passed over; an error frame may have less
+    The raw length code after eight bytes is ignored; an error frame may have less
     than eight bytes.
     """
     if error := _ERROR.fullmatch(notation):

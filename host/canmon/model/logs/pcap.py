@@ -126,7 +126,7 @@ def packet(frame: AnyFrame) -> bytes:
 
 
 def _parse_packet(data: bytes) -> AnyFrame | str | None:
-    """Return the frame of a packet, `CAN_XL`, or None for what is no frame or was cut."""
+    """Return the frame of a packet, `CAN_XL`, or None for other or truncated packets."""
     if len(data) < _DATA_AT or data[_LENGTH_AT] & _XL:
         return None if len(data) < _DATA_AT else log_file.CAN_XL
     flagged, length, flags = _HEAD.unpack_from(data)
@@ -148,8 +148,8 @@ def _parse_packet(data: bytes) -> AnyFrame | str | None:
 
 # The frames in a pcapng file (draft-ietf-opsawg-pcapng), in either byte order.
 #
-# Read are sections, interfaces, and packets in enhanced, simple and the obsolete blocks; others
-# are passed over. Times of any resolution are cut to microseconds.
+# The reader handles sections, interfaces, and packets in enhanced, simple and obsolete blocks, and
+# skips others. Times of any resolution are truncated to microseconds.
 
 _MOST_BYTES: Final = 1 << 24
 """Of a block: more is damage."""
@@ -163,14 +163,14 @@ _END_HIGH: Final = _END_US >> 32
 
 
 class _Interface(NamedTuple):
-    """Where packets were captured.
+    """An interface on which packets were captured.
 
     Attributes:
         name: of the bus.
-        is_can: its packets are frames.
-        parts: parts of a second that its times count.
-        offset_us: what is added to them.
-        snap_bytes: packets are cut to so many; 0 for no limit.
+        is_can: whether its packets are frames.
+        parts: units of its times per second.
+        offset_us: offset added to them.
+        snap_bytes: packets are truncated to this size; 0 for no limit.
     """
 
     name: str
@@ -190,12 +190,12 @@ class _Usual(NamedTuple):
 
 
 class _PcapngReader:
-    """Takes blocks apart, one file.
+    """Parses the blocks of one file.
 
     Args:
-        name: what the file is called.
-        tally: takes what is no frame.
-        marks: give marks among the frames, too: a comment of a frame is in front of it.
+        name: name of the file.
+        tally: counts what is not a frame.
+        marks: whether to return marks among the frames: a comment of a frame precedes it.
     """
 
     def __init__(self, name: str, tally: log_file.LogTally, marks: bool = False) -> None:
@@ -211,10 +211,10 @@ class _PcapngReader:
 
         Args:
             file: the file.
-            begun: what was read of it.
+            begun: the part already read.
 
         Raises:
-            LogError: it is cut or damaged, after all frames before that.
+            LogError: it is truncated or damaged, after all frames before that.
         """
         more, some = True, cast("BufferedReader", file).read1  # `read` loses the end of a cut log
         while more:
@@ -301,7 +301,7 @@ class _PcapngReader:
                 self._add(number, high << 32 | low, content[20:], size, records)
             elif kind == _OBSOLETE_PACKET:
                 number, drops, high, low, size, _ = struct.unpack_from(f"{order}HH4I", content)
-                # FFFFh in the obsolete packet block: nobody counted.
+                # FFFFh in the obsolete packet block: not counted.
                 self._drop(drops if drops < 0xFFFF else 0, records)
                 self._add(number, high << 32 | low, content[20:], size, records)
             elif kind == _SIMPLE_PACKET:
@@ -384,7 +384,7 @@ class _PcapngReader:
 
 
 def _damage_of(size: int, rest: int, block: bytes) -> str:
-    """Say what is wrong with a block of which so many bytes are there; empty if nothing is."""
+    """Return what is wrong with a block of which `present` bytes exist; empty if nothing is."""
     if size < _BLOCK_BYTES or size % 4 or size > _MOST_BYTES:
         return f"it has a block of {size} bytes"
     return "it has a block whose sizes differ" if rest >= size and block[4:8] != block[-4:] else ""

@@ -65,7 +65,7 @@ class TraceLogWriter:
                 self._file.close()
 
     def messages(self) -> list[str]:
-        """Say what was left out."""
+        """Report what was left out."""
         return [
             f"{self._name}: a trace holds one bus, without errors; left out: {count} {what}"
             for what, count in self._left_out.items()
@@ -125,14 +125,14 @@ class TraceLogReader:
 
 
 def _whole_lines(file: BinaryIO) -> Iterator[str]:
-    """Give the lines; a last one without LF is of a writer that was killed."""
+    """Return the lines; a last one without LF comes from a writer that was killed."""
     for line in file:
         if line.endswith(b"\n"):
             yield line[:-1].decode("ascii")
 
 
 class _Passed:
-    """Tells what was on a bus by what its nodes sent and received."""
+    """Reconstructs the traffic of a bus from what its nodes sent and received."""
 
     def __init__(self, header: bench_header.BenchHeader) -> None:
         self._header = header

@@ -170,7 +170,7 @@ class _TrcLines:
 
 
 def _aside(row: _Row, kind: str, tally: log_file.LogTally) -> str:
-    """Say what a line is that is no frame of CAN or CAN FD, and note what it says of errors."""
+    """Return the kind of a line that is not a CAN or CAN FD frame, and record errors in it."""
     if kind == "XL":
         return log_file.CAN_XL
     # Version 1.0 has no type; a status has the CAN-ID FFFFFFFFh there.
@@ -185,7 +185,7 @@ def _aside(row: _Row, kind: str, tally: log_file.LogTally) -> str:
 
 
 def _start_us(days: str) -> int | None:
-    """Return the start of a trace; None for what is no date since 1970."""
+    """Return the start of a trace; None if it is not a date since 1970."""
     try:
         value = float(days)
     except ValueError:

@@ -64,7 +64,7 @@ class AtLimit(StrEnum):
 
 
 class TriggerSpan(NamedTuple):
-    """Before or behind a trigger: so many frames, or so long; the other is None."""
+    """The length before or after a trigger: a number of frames, or a time; the other is None."""
 
     frames: int | None
     us: int | None
@@ -75,16 +75,16 @@ DEFAULT_SPAN: Final = TriggerSpan(None, 5_000_000)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RecordingPlan:
-    """A recording; without any of its settings it is the file `path`, and nothing else.
+    """The settings of a recording; without any it is the single file `path`.
 
     Attributes:
-        path: of the file, or what its parts are named after.
-        rotate_bytes: a part is ended before it grows larger; None for no limit.
-        rotate_us: a part is ended at the first frame that is so much later than its first.
-        disk_bytes: all parts together are no larger.
+        path: the file, or the base name of its parts.
+        rotate_bytes: a part ends before it exceeds this size; None for no limit.
+        rotate_us: a part ends at the first frame that is this much later than its first.
+        disk_bytes: the largest size of all parts together.
         at_limit: what happens there.
-        around: what is kept before a trigger, and recorded behind it; None to record all.
-        parts: it is in parts, though no setting asks for that.
+        around: what is kept before a trigger, and recorded after it; None to record all.
+        parts: whether to record in parts, even if no setting requires it.
     """
 
     path: Path
@@ -136,7 +136,7 @@ def read_plan(  # noqa: PLR0913 - all that people may say
     waits: bool = False,
     parts: bool = False,
 ) -> RecordingPlan:
-    """Read what people say of a recording.
+    """Parse the arguments of a recording.
 
     Args:
         path: the file; parts are named after it.
@@ -144,12 +144,12 @@ def read_plan(  # noqa: PLR0913 - all that people may say
         disk: size of all parts.
         at_limit: `oldest` or `end`.
         pre: before a trigger.
-        post: behind it.
-        waits: it waits for a trigger, also where nothing is said of `pre` and `post`.
-        parts: it is in parts, also where nothing else asks for that.
+        post: after it.
+        waits: whether it waits for a trigger, even without `pre` and `post`.
+        parts: whether to record in parts, even if nothing else requires it.
 
     Raises:
-        ValueError: one that is none, too small, or goes with none of the others.
+        ValueError: an argument that is invalid, too small, or needs another one.
     """
     sizes = [_parse_bytes("rotate", word) for word in rotate if _SIZE.fullmatch(word)]
     times = [_rotate_us(word) for word in rotate if not _SIZE.fullmatch(word)]
@@ -352,9 +352,9 @@ class _RecordingPart:
 
 
 def _recovered(path: Path) -> dict[str, object]:
-    """Return what an index says of a file that its recorder could not end: what can be read.
+    """Return the index entry of a file that its recorder could not end: what can be read.
 
-    A large one is not read: frames come meanwhile, and wait.
+    A large one is not read, because new frames would have to wait.
 
     Raises:
         OSError: it cannot be read.
@@ -378,16 +378,16 @@ _END: Final = "end"
 
 
 class _Index:
-    """A file to which lines are added, each at once; one that is there is gone on with.
+    """A file to which lines are appended, each at once; an existing file is continued.
 
     Args:
         path: of the file.
-        is_part: whether a name is that of a part; lines about others are passed over.
+        is_part: whether a name is that of a part; lines about others are ignored.
 
     Attributes:
-        files: the size of each file that was ended and is still there, the oldest first.
-        bytes: size of all of them.
-        unended: files that were begun, and neither ended nor removed.
+        files: size of each completed file that still exists, the oldest first.
+        bytes: total size of them.
+        unended: files that were started, and neither completed nor removed.
 
     Raises:
         OSError: it cannot be written, now or later.
@@ -403,7 +403,7 @@ class _Index:
         # Each line is one `write` in append mode: a kill leaves whole lines and at most
         # half of the last.
         self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
-        if text and not text.endswith("\n"):  # somebody was killed in the middle of a line
+        if text and not text.endswith("\n"):  # a recorder was killed in the middle of a line
             os.write(self._file, b"\n")
 
     def write(self, event: str, at_us: int, **more: object) -> None:
@@ -463,23 +463,23 @@ _LOOK_FRAMES: Final = 512
 
 
 class Files:
-    """Writes frames and marks into one file, or into parts of which each is in the index.
+    """Writes frames and marks into one file, or into parts that the index lists.
 
-    A recording whose index is there already is gone on with: its parts stay, and count.
+    A recording with an existing index is continued: its parts stay, and count.
 
     Args:
-        plan: what it shall be.
+        plan: its settings.
         now_us: the time.
 
     Attributes:
-        frames: how many were given; all of them were to be in files.
-        parts: how many files were begun.
-        removed: how many had to go.
-        ended: why no more is written; empty while all is well.
+        frames: number of frames to be written.
+        parts: number of started files.
+        removed: number of removed files.
+        ended: why no more is written; empty if writing continues.
 
     Raises:
         OSError: a file cannot be written, now or later.
-        LogError: the format cannot be written here, likewise.
+        LogError: the format cannot be written here, now or later.
     """
 
     def __init__(self, plan: RecordingPlan, now_us: int) -> None:
@@ -583,7 +583,7 @@ class Files:
             self._index.close()
 
     def messages(self) -> list[str]:
-        """Say what formats could not hold, and what was found of an earlier recording."""
+        """Report what formats could not hold, and remains of an earlier recording."""
         return self._said
 
     def _part_for(self, record: Record) -> _RecordingPart:
@@ -673,7 +673,7 @@ class Files:
                 raise OSError(errno.ENOSPC, left, path)
 
     def _remove_oldest(self, index: _Index) -> bool:
-        """Remove a file; say whether there was one."""
+        """Remove a file; return whether it existed."""
         if not index.files:
             return False
         name = next(iter(index.files))
@@ -684,7 +684,7 @@ class Files:
 
 
 def _readable(found: dict[str, object]) -> str:
-    """Say what can be read of a file that was not ended."""
+    """Return what can be read of a file that was not completed."""
     if found["frames"] is None:
         return f"it has {found['bytes']} bytes; what came behind them is missing"
     last = "" if found["to"] is None else f", the last of {found['to']} s"

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from tickrig.host.canmon.model.logs.log_writer import TextBlock
 
 
-# What makes somebody record: a frame that passes a filter, a rule that is broken.
+# Triggers of a recording: a frame that passes a filter, a rule that is broken.
 
 
 class Trigger(Protocol):
@@ -43,13 +43,13 @@ class Trigger(Protocol):
     decodes: bool
 
     def why(self, record: Record, decoded: Decoded | None, /) -> str:
-        """Say why this frame makes somebody record; nothing if it does not."""
+        """Return why this frame is a trigger; empty if it is not."""
 
     def missing(self, now_us: int, lost: int, /) -> str:
-        """Say why what did not come until now, or was lost, does."""
+        """Return why a missing or lost frame is a trigger."""
 
     def messages(self) -> list[str]:
-        """Say what else there is to know of it."""
+        """Return other notes about it."""
 
 
 class FilterTrigger:
@@ -76,7 +76,7 @@ class FilterTrigger:
         return ""
 
     def messages(self) -> list[str]:
-        """Say which signals it asks for that never came."""
+        """Return the signals in it that never came."""
         return self._missing.messages()
 
 
@@ -119,31 +119,29 @@ class RuleTrigger:
 # Theory of operation
 # ===================
 #
-# A recorder is fed (`take`) and never reads anything itself. It is one of three, by its
-# plan: all frames into files; frames around triggers (`around`), where `_before` keeps the
-# latest in a ring and `_window` is what is recorded behind a trigger; and either of these
-# through a filter (`wanted`). Triggers see every frame, also those that the filter keeps
-# out.
+# A recorder is fed by `take` and never reads anything itself. It is one of three, by its
+# plan: all frames into files; frames around triggers (`around`), where `_before` keeps the latest
+# frames in a ring and `_window` is the recording after a trigger; and either of these through a
+# filter (`wanted`). Triggers see every frame, also those that do not pass the filter.
 #
-# The order for one frame in `_watch`: the frame ends a window that does not take it; then
-# it is recorded or kept; then the triggers look at it. So the frame that triggers is the
-# last of what came before and is recorded with it, if the filter lets it through.
+# The order for one frame in `_watch`: the frame ends a window that it does not belong to; then it
+# is recorded or kept; then the triggers see it. So the frame that triggers is the last of those
+# before and is recorded with them, if it passes the filter.
 #
-# Two clocks. Frames have times of their source, `now_us` goes on from the latest of them. A
+# Two clocks. Frames have times of their source, `now_us` continues from the latest of them. A
 # window in time ends by a frame that is later, or by `now_us` with a second's grace
-# (`_LATE_US`), because frames may still be on their way through this machine. Marks (gaps
-# of a bus, losses, triggers) have the time of this machine where no frame tells it, so they
-# are ordered by their place among the frames and never by their time; in the ring they go
-# when all frames before them have gone.
+# (`_LATE_US`), because frames may still be on their way through this machine. Marks (gaps of a bus,
+# losses, triggers) have the time of this machine if no frame has a time, so they are ordered by
+# their place among the frames and never by their time; they leave the ring after all frames before
+# them.
 #
-# What may be lost. `store` gives frames to the file under way, `flush` gives them to the
-# operating system; `safe_frames` counts only those. If writing fails, everything after that
-# is counted as `missing`, and `rescue` cuts the file behind what was flushed last. A
-# recorder never raises once it runs: it fails, and says why in `failed`, because whoever
-# feeds it must go on.
+# What may be lost. `store` passes frames to the current file, `flush` passes them to the operating
+# system; `safe_frames` counts only those. If writing fails, everything after that is counted as
+# `missing`, and `rescue` truncates the file after the last flush. A running recorder never raises:
+# it fails, and `failed` has the reason, because its caller must continue.
 #
 # files.py has parts, limits and the index; a mark that waited in the ring is written into
-# the file but not into the index again (`mark_again`), which had it when it happened.
+# the file but not into the index again (`mark_again`), which got it when it happened.
 
 # What came before a trigger.
 
@@ -203,7 +201,7 @@ _LATE_US: Final = 1_000_000
 """A frame is taken to have come by then, when time alone says that a recording is over."""
 
 _MOST_CHARACTERS: Final = 200
-"""Of what is said of a frame that was a trigger."""
+"""Length limit of the text about a frame that was a trigger."""
 
 _LOOK_US: Final = 100_000
 """How often rules are asked what is missing."""
@@ -354,7 +352,7 @@ class Recorder:
         return stored
 
     def trigger(self, why: str, now_us: int) -> None:
-        """Record what is kept, and what comes: somebody has pressed a key."""
+        """Record the kept frames and the following ones: the user pressed a key."""
         if self._before is not None and self.state in (
             RecorderState.WAITING,
             RecorderState.RECORDING,
@@ -377,7 +375,7 @@ class Recorder:
             self._fail(error)
 
     def messages(self) -> list[str]:
-        """Say how it went, one line each."""
+        """Report the result, one line each."""
         said = self._files.messages()
         if self._before is not None and self._before.short:
             said = [*said, "too many frames came before a trigger: the oldest of them had to go"]
@@ -427,7 +425,7 @@ class Recorder:
             self._store([] if self._before is None else self._before.drain())
         else:
             self._window.extend(at_us)
-        if name not in self._window.names:  # a filter that passes each frame is told once
+        if name not in self._window.names:  # a filter that passes each frame is reported once
             self._window.names.add(name)
             # a rule says what is wrong; a filter is its own name
             what = f": {_what(*seen)}" if seen is not None and why == name else ""
@@ -475,6 +473,6 @@ class Recorder:
 
 
 def _what(record: Record, decoded: Decoded | None) -> str:
-    """Say which frame it was, and what it means."""
+    """Return the frame with its meaning, as text."""
     text = decoded_text(decoded)
     return f"{record.channel} {record.frame}{f', {text}' if text else ''}"[:_MOST_CHARACTERS]

@@ -20,5 +20,5 @@ def test_what_pdos_carry_is_known_after_their_mapping_is_dropped(
         text = last_lines(drives.bench, 60)
     pdos = [line for line in text.splitlines() if " 182#" in line]
     assert pdos
-    assert "no mapping was heard" not in text
+    assert "mapping unknown" not in text
     assert all("Statusword" in line or "statusword" in line for line in pdos), pdos[0]

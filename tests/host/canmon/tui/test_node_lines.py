@@ -98,14 +98,14 @@ def test_of_a_node_without_an_eds_it_is_said_that_nothing_is_known() -> None:
     rows = board("1.0 708#05", eds=False).rows()
     assert texts(card_lines(rows[0], rows, 100)) == [
         "can0 node 8",
-        "  device     not known: no EDS, and nobody has read 1000h or 1018h",
+        "  device     not known: no EDS, and no read of 1000h or 1018h",
     ]
 
 
 def test_a_mapping_that_was_not_heard_is_told() -> None:
     text = "1.0 608#2300180188010000\n1.1 588#6000180100000000\n1.2 708#05"
     rows = board(text, eds=False).rows()
-    assert texts(card_lines(rows[0], rows, 100))[2] == "  TPDO1 188h mapping was not heard"
+    assert texts(card_lines(rows[0], rows, 100))[2] == "  TPDO1 188h mapping unknown"
 
 
 @pytest.mark.parametrize(

@@ -363,7 +363,7 @@ def test_a_silent_bus_is_no_good_bus() -> None:
 
 def test_what_must_come_is_judged_by_silence(tmp_path: Path) -> None:
     result = check(write(tmp_path / "run.log", ""), "--nodes", "3", "--no-emcy")
-    assert (result.exit_code, result.stdout) == (1, "(0.000000) nodes: node 3 was never heard\n")
+    assert (result.exit_code, result.stdout) == (1, "(0.000000) nodes: node 3 was never seen\n")
 
 
 def test_a_report_of_a_log_that_breaks_off_does_not_say_that_it_is_well(tmp_path: Path) -> None:
@@ -463,7 +463,7 @@ def test_a_file_is_given_as_the_page_has_it(
     for line in words:
         result = check(*line.split())
         assert (result.exit_code, EMCY in result.stdout) == (1, True)
-        assert "nodes: node 16 was never heard" in result.stdout
+        assert "nodes: node 16 was never seen" in result.stdout
 
 
 def test_a_log_that_is_not_there_ends_with_3() -> None:
@@ -608,7 +608,7 @@ def test_findings_are_written_as_sarif(tmp_path: Path) -> None:
     assert (quiet["ruleId"], quiet["ruleIndex"], quiet["level"]) == ("quiet", 1, "error")
     place = quiet["locations"][0]["physicalLocation"]["artifactLocation"]["uri"]
     assert place.endswith("/a%20b.log")
-    assert nodes["message"] == {"text": "node 9 was never heard"}
+    assert nodes["message"] == {"text": "node 9 was never seen"}
     assert nodes["properties"] == {"t": 1.11}
 
 

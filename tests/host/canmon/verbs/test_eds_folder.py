@@ -121,7 +121,7 @@ def test_the_nearest_revision_is_taken_and_a_wrong_one_is_said(folder: Path) -> 
     (folder / "c.eds").unlink()
     assert choice(folder).endswith("it has the major revision of the node")
     assert choice(folder, None).startswith("a.eds ")
-    assert choice(folder, None).endswith("the latest revision; the node has not told its own")
+    assert choice(folder, None).endswith("the latest revision; that of the node is unknown")
 
 
 def test_a_dcf_of_this_node_goes_before_its_eds(folder: Path) -> None:

@@ -76,7 +76,7 @@ def test_what_has_never_come_is_missed_after_a_time_of_grace() -> None:
     made = alarms(nodes="3,4")
     assert states(made, GRACE_US - 1) == [AlarmState.HOLDS]
     assert states(made, GRACE_US) == [AlarmState.BROKEN]
-    assert made.findings[0].text == "node 3 was never heard; node 4 was never heard"
+    assert made.findings[0].text == "node 3 was never seen; node 4 was never seen"
 
 
 def test_the_grace_begins_with_the_time_of_the_source() -> None:

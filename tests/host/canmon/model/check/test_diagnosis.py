@@ -198,7 +198,7 @@ def test_what_is_no_canopen_is_not_judged_as_if_it_were(text: str) -> None:
     found = diagnose([[*records[:70], *records[75:]]])
     assert found.faults == ()
     assert set(found.judged) == {"no-error-frames", "no-loss", "time-back"}
-    assert found.unjudged["pdo-missing"] == "no CANopen was heard"
+    assert found.unjudged["pdo-missing"] == "no CANopen traffic was found"
 
 
 # What is learnt from a good log.

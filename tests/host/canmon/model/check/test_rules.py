@@ -153,7 +153,7 @@ def test_gaps_are_those_of_one_bus() -> None:
 
 def test_nodes_that_were_never_heard_are_found() -> None:
     rules = parse_rules({"nodes": "3,5-6"})
-    assert broken(rules, "1 705#7F") == ["1 node 3 was never heard", "1 node 6 was never heard"]
+    assert broken(rules, "1 705#7F") == ["1 node 3 was never seen", "1 node 6 was never seen"]
 
 
 @pytest.mark.parametrize("can_id", ["083", "183", "283", "383", "483", "583", "703"])
@@ -165,7 +165,7 @@ def test_a_node_was_heard_by_whatever_it_sent(can_id: str) -> None:
 
 @pytest.mark.parametrize("frame", ["000#0103", "080#", "203#00", "603#40", "703#R", "00000183#"])
 def test_what_others_send_to_a_node_is_not_the_node(frame: str) -> None:
-    assert broken(parse_rules({"nodes": 3}), f"1 {frame}") == ["1 node 3 was never heard"]
+    assert broken(parse_rules({"nodes": 3}), f"1 {frame}") == ["1 node 3 was never seen"]
     assert broken(Rules(no_reboot=True), f"1 {frame}\n2 703#00") == []
 
 

@@ -70,7 +70,7 @@ def test_a_mapping_that_was_read_counts_as_well() -> None:
 
 def test_of_a_mapping_half_heard_the_rest_is_said_to_be_unknown() -> None:
     read = "585#4F001A0002000000 585#43001A0110004160 185#4002FFFF"
-    assert last(read).text.endswith("and 1A00h:02, which was not heard")
+    assert last(read).text.endswith("and 1A00h:02, which is unknown")
 
 
 def test_a_mapping_that_was_refused_is_not_learnt() -> None:

@@ -108,7 +108,7 @@ def test_segments_that_the_monitor_missed_are_a_flaw(listener: Listener) -> None
     with listener.node.sdo.open(0x2008, 0, "wb", size=len(BLOB), block_transfer=True) as stream:
         stream.write(BLOB)
     (found,) = listener.found
-    assert "segments not heard" in found.flaws
+    assert "segments missing" in found.flaws
     assert not last("705#00").transfers
 
 
@@ -263,7 +263,7 @@ def test_a_size_that_does_not_fit_is_a_flaw() -> None:
 def test_blocks_without_beginning_end_in_no_transfer() -> None:
     found = decode("585#C60720001E000000 605#A2017F0000000000 605#A100000000000000")
     assert all(not decoded.transfers for decoded in found)
-    assert found[-1].text.endswith("beginning was not heard")
+    assert found[-1].text.endswith("beginning is missing")
 
 
 def test_a_block_upload_may_be_switched_to_a_short_one() -> None:
@@ -284,7 +284,7 @@ def test_a_receipt_that_was_not_heard_is_a_flaw() -> None:
         "605#A40810007F000000 585#C608100004000000 605#A300000000000000 585#8145504F53000000"
         " 585#CD73FB0000000000 605#A100000000000000"
     )
-    assert "a receipt was not heard" in found.flaws
+    assert "a confirmation is missing" in found.flaws
 
 
 def test_a_further_sdo_server_is_followed_once_its_cob_ids_are_known() -> None:
@@ -334,15 +334,15 @@ def test_an_unknown_command_is_said_to_be() -> None:
 @pytest.mark.parametrize(
     ("answer", "text", "length"),
     [
-        ("42191000090000AA", "9", "size not told"),  # what is behind means nothing
-        ("4219100009000000", "9", "size not told"),
-        ("42171000E80300AA", "1000", "size not told"),
+        ("42191000090000AA", "9", "size not indicated"),  # what is behind means nothing
+        ("4219100009000000", "9", "size not indicated"),
+        ("42171000E80300AA", "1000", "size not indicated"),
         ("42001000920102AA", "0xAA020192", ""),  # four bytes are what it has
         ("4319100009000000", "9", "4 B where UNSIGNED8 has 1"),
         ("4B19100009000000", "9", "2 B where UNSIGNED8 has 1"),
         ("43191000090000AA", "0xAA000009", "4 B where UNSIGNED8 has 1"),
         ("4F17100007000000", "0x07", "1 B where UNSIGNED16 has 2"),
-        ("42002000090000AA", "0xAA000009", "size not told"),
+        ("42002000090000AA", "0xAA000009", "size not indicated"),
         ("4F19100009000000", "9", ""),
     ],
 )
@@ -369,6 +369,6 @@ def test_what_is_learnt_has_the_length_of_its_type() -> None:
 
 def test_segments_of_an_unknown_number_are_said_to_be_so() -> None:
     assert last("605#4008100000000000 585#4008100000000000").text == (
-        "segments follow, their size is not told"
+        "segments follow, their size is not indicated"
     )
     assert last("605#4008100000000000 585#4108100005000000").text == ("segments follow, 0 of 5 B")

@@ -35,7 +35,7 @@ def test_frames_are_shown_decoded_as_they_come(wire: Wire) -> None:
         lines = shown(monitor)
         assert "705       [1] 7F" in lines[0]
         assert lines[0].endswith("5 heartbeat pre-operational")
-        assert lines[1].endswith("5 unmapped no mapping was heard")
+        assert lines[1].endswith("5 unmapped mapping unknown")
 
     on_monitor(session, act)
 

@@ -110,7 +110,7 @@ def test_a_rule_whose_signal_never_came_does_not_hold(rule: str, said: str) -> N
     assert found == [f"1 {said}"]
 
 
-UNMAPPED = "unmapped of node 1: no mapping was heard "
+UNMAPPED = "unmapped of node 1: mapping unknown "
 
 
 @pytest.mark.parametrize(
@@ -134,7 +134,7 @@ def test_a_slice_of_29_bits_is_another_one() -> None:
     assert broken("00000181[0] never", "1 181#02") == ["1 no signal 00000181[0] came"]
 
 
-HINT = "; PDOs came that nobody mapped: name them by --eds"
+HINT = "; PDOs without a known mapping came: describe them by --eds"
 
 
 @pytest.mark.parametrize(

@@ -264,7 +264,7 @@ def test_a_further_section_begins_anew(tmp_path: Path) -> None:
         ((enhanced("<", PACKET),), "x: 1 packets that are no frames passed over"),
         ((interface("<"), enhanced("<", PACKET, number=1)), "x: 1 packets that are no frames"),
         ((interface("<"), enhanced("<", PACKET[:8])), "x: 1 packets that are no frames"),
-        ((interface("<"), enhanced("<", PACKET, 10**18)), "x: 1 frames with what is no time"),
+        ((interface("<"), enhanced("<", PACKET, 10**18)), "x: 1 frames with an invalid time"),
         ((interface("<"), enhanced("<", b"")), "x: 1 packets that are no frames passed over"),
         ((interface("<"), block("<", 6, b"cut!")), "x: 1 packets that are no frames passed over"),
         ((interface("<"), enhanced("<", bytes(4) + b"\x80" + bytes(11))), "x: 1 CAN XL frames"),
