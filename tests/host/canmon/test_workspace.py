@@ -102,9 +102,7 @@ def test_a_file_that_somebody_else_changed_is_left_alone(path: Path) -> None:
     workspace = Workspace.read(path)
     path.write_text("[bus]\n", "utf-8")
     workspace.put("trace", {"bits": True})
-    with pytest.raises(
-        WorkspaceError, match=r"bench\.toml was changed by another program: not"
-    ):
+    with pytest.raises(WorkspaceError, match=r"bench\.toml was changed by another program: not"):
         workspace.write()
     assert path.read_text("utf-8") == "[bus]\n"
     assert workspace.write(over=True)
