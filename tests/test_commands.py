@@ -420,6 +420,206 @@ def test_the_table_of_option_names_is_what_is_held() -> None:
     assert re.findall(r"(?m)^\| `(-+\w+)", table) == [*OPTION_NAMES]
 
 
+# The exit statuses of CONTRIBUTING.md: each command of all scripts ends with them.
+
+BEFORE_VERB = {"tickrig ctl": "/nowhere", "rrc": "/nowhere", "canmon net": "slcan:/nowhere"}
+"""What a group wants before its verbs."""
+
+GONE, GONE_OPTIONS = "slcan:/nowhere", "-i slcan -c /nowhere"
+SLAVE = f"--model epos --node-id 5 {GONE_OPTIONS}"
+FIG120 = ROOT / "examples" / "rtc_canopen" / "fig120.yaml"
+NO_BUS = {
+    **{
+        f"canmon {verb}": GONE
+        for verb in ("dump", "top", "stats", "check", "nodes", "gateway", "tui")
+    },
+    "canmon report": f"{GONE} -o x.html",
+    "canmon graph": f"{GONE} 185[0:2]",
+    "canmon conform": f"{GONE} --node 5",
+    "canmon send": f"{GONE} 185#01",
+    "canmon seq": f"{GONE} ok.seq",
+    "canmon play": f"a.log {GONE}",
+    **{f"canmon net {verb}": "" for verb in ("scan", "lss")},
+    **{f"canmon net {verb}": "5 --yes" for verb in ("store", "restore", "boot")},
+    "canmon net nmt": "start 5 --yes",
+    "canmon net read": "5 1000h",
+    "canmon net write": "5 2222h=u8:1 --yes",
+    "canmon net dcf": "5 good.eds --yes",
+    "canmon net compare": "5 6",
+    "canmon net program": "5 ok.seq --yes",
+    **{f"rrc {verb}": "" for verb in ("status", "poweroff", "watch", "test")},
+    "rrc beep": "1s",
+    "rrc drive": "1 1 --for 1s",
+    "rrc limit": "1 1",
+    "rrc speed": "1",
+    "rrc stick": "--reverse 3",
+    "rh3 goto": "1 0 0 --device /nowhere",
+    "rh3 path": "points.txt --device /nowhere",
+    "rh3 square": "--device /nowhere",
+    "rh3 serve": "--device /nowhere",
+    "canopen-slave-emu": SLAVE,
+    "tickrig emu canopen-slave": SLAVE,
+    "tickrig demo fig120": GONE_OPTIONS,
+    "tickrig record": "/nowhere -o x.trace",
+    "rtc-canopen-server": f"{FIG120} {GONE_OPTIONS}",
+}
+"""By command, words that name a bus or a port that cannot be opened."""
+
+ON_A_TERMINAL = {"rtc-canopen-editor"}
+"""Opens its bus on a terminal alone; tests of its own."""
+
+STRICT_LOG = {f"canmon {verb}": "dirty.log --strict" for verb in ("dump", "top", "stats", "nodes")}
+STRICT_LOG |= {
+    "canmon conv": "dirty.log x.log --strict",
+    "canmon check": "dirty.log --nodes 5 --strict",
+    "canmon report": "dirty.log -o x.html --strict",
+    "canmon graph": "dirty.log 185[0:2] --strict",
+}
+STRICT_WARNINGS = {"tickrig check", "canmon eds check", "canmon tui"}
+"""Here `--strict` is about warnings; the screen shows what was lost."""
+
+ENDS = [
+    (0, "canmon check a.log --nodes 5"),
+    (0, "tickrig check rig.toml"),
+    (0, "canmon eds check good.eds"),
+    (1, "canmon check a.log --nodes 6"),
+    (1, "canmon check a.log --no-emcy"),
+    (1, "canmon dump a.log -F nmt"),
+    (1, "canmon eds diff good.eds other.eds"),
+    (1, "canmon net rig.toml read 5 2222h"),
+    (1, "rrc-emu --scenario missed.txt"),
+    (2, "canmon check a.log nowhere.toml"),
+    (2, "canmon dump a.log --eds 5=nowhere.eds"),
+    (2, "canmon eds check nowhere.eds"),
+    (2, "canmon seq virtual:x nowhere.seq"),
+    (2, "tickrig check nowhere.toml"),
+    (2, "tickrig run nowhere.toml"),
+    (2, "tickrig replay nowhere.trace"),
+    (2, "tickrig rtc run nowhere.toml"),
+    (2, "rrc-emu --scenario nowhere.txt"),
+    (2, "rtc-canopen-server nowhere.yaml"),
+    (2, "rtc-canopen-builder nowhere.toml"),
+    (2, "ucode-resolver nowhere"),
+    (2, "tkernel-emu nowhere.toml"),
+    *(
+        (3, f"canmon {verb} {log} {more}")
+        for verb, more in (
+            *(("dump", ""), ("top", ""), ("stats", ""), ("check", ""), ("nodes", "")),
+            *(("info", ""), ("conv", "x.log"), ("report", "-o x.html"), ("graph", "185[0:2]")),
+            ("play", "virtual:x"),
+        )
+        for log in ("nowhere.log", "bad.blf")
+    ),
+    (5, "canmon check empty.log"),
+    (5, "canmon check empty.log --no-emcy"),
+]
+"""Exit status, and a line that ends with it."""
+
+
+def ended(line: str) -> tuple[int, str]:
+    """Run a line here; return its exit status and what it prints on standard error."""
+    script, *words = shlex.split(line)
+    result = CliRunner().invoke(load(f"{MODULES[script]}:main"), words)
+    assert result.exception is None or isinstance(result.exception, SystemExit), line
+    return result.exit_code, result.stderr
+
+
+def with_words(command: str, words: str) -> str:
+    """Put what a group wants before its verb."""
+    for group, first in BEFORE_VERB.items():
+        if command.startswith(f"{group} "):
+            return f"{group} {first} {command.removeprefix(group)} {words}"
+    return f"{command} {words}"
+
+
+def leaves(*options: str, below: str = "") -> set[str]:
+    """Return the commands that are no groups, below some words; with one of the options, if any."""
+    return {
+        words
+        for words, command in COMMANDS.items()
+        if not isinstance(command, click.Group)
+        and words.startswith(below)
+        and (not options or any({*options} & {*one.opts} for one in command.params))
+    }
+
+
+@pytest.fixture
+def some_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Stand in a folder with the files of the lines."""
+    monkeypatch.chdir(tmp_path)
+    eds = (ROOT / "examples" / "eds" / "epos.eds").read_text("utf-8")
+    rig = '[device.node]\ntype = "f-palette"\nnode_id = 5\n'
+    texts = {
+        "a.log": f"{LOG}(1.100000) can0 705#05\n(1.200000) can0 085#1081110000000000\n",
+        "dirty.log": f"{LOG}(1.100000) can0 705#05\nno frame\n{LOG}",
+        "empty.log": "",
+        "bad.blf": "no blf",
+        "ok.seq": "+10 123#DE\n",
+        "points.txt": "0 0\n1 0\n",
+        "good.eds": eds,
+        "other.eds": eds.replace("ProductName=EPOS", "ProductName=EPOS2"),
+        "rig.toml": rig,
+        "missed.txt": "1ms send version\\r\n1ms expect nothing-of-the-kind within 2ms\n",
+    }
+    for name, text in texts.items():
+        Path(name).write_text(text, "utf-8")
+
+
+@pytest.mark.parametrize("words", sorted(leaves()))
+def test_wrong_use_of_every_command_is_2(words: str) -> None:
+    status, said = ended(with_words(words, "--no-such-option"))
+    assert (status, said.splitlines()[-1][:7]) == (2, "Error: "), said
+
+
+def test_every_command_that_opens_a_bus_is_tried_without_one() -> None:
+    opening = leaves("--interface", "--device") | leaves(below="canmon net ") | leaves(below="rrc ")
+    assert opening - NO_BUS.keys() - {"tickrig init"} == ON_A_TERMINAL
+    assert NO_BUS.keys() <= COMMANDS.keys()
+
+
+@pytest.mark.usefixtures("some_files")
+@pytest.mark.parametrize("words", NO_BUS)
+def test_a_bus_that_cannot_be_opened_is_3(words: str) -> None:
+    status, said = ended(with_words(words, NO_BUS[words]))
+    assert (status, "/nowhere" in said) == (3, True), said
+
+
+def test_every_strict_command_is_tried() -> None:
+    assert leaves("--strict") == STRICT_LOG.keys() | STRICT_WARNINGS
+
+
+@pytest.mark.usefixtures("some_files")
+@pytest.mark.parametrize("words", STRICT_LOG)
+def test_a_line_that_is_no_frame_is_4_with_strict(words: str) -> None:
+    status, said = ended(f"{words} {STRICT_LOG[words]}")
+    assert status == 4, said
+    status, said = ended(f"{words} {STRICT_LOG[words].removesuffix('--strict')}")
+    assert status == 0, said
+
+
+@pytest.mark.usefixtures("some_files")
+@pytest.mark.parametrize(("status", "line"), ENDS)
+def test_a_command_ends_with_the_status_of_the_table(status: int, line: str) -> None:
+    found, said = ended(line)
+    assert found == status, said
+
+
+@pytest.mark.usefixtures("some_files")
+def test_ctrl_c_in_the_middle_is_130(monkeypatch: pytest.MonkeyPatch) -> None:
+    def press(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("tickrig.host.canopen.commissioning.node_bus.NetworkScan.run", press)
+    assert ended("canmon net rig.toml scan")[0] == 130
+
+
+def test_the_table_of_exit_statuses_is_what_is_held() -> None:
+    page = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
+    table = page.partition("| exit status | meaning |")[2].partition("\n\n")[0]
+    statuses = {*map(int, re.findall(r"(?m)^\| ([0-9]+) \|", table))}
+    assert statuses == {status for status, _ in ENDS} | {4, 130}
+
+
 def test_the_package_is_the_command() -> None:
     words = [sys.executable, "-m", "tickrig", "--version"]
     assert subprocess.check_output(words, text=True) == f"tickrig (tickrig) {__version__}\n"

@@ -33,6 +33,18 @@ class Child:
     log: Path
 
 
+class _ChildError(RuntimeError):
+    """An emulator that does not start.
+
+    Attributes:
+        status: its exit status, 1 if it did not end.
+    """
+
+    def __init__(self, text: str, status: int | None) -> None:
+        super().__init__(text)
+        self.status = 1 if status is None else status
+
+
 @contextmanager
 def running(module: str, *options: str, linked: bool = True) -> Iterator[Child]:
     """Run the emulator whose command is `main` of a module; end it on exit.
@@ -43,7 +55,7 @@ def running(module: str, *options: str, linked: bool = True) -> Iterator[Child]:
         linked: whether it has an option `--link` for a terminal.
 
     Raises:
-        RuntimeError: it does not start; the message is its last line of output.
+        _ChildError: it does not start; the message is its last line of output.
     """
     with tempfile.TemporaryDirectory(prefix="tickrig-") as name:
         link, control, log = (Path(name, part) for part in ("tty", "control", "log"))
@@ -67,5 +79,6 @@ def _wait_until_up(child: Child, paths: list[Path]) -> None:
         if child.process.poll() is not None or time.monotonic() > deadline:
             said = child.log.read_text("utf-8", "replace").split("\n")
             last = next((line for line in reversed(said) if line), "it said nothing")
-            raise RuntimeError(f"the emulator did not start: {last.removeprefix('Error: ')}")
+            text = f"the emulator did not start: {last.removeprefix('Error: ')}"
+            raise _ChildError(text, child.process.poll())
         time.sleep(0.01)

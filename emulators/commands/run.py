@@ -65,7 +65,7 @@ class EmulatorRun(ABC, Generic[_OptionsT]):
 
         Raises:
             Refused: the options cannot be carried out.
-            BusFailed: its CAN bus can no longer be read.
+            SourceFailed: its CAN bus can no longer be read.
         """
         with ExitStack() as stack:
             if self._shows_warnings:
@@ -95,7 +95,7 @@ class EmulatorRun(ABC, Generic[_OptionsT]):
             self._show(bench)
         status = self._sum_up(bench, player)
         if gone:
-            raise messages.BusFailed(gone)
+            raise messages.SourceFailed(gone)
         return status
 
     @property

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 from click.shell_completion import CompletionItem
 
-from tickrig.host.cli.messages import BusUnavailable, Refused
+from tickrig.host.cli.messages import Refused, SourceFailed
 from tickrig.host.cli.options import Decorator, HarmlessCommand, add_options
 from tickrig.host.cli.start import loading
 from tickrig.host.text.values import parse_setting
@@ -210,7 +210,7 @@ def open_raw(options: BusOptions, instead: str = "") -> tuple[can.BusABC, str, s
         The bus, its interface and its channel.
 
     Raises:
-        Refused: no bus is given; BusUnavailable: it cannot be opened.
+        Refused: no bus is given; SourceFailed: it cannot be opened.
     """
     with loading():
         import can  # noqa: PLC0415 - slow
@@ -236,7 +236,7 @@ def open_raw(options: BusOptions, instead: str = "") -> tuple[can.BusABC, str, s
     except Exception as error:  # its drivers raise whatever they come across, NameError even
         _let_go(error)
         name = interface if channel is None else f"{interface} {channel}"
-        raise BusUnavailable(f"CAN bus {name}: {bus_reason(error)}") from None
+        raise SourceFailed(f"CAN bus {name}: {bus_reason(error)}") from None
     return bus, interface, channel
 
 

@@ -27,12 +27,8 @@ class Refused(click.ClickException):
     exit_code = 2
 
 
-class BusUnavailable(Refused):
-    """A valid bus that cannot be opened."""
-
-
-class BusFailed(click.ClickException):
-    """One line on standard error, and exit status 3: a bus that was open is gone."""
+class SourceFailed(click.ClickException):
+    """One line on standard error, and exit status 3: a bus, a file or a disk failed."""
 
     exit_code = 3
 
@@ -50,13 +46,15 @@ def refused_at(option: str) -> Iterator[None]:
 def failing(*errors: type[Exception]) -> Iterator[None]:
     """Raise ClickException, which is exit status 1, in place of these errors.
 
+    It is SourceFailed for an error with `status` 3, which a process that was started ended with.
     An output error is not changed.
     """
     try:
         yield
     except errors as error:
         raise_of_output(error)
-        raise click.ClickException(str(error)) from error
+        bus_failed = getattr(error, "status", 1) == SourceFailed.exit_code
+        raise (SourceFailed if bus_failed else click.ClickException)(str(error)) from error
 
 
 def refuse_path(what: str, error: OSError) -> NoReturn:
@@ -118,15 +116,6 @@ def show_findings(findings: Iterable[Finding]) -> None:
 
     for line in finding_lines(findings):
         say(line)
-
-
-# End of a verb that could not do everything.
-
-
-class SourceFailed(click.ClickException):
-    """One line on standard error, and exit status 3."""
-
-    exit_code = 3
 
 
 @contextmanager

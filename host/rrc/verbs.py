@@ -13,7 +13,7 @@ from typing import Any, Final, Protocol
 
 import click
 
-from tickrig.host.cli.messages import BusFailed, Refused, refuse_path, refused_at, say
+from tickrig.host.cli.messages import Refused, SourceFailed, refuse_path, refused_at, say
 from tickrig.host.cli.start import give_up_terminals, taking_signals
 from tickrig.host.links.game_pad import EvdevPad
 from tickrig.host.links.link import DeviceRefused, LinkClosed, LinkError, first_line
@@ -86,7 +86,7 @@ def open_chair(ended: Ended, *, stable: bool = True) -> Iterator[Chair]:
             ) as chair:
                 yield chair
         except LinkError as error:
-            raise BusFailed(_lost(call, error, chair)) from error
+            raise SourceFailed(_lost(call, error, chair)) from error
         except (DeviceRefused, ChairStopped) as error:
             raise click.ClickException(str(error)) from error
     if ended.number:

@@ -18,7 +18,7 @@ from tickrig.device.urg.world import room
 from tickrig.emulators.rh3.closed_loop import ClosedLoop, MountedUrg
 from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.host.cli.control import stopped_by_signals
-from tickrig.host.cli.messages import Refused, refuse_path
+from tickrig.host.cli.messages import Refused, SourceFailed, refuse_path
 from tickrig.host.cli.start import INTERRUPTED, paint
 from tickrig.host.control.clock import RealClock
 from tickrig.host.links.serial_link import SerialLink
@@ -84,7 +84,7 @@ class MotionOptions:
             refuse_path("odometry-conf", error)
         start(connection, self.set_id)
         if connection.chain.in_error:
-            raise Refused(connection.chain.ref_hard.error_reason)
+            raise SourceFailed(connection.chain.ref_hard.error_reason)
         return connection
 
     def _connection(self) -> BaseConnection:

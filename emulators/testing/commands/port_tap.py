@@ -18,7 +18,14 @@ from tickrig.emulators.commands.device_type import DEVICES, configure
 from tickrig.emulators.rig.emulated import Inputs
 from tickrig.emulators.serial.pty_port import PtyPort
 from tickrig.host.cli.control import stopped_by_signals
-from tickrig.host.cli.messages import Refused, refuse_path, refused_at, say, warnings_shown
+from tickrig.host.cli.messages import (
+    Refused,
+    SourceFailed,
+    refuse_path,
+    refused_at,
+    say,
+    warnings_shown,
+)
 from tickrig.host.links.link import LinkClosed
 from tickrig.host.links.ready import ready
 from tickrig.host.links.recording_link import RecordingLink
@@ -134,8 +141,7 @@ class _PortTap:
 _BAUD: Final = 115_200
 _RESET: Final = "reset"
 
-_PORT_GONE: Final = 1
-_RECORDING_ENDED: Final = 3
+_FAILED: Final = 3
 
 
 def record_port(port: str, out: Path, type_name: str, link: Path | None, baud: int | None) -> int:
@@ -158,7 +164,7 @@ def record_port(port: str, out: Path, type_name: str, link: Path | None, baud: i
         say(f"the port is gone: {tap.gone}")
     if recorded.recording_error:
         say(f"the recording ended early: {recorded.recording_error}")
-    return _RECORDING_ENDED if recorded.recording_error else _PORT_GONE if tap.gone else 0
+    return _FAILED if recorded.recording_error or tap.gone else 0
 
 
 def _known(type_name: str) -> tuple[int, Inputs | None]:
@@ -177,7 +183,7 @@ def _open_port(port: str, baud: int, out: Path, type_name: str) -> RecordingLink
     try:
         line = SerialLink(port, baud)
     except LinkClosed as error:
-        raise Refused(str(error)) from None
+        raise SourceFailed(str(error)) from None
     try:
         return RecordingLink(line, out, name=type_name or "device", type=type_name)
     except OSError as error:

@@ -25,7 +25,7 @@ def record_command(**options: Any) -> None:
     them: NAME=VALUE for an input, such as power_button=1; reset for switching it off and on. Ctrl-C
     ends.
 
-    Exit status 1 if the port is lost, 3 if the recording is incomplete.
+    Exit status 3 if the port is lost, or the recording is incomplete.
 
     \b
     tickrig record /dev/ttyUSB0 --out run.trace --type rrc --link /tmp/rrc

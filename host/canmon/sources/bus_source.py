@@ -24,7 +24,7 @@ from tickrig.host.canmon.model.logs.log_file import CAN_XL, LogTally
 from tickrig.host.canmon.sources.live_source import LiveSource, Reader
 from tickrig.host.canmon.sources.source import INTERFACES, BusSpec, parse_source
 from tickrig.host.cli.can_options import UNNAMED, BusOptions, open_raw
-from tickrig.host.cli.messages import BusUnavailable, Refused, SourceFailed
+from tickrig.host.cli.messages import Refused, SourceFailed
 from tickrig.host.links.can_link import BusReceiver, close_bus, reason_of, to_message
 from tickrig.host.links.link import LinkClosed
 from tickrig.host.links.ready import ready
@@ -162,10 +162,7 @@ def open_bus(options: BusOptions) -> tuple[can.BusABC, str, str]:
         Refused: options that python-can does not know.
         SourceFailed: the bus cannot be opened.
     """
-    try:
-        bus, interface, channel = open_raw(_with_interface(options))
-    except BusUnavailable as error:
-        raise SourceFailed(error.message) from None
+    bus, interface, channel = open_raw(_with_interface(options))
     if interface == _DEFAULT:
         _let_fd(bus)
     return bus, interface, channel_name(interface if channel is None else channel)

@@ -8,7 +8,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from tickrig.host.cli.can_options import BusOptions
-from tickrig.host.cli.messages import BusFailed, Refused
+from tickrig.host.cli.messages import Refused, SourceFailed
 from tickrig.host.links.link import LinkClosed
 from tickrig.host.rtc.canopen.commands import opening
 from tickrig.host.rtc.canopen.editor.app import SystemEditor
@@ -49,4 +49,4 @@ def run_editor(
         try:
             SystemEditor(session, name).run_session()
         except LinkClosed as error:
-            raise BusFailed(str(error)) from None
+            raise SourceFailed(str(error)) from None

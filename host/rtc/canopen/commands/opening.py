@@ -13,7 +13,13 @@ import click
 from tickrig.host.cli.can_options import BusOptions, open_raw
 from tickrig.host.cli.control import serving_control, stopped_by_signals
 from tickrig.host.cli.engine_options import EngineOptions
-from tickrig.host.cli.messages import BusFailed, Refused, refuse_path, show_findings, warnings_shown
+from tickrig.host.cli.messages import (
+    Refused,
+    SourceFailed,
+    refuse_path,
+    show_findings,
+    warnings_shown,
+)
 from tickrig.host.control.requests import Object, whole
 from tickrig.host.links.can_link import CanLink
 from tickrig.host.links.echo import free_of_echo
@@ -233,7 +239,7 @@ def _run(server: RtcCanopenServer, link: StampedLink, span_us: int, doors: _Door
             runner.run(until_us)
         link.send(server.stop(link.now_us))
     except LinkClosed as error:
-        raise BusFailed(str(error)) from None
+        raise SourceFailed(str(error)) from None
 
 
 @dataclass(frozen=True, slots=True)

@@ -197,7 +197,7 @@ def test_a_port_that_goes_ends_the_recording(record: Start, tmp_path: Path) -> N
         rrc.await_output("state", "WaitPowerOn")
         recorder = record(port.path, tmp_path / "run.trace", tmp_path / "tty")
         answer(SerialLink(str(recorder.link)), b"version\n", b"Version 1.0\n")
-    assert recorder.process.wait(PATIENCE_S) == 1
+    assert recorder.process.wait(PATIENCE_S) == 3
     _, err = recorder.end()
     assert "the port is gone: cannot " in err
     assert "Traceback" not in err
