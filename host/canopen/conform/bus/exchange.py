@@ -160,7 +160,7 @@ class _Allowance:
         max_load: allowed share of it, above 0 to 1.
 
     Attributes:
-        slowness: so many times as long as usual may all take.
+        slowness: factor by which everything may take longer than usual.
         from_us: nothing may be sent before.
     """
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, cast
 
 import pytest
@@ -193,12 +194,13 @@ def test_after_a_second_reset_of_a_kind_only_what_the_first_changed_is_read() ->
 
     node = Node()
     begin = dict(node.values)
-    state = KnownState(cast("BusExchange", None), cast("SdoClient", node))
+    state = KnownState(cast("BusExchange", SimpleNamespace(boots=0)), cast("SdoClient", node))
     state.learn(begin)
     reads = []
     for resets, changed in ((["000#82"], 7), (["000#82"], 7), ([], 9), (["000#82", "000#81"], 9)):
         node.values[0x2000 + changed, 0] = b"\xff"
         node.read = 0
+        state.forget()
         state.tidy_after(resets)
         assert node.values == begin
         reads.append(node.read >= len(begin))
