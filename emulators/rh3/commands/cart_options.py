@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from shutil import get_terminal_size
 from typing import Final
 
 import click
@@ -17,26 +13,20 @@ from tickrig.device.rh3.parameters import BaseParameters
 from tickrig.device.urg.world import room
 from tickrig.emulators.rh3.closed_loop import ClosedLoop, MountedUrg
 from tickrig.emulators.rig.sim_link import SimLink
-from tickrig.host.cli.control import stopped_by_signals
 from tickrig.host.cli.messages import Refused, SourceFailed, refuse_path
-from tickrig.host.cli.start import INTERRUPTED, paint
 from tickrig.host.control.clock import RealClock
 from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.rtc import Manager
 from tickrig.host.rtc.motion.chain import RATE_HZ, MotionChain
 from tickrig.host.rtc.motion.drive import BaseConnection, start
 from tickrig.host.rtc.motion.geometry import Pose, Wheels
-from tickrig.host.rtc.motion.motion_run import WIDTH, LiveMap, MotionRun, TrackMap, TrackSample
+from tickrig.host.rtc.motion.motion_run import MotionRun
 from tickrig.host.rtc.motion.options.lrf_capture_urg import LrfCaptureUrg
 from tickrig.host.rtc.states import RtcRefused
 from tickrig.host.rtc.system.schedule import RealTime
 
 _SCANNER: Final = "LRFCapture_URG0"
 """The component of a range finder, if the cart has one."""
-
-
-class _RunStopped(Exception):  # noqa: N818 - no error
-    """The user ended the run."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,54 +128,6 @@ class _SerialBaseConnection:
         """Wait until a time, and run everything due before it."""
         while self.now_us < t_us:
             self._runner.step()
-
-
-class RunWatcher:
-    """Draws samples if requested, and raises `_RunStopped` after a signal."""
-
-    def __init__(self, options: MotionOptions, points: Sequence[Pose]) -> None:
-        self._ended = self._asking = False
-        width = min(WIDTH, get_terminal_size().columns - 1)
-        drawn = partial(paint, sys.stdout)
-        self._map = LiveMap(TrackMap(points, width), drawn) if options.show_map else None
-
-    def end(self) -> None:
-        """Stop at the next sample, or at once during a question."""
-        self._ended = True
-        if self._asking:
-            raise KeyboardInterrupt
-
-    @contextmanager
-    def asking(self) -> Iterator[None]:
-        """Ask the user a question; raise `_RunStopped` if the user ends the run."""
-        self._asking = True
-        try:
-            yield
-        except (click.Abort, KeyboardInterrupt):
-            raise _RunStopped from None
-        finally:
-            self._asking = False
-        if self._ended:  # click.pause passes Ctrl-C over
-            raise _RunStopped
-
-    def watch(self, sample: TrackSample) -> None:
-        """Handle a sample."""
-        if self._map is not None:
-            self._map.watch(sample)
-        if self._ended:
-            raise _RunStopped
-
-
-@contextmanager
-def watched(options: MotionOptions, points: Sequence[Pose]) -> Iterator[RunWatcher]:
-    """Watch a run; Ctrl-C ends it with exit status 130."""
-    watcher = RunWatcher(options, points)
-    with stopped_by_signals(watcher.end):
-        try:
-            yield watcher
-        except _RunStopped:
-            click.echo("stopped", err=True)
-            raise SystemExit(INTERRUPTED) from None
 
 
 def require_arrival(connection: BaseConnection, run: MotionRun) -> None:

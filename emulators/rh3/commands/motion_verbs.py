@@ -3,29 +3,29 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from functools import partial
 from math import nan
 from pathlib import Path
+from shutil import get_terminal_size
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import click
 
 from tickrig.emulators.commands.picture import check_plot, new_figure, write_figure
-from tickrig.emulators.rh3.commands.cart_options import (
-    MotionOptions,
-    RunWatcher,
-    require_arrival,
-    watched,
-)
+from tickrig.emulators.rh3.commands.cart_options import MotionOptions, require_arrival
 from tickrig.emulators.rh3.commands.served_cart import serve_cart
 from tickrig.emulators.rh3.device_type import read_parameters
 from tickrig.emulators.rh3.fields import PARAMETERS
+from tickrig.host.cli.control import stopped_by_signals
 from tickrig.host.cli.engine_options import take_engines
 from tickrig.host.cli.messages import Refused, refuse_path
 from tickrig.host.cli.options import NumberRange
+from tickrig.host.cli.start import INTERRUPTED, paint
 from tickrig.host.rtc.motion.drive import BaseConnection, drive, limits_of, stop, table
 from tickrig.host.rtc.motion.geometry import Pose, Wheels
-from tickrig.host.rtc.motion.motion_run import MotionRun
+from tickrig.host.rtc.motion.motion_run import WIDTH, LiveMap, MotionRun, TrackMap, TrackSample
 from tickrig.host.rtc.motion.path_file import FARTHEST_M, read_path, within_reach
 from tickrig.host.rtc.motion.ports import plausible
 from tickrig.host.rtc.motion.umbmark import SIDE_M, Umbmark, run_umbmark, square
@@ -81,6 +81,61 @@ def _beside_mm(line: Pose | None, pose: Pose) -> float:
     return nan if line is None else line.left(pose) * 1e3
 
 
+# What a user does while a cart drives.
+
+
+class _RunStopped(Exception):  # noqa: N818 - no error
+    """The user ended the run."""
+
+
+class _RunWatcher:
+    """Draws samples if requested, and raises `_RunStopped` after a signal."""
+
+    def __init__(self, options: MotionOptions, points: Sequence[Pose]) -> None:
+        self._ended = self._asking = False
+        width = min(WIDTH, get_terminal_size().columns - 1)
+        drawn = partial(paint, sys.stdout)
+        self._map = LiveMap(TrackMap(points, width), drawn) if options.show_map else None
+
+    def end(self) -> None:
+        """Stop at the next sample, or at once during a question."""
+        self._ended = True
+        if self._asking:
+            raise KeyboardInterrupt
+
+    @contextmanager
+    def asking(self) -> Iterator[None]:
+        """Ask the user a question; raise `_RunStopped` if the user ends the run."""
+        self._asking = True
+        try:
+            yield
+        except (click.Abort, KeyboardInterrupt):
+            raise _RunStopped from None
+        finally:
+            self._asking = False
+        if self._ended:  # click.pause passes Ctrl-C over
+            raise _RunStopped
+
+    def watch(self, sample: TrackSample) -> None:
+        """Handle a sample."""
+        if self._map is not None:
+            self._map.watch(sample)
+        if self._ended:
+            raise _RunStopped
+
+
+@contextmanager
+def _watched(options: MotionOptions, points: Sequence[Pose]) -> Iterator[_RunWatcher]:
+    """Watch a run; Ctrl-C ends it with exit status 130."""
+    watcher = _RunWatcher(options, points)
+    with stopped_by_signals(watcher.end):
+        try:
+            yield watcher
+        except _RunStopped:
+            click.echo("stopped", err=True)
+            raise SystemExit(INTERRUPTED) from None
+
+
 # `rh3 square`: UMBmark before and after a calibration.
 
 
@@ -109,7 +164,7 @@ class _Squares:
         latest: the connection of the latest square.
     """
 
-    def __init__(self, options: MotionOptions, size: SquarePlan, watcher: RunWatcher) -> None:
+    def __init__(self, options: MotionOptions, size: SquarePlan, watcher: _RunWatcher) -> None:
         self._options, self._size, self._watcher = options, size, watcher
         self.latest: BaseConnection | None = None
 
@@ -153,7 +208,7 @@ class _Squares:
 
 def run_squares(options: MotionOptions, size: SquarePlan, save: Path | None) -> None:
     """Drive squares, calibrate, drive them again, and print both results."""
-    with watched(options, size.corners) as watcher:
+    with _watched(options, size.corners) as watcher:
         squares = _Squares(options, size, watcher)
         try:
             before = squares.run()
@@ -240,7 +295,7 @@ def _checked(options: dict[str, Any]) -> MotionOptions:
 def _drive(options: MotionOptions, points: Sequence[Pose], title: str) -> None:
     connection = options.begin()
     began = connection.chain.odometry.pose
-    with watched(options, [began, *points]) as watcher:
+    with _watched(options, [began, *points]) as watcher:
         try:
             run = drive(connection, points, watcher.watch)
             require_arrival(connection, run)
