@@ -28,6 +28,15 @@ _DRIVE_PROFILE: Final = 402
 _IO_PROFILE: Final = 401
 _SEVERAL: Final = 0xFFFF
 
+NMT_WORDS: Final = {
+    "start": NmtCommand.START,
+    "stop": NmtCommand.STOP,
+    "pre-op": NmtCommand.ENTER_PRE_OPERATIONAL,
+    "reset-node": NmtCommand.RESET_NODE,
+    "reset-comm": NmtCommand.RESET_COMMUNICATION,
+}
+"""NMT commands as `canmon net nmt` and the screen call them."""
+
 
 def write_risk(is_drive: bool, entries: Iterable[Entry]) -> str:
     """Return what writing objects may move at a node, a CiA 402 drive or another one."""

@@ -406,6 +406,10 @@ def seconds_text(span_us: int, digits: int) -> str:
     return f"{'-' * (span_us < 0)}{seconds:0{digits}d}.{micros:06d}"
 
 
+DATED_US: Final = 1_000_000_000_000_000
+"""Times before it (September 2001) are no dates, but count from the start of a recorder."""
+
+
 def date_text(at_us: int) -> str:
     """Write a time since the epoch as the local date and time; without a date after 9999."""
     from datetime import datetime  # noqa: PLC0415 - seldom wanted

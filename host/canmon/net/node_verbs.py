@@ -34,7 +34,7 @@ from tickrig.host.canmon.net.session import (
     net_session,
     print_plan,
 )
-from tickrig.host.canmon.risks import nmt_risk, write_risk
+from tickrig.host.canmon.risks import NMT_WORDS, nmt_risk, write_risk
 from tickrig.host.canopen.bus_file.bus_file import decode_bus_file, read_bus_file
 from tickrig.host.canopen.commissioning.configuration import dcf_values, writes
 from tickrig.host.canopen.commissioning.node_bus import NetworkScan, NodeFound
@@ -300,13 +300,6 @@ def _no_eds_lines(node: NodeFound) -> list[str]:
 # The verb `net nmt`: NMT commands and their effect.
 
 
-_COMMANDS: Final = {
-    "start": NmtCommand.START,
-    "stop": NmtCommand.STOP,
-    "pre-op": NmtCommand.ENTER_PRE_OPERATIONAL,
-    "reset-node": NmtCommand.RESET_NODE,
-    "reset-comm": NmtCommand.RESET_COMMUNICATION,
-}
 _AFTER: Final = {
     NmtCommand.START: (NmtState.OPERATIONAL,),
     NmtCommand.STOP: (NmtState.STOPPED,),
@@ -324,7 +317,7 @@ _PERIODS: Final = 3
 
 
 @click.command()
-@click.argument("word", type=click.Choice(list(_COMMANDS)), metavar="COMMAND")
+@click.argument("word", type=click.Choice(list(NMT_WORDS)), metavar="COMMAND")
 @click.argument("node", metavar="NODE|all")
 @dry_run_option
 @click.option("--yes", is_flag=True, help="Do not ask.")
@@ -341,7 +334,7 @@ def nmt(call: NetCall, word: str, node: str, dry_run: bool, yes: bool) -> None:
     canmon net can0 nmt reset-node 5 --dry-run
     canmon net can0 nmt reset-node all --yes
     """  # noqa: D301 - click wants the backspace
-    command, node_id = _COMMANDS[word], _node_id(node)
+    command, node_id = NMT_WORDS[word], _node_id(node)
     with net_session(call, node_id or None) as session:
         if dry_run:
             to = f"node {node_id}" if node_id else "all nodes"

@@ -24,6 +24,7 @@ from tickrig.host.canmon.model.decode.node_board import (
 )
 from tickrig.host.canmon.model.decode.node_memory import HEARTBEAT_TIME
 from tickrig.host.canmon.model.frames import (
+    DATED_US,
     REMOTE,
     Record,
     decoded_text,
@@ -123,7 +124,7 @@ def _what(survey: Survey, head: ReportHead) -> str:
         return f"{head.source} holds no frame."
     span_us = survey.last_us - survey.first_us
     buses = ", ".join(sorted(survey.frames))
-    begun = f", from {_date(survey.first_us)}" if survey.first_us >= _DATED_US else ""
+    begun = f", from {_date(survey.first_us)}" if survey.first_us >= DATED_US else ""
     bits = sum(sum(spans.values()) for spans in survey.bits.sums.values())
     load = load_text(bits * 1_000_000 // span_us, head.bit_rate) if span_us else ""
     busy = f", at a mean load of {load} over that time" if load and len(survey.frames) == 1 else ""
@@ -136,10 +137,6 @@ def _date(at_us: int) -> str:
         return f"{datetime.fromtimestamp(at_us // 1_000_000, UTC):%Y-%m-%d %H:%M:%S} UTC"
     except (ValueError, OverflowError, OSError):
         return f"{at_us / 1e6:.0f} s"
-
-
-_DATED_US: Final = 1_000_000_000_000_000
-"""Times before it (September 2001) are no dates, but count from the start of a recorder."""
 
 
 def _who(rows: Iterable[NodeStatus]) -> str:
@@ -273,7 +270,7 @@ def _node(
     cells = (
         *(label, name, told_identity(row) or "not read", row.state_text),
         *(_heartbeat(row, gaps, diagnosis), boots, row.drive_state),
-        *(_emcys(lane.emcys), _failures(lane.failures)),
+        *(_latest(lane.emcys), _latest(lane.failures)),
     )
     return {
         "key": _key(row.channel, row.node),
@@ -356,11 +353,7 @@ def _seen(fault: BusFault) -> Iterable[tuple[int, int]]:
         yield fault.frames[-1].at_us if fault.frames else fault.first_us, fault.last_us
 
 
-def _emcys(marks: Thinned[Mark]) -> str:
-    return f"{marks.count}, the latest: {marks.items[-1].text}" if marks.items else ""
-
-
-def _failures(marks: Thinned[Mark]) -> str:
+def _latest(marks: Thinned[Mark]) -> str:
     return f"{marks.count}, the latest: {marks.items[-1].text}" if marks.items else ""
 
 

@@ -17,6 +17,7 @@ import click
 
 from tickrig._lazy import LazyModule
 from tickrig.host.canmon.model.frames import (
+    DATED_US,
     REMOTE,
     LogTime,
     Record,
@@ -145,7 +146,7 @@ def _range(text: str) -> tuple[int, tuple[float, float]]:
 _MOST: Final = 2_000_000
 """Samples of a signal that are kept of a bus."""
 
-SIZE: Final = (100, 28)
+_NO_TERMINAL: Final = (100, 28)
 """Columns and lines where there is no terminal."""
 
 
@@ -350,9 +351,9 @@ def _show(source: str, collector: Collector, request: _GraphRequest) -> bool:
     for file in request.files:
         write_graph(file, series, view, request.size, _title(source, view, request.title))
     if not request.files:
-        width, height = shutil.get_terminal_size(SIZE)
+        width, height = shutil.get_terminal_size(_NO_TERMINAL)
         colour = sys.stdout.isatty() and "NO_COLOR" not in os.environ
-        lines = render(series, view, width, min(height - 1, SIZE[1]), colour=colour)
+        lines = render(series, view, width, min(height - 1, _NO_TERMINAL[1]), colour=colour)
         show = partial(paint, sys.stdout) if colour else click.echo
         show("\n".join(line.rstrip() for line in lines) + "\n" * colour)
     return any(series) and not missed
@@ -372,12 +373,9 @@ def _missed(series: Sequence[Series], view: View) -> str:
 
 def _title(source: str, view: View, title: str) -> str:
     """Return what stands above a picture: what it is, of what, and when its time begins."""
-    begun = f"0 s is {date_text(view.origin_us)}" if view.origin_us >= _DATED_US else ""
+    begun = f"0 s is {date_text(view.origin_us)}" if view.origin_us >= DATED_US else ""
     name = Path(source).name if Path(source).is_file() else source
     return ", ".join(filter(None, [one_line(title), one_line(name), begun]))
 
-
-_DATED_US: Final = 1_000_000_000_000_000
-"""Times before it (September 2001) are no dates, but count from the start of a recorder."""
 
 explained(command)

@@ -527,11 +527,6 @@ def name_text(row: NodeStatus) -> str:
     return name + _FROM_EDS * bool(name and not told)
 
 
-def identity_words(row: NodeStatus) -> str:
-    """Return profile, vendor, product, revision and serial number, as far as they are known."""
-    return told_identity(row) or "not known: no EDS, and no read of 1000h or 1018h"
-
-
 def told_identity(row: NodeStatus) -> str:
     """Return what was read from the node, and behind it what else its EDS says of its kind.
 

@@ -13,9 +13,10 @@ from textual.binding import Binding, BindingType
 from textual.widgets import TabbedContent, TabPane
 
 from tickrig.host.canmon.model.decode import node_board
+from tickrig.host.canmon.model.decode.node_board import told_identity
 from tickrig.host.canmon.model.decode.node_memory import DEVICE_TYPE
 from tickrig.host.canmon.model.frames import Record, Stamp
-from tickrig.host.canmon.risks import nmt_risk
+from tickrig.host.canmon.risks import NMT_WORDS, nmt_risk
 from tickrig.host.canmon.tui.panels.dictionary_panel import DictionaryPanel
 from tickrig.host.canmon.tui.panels.panel import ChoiceView, Panel, PromptLine, TitleLine, read_help
 from tickrig.host.canmon.tui.session import DecodedFrame, Model, Session, Task
@@ -225,7 +226,11 @@ def card_lines(
     name = node_board.name_text(row)
     where = f"{row.channel} node {row.node}" + f": {name}" * bool(name)
     lines = [plain(where, _HEAD)]
-    lines += _wrapped("device", node_board.identity_words(row), width)
+    lines += _wrapped(
+        "device",
+        told_identity(row) or "not known: no EDS, and no read of 1000h or 1018h",
+        width,
+    )
     for pdo in node_board.pdo_contents(row):
         lines += _wrapped(f"{pdo.kind.upper()} {pdo.can_id:03X}h", pdo.text, width)
     if row.drive_state:
@@ -324,14 +329,6 @@ _NODE_IDS: Final = range(1, 128)
 _IDENTITY: Final = tuple((0x1018, sub) for sub in (1, 2, 3))
 _ASK_US: Final = 10_000
 """Between two requests: 5 % of a bus of 125 kbit/s, and time for an answer."""
-_COMMANDS: Final = {
-    "start": NmtCommand.START,
-    "stop": NmtCommand.STOP,
-    "pre-op": NmtCommand.ENTER_PRE_OPERATIONAL,
-    "reset-node": NmtCommand.RESET_NODE,
-    "reset-comm": NmtCommand.RESET_COMMUNICATION,
-}
-"""As `canmon net` calls them."""
 _YES: Final = ("y", "yes")
 _SHARE: Final = 0.6
 """The board takes no more of the tab."""
@@ -448,7 +445,7 @@ class NodesPanel(Panel):
         row = self.chosen
         if row is None or not self.may_send():
             return
-        command, whom = _COMMANDS[word], "all nodes" if to_all else f"node {row.node}"
+        command, whom = NMT_WORDS[word], "all nodes" if to_all else f"node {row.node}"
         risk = nmt_risk(command, None if to_all else row.memory.number(*DEVICE_TYPE))
         several = f" on {row.channel}" * (len(self.session.buses) > 1)
         question = f"NMT {word} to {whom}{several}. {risk}. Send it (y or n)?"
