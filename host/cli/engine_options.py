@@ -67,7 +67,7 @@ class OpenRtmOptions:
     names: str = FORMAT
 
 
-def _parse_options(name_server: str, address: str = "", names: str = "") -> OpenRtmOptions:
+def _parse_openrtm(name_server: str, address: str = "", names: str = "") -> OpenRtmOptions:
     """Read the words of a command line, empty for omitted ones.
 
     Raises:
@@ -204,7 +204,7 @@ def _take_openrtm(options: dict[str, Any]) -> OpenRtmOptions | None:
         return None
 
     try:
-        return _parse_options(server, address, names)
+        return _parse_openrtm(server, address, names)
     except ValueError as error:
         raise Refused(str(error)) from None
 
@@ -218,7 +218,7 @@ def _take_ros2(options: dict[str, Any], topics: str) -> Ros2Options | None:
                 raise Refused(f"--ros2-{name} is for --ros2")
         return None
     try:
-        return parse_options(**given, topics=topics)
+        return _parse_ros2(**given, topics=topics)
     except ValueError as error:
         raise Refused(str(error)) from None
 
@@ -248,7 +248,7 @@ class Ros2Options:
     topics: str = ""
 
 
-def parse_options(
+def _parse_ros2(
     domain: int | None, interface: str | None, table: Path | None, topics: str
 ) -> Ros2Options:
     """Return the options; the default domain is ROS_DOMAIN_ID, or 0.

@@ -24,14 +24,14 @@ from typing import Final
 from tickrig.host.text.byte_text import escape, unescape
 from tickrig.host.text.values import Setting, format_time, parse_setting
 
-VERSION: Final = 1
+_VERSION: Final = 1
 RESET: Final = "reset"
 
 Config = Mapping[str, str | int | float | None]
 """Configuration of a device, as in the header of its trace."""
 
 BEGIN: Final = "# tickrig-trace v"
-_VERSION: Final = re.compile(r"# tickrig-trace v([0-9]{1,9}) ")
+_VERSION_LINE: Final = re.compile(r"# tickrig-trace v([0-9]{1,9}) ")
 _HEADER: Final = re.compile(r"# tickrig-trace v1 ([\w-]+) (\{.*\})")
 _LINE: Final = re.compile(r"([0-9]{1,12})\.([0-9]{6}) ([<>!.])(?: (.*))?")
 _INPUT: Final = re.compile(r"(\w+)=(-?[0-9]{1,18}(?:\.[0-9]{1,20})?(?:e[+-][0-9]{2,3})?)", re.ASCII)
@@ -60,7 +60,7 @@ class Header:
 
     def encode(self) -> str:
         """Write the first line, without LF."""
-        return f"# tickrig-trace v{VERSION} {self.device} {json.dumps(dict(self.config))}"
+        return f"# tickrig-trace v{_VERSION} {self.device} {json.dumps(dict(self.config))}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,13 +108,13 @@ def trace_text(data: bytes) -> str:
 
 def parse_header(line: str) -> Header:
     """Read the first line; TraceError if it is not a valid header."""
-    version = _VERSION.match(line)
-    if version is not None and int(version[1]) != VERSION:
+    version = _VERSION_LINE.match(line)
+    if version is not None and int(version[1]) != _VERSION:
         raise TraceError(f"this is trace version {int(version[1])}; versions 1 and 2 are known")
     match = _HEADER.fullmatch(line)
     if match is None:
         raise TraceError(
-            f"line 1 is not '# tickrig-trace v{VERSION} DEVICE {{CONFIG}}': {line!r:.60}"
+            f"line 1 is not '# tickrig-trace v{_VERSION} DEVICE {{CONFIG}}': {line!r:.60}"
         )
     try:
         return Header(match[1], json.loads(match[2]))

@@ -258,7 +258,7 @@ _DATA_WIDTH: Final = 23
 _HEAT_WIDTH: Final = 71
 _MEANING_WIDTH: Final = 50
 _CHANNEL_MAX: Final = 12
-KEYS: Final = "  q quit, space hold, b bits, d decode, n notch, s sort, c clear"
+_KEY_LINE: Final = "  q quit, space hold, b bits, d decode, n notch, s sort, c clear"
 _UNRATED: Final = "load at most (no --data-bitrate)"
 UNBOUNDED: Final = 1 << 16
 """A width or height that everything fits into."""
@@ -274,7 +274,7 @@ class RowOrder(StrEnum):
     AGE = "age"
 
 
-_KEYS: Final[dict[RowOrder, Callable[[traffic.IdRow], float]]] = {
+_ORDER_KEYS: Final[dict[RowOrder, Callable[[traffic.IdRow], float]]] = {
     RowOrder.ID: lambda row: 0,
     RowOrder.RATE: lambda row: -row.rate_hz,
     RowOrder.JITTER: lambda row: -row.gaps.jitter_us if row.gaps else 1,
@@ -331,7 +331,7 @@ def render(
     table = _Table.of(snapshot, view, width)
     head.append(table.titles())
     room = max(0, height - len(head))
-    rows = sorted(snapshot.rows, key=_KEYS[view.order])[view.top : view.top + room]
+    rows = sorted(snapshot.rows, key=_ORDER_KEYS[view.order])[view.top : view.top + room]
     return (head + [table.line(row, snapshot.at_us) for row in rows])[:height]
 
 
@@ -360,7 +360,7 @@ def _state_line(snapshot: traffic.TrafficSnapshot, view: TableView, lost: int) -
     words = [f"lost {lost}", *[f"passed over {view.unread}"] * bool(view.unread)]
     words += [f"{len(snapshot.rows)} identifiers by {view.order}"]
     words += ["held"] * view.held
-    keys = KEYS if view.keys else ""
+    keys = _KEY_LINE if view.keys else ""
     return ", ".join(words) + keys
 
 

@@ -64,6 +64,9 @@ class LssSettings:
         return steps
 
 
+_MOST_FOUND: Final = 127
+
+
 class LssWork:
     """One call.
 
@@ -162,7 +165,7 @@ class LssWork:
     def _scanned(self) -> Iterator[tuple[LssAddress, int]]:
         """Yield the results of fastscans: a found slave is in configuration and stays silent."""
         seen = set[LssAddress]()
-        most = len(self._settings.node_ids) or lss_master.MOST_FOUND
+        most = len(self._settings.node_ids) or _MOST_FOUND
         while len(seen) < most and (address := self._master.fastscan()) is not None:
             if address in seen:
                 say(f"{_text(address)} answers a fastscan twice; the search ends here")

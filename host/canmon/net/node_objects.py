@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from functools import cache, cached_property
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -15,7 +15,7 @@ from tickrig.host.canmon.model.decode.eds_folder import EdsFolder
 from tickrig.host.canmon.model.decode.node_memory import NodeMemory, eds_objects
 from tickrig.host.canmon.model.node_dictionary import encode_value
 from tickrig.host.canmon.net.session import NetSession, NodeFailed, failure_text
-from tickrig.host.canopen.commissioning.configuration import Values, same
+from tickrig.host.canopen.commissioning.configuration import same
 from tickrig.host.canopen.conform.subject import TOLD, other_device
 from tickrig.host.canopen.errors import SdoAborted, SdoFailed, SdoTimeout
 from tickrig.host.cli.messages import Refused, say
@@ -358,14 +358,3 @@ def line(objects: NamedObjects, one: _ValueDifference, where: str) -> str:
     there = f"{shown(objects, one.entry, one.wanted)} {where}"
     here = one.why if one.found is None else f"{shown(objects, one.entry, one.found)} here"
     return f"{objects.title(one.entry)}: {here}, {there}"
-
-
-def values_of(session: NetSession, node_id: int, entries: Collection[Entry]) -> Values:
-    """Read objects of a node; omit those that it refuses."""
-    found: Values = {}
-    for entry in sorted(entries):
-        try:
-            found[entry] = session.bus.read(node_id, *entry)
-        except SdoAborted:
-            continue
-    return found

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -34,7 +34,6 @@ from tickrig.host.canmon.risks import write_risk
 from tickrig.host.canopen.commissioning.configuration import (
     Values,
     dcf_values,
-    default_values,
     disabled,
     is_parameter,
     writes,
@@ -45,6 +44,7 @@ from tickrig.host.cli.messages import Refused, refusing, say, until_unread
 from tickrig.host.cli.options import NODE_ID, PATH
 from tickrig.host.text.page_text import json_text, one_line
 from tickrig.host.text.values import counted
+from tickrig.wire.canopen.eds.eds_device import EdsDevice
 from tickrig.wire.canopen.nmt import NmtCommand, NmtState
 from tickrig.wire.canopen.sdo_frame import describe_abort
 
@@ -237,13 +237,33 @@ def _other_id(word: str) -> int:
     return number
 
 
+def _default_values(device: EdsDevice, node_id: int) -> Values:
+    """Return the defaults of all parameters that an EDS describes."""
+    return {
+        (row.index, row.sub): row.power_on_data(node_id)
+        for row in device.entries
+        if row.has_default and is_parameter(row)
+    }
+
+
 def _of_file(objects: node_objects.NamedObjects) -> Values:
     assert objects.file is not None
     assert objects.device is not None
     node_id = objects.node_id
     values = dcf_values(objects.file, objects.device, node_id)
-    values = values or default_values(objects.device, node_id)
+    values = values or _default_values(objects.device, node_id)
     return {at: data for at, data in values.items() if objects.rows[at].readable}
+
+
+def _values_of(session: NetSession, node_id: int, entries: Collection[Entry]) -> Values:
+    """Read objects of a node; omit those that it refuses."""
+    found: Values = {}
+    for entry in sorted(entries):
+        try:
+            found[entry] = session.bus.read(node_id, *entry)
+        except SdoAborted:
+            continue
+    return found
 
 
 def _of_node(session: NetSession, objects: node_objects.NamedObjects, other_id: int) -> Values:
@@ -252,7 +272,7 @@ def _of_node(session: NetSession, objects: node_objects.NamedObjects, other_id: 
     if not rows:
         raise Refused("which objects? give the EDS of both nodes (--eds FILE)")
     with of_node(other_id, objects.title):
-        found = node_objects.values_of(session, other_id, rows)
+        found = _values_of(session, other_id, rows)
     shift = objects.node_id - other_id
     for at, data in found.items():
         if rows[at].relative and data != bytes(len(data)):

@@ -781,11 +781,3 @@ def open_live(
 def is_live(word: str) -> bool:
     """Say whether a SOURCE word names something that goes on: no log file."""
     return not isinstance(parse_source(word), FileSpec)
-
-
-def log_path(word: str) -> Path:
-    """Return the log file that a word names; Refused if it names none."""
-    parsed = parse_source(word)
-    if not isinstance(parsed, FileSpec):
-        raise Refused(f"{word!r} is no log file")
-    return parsed.path

@@ -13,7 +13,7 @@ from typing import Final
 import click
 
 from tickrig.host.canmon.model.logs import log_file
-from tickrig.host.canmon.model.logs.log_file import LogTally
+from tickrig.host.canmon.model.logs.log_file import LogFormat, LogTally
 from tickrig.host.canmon.model.logs.log_reader import LogLines, read_log
 from tickrig.host.cli.messages import Refused, SourceFailed
 from tickrig.host.cli.options import PATH
@@ -61,6 +61,10 @@ class _LogHead:
         return self.whole or self.last_us is not None
 
 
+_TEXT: Final = (LogFormat.CANDUMP, LogFormat.JSONL, LogFormat.CSV, LogFormat.GVRET)
+"""Formats of lines that `LogLines` reads."""
+
+
 def read_head(path: Path) -> _LogHead:
     """Read the first thousand frames, and the end of a log in text.
 
@@ -74,7 +78,7 @@ def read_head(path: Path) -> _LogHead:
     head = list(islice(reader, _HEAD_FRAMES))
     whole = len(head) < _HEAD_FRAMES
     last_us = head[-1].at_us if whole and head else None
-    if not whole and kind in log_file.TEXT and not compressed:
+    if not whole and kind in _TEXT and not compressed:
         last_us = None if reader.tally.shifted_us else _last_us(path)
     if kind is log_file.LogFormat.CSV and reader.tally.without_errors:
         kind = log_file.LogFormat.GVRET

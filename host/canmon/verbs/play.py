@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import click
@@ -19,7 +20,7 @@ from tickrig.host.canmon.model.logs.log_file import LogError
 from tickrig.host.canmon.model.logs.log_reader import LogReader, read_log
 from tickrig.host.canmon.model.traffic import bucket_of, middle_us
 from tickrig.host.canmon.output.listening import Pace, until_interrupted
-from tickrig.host.canmon.sources.source import log_path
+from tickrig.host.canmon.sources.source import FileSpec, parse_source
 from tickrig.host.canmon.verbs.decode_options import log_time_option
 from tickrig.host.cli.can_options import BusOptions, bus_options, fd_options
 from tickrig.host.cli.messages import Refused, SourceFailed, refusing, until_unread
@@ -178,6 +179,14 @@ _NOTHING_SENT: Final = 1
 _CAN_ID: Final = re.compile(r"[0-9A-Fa-f]{3}|[0-9A-Fa-f]{8}")
 
 
+def _log_path(word: str) -> Path:
+    """Return the log file that a word names; Refused if it names none."""
+    parsed = parse_source(word)
+    if not isinstance(parsed, FileSpec):
+        raise Refused(f"{word!r} is no log file")
+    return parsed.path
+
+
 @click.command()
 @click.argument("log")
 @click.argument("buses", nargs=-1, metavar="[BUS|BUS=RECORDED...]")
@@ -205,7 +214,7 @@ def command(log: str, buses: Sequence[str], step: bool, **options: Any) -> None:
         refuse_idle("--step waits for Enter, not for a time", "speed")
     wait_rx = _can_id(options.pop("wait_rx"))
     words, route = _routes(buses, options["channel"])
-    path = log_path(log)
+    path = _log_path(log)
     reader = read_log(path)
     plan = _plan(reader, route, options)
     receives = wait_rx is not None

@@ -6,12 +6,11 @@ from collections.abc import Iterable, Iterator, Mapping
 from functools import lru_cache
 from typing import Final
 
-from tickrig.host.canopen.bus_file.bus_values import BusMaster, BusSlave, DriveChannel
+from tickrig.host.canopen.bus_file.bus_values import BusMaster, BusSlave, BusWrite, DriveChannel
 from tickrig.host.canopen.bus_file.known_keys import SETTINGS
 from tickrig.host.canopen.bus_file.layout import MASTER, OPTIONS, Layout
 from tickrig.host.canopen.bus_file.notes import BusFileNotes, BusFileSection
 from tickrig.host.canopen.bus_file.pdo_reader import RPDO, TPDO
-from tickrig.host.canopen.bus_file.sheet import final_places
 from tickrig.host.canopen.data_sheet.check import check, failing, severities
 from tickrig.host.canopen.data_sheet.document import Document
 from tickrig.host.canopen.data_sheet.rule import RuleFinding
@@ -96,11 +95,16 @@ def _is_double(one: BusSlave | None, other: BusSlave) -> bool:
     return one is not None and one is not other and one.node_id == other.node_id
 
 
+def _final_places(writes: Iterable[BusWrite]) -> dict[int, FilePlace]:
+    """Return the place of the last write to an entry, by index << 8 | sub-index."""
+    return {write.index << 8 | write.sub_index: write.place for write in writes}
+
+
 def _pdos(slaves: Mapping[str, BusSlave]) -> Iterator[tuple[str, int, FilePlace, BusSlave, bool]]:
     """Yield the enabled PDOs with 11-bit CAN-IDs, TPDOs first: name, CAN-ID, place, slave."""
     for transmit in (True, False):
         for slave in slaves.values():
-            places = final_places(slave.writes)
+            places = _final_places(slave.writes)
             for pdo in slave.pdos:
                 if pdo.transmit is not transmit or pdo.cob_id & (INVALID | EXTENDED):
                     continue

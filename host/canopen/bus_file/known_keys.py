@@ -45,8 +45,6 @@ PDO: Final = (
     *("enabled", "cob_id", "transmission", "inhibit_time", "event_timer", "event_deadline"),
     *("sync_start", "mapping"),
 )
-MAPPED: Final = ("index", "sub_index", "bits")
-WRITE: Final = ("index", "sub_index", "value")
 _FLAGS: Final = {
     **dict.fromkeys(("true", "yes", "on", "y"), 1),
     **dict.fromkeys(("false", "no", "off", "n"), 0),

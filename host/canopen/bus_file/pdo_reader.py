@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Final
 
 from tickrig.host.canopen.bus_file.bus_values import BusPdo
-from tickrig.host.canopen.bus_file.known_keys import MAPPED, PDO, check_keys
+from tickrig.host.canopen.bus_file.known_keys import PDO, check_keys
 from tickrig.host.canopen.bus_file.notes import UNSIGNED8, UNSIGNED16, BusFileSection
 from tickrig.host.canopen.bus_file.sheet import Sheet, Writes
 from tickrig.wire.canopen.eds.eds_file import shorten
@@ -41,6 +41,9 @@ class CobIds:
             return None
         self._next += 1
         return self._next - 1
+
+
+_MAPPED: Final = ("index", "sub_index", "bits")
 
 
 class PdoReader:
@@ -160,7 +163,7 @@ class PdoReader:
             self._writes.add(index, 0, 0, place)
         mapping: list[MappedObject] = []
         for entry in entries:
-            check_keys(entry, MAPPED)
+            check_keys(entry, _MAPPED)
             mapped = self._mapped(entry, pdo)
             if mapped is not None:
                 mapping.append(mapped)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
@@ -283,8 +283,3 @@ class Writes:
             limits = f"{'' if low is None else low}..{'' if high is None else high}"
             text = f"{what}: {value} is not in {limits}: {self._sheet.place(row.index, row.sub)}"
             self._notes.note("value-limits", place, self._name, text)
-
-
-def final_places(writes: Iterable[BusWrite]) -> dict[int, FilePlace]:
-    """Return the place of the last write to an entry, by index << 8 | sub-index."""
-    return {write.index << 8 | write.sub_index: write.place for write in writes}

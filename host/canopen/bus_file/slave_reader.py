@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Final
 
 from tickrig.host.canopen.bus_file.bus_values import BusDefaults, BusSlave, DriveChannel, Identity
-from tickrig.host.canopen.bus_file.known_keys import DRIVER, EXTRA, SCALES, SLAVE, WRITE, check_keys
+from tickrig.host.canopen.bus_file.known_keys import DRIVER, EXTRA, SCALES, SLAVE, check_keys
 from tickrig.host.canopen.bus_file.notes import UNSIGNED8, UNSIGNED16, BusFileSection
 from tickrig.host.canopen.bus_file.pdo_reader import RPDO, TPDO, CobIds, PdoReader
 from tickrig.host.canopen.bus_file.sheet import IDENTITY, Sheet, Writes
@@ -17,6 +17,9 @@ from tickrig.wire.canopen.nmt import INVALID
 _MOST_CHANNELS: Final = 8
 TIME, EMCY, HEARTBEAT, GUARD_TIME, LIFE_TIME = 0x1012, 0x1014, 0x1017, 0x100C, 0x100D
 ERROR_BEHAVIOR, RESTORE, SOFTWARE = 0x1029, 0x1011, 0x1F56
+
+
+_WRITE: Final = ("index", "sub_index", "value")
 
 
 class SlaveReader:
@@ -200,7 +203,7 @@ class SlaveReader:
 
     def _sdo(self) -> None:
         for entry in self._node.sections("sdo"):
-            check_keys(entry, WRITE)
+            check_keys(entry, _WRITE)
             if "index" not in entry:
                 entry.note("kind", "index", "an entry of sdo needs an index")
                 continue

@@ -46,15 +46,6 @@ def _has_value(file: EdsFile, sections: Mapping[_Address, str], row: EntryDescri
     return bool(file.value(section, "ParameterValue") or beside)
 
 
-def default_values(device: EdsDevice, node_id: int) -> Values:
-    """Return the defaults of all parameters that an EDS describes."""
-    return {
-        (row.index, row.sub): row.power_on_data(node_id)
-        for row in device.entries
-        if row.has_default and is_parameter(row)
-    }
-
-
 def is_parameter(row: EntryDescription) -> bool:
     """Return whether an entry is a setting, and not a value of the running process."""
     mapped = Access.RPDO in row.access or Access.TPDO in row.access

@@ -34,7 +34,6 @@ _PATIENCE: Final = (1, 2, 4)
 """A fastscan is tried with these multiples of its wait."""
 _SETTLE_US: Final = 5_000
 """Pause after a command without an answer, so that slow slaves can execute it."""
-MOST_FOUND: Final = 127
 _BITS: Final = range(31, -1, -1)
 
 INDICES: Final = {rate: index for index, rate in BIT_RATES.items()}

@@ -84,6 +84,10 @@ _UNSAID: Final = logging.NullHandler()
 """For what python-can logs of objects: what is not read of them is counted here."""
 
 
+_NO_MF4: Final = "MF4 needs asammdf: pip install 'python-can[mf4]'"
+"""Said where it is not there."""
+
+
 class CanLogReader:
     """A reader of a log that python-can understands."""
 
@@ -136,7 +140,7 @@ class CanLogReader:
         try:
             return can.MF4Reader(file)
         except NotImplementedError as error:
-            raise log_file.LogError(f"{self._path}: {log_file.NO_MF4}") from error
+            raise log_file.LogError(f"{self._path}: {_NO_MF4}") from error
 
     def _blf(
         self, reader: _BlfReader, apart: _TakeApart | None
@@ -594,7 +598,7 @@ class CanLogWriter:
         except NotImplementedError as error:
             self._file.close()
             path.unlink()
-            raise log_file.LogError(f"{path}: {log_file.NO_MF4}") from error
+            raise log_file.LogError(f"{path}: {_NO_MF4}") from error
 
     def write(self, record: Record, /) -> None:
         """Add a frame."""

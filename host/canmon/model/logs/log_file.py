@@ -102,18 +102,6 @@ def triggered(at_us: int, why: str) -> Mark:
     return Mark(at_us, TRIGGER, f"trigger: {_plain(why)}")
 
 
-def lost_frames(comment: str) -> int:
-    """Return how many frames a comment of a log says were lost; 0 for any other.
-
-    >>> lost_frames("# 12 frames were lost"), lost_frames("# a note")
-    (12, 0)
-    >>> lost_frames("DROPCOUNT: dropped 1 CAN frame on 'can0' socket (total drops 1)")
-    1
-    """
-    mark = read_mark(0, comment.removeprefix("#"))
-    return mark.frames if mark else 0
-
-
 def read_mark(at_us: int, text: str) -> Mark | None:
     """Return the mark that a log has in these words; None for others.
 
@@ -154,7 +142,6 @@ COUNTERS_TOLD: Final = "that error counters are above 0"
 OTHER_LINES: Final = "lines with other events"
 OTHER_OBJECTS: Final = "objects that are no frames"
 NO_TIME: Final = "frames with an invalid time"
-BAD_PACKETS: Final = "packets that are no frames"
 OTHER_PACKETS: Final = "packets of other links"
 _NO_FRAMES: Final = (SERIAL_LINES, OTHER_LINES, OTHER_OBJECTS, OTHER_PACKETS)
 """What a log may hold beside frames."""
@@ -288,12 +275,6 @@ _FORMATS: Final = {
 }
 SUFFIXES: Final = {suffix: kind for kind, one in _FORMATS.items() for suffix in one[0].split()}
 COMPRESSED: Final = ".gz"
-
-NO_MF4: Final = "MF4 needs asammdf: pip install 'python-can[mf4]'"
-"""Said where it is not there."""
-
-TEXT: Final = (LogFormat.CANDUMP, LogFormat.JSONL, LogFormat.CSV, LogFormat.GVRET)
-"""Formats of lines that `LogLines` reads."""
 
 
 class LogFormatError(ValueError):

@@ -36,7 +36,6 @@ from tickrig.host.canmon.model.logs.log_file import (
     SERIAL_LINES,
     LogTally,
     Mark,
-    lost_frames,
     read_mark,
 )
 from tickrig.host.canmon.model.logs.notation import (
@@ -45,7 +44,6 @@ from tickrig.host.canmon.model.logs.notation import (
     parse_csv_line,
     parse_frame,
     parse_json_line,
-    parse_json_mark,
 )
 from tickrig.wire.can import BRS, ERROR_FLAG, ESI, MAX_DATA_BYTES, CanFrame
 from tickrig.wire.errors import WireError
@@ -171,6 +169,18 @@ def _parse_screen_line(line: str, tally: LogTally, clock: ScreenClock) -> Record
     return Record(at_us, channel, frame, direction == "T")
 
 
+def _lost_frames(comment: str) -> int:
+    """Return how many frames a comment of a log says were lost; 0 for any other.
+
+    >>> _lost_frames("# 12 frames were lost"), _lost_frames("# a note")
+    (12, 0)
+    >>> _lost_frames("DROPCOUNT: dropped 1 CAN frame on 'can0' socket (total drops 1)")
+    1
+    """
+    mark = read_mark(0, comment.removeprefix("#"))
+    return mark.frames if mark else 0
+
+
 def _beside(line: str, text: str, tally: LogTally, clock: ScreenClock) -> Record | str | None:
     """Return what other lines of a screen say.
 
@@ -180,7 +190,7 @@ def _beside(line: str, text: str, tally: LogTally, clock: ScreenClock) -> Record
     if _SERIAL.fullmatch(text):
         tally.passed_over[SERIAL_LINES] += 1
         return SERIAL_LINES
-    if text.startswith(DROP_COUNT) and (lost := lost_frames(text)):
+    if text.startswith(DROP_COUNT) and (lost := _lost_frames(text)):
         tally.lost += lost
         return text
     if match := _PRINTED.fullmatch(text):
@@ -288,7 +298,7 @@ def parse_log_line(
     """
     text = line.strip()
     if not text or text.startswith(_COMMENTS):
-        tally.lost += lost_frames(text)
+        tally.lost += _lost_frames(text)
         return None
     record = _parsed(line, text, tally, clock or ScreenClock())
     if record is None:
@@ -410,11 +420,26 @@ class LogLines:
         return mark._replace(at_us=records[at - 1].at_us if at else self._latest_us or first_us)
 
 
+def _parse_json_mark(text: str) -> log_file.Mark | None:
+    """Return the mark that an event is; its time is 0 where it has none; None for others."""
+    import json  # noqa: PLC0415 - candump's lines are the usual ones
+
+    try:
+        said = json.loads(text)
+        at_us = log_file.to_us(said.get("t", 0))
+        if said["ev"] == log_file.DROP:
+            return log_file.dropped(at_us, int(said["n"])) if int(said["n"]) > 0 else None
+        mark = log_file.read_mark(at_us, str(said["text"]))
+        return mark if mark and mark.event == said["ev"] else None
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError):
+        return None
+
+
 def _mark(text: str) -> Mark | None:
     """Return the mark that a comment or an event is, without a time where it has none."""
     if text.startswith(("#", DROP_COUNT)):
         return read_mark(0, text.removeprefix("#"))
-    return parse_json_mark(text) if text.startswith("{") else None
+    return _parse_json_mark(text) if text.startswith("{") else None
 
 
 def among(records: Sequence[Record], marks: Sequence[tuple[int, Mark]]) -> Sequence[Item]:

@@ -214,13 +214,17 @@ class BusNumbers:
         ]
 
 
+_GVRET_HEADER: Final = "Time Stamp,ID,Extended,Dir,Bus,LEN,D1,D2,D3,D4,D5,D6,D7,D8"
+"""Of SavvyCAN's own logs; older ones have no `Dir`."""
+
+
 class GvretLogWriter(TextLogWriter):
     """Rows as SavvyCAN reads them: data frames of at most 8 bytes, with numbers of buses."""
 
     def __init__(self, path: Path, kind: log_file.LogFormat) -> None:
         super().__init__(path, kind)
         self._name, self._numbers, self._left_out = path.name, BusNumbers(), Counter[str]()
-        self._lines.append(notation.GVRET_HEADER)
+        self._lines.append(_GVRET_HEADER)
 
     def write(self, record: Record, /) -> None:
         """Add a row, or count what such a log does not hold."""

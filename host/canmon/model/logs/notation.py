@@ -110,21 +110,6 @@ def parse_json_line(text: str, tally: log_file.LogTally) -> Record | str | None:
         return None
 
 
-def parse_json_mark(text: str) -> log_file.Mark | None:
-    """Return the mark that an event is; its time is 0 where it has none; None for others."""
-    import json  # noqa: PLC0415 - candump's lines are the usual ones
-
-    try:
-        said = json.loads(text)
-        at_us = log_file.to_us(said.get("t", 0))
-        if said["ev"] == log_file.DROP:
-            return log_file.dropped(at_us, int(said["n"])) if int(said["n"]) > 0 else None
-        mark = log_file.read_mark(at_us, str(said["text"]))
-        return mark if mark and mark.event == said["ev"] else None
-    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError):
-        return None
-
-
 def _event(said: dict[str, Any], tally: log_file.LogTally) -> str:
     """Take an event; one that is not known says nothing to us."""
     if said["ev"] == log_file.DROP:
@@ -213,8 +198,6 @@ def csv_row(record: Record) -> str:
     return f"{at_us // 1_000_000}.{at_us % 1_000_000:06d},{what},{data}{marks}"
 
 
-GVRET_HEADER: Final = "Time Stamp,ID,Extended,Dir,Bus,LEN,D1,D2,D3,D4,D5,D6,D7,D8"
-"""Of SavvyCAN's own logs; older ones have no `Dir`."""
 _GVRET_BYTES: Final = 8
 """So many columns of data there are, whatever the length."""
 _WITHOUT_ERRORS: Final = "a GVRET log holds no error frames"

@@ -37,13 +37,13 @@ from tickrig.wire import can
 # 0A0D0D0A size 1A2B3C4D 1 0 -1 options size     section
 # 00000001 size 227 0 snap options size          interface: link type, name, resolution of times
 # 00000006 size interface high low len len data  packet, padded, then options
-SECTION: Final = 0x0A0D_0D0A
+_SECTION_BLOCK: Final = 0x0A0D_0D0A
 _ORDER_MAGIC: Final = 0x1A2B_3C4D
-INTERFACE: Final = 1
+_INTERFACE_BLOCK: Final = 1
 _OBSOLETE_PACKET: Final = 2
 _SIMPLE_PACKET: Final = 3
-STATISTICS: Final = 5
-PACKET: Final = 6
+_STATISTICS_BLOCK: Final = 5
+_PACKET_BLOCK: Final = 6
 """Types of blocks."""
 
 _COMMENT: Final = 1
@@ -189,6 +189,9 @@ class _Usual(NamedTuple):
     tail: bytes
 
 
+_BAD_PACKETS: Final = "packets that are no frames"
+
+
 class _PcapngReader:
     """Parses the blocks of one file.
 
@@ -235,7 +238,7 @@ class _PcapngReader:
         while len(data) - (at := self._take_usual(data, at, records)) >= _BLOCK_BYTES:
             # A section may begin anywhere in a file, in the other byte order (files put one
             # behind the other).
-            if data.startswith(SECTION.to_bytes(4, "big"), at):
+            if data.startswith(_SECTION_BLOCK.to_bytes(4, "big"), at):
                 self._begin(data[at + 8 : at + _BLOCK_BYTES])
             kind, size = struct.unpack_from(f"{self._order}II", data, at)
             rest = len(data) - at
@@ -294,9 +297,9 @@ class _PcapngReader:
     def _take_block(self, kind: int, content: bytes, records: list[Item]) -> None:
         order = self._order
         try:
-            if kind == INTERFACE:
+            if kind == _INTERFACE_BLOCK:
                 self._add_interface(content)
-            elif kind == PACKET:
+            elif kind == _PACKET_BLOCK:
                 number, high, low, size, _ = struct.unpack_from(f"{order}5I", content)
                 self._add(number, high << 32 | low, content[20:], size, records)
             elif kind == _OBSOLETE_PACKET:
@@ -309,10 +312,10 @@ class _PcapngReader:
                 snap = self._interfaces[0].snap_bytes if self._interfaces else 0
                 self._tally.untimed += 1
                 self._add(0, None, content[4:], min(size, snap or size), records)
-            elif kind == STATISTICS:
+            elif kind == _STATISTICS_BLOCK:
                 self._comment(options(order, content[12:]), records)
         except struct.error:
-            self._tally.passed_over[log_file.BAD_PACKETS] += 1
+            self._tally.passed_over[_BAD_PACKETS] += 1
 
     def _add_interface(self, content: bytes) -> None:
         link_type, _, snap = struct.unpack_from(f"{self._order}HHI", content)
@@ -343,7 +346,7 @@ class _PcapngReader:
     ) -> None:
         """Add the frame of a packet; without a time it has that of the packet before."""
         if number >= len(self._interfaces) or size > len(data):
-            self._tally.passed_over[log_file.BAD_PACKETS] += 1
+            self._tally.passed_over[_BAD_PACKETS] += 1
             return
         where = self._interfaces[number]
         if not where.is_can:
@@ -362,7 +365,7 @@ class _PcapngReader:
             return
         frame = _parse_packet(data[:size])
         if frame is None or isinstance(frame, str):
-            self._tally.passed_over[frame or log_file.BAD_PACKETS] += 1
+            self._tally.passed_over[frame or _BAD_PACKETS] += 1
             return
         flags = told.get(_PACKET_FLAGS, b"")
         sent = int.from_bytes(flags, "little" if self._order == "<" else "big") & _DIRECTION
@@ -392,7 +395,7 @@ def _damage_of(size: int, rest: int, block: bytes) -> str:
 
 def _usual(order: str) -> _Usual:
     sizes = struct.pack(f"{order}II", 16, 16)
-    head = struct.pack(f"{order}II", PACKET, _USUAL_BYTES)
+    head = struct.pack(f"{order}II", _PACKET_BLOCK, _USUAL_BYTES)
     return _Usual(struct.Struct(f"{order}8s3I8s4sB3s8s4s"), head, sizes, head[4:])
 
 
@@ -438,7 +441,7 @@ class PcapReader:
 
     def _frames(self, file: BinaryIO, marks: bool) -> Iterator[Item]:
         first = file.read(4)
-        if first == SECTION.to_bytes(4, "little"):
+        if first == _SECTION_BLOCK.to_bytes(4, "little"):
             yield from _PcapngReader(str(self._path), self.tally, marks).frames(file, first)
         elif first in _PCAP:
             yield from self._packets(file, *_PCAP[first])
@@ -472,7 +475,7 @@ class PcapReader:
                 continue
             frame = _parse_packet(data)
             if frame is None or isinstance(frame, str):
-                self.tally.passed_over[frame or log_file.BAD_PACKETS] += 1
+                self.tally.passed_over[frame or _BAD_PACKETS] += 1
             else:
                 yield Record(seconds * 1_000_000 + fraction // parts, UNNAMED, frame)
 
@@ -508,7 +511,7 @@ class PcapngWriter:
         self._at_us = 0
         content = _SECTION.pack(_ORDER_MAGIC, 1, 0, -1)
         self._blocks.append(
-            _block(SECTION, content + _option(_APPLICATION, b"tickrig canmon") + _END)
+            _block(_SECTION_BLOCK, content + _option(_APPLICATION, b"tickrig canmon") + _END)
         )
 
     def write(self, record: Record, /) -> None:
@@ -523,7 +526,7 @@ class PcapngWriter:
             ident = frame.can_id | _EXTENDED if frame.extended else frame.can_id
             self._blocks.append(
                 _USUAL.pack(
-                    *(PACKET, size, number, at_us >> 32, at_us & _LOW, _CLASSIC_BYTES),
+                    *(_PACKET_BLOCK, size, number, at_us >> 32, at_us & _LOW, _CLASSIC_BYTES),
                     *(_CLASSIC_BYTES, _swapped(ident), length, frame.data, size),
                 )
             )
@@ -551,7 +554,7 @@ class PcapngWriter:
         try:
             if self._comments and self._interfaces:
                 content = _STATISTICS.pack(0, self._at_us >> 32, self._at_us & _LOW)
-                self._blocks.append(_block(STATISTICS, content + self._comments + _END))
+                self._blocks.append(_block(_STATISTICS_BLOCK, content + self._comments + _END))
             self._give()
         finally:
             self._file.close()
@@ -562,7 +565,7 @@ class PcapngWriter:
 
     def _begin(self, channel: str) -> int:
         options = _option(_IF_NAME, channel.encode()) + _option(_TIME_RESOLUTION, b"\x06") + _END
-        self._blocks.append(_block(INTERFACE, _INTERFACE.pack(_LINK_TYPE, 0, 0) + options))
+        self._blocks.append(_block(_INTERFACE_BLOCK, _INTERFACE.pack(_LINK_TYPE, 0, 0) + options))
         number = self._interfaces[channel] = len(self._interfaces)
         return number
 
@@ -572,7 +575,9 @@ class PcapngWriter:
         if sent:
             options = _option(_PACKET_FLAGS, struct.pack("<I", _OUTBOUND)) + options
         head = _PACKET.pack(number, at_us >> 32, at_us & _LOW, len(data), len(data))
-        self._blocks.append(_block(PACKET, head + data + (options + _END if options else b"")))
+        self._blocks.append(
+            _block(_PACKET_BLOCK, head + data + (options + _END if options else b""))
+        )
 
     def _give(self) -> None:
         self._file.write(b"".join(self._blocks))
