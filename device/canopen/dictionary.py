@@ -7,7 +7,8 @@ from itertools import pairwise
 from operator import attrgetter
 from typing import Final
 
-from tickrig.device.twin import Immutable, Part
+from tickrig.device.twin import Cache, Immutable, Part
+from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.datatypes import DataType, Value
 from tickrig.wire.canopen.eds.object_table import EntryDescription, ObjectDescription
 from tickrig.wire.canopen.nmt import CAN_ID_MASK, FLAG_30, INVALID, is_restricted
@@ -309,6 +310,7 @@ class Dictionary(Part):
     Attributes:
         description: names, types, access, limits and defaults.
         by_multiplexer: cache of readable entries, by the three bytes of their multiplexer.
+        answers: cache of their entries, values and SDO frames, likewise.
 
     >>> from tickrig.wire.canopen.datatypes import DataType
     >>> from tickrig.wire.canopen.eds.object_table import RW
@@ -318,7 +320,7 @@ class Dictionary(Part):
     (5, 0)
     """
 
-    __slots__ = ("_entries", "_only", "_places", "by_multiplexer", "description")
+    __slots__ = ("_entries", "_only", "_places", "answers", "by_multiplexer", "description")
 
     def __init__(
         self,
@@ -332,6 +334,7 @@ class Dictionary(Part):
         self.description, self._places = description, description.places
         self._entries = list(map(Entry, description.entries))
         self.by_multiplexer: dict[bytes, Entry] = {}
+        self.answers: dict[bytes, tuple[Entry, bytes, CanFrame]] = Cache()
         self._only: frozenset[int] | None = None
 
     def restrict(self, only: frozenset[int] | None) -> None:
@@ -342,6 +345,7 @@ class Dictionary(Part):
         """
         self._only = only
         self.by_multiplexer.clear()
+        self.answers.clear()
 
     def copy(self) -> Dictionary:
         """Return the same objects with their default values, for another slave."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 from tickrig._compiled import mypyc_attr
 from tickrig.device.canopen.dictionary import Entry, SdoAbort, check_sdo_cob_id, is_valid
 from tickrig.device.canopen.slave import ALIVE, Handler, Service
-from tickrig.device.twin import Cache, Immutable, Part
+from tickrig.device.twin import Immutable, Part
 from tickrig.wire.can import CanFrame, data_frame
 from tickrig.wire.canopen.datatypes import DataType, Value
 from tickrig.wire.canopen.nmt import CAN_ID_MASK, NmtState
@@ -95,7 +95,7 @@ if TYPE_CHECKING:
 #
 # `_without_transfer` answers the commonest request itself: reading up to four bytes without a
 # `source`. It must answer exactly as `initiate` would; `by_multiplexer` holds readable entries
-# only, for that reason. `_answers` keeps the latest frame of each; it holds as long as the entry
+# only, for that reason. `answers` keeps the latest frame of each; it holds as long as the entry
 # has the very bytes object that the frame was made of, and the server its CAN-ID.
 #
 # Other ends of this dialogue: `wire/canopen/sdo_frame.py` has the command bytes, the client
@@ -459,7 +459,7 @@ class SdoServer(Part):
         self.response_id: int
         self.block_size = MAX_BLOCK_SIZE
         self._entries = node.dictionary.by_multiplexer
-        self._answers: dict[bytes, tuple[bytes, CanFrame]] = Cache()  # each with its value
+        self._answers = node.dictionary.answers
         self._multiplexer: bytes
         self._idle: State = self._without_transfer
         self._state: State
@@ -550,18 +550,21 @@ class SdoServer(Part):
         """Handle a request while no transfer runs, with a short path for reading a small value."""
         if request[0] == _UPLOAD:
             multiplexer = request[1:4]
-            entry = self._entries.get(multiplexer)
-            if entry is not None and entry.source is None:
-                data, answer = entry.data, self._answers.get(multiplexer)
+            answer = self._answers.get(multiplexer)
+            if answer is not None:
+                entry, data, frame = answer
                 # The frame of the same bytes is sent again: a third of an upload in process.
-                if answer is not None and answer[0] is data and answer[1][0] == self.response_id:
-                    self.node.put(answer[1])
+                if entry.data is data and entry.source is None and frame[0] == self.response_id:
+                    self.node.put(frame)
                     return
+            found = self._entries.get(multiplexer)
+            if found is not None and found.source is None:
+                data = found.data
                 size = len(data)
                 if 0 < size <= EXPEDITED_BYTES:
                     response = _EXPEDITED[size] + multiplexer + data + _FILL[size]
                     frame = data_frame(self.response_id, response)
-                    self._answers[multiplexer] = data, frame
+                    self._answers[multiplexer] = found, data, frame
                     self.node.put(frame)
                     return
         self.initiate(request)

@@ -377,9 +377,8 @@ class Servo(Readings):
             rubbed += b * (w * w + w * speed + speed * speed) / 3 * STEP_S - friction * way
             angle, w, i, integral, counts = ahead, speed, current, led, seen
             if left:
-                position, velocity, left = (
-                    *(position + ahead_velocity * STEP_S, ahead_velocity + added, left - 1),
-                )
+                position += ahead_velocity * STEP_S
+                velocity, left = ahead_velocity + added, left - 1
             else:
                 velocity = 0.0
             steps += 1

@@ -66,8 +66,9 @@ def over_a_wire() -> None:
 
     def work() -> None:
         for _ in range(CALLS // 4):
-            end.send(rig.now_us, request)
-            rig.run_to(rig.now_us + TIME_OUT_US, end)
+            now_us = rig.now_us
+            end.send(now_us, request)
+            rig.run_to(now_us + TIME_OUT_US, end)
             assert end.poll(rig.now_us)
 
     rates("tickrig: expedited uploads over rig and wire", CALLS // 4, "/s", work)

@@ -239,6 +239,7 @@ class Axis(Part):
         settings: the present configuration.
         zero: counts of the encoder at position 0 of the user.
         homed: whether a homing has set it.
+        standstill: velocity up to which the motor counts as standing, in counts per second.
     """
 
     def __init__(self, motor: Motor, settings: Settings) -> None:
@@ -246,6 +247,7 @@ class Axis(Part):
         self.settings = settings
         self.reference, self.control = Reference(), Control.POSITION
         self.zero, self.homed = 0.0, False
+        self.standstill = _STANDSTILL_TURNS_S * motor.counts_per_turn
 
     @property
     def position(self) -> int:
@@ -280,11 +282,6 @@ class Axis(Part):
         unit = self.settings.units.per_position
         first, last = sorted((self.zero + (low + 1) * unit, self.zero + (high - 1) * unit))
         return first, last
-
-    @property
-    def standstill(self) -> float:
-        """Velocity up to which the motor counts as standing, in counts per second."""
-        return _STANDSTILL_TURNS_S * self.motor.counts_per_turn
 
     def is_fast(self, velocity: float) -> bool:
         """Return whether a velocity in counts per second is more than standstill."""

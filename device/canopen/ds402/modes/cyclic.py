@@ -78,11 +78,15 @@ class CyclicPosition(LatchedSetPoint):
     A SYNC begins a line, and so does another target without SYNC. At the end of the line it stops.
 
     Not emulated: extrapolation when SYNC is late; the torque offset.
+
+    Attributes:
+        rests: a line that goes nowhere counts as one that has ended.
     """
 
     shows_following_error = True
     index = indices.TARGET_POSITION
     offset = indices.POSITION_OFFSET
+    rests: ClassVar[bool] = True
 
     def __init__(self, drive: DriveView) -> None:
         super().__init__(drive)
@@ -98,7 +102,10 @@ class CyclicPosition(LatchedSetPoint):
             return True
         self._step()
         self._left -= 1
-        return False
+        if not self.rests or self.limited or self._ahead or self.reference.velocity:
+            return False
+        self._left = 0  # it goes nowhere, and the drive may rest: 8 % of a swing
+        return True
 
     def ahead(self) -> Line | None:
         """Return the rest of the line."""
@@ -138,6 +145,7 @@ class InterpolatedPosition(CyclicPosition):
 
     halts = True
     shows_following_error = False
+    rests = False
     index = indices.INTERPOLATION_DATA
     sub = 1
     offset = 0

@@ -276,6 +276,21 @@ def test_a_line_is_ahead_with_the_limit_that_cuts_it(wheel: Wheel) -> None:
     assert (ahead.goal - ahead.position) / (ahead.left / 1_000) > ahead.most == 25_000 * RPM
 
 
+def test_a_line_that_goes_nowhere_lets_the_drive_rest(wheel: Wheel) -> None:
+    wheel.step("000#0101")
+    wheel.write(0x60C2, 200, 1)
+    wheel.enable(8)
+    wheel.write(0x607A, 200)
+    for _ in range(2):
+        wheel.step("080#")
+        wheel.run(250)
+    wheel.step("080#")
+    wheel.run(20)
+    assert wheel.read(0x6064) == pytest.approx(200, abs=1)
+    assert wheel.drive.axis.motor.resting
+    assert wheel.drive.asked_us > wheel.now_us + 100_000
+
+
 @pytest.mark.parametrize("mode", [1, 7])
 def test_other_modes_are_known_step_by_step_alone(wheel: Wheel, mode: int) -> None:
     wheel.enable(mode)
