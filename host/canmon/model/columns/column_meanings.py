@@ -134,11 +134,19 @@ class ColumnMeanings:
     ) -> int:
         """Decode frames until what a CAN-ID means changes; return the row behind that."""
         ident = frames.ident[begin:]
-        groups = [
-            (rows + begin, bus.lasting(number & STANDARD_MAX))
-            for number, rows in _groups(ident & np.uint32(STANDARD_MAX))
-        ]
-        each = [rows for rows, route in groups if route is None or len(rows) < _FEW]
+        groups, each = list[tuple[Ints, Route]](), list[Ints]()
+        for number, found in _groups(ident & np.uint32(STANDARD_MAX)):
+            rows, can_id = found + begin, number & STANDARD_MAX
+            route = None if len(rows) < _FEW else bus.lasting(can_id)
+            if route is None and len(rows) >= _FEW and (beats := bus.heartbeat(can_id)):
+                boots = frames.payload[rows] == 0
+                if not (frames.ident[rows] & np.uint32(REMOTE)).any() and not boots.all():
+                    each.append(rows[boots])
+                    rows, route = rows[~boots], beats
+            if route is None:
+                each.append(rows)
+            else:
+                groups.append((rows, route))
         order = np.sort(np.concatenate(each)) if each else np.empty(0, np.int64)
         end = len(frames)
         for first in range(0, len(order), _SETTLED):
@@ -152,10 +160,9 @@ class ColumnMeanings:
             if end < len(frames):
                 break
         for found, route in groups:
-            if route is not None and len(found) >= _FEW:
-                rows = found[: np.searchsorted(found, end)]
-                if len(rows):
-                    self._settled(route, select(frames, rows), places[rows], texts)
+            rows = found[: np.searchsorted(found, end)]
+            if len(rows):
+                self._settled(route, select(frames, rows), places[rows], texts)
         return end
 
     def _settled(self, route: Route, frames: Columns, places: Ints, texts: cells.Texts) -> None:

@@ -45,7 +45,8 @@ class DbcFile:
             database = load_string(text, "dbc", strict=False)
         except (Error, ValueError, KeyError) as error:
             raise DbcError(f"{path} is no DBC: {' '.join(str(error).split())}") from error
-        self._failures = (Error, ValueError, KeyError)
+        # of a float that is infinite it looks up the name of a whole number: OverflowError
+        self._failures = (Error, ArithmeticError, ValueError, KeyError)
         self._alone: dict[tuple[int, bool], dict[str, Message]] = {}
         assert isinstance(database, Database)  # as the format says
         self._messages: dict[tuple[int, bool], Message] = {

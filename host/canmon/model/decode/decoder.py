@@ -189,6 +189,17 @@ class BusDecoder:
         alone = by_frame or (can_id in _LSS_IDS and told is _lss_route())
         return route if alone or isinstance(getattr(route, "__self__", None), PdoDecoder) else None
 
+    def heartbeat(self, can_id: int) -> Route | None:
+        """Return what decodes heartbeats of a node that nobody guards, None for other CAN-IDs.
+
+        It holds until a remote frame comes. A boot-up changes more: it goes through `take`.
+        """
+        route = self._routes.get(can_id) or self._route(can_id)
+        if not isinstance(route, partial) or route.func != self._error_control:
+            return None
+        node = int(route.args[0])
+        return None if node in self._guarded else partial(_unguarded, node)
+
     def pending(self, now_us: int) -> tuple[Transfer, ...]:
         """Return the SDO transfers that run."""
         found = (channel.pending(now_us) for channel in self._channels.values())
@@ -373,6 +384,10 @@ def _lss_route() -> Route:
     from tickrig.host.canmon.model.decode.services import decode_lss  # noqa: PLC0415 - on few buses
 
     return decode_lss
+
+
+def _unguarded(node: int, at_us: int, frame: CanFrame) -> Decoded:
+    return services.decode_error_control(node, frame, guarded=False)
 
 
 def _emcy(node: int, at_us: int, frame: CanFrame) -> Decoded:
