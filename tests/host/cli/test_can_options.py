@@ -11,7 +11,7 @@ from click.testing import CliRunner
 
 from tickrig.emulators.testing.commands.canopen_run import open_bus
 from tickrig.host.cli.can_options import GREEDY, BusCommand, BusOptions, bus_options, open_raw
-from tickrig.host.cli.messages import Refused
+from tickrig.host.cli.messages import Refused, SourceFailed
 
 
 @pytest.fixture(autouse=True)
@@ -30,6 +30,13 @@ def opened(**options: Any) -> tuple[str, str]:
 
 def refused(**options: Any) -> str:
     with ExitStack() as stack, pytest.raises(Refused) as caught:
+        open_bus(BusOptions(**options), stack)
+    return caught.value.message
+
+
+def failed(**options: Any) -> str:
+    """Return the message of a bus that cannot be opened: exit status 3."""
+    with ExitStack() as stack, pytest.raises(SourceFailed) as caught:
         open_bus(BusOptions(**options), stack)
     return caught.value.message
 
@@ -61,7 +68,7 @@ def test_the_driver_gets_what_is_meant_for_it(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr("can.Bus", take)
     timing = ("f_clock=8000000", "brp=1", "tseg1=5", "tseg2=2", "sjw=1")
     words = ("app-name=x", "port=0x10", "rate=1.5")
-    said = refused(
+    said = failed(
         interface="virtual", channel="c", bitrate=500_000, timing=timing, bus_kwargs=words
     )
     assert said == "CAN bus virtual c: no adapter"
@@ -120,12 +127,23 @@ def test_a_tool_that_plays_no_scenario_names_none() -> None:
         ({"bus_kwargs": ("a",)}, "--bus-kwargs 'a' is not KEY=VALUE"),
         ({"timing": ("brp=x",)}, "--timing 'brp=x' is not KEY=VALUE"),
         ({"timing": ("brp=1",)}, "--timing: "),
+    ],
+)
+def test_options_that_are_none_are_one_line(options: dict[str, Any], error: str) -> None:
+    said = refused(**options)
+    assert said.startswith(error)
+    assert "\n" not in said
+
+
+@pytest.mark.parametrize(
+    ("options", "error"),
+    [
         ({"interface": "slcan", "channel": "/nowhere"}, "CAN bus slcan /nowhere: [Errno 2] could"),
         ({"interface": "kvaser", "channel": "x"}, "CAN bus kvaser x: "),
     ],
 )
 def test_what_cannot_be_opened_is_one_line(options: dict[str, Any], error: str) -> None:
-    said = refused(**options)
+    said = failed(**options)
     assert said.startswith(error)
     assert "\n" not in said
 
@@ -144,7 +162,7 @@ def test_what_linux_lacks_is_explained(
         raise OSError(number, "because")
 
     monkeypatch.setattr("can.Bus", fail)
-    assert refused(interface="socketcan", channel="can0").endswith(hint)
+    assert failed(interface="socketcan", channel="can0").endswith(hint)
 
 
 def test_what_python_can_lacks_is_explained(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -152,7 +170,7 @@ def test_what_python_can_lacks_is_explained(monkeypatch: pytest.MonkeyPatch) -> 
         raise can.CanInterfaceNotImplementedError("msgpack not installed")
 
     monkeypatch.setattr("can.Bus", fail)
-    said = refused(interface="udp_multicast", channel="239.74.163.2")
+    said = failed(interface="udp_multicast", channel="239.74.163.2")
     assert said.endswith("(pip install 'python-can[multicast]')")
 
 

@@ -157,7 +157,6 @@ def test_odometry_conf_is_used(tmp_path: Path) -> None:
         (["goto", "1", "0", "0", "--tread-m", "-1"], "--tread-m -1.0 is not above 0"),
         (["goto", "1", "0", "0", "--plot", "t.jpg"], "--plot t.jpg: the name ends in .png,"),
         (["goto", "1", "0", "0", "--plot", "/nowhere/t.svg"], "no directory /nowhere"),
-        (["goto", "1", "0", "0", "--device", "/dev/nothing"], "cannot open '/dev/nothing'"),
         (["goto", "1", "0", "0", "--device", "x", "--pace", "1"], "--pace is for the emulated"),
         (["goto", "1", "0", "0", "--odometry-conf", "none"], "odometry-conf none: No such file"),
         (["path", "none.txt"], "path none.txt: No such file"),
@@ -167,6 +166,13 @@ def test_a_mistake_is_one_line(words: list[str], told: str) -> None:
     result = run(*words)
     assert result.exit_code == 2
     assert told in result.stderr
+    assert result.stderr.count("\n") == 1
+
+
+def test_a_port_that_cannot_be_opened_is_one_line() -> None:
+    result = run("goto", "1", "0", "0", "--device", "/dev/nothing")
+    assert result.exit_code == 3
+    assert result.stderr.startswith("Error: cannot open '/dev/nothing'")
     assert result.stderr.count("\n") == 1
 
 
