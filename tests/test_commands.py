@@ -620,6 +620,54 @@ def test_the_table_of_exit_statuses_is_what_is_held() -> None:
     assert statuses == {status for status, _ in ENDS} | {4, 130}
 
 
+# A misspelt name is guessed, of whatever it is the name.
+
+MISSPELT = {
+    "command": ("canmon dmp a.log", "Did you mean 'dump'?"),
+    "verb": ("canmon net rig.toml scn", "Did you mean 'scan'?"),
+    "demo": ("tickrig demo fig12", "Did you mean 'fig120'?"),
+    "option": ("tickrig rtc ls --att x", "Did you mean '--at'?"),
+    "word of an option": ("canmon eds fix good.eds --encoding asci", "Did you mean 'ascii'?"),
+    "NMT command": ("canmon net rig.toml nmt strt 5", "Did you mean 'start'?"),
+    "model": ("canopen-slave-emu --model epso --node-id 5", "Did you mean 'epos'?"),
+    "device": ("tickrig emu rcc", "did you mean 'rrc'?"),
+    "type of a recorded device": ("tickrig record /x -o y --type rcc", "did you mean 'rrc'?"),
+    "interface of a bus": ("canmon dump -i virtul", "did you mean 'virtual'?"),
+    "bus of a SOURCE": ("canmon dump slcn:x", "did you mean 'slcan'?"),
+    "object": ("canmon net rig.toml read 5 device_typ", "did you mean 'device_type'?"),
+    "rule as an option": ("canmon check a.log --no-emyc", "'--no-emcy'"),
+    "rule by name": ("canmon check a.log --rule no-emyc", "did you mean --no-emcy?"),
+    "key of rules": ("canmon check a.log rules.toml", "did you mean 'no_emcy'?"),
+    "key of learnt rules": ("canmon check a.log learnt.toml", "did you mean 'others'?"),
+    "word of a filter": ("canmon dump a.log -F nod=5", "did you mean 'node'?"),
+    "kind in a filter": ("canmon dump a.log -F hartbeat", "did you mean 'heartbeat'?"),
+    "type in a rig file": ("tickrig run type.toml", "did you mean 'epos'?"),
+    "key of a rig file": ("tickrig run key.toml", "did you mean 'node_id'?"),
+    "table of a rig file": ("tickrig run table.toml", "did you mean 'device'?"),
+    "fault": ("tickrig run rig.toml --for 1ms --fault node/corupt", "did you mean 'node/corrupt'?"),
+}
+"""A line for each kind of name that a user can misspell, and what the message ends with."""
+
+MISSPELT_FILES = {
+    "rules.toml": "no_emyc = true\n",
+    "learnt.toml": "[learnt.can0]\nothrs = true\n",
+    "type.toml": '[device.drive]\ntype = "epso"\nnode_id = 5\n',
+    "key.toml": '[device.drive]\ntype = "epos"\nnode_idd = 5\n',
+    "table.toml": '[devices.drive]\ntype = "epos"\nnode_id = 5\n',
+}
+
+
+@pytest.mark.usefixtures("some_files")
+@pytest.mark.parametrize("kind", MISSPELT)
+def test_a_misspelt_name_is_guessed(kind: str) -> None:
+    for name, text in MISSPELT_FILES.items():
+        Path(name).write_text(text, "utf-8")
+    line, meant = MISSPELT[kind]
+    status, said = ended(line)
+    assert status in (1, 2)
+    assert meant in said
+
+
 def test_the_package_is_the_command() -> None:
     words = [sys.executable, "-m", "tickrig", "--version"]
     assert subprocess.check_output(words, text=True) == f"tickrig (tickrig) {__version__}\n"

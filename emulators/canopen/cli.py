@@ -10,7 +10,7 @@ import click
 from tickrig.emulators.canopen.choices import AUTO, MODEL_FAULTS, MODELS, NODE_FAULTS, PROFILES
 from tickrig.emulators.commands.run_options import run_options
 from tickrig.host.cli.can_options import BusCommand, bus_options
-from tickrig.host.cli.options import PATH, refuse_idle
+from tickrig.host.cli.options import PATH, Choice, refuse_idle
 from tickrig.host.cli.start import load
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ def _device_faults(context: click.Context) -> tuple[str, ...]:
 @click.option("--dcf", type=PATH, help="DCF of the node; it may contain the node-ID.")
 @click.option(
     "--model",
-    type=click.Choice(MODELS),
+    type=Choice(MODELS),
     metavar="NAME",
     help=f"Model, which needs no file: {', '.join(MODELS)}.",
 )
@@ -65,7 +65,7 @@ def _device_faults(context: click.Context) -> tuple[str, ...]:
 @click.option("--urdf", type=PATH, help="Robot with the joints of --bus, expanded by xacro.")
 @click.option(
     "--profile",
-    type=click.Choice(PROFILES),
+    type=Choice(PROFILES),
     default=AUTO,
     help="CiA profile of nodes of an EDS or DCF; auto uses the one of the device type. [auto]",
 )

@@ -11,6 +11,7 @@ import click
 from tickrig.emulators.fields import DeviceField
 from tickrig.host.cli.options import (
     PATH,
+    Choice,
     Decorator,
     HarmlessCommand,
     NumberRange,
@@ -40,7 +41,7 @@ def _field_option(field: DeviceField) -> Decorator:
     if field.kind is bool:
         return click.option(f"--{field.word}", field.name, is_flag=True, **given)
     if field.choices:
-        given["type"] = click.Choice(field.choices)
+        given["type"] = Choice(field.choices)
     elif ranged:
         range_type: Any = click.IntRange if field.kind is int else NumberRange
         given["type"] = range_type(field.low, field.high)

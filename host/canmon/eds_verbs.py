@@ -18,7 +18,7 @@ from tickrig.host.canopen.data_sheet.fix import fix
 from tickrig.host.canopen.data_sheet.rule import RULES, EditPlace, RuleFinding
 from tickrig.host.canopen.data_sheet.show import diff, entries, head, pdos, table
 from tickrig.host.cli.messages import Refused, refuse_path, refusing, say, until_unread
-from tickrig.host.cli.options import PATH
+from tickrig.host.cli.options import PATH, Choice
 from tickrig.host.text.page_text import json_text
 from tickrig.host.text.values import counted
 from tickrig.host.text.whole_file import check_file, check_not_read, write_whole
@@ -150,7 +150,7 @@ _LEFT: Final = 1
 @click.option("--dry-run", is_flag=True, help="Show the changes; write nothing.")
 @click.option(
     "--encoding",
-    type=click.Choice(("utf-8", "ascii")),
+    type=Choice(("utf-8", "ascii")),
     default="utf-8",
     help="Encoding of OUT if FILE is not ASCII; ascii writes ö as oe. [utf-8]",
 )

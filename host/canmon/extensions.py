@@ -7,8 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from tickrig.host.canmon.model.check.rule import Rule
+from tickrig.host.canmon.model.check.rules import SWITCHES
 from tickrig.host.cli.extensions import ExtensionError, ExtensionGroup
 from tickrig.host.cli.messages import Refused, say
+from tickrig.host.text.names import closest
 from tickrig.host.text.user_file import explain_error
 
 if TYPE_CHECKING:
@@ -65,7 +67,10 @@ def load_rule(name: str) -> Callable[[], Rule]:
     try:
         found = _DECODERS.load(name)
     except ExtensionError as error:
-        hint = "" if name in _DECODERS.names() else "; without a package it is as 'emcy never'"
+        switches = [f"--{rule.replace('_', '-')}" for rule in SWITCHES]
+        hint = "".join(f"; did you mean {one}?" for one in closest(f"--{name}", switches))
+        hint = hint or "; without a package it is as 'emcy never'"
+        hint *= name not in _DECODERS.names()
         raise ExtensionError(f"{error}{hint}") from None
     if not _is_class_with(found, _RULE):
         raise ExtensionError(f"{name!r} is a decoder, no rule")

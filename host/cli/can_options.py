@@ -254,7 +254,11 @@ def _let_go(error: Exception) -> None:
 def check_interface(interface: str | None) -> None:
     """Refuse an interface that python-can does not have."""
     if interface is not None and interface not in (names := _interfaces()):
-        raise Refused(f"-i {interface!r} is not an interface of python-can: {', '.join(names)}")
+        from tickrig.host.text.names import closest  # noqa: PLC0415 - only for mistakes
+
+        meant = "".join(f"; did you mean {word!r}?" for word in closest(interface, names))
+        known = ", ".join(names)
+        raise Refused(f"-i {interface!r} is not an interface of python-can: {known}{meant}")
 
 
 def _given(options: BusOptions) -> Mapping[str, Any]:

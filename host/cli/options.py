@@ -75,6 +75,21 @@ def refuse_idle(why: str, *names: str) -> None:
             raise Refused(f"{max(parameter.opts, key=len)} does nothing here: {why}")
 
 
+class Choice(click.Choice):  # type: ignore[type-arg] # click 8.1 has no type there
+    """One of some words; the message about another word names the nearest."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Read a word."""
+        try:
+            return super().convert(value, param, ctx)
+        except click.BadParameter as error:
+            from tickrig.host.text.names import closest  # noqa: PLC0415 - only for mistakes
+
+            meant = closest(str(value), map(str, self.choices))
+            hint = "".join(f" Did you mean {word!r}?" for word in meant)
+            raise click.BadParameter(f"{error.message}{hint}", ctx, param) from None
+
+
 class NumberRange(click.FloatRange):
     """Numbers of a range; NaN is refused."""
 

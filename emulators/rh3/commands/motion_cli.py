@@ -12,6 +12,7 @@ from tickrig.emulators.rh3.fields import PARAMETERS
 from tickrig.host.cli.engine_options import openrtm_options, ros2_options
 from tickrig.host.cli.options import (
     PATH,
+    Choice,
     Decorator,
     LazyGroup,
     NumberRange,
@@ -29,7 +30,7 @@ _SHARED: Final[Decorator] = add_options(
     click.option(
         "--set",
         "set_id",
-        type=click.Choice(["default", "tuned"]),
+        type=Choice(["default", "tuned"]),
         default="default",
         show_default=True,
         help="Configuration set: the specification's, or the more precise one.",

@@ -45,7 +45,7 @@ from tickrig.host.canopen.master.assignment import ObjectWrite, SlaveAssignment
 from tickrig.host.canopen.master.boot_slave import BootStatus
 from tickrig.host.canopen.master.from_bus_file import plan_of
 from tickrig.host.cli.messages import Refused, refuse_path, refusing, say, until_unread
-from tickrig.host.cli.options import NODE_ID, PATH, time_option
+from tickrig.host.cli.options import NODE_ID, PATH, Choice, time_option
 from tickrig.host.text.page_text import json_text, one_line
 from tickrig.host.text.values import counted, format_time
 from tickrig.host.text.whole_file import write_whole
@@ -317,7 +317,7 @@ _PERIODS: Final = 3
 
 
 @click.command()
-@click.argument("word", type=click.Choice(list(NMT_WORDS)), metavar="COMMAND")
+@click.argument("word", type=Choice(list(NMT_WORDS)), metavar="COMMAND")
 @click.argument("node", metavar="NODE|all")
 @dry_run_option
 @click.option("--yes", is_flag=True, help="Do not ask.")

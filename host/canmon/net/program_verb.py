@@ -28,7 +28,7 @@ from tickrig.host.canopen.commissioning.program import (
     ProgramStatus,
 )
 from tickrig.host.cli.messages import Refused, refusing, say
-from tickrig.host.cli.options import NODE_ID, PATH
+from tickrig.host.cli.options import NODE_ID, PATH, Choice
 from tickrig.host.cli.start import paint
 
 # A progress line on a terminal; none in a pipe.
@@ -96,7 +96,7 @@ _HALF: Final = (
 @click.argument("node", type=NODE_ID)
 @click.argument("file", type=PATH, required=False)
 @click.option("--number", type=click.IntRange(1, 254), default=1, metavar="N", help="Program.  [1]")
-@click.option("--control", type=click.Choice(list(COMMANDS)), help="Only command its program.")
+@click.option("--control", type=Choice(list(COMMANDS)), help="Only command its program.")
 @click.option("--expect", metavar="ID", help="1F56h of FILE, in hex; skip if the node has it.")
 @click.option("--no-start", is_flag=True, help="Leave the program stopped.")
 @click.option("--tries", type=click.IntRange(1, 99), default=3, metavar="N", help="Transfers.  [3]")

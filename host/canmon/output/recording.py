@@ -27,7 +27,7 @@ from tickrig.host.canmon.output.listening import Stopwatch
 from tickrig.host.canmon.output.printer import DecodedFrame
 from tickrig.host.canmon.sources.source import FileSpec, parse_source
 from tickrig.host.cli.messages import Refused, SourceFailed, refusing
-from tickrig.host.cli.options import PATH, Decorator, add_options
+from tickrig.host.cli.options import PATH, Choice, Decorator, add_options
 from tickrig.host.text.values import counted
 from tickrig.host.text.whole_file import replacing
 
@@ -199,7 +199,7 @@ recording_options: Final[Decorator] = add_options(
     click.option("--disk", metavar="SIZE", help="With -l: all its files together, as 2G."),
     click.option(
         "--at-limit",
-        type=click.Choice([limit.value for limit in AtLimit]),
+        type=Choice([limit.value for limit in AtLimit]),
         help="What happens there: the oldest file goes (default), or the recording ends.",
     ),
     click.option(

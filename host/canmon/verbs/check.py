@@ -45,7 +45,7 @@ from tickrig.host.canmon.sources.source import (
 from tickrig.host.canmon.verbs import decode_options
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.messages import Refused, refuse_path, refusing, until_unread
-from tickrig.host.cli.options import PATH, Decorator, add_options, refuse_idle
+from tickrig.host.cli.options import PATH, Choice, Decorator, add_options, refuse_idle
 from tickrig.host.text.page_text import json_text, one_line
 from tickrig.host.text.toml_reader import read_toml
 from tickrig.host.text.values import counted
@@ -312,7 +312,7 @@ _MOST_AROUND: Final = 1_000
     click.option(
         "-t",
         "stamp",
-        type=click.Choice([Stamp.ABSOLUTE.value, Stamp.ZERO.value, Stamp.DATE.value]),
+        type=Choice([Stamp.ABSOLUTE.value, Stamp.ZERO.value, Stamp.DATE.value]),
         help="Time: (a)bsolute, (z)ero at the first frame, (A)bsolute with date.",
     ),
     decode_options.reopen_option,

@@ -49,7 +49,7 @@ from tickrig.host.canmon.sources.source import (
 from tickrig.host.canmon.verbs import decode_options
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.messages import Refused, until_unread
-from tickrig.host.cli.options import PATH, add_options, refuse_idle
+from tickrig.host.cli.options import PATH, Choice, add_options, refuse_idle
 from tickrig.host.cli.start import INTERRUPTED
 from tickrig.host.links.ready import ready
 
@@ -123,7 +123,7 @@ _shown: Final = add_options(
     click.option(
         "-t",
         "stamp",
-        type=click.Choice([stamp.value for stamp in Stamp if stamp]),
+        type=Choice([stamp.value for stamp in Stamp if stamp]),
         help="Time: (a)bsolute, (d)elta, (z)ero at the first, (A)bsolute with date.",
     ),
     click.option("-x", "extra", is_flag=True, help="Show RX or TX."),

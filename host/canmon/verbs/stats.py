@@ -26,6 +26,7 @@ from tickrig.host.canmon.sources.source import BlockLog, LogCut, Source, block_l
 from tickrig.host.canmon.verbs.decode_options import cut_options, source_command
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.messages import until_unread
+from tickrig.host.cli.options import Choice
 from tickrig.host.text.page_text import json_text
 from tickrig.wire.can import EXTENDED_MAX
 
@@ -204,7 +205,7 @@ def _line(what: str, **members: object) -> str:
 
 @source_command(
     click.option(
-        "--by", type=click.Choice(["id", "node"]), default="id", help="A row each (default: id)."
+        "--by", type=Choice(["id", "node"]), default="id", help="A row each (default: id)."
     ),
     listening.span_option,
     cut_options,

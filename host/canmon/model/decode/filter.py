@@ -371,7 +371,12 @@ class MissingSignals:
 
     def messages(self) -> list[str]:
         """Report what never came, one line each."""
-        signals = [f"the filter asks for {path!r}: no such signal came" for path in self._left]
+        known = (*_FIELDS, *_WORDS, *KINDS)
+        signals = [
+            f"the filter asks for {path!r}: no such signal came"
+            + "".join(f"; did you mean {word!r}?" for word in closest(path, known))
+            for path in self._left
+        ]
         return signals + [
             f"the filter asks for {name}={word}: no such frame came;"
             f" there are {', '.join(KNOWN_WORDS[name])}"

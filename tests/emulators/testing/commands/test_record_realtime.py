@@ -156,7 +156,7 @@ JITTER = ("--tolerance", "200ms")  # a busy machine is no difference
     [
         (RrcConfig(), 0, "\nsame: "),
         (RrcConfig(power_on_ticks=130), 1, "ms earlier\n  recorded < EV:PowerOnSuccess "),
-        (RrcConfig(version="Version 1.1"), 1, "something else\n  recorded < Version 1.1 "),
+        (RrcConfig(version="Version 1.1"), 1, "differently\n  recorded < Version 1.1 "),
     ],
 )
 def test_what_was_recorded_of_a_pty_is_compared(
