@@ -394,6 +394,7 @@ class MonitorApp(FramedApp):
 
     Attributes:
         reopens: whether buses that go away are opened again.
+        asks: whether it begins with the settings, as no source is named.
     """
 
     TITLE = "canmon"
@@ -425,7 +426,7 @@ class MonitorApp(FramedApp):
     ) -> None:
         super().__init__()
         self.recorder = recorder or RecorderTask(session)
-        self.reopens = False
+        self.reopens = self.asks = False
         self._moving, self._section = False, panels[0].section
         self.animation_level = "none"  # each picture goes over a line that may be slow
         self.session, self.panels = session, tuple(panels)
@@ -446,6 +447,8 @@ class MonitorApp(FramedApp):
         """Begin to paint."""
         self.set_interval(_PAINT_S, self.refresh_view)
         self.set_interval(_SAVE_S, self.save)
+        if self.asks:
+            self.call_after_refresh(self.action_settings)
         if unknown := self.panel_settings.unknown():
             self.notify(f"not known here, and kept: {', '.join(unknown)}", severity="warning")
 

@@ -387,6 +387,13 @@ def open_session(words: Sequence[str], options: BusOptions, model: Model) -> Ses
     return session
 
 
+def empty_session(model: Model) -> Session:
+    """Return a session that reads nothing, until settings name a source."""
+    source = AnySource[AnyRecord]()
+    source.close()
+    return Session(source, model)
+
+
 def _send(bus: OpenBus, frame: CanFrame | FdFrame) -> None:
     """Send on a bus as it was opened last."""
     bus_source.send_on(bus.bus, bus.name, frame)

@@ -48,6 +48,7 @@ def command(  # noqa: PLR0913 - options
 ) -> None:
     """Show all there is in tabs: trace, nodes, statistics and more (extra tickrig[tui]).
 
+    Without a SOURCE the settings (F2) ask for one.
     It listens only, until it is armed (A). With -w all settings are recalled
     from a TOML file and kept there, buses and EDS files with them; what the
     command line says goes before.
@@ -57,6 +58,7 @@ def command(  # noqa: PLR0913 - options
     canmon tui can0 --eds 3=drive.eds -w bench.toml
     canmon tui -w bench.toml
     canmon tui run.log
+    canmon tui
     ssh robot canmon dump can0 --jsonl | canmon tui -
 
     Keys: 1 to 9 tabs, F1 help, F2 settings, F3 times, ctrl+p commands, A arm,
@@ -71,7 +73,7 @@ def command(  # noqa: PLR0913 - options
         dbc=tuple(dbc),
         eds_dir=eds.folders,
     )
-    monitor = _monitor(path, said)
+    monitor = _monitor(path, said, asks=sys.stdout.isatty())
     if not sys.stdout.isatty():
         monitor.session.source.close()
         raise Refused("canmon tui needs a terminal; canmon top prints a table without one")
@@ -85,8 +87,14 @@ def command(  # noqa: PLR0913 - options
     report(monitor.session.source, strict)
 
 
-def _monitor(path: Path | None, said: MonitorSetup) -> app.MonitorApp:
-    """Make the program, its panels with the settings of the workspace."""
+def _monitor(path: Path | None, said: MonitorSetup, *, asks: bool) -> app.MonitorApp:
+    """Make the program, its panels with the settings of the workspace.
+
+    Args:
+        path: of the workspace.
+        said: what the command line says.
+        asks: without a source the screen of settings is shown, which takes one.
+    """
     try:
         with loading():
             make_app, make_panels = app.MonitorApp, panel.make_panels
@@ -98,7 +106,11 @@ def _monitor(path: Path | None, said: MonitorSetup) -> app.MonitorApp:
         objects = eds_document.read_eds_paths(setup.eds, setup.eds_dir)
         with decode_options.refusing_dbc():
             model = sessions.Model(objects, setup.dbc, *bit_rates_of(setup.source, setup.options))
-        session = sessions.open_session(setup.source, setup.options, model)
+        asks = asks and not (setup.source or setup.options)
+        if asks:
+            session = sessions.empty_session(model)
+        else:
+            session = sessions.open_session(setup.source, setup.options, model)
         try:
             panels = make_panels(session, say)
             recorder = app.RecorderTask(session)
@@ -107,4 +119,6 @@ def _monitor(path: Path | None, said: MonitorSetup) -> app.MonitorApp:
         except BaseException:
             session.source.close()
             raise
-    return make_app(session, panels, panel_settings, recorder)
+    monitor = make_app(session, panels, panel_settings, recorder)
+    monitor.asks = asks
+    return monitor

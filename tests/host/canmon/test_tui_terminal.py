@@ -187,3 +187,10 @@ def test_settings_change_a_bus_for_a_log_and_the_workspace_keeps_it(
     by_key(terminal)
     assert terminal.end() == 0
     assert 'source = ["run.log"]' in kept.read_text("utf-8")
+
+
+def test_settings_that_ask_for_a_source_are_left_without_one() -> None:
+    terminal = Terminal("tui")
+    terminal.wait_for("bus or file")
+    terminal.child.send("\x11")  # Ctrl-Q
+    assert terminal.end() == 0

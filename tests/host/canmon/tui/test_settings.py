@@ -15,7 +15,7 @@ from tickrig.host.canmon.tui.app import MonitorApp
 from tickrig.host.canmon.tui.panels.alarms_panel import AlarmsPanel
 from tickrig.host.canmon.tui.panels.panel import TABS, Panel
 from tickrig.host.canmon.tui.panels.trace_panel import TracePanel
-from tickrig.host.canmon.tui.session import Session
+from tickrig.host.canmon.tui.session import Model, Session, empty_session
 from tickrig.host.canmon.tui.settings import EMPTY, InputError, parse_settings, setting_texts
 from tickrig.host.canmon.workspace import MonitorSetup, PanelSettings, Workspace
 from tickrig.host.cli.can_options import BusOptions
@@ -100,6 +100,25 @@ def hear(session: Session, wire: Wire, *frames: str) -> None:
         if session.model.frames == count:
             return
     raise AssertionError(session.model.frames)
+
+
+def test_without_a_source_the_settings_ask_for_one(folder: Path) -> None:
+    (folder / "run.log").write_text("(1.0) can0 181#A5\n", "ascii")
+
+    async def act(form: Form) -> None:
+        assert not form.shown
+        form.monitor.asks = True
+        form.monitor.on_mount()  # as it begins
+        await until(form.pilot, lambda: form.shown)
+        await form.apply(source="run.log")
+        assert not form.shown
+        while not form.monitor.session.model.ended:
+            form.monitor.session.step()
+        form.monitor.refresh_view()
+        await form.pilot.pause()
+        assert "[1] A5" in screen_text(form.monitor)
+
+    on_form(empty_session(Model()), MonitorSetup(), act)
 
 
 def test_another_bus_is_opened_and_the_settings_of_the_tabs_stay(wire: Wire) -> None:
