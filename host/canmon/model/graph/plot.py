@@ -25,7 +25,7 @@ from pathlib import Path
 from typing import Final, NamedTuple, assert_never
 
 from tickrig.host.canmon.model.decode.decoded import Decoded
-from tickrig.host.canmon.model.frames import Record
+from tickrig.host.canmon.model.frames import Record, Stamp, date_text, seconds_text
 from tickrig.host.canmon.model.graph.series import LEAST_US, Collector, CurveSpec, Series, View
 from tickrig.host.text.page_text import one_line
 
@@ -686,15 +686,33 @@ def _labels(drawn: Chart, number: int, rows: int) -> dict[int, str]:
 
 
 def _time_axis(view: View, inner: int) -> list[str]:
-    low, high = (view.seconds(at_us) for at_us in (view.from_us, view.to_us))
+    dated = view.stamp in (Stamp.ABSOLUTE, Stamp.DATE)
+    # whole minutes, so that dates have round seconds
+    base_us = view.from_us - view.from_us % 60_000_000 if dated else view.origin_us
+    low, high = ((at_us - base_us) / 1e6 for at_us in (view.from_us, view.to_us))
     rule, text = ["─"] * inner, ""
-    for second, label in ticks(low, high, max(2, inner // 14)):
-        cell = _cell(view.origin_us + round(second * 1e6), view, inner)
+    for second, number in ticks(low, high, max(2, inner // (22 if dated else 14))):
+        at_us = base_us + round(second * 1e6)
+        cell = _cell(at_us, view, inner)
+        label = _moment(at_us, view.stamp, len(number.partition(".")[2])) if dated else number
         start = LABEL_WIDTH + 1 + cell - len(label) // 2
         if len(text) < start and start + len(label) < inner + LABEL_WIDTH:
             rule[cell] = "┬"
             text = text.ljust(start) + label
-    return [" " * LABEL_WIDTH + "└" + "".join(rule), text + " s"]
+    unit = date_text(view.from_us)[:10] if view.stamp is Stamp.DATE else "s"
+    return [" " * LABEL_WIDTH + "└" + "".join(rule), f"{text} {unit}"]
+
+
+def _moment(at_us: int, stamp: Stamp, digits: int) -> str:
+    """Write seconds of the epoch, or the time of day.
+
+    >>> _moment(1_700_000_000_250_000, Stamp.ABSOLUTE, 2)
+    '1700000000.25'
+    """
+    whole, _, fraction = (
+        seconds_text(at_us, 1) if stamp is Stamp.ABSOLUTE else date_text(at_us)[11:]
+    ).partition(".")
+    return f"{whole}.{fraction[:digits]}" if digits else whole
 
 
 def _cell(at_us: int, view: View, inner: int) -> int:
@@ -735,6 +753,8 @@ class LiveGraph:
         cursor_us: time of the cursor, None for none.
         axis: the vertical axis that is zoomed and moved.
         now_us: the latest time of the frames.
+        first_us: time of the first frame, None to count from the first sample.
+        stamp: notation of times.
     """
 
     def __init__(self, mode: ViewMode = ViewMode.LIVE) -> None:
@@ -742,6 +762,8 @@ class LiveGraph:
         self.mode, self.window_us, self.axis = mode, _WINDOW_US, 1
         self.cursor_us: int | None = None
         self.now_us = 0
+        self.first_us: int | None = None
+        self.stamp = Stamp.ZERO
         self._collector = Collector((), None)
         self._ranges: dict[int, tuple[float, float]] = {}
         self._held, self._origin_us = View(0, _WINDOW_US), 0
@@ -788,7 +810,11 @@ class LiveGraph:
             case _ as never:
                 assert_never(never)
         return replace(
-            view, ranges=self._ranges, cursor_us=self.cursor_us, origin_us=self._origin_us
+            view,
+            ranges=self._ranges,
+            cursor_us=self.cursor_us,
+            origin_us=self._origin_us if self.first_us is None else self.first_us,
+            stamp=self.stamp,
         )
 
     def render(self, width: int, height: int) -> list[str]:

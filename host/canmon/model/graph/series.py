@@ -32,7 +32,7 @@ from typing import TYPE_CHECKING, Final
 from tickrig.host.canmon.model.decode.decoded import Decoded, Signal
 from tickrig.host.canmon.model.decode.node_memory import BITS, drive_state
 from tickrig.host.canmon.model.decode.services import nmt_state_name
-from tickrig.host.canmon.model.frames import Record
+from tickrig.host.canmon.model.frames import Record, Stamp
 from tickrig.host.canmon.model.traffic import NO_RATES, BitRates
 from tickrig.wire.can import MAX_DATA_BYTES, ErrorFrame, FdFrame, frame_bits
 from tickrig.wire.canopen.emcy import describe
@@ -390,6 +390,7 @@ class View:
         ranges: least and greatest value by axis; other axes fit what is seen.
         cursor_us: a moment that is marked.
         origin_us: the moment that is written as 0.
+        stamp: how times are written: since the origin, as seconds of the epoch, or as dates.
     """
 
     from_us: int
@@ -397,6 +398,7 @@ class View:
     ranges: Mapping[int, tuple[float, float]] = field(default_factory=dict)
     cursor_us: int | None = None
     origin_us: int = 0
+    stamp: Stamp = field(default=Stamp.ZERO, repr=False)
 
     def __post_init__(self) -> None:
         """Raise ValueError unless the span and the ranges are not empty."""

@@ -16,7 +16,7 @@ import click
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
-from tickrig.host.canmon.model.frames import Record
+from tickrig.host.canmon.model.frames import Record, Stamp, stamp_text
 from tickrig.host.canmon.model.graph.plot import LABEL_WIDTH, LiveGraph, ViewMode
 from tickrig.host.canmon.model.graph.series import LEAST_US, CurveSpec, parse_signal
 from tickrig.host.canmon.output.graph_file import check_graph_path, write_graph
@@ -116,6 +116,7 @@ class GraphPanel(panel.Panel):
     def snapshot(self, model: Model) -> None:
         """Draw the picture: it reads the samples."""
         self.graph.now_us = model.now_us
+        self.graph.first_us, self.graph.stamp = self.session.origin_us, self.session.stamp
         width, height = self.query_one(panel.PictureView).size
         if self.graph.words:
             self._lines = [_colour_line(line) for line in self.graph.render(width, height)]
@@ -213,7 +214,9 @@ class GraphPanel(panel.Panel):
         graph = self.graph
         words = [str(graph.mode), f"window {graph.window_us / 1e6:g} s", f"axis {graph.axis}"]
         if graph.cursor_us is not None:
-            words.append(f"cursor at {graph.view().seconds(graph.cursor_us):.6f} s")
+            origin_us = graph.view().origin_us
+            time = stamp_text(graph.stamp, graph.cursor_us, origin_us, origin_us)
+            words.append(f"cursor at {time}{' s' * (graph.stamp is not Stamp.DATE)}")
         return "   ".join(words)
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from tests.host.canmon.tui.panel_pilot import Desk, at_desk, kept
 from tests.host.canmon.tui.rig_session import RigSession
-from tickrig.host.canmon.model.frames import Record
+from tickrig.host.canmon.model.frames import Record, Stamp, date_text
 from tickrig.host.canmon.model.graph.plot import ViewMode
 from tickrig.host.canmon.tui.panels.graph_panel import GraphPanel
 from tickrig.host.canmon.workspace import SettingError
@@ -124,3 +124,19 @@ def test_of_a_log_all_is_seen_at_first() -> None:
     session = RigSession()
     session.source.live = False
     assert GraphPanel(session).graph.mode is ViewMode.ALL
+
+
+def test_the_axis_writes_times_as_the_other_tabs() -> None:
+    async def act(desk: Desk[GraphPanel]) -> None:
+        await desk.press("h", "right")
+        axes = []
+        for stamp in (Stamp.ZERO, Stamp.ABSOLUTE, Stamp.DATE):
+            desk.session.stamp = stamp
+            axes.append((desk.lines()[-1].split(), desk.static("#state").partition("cursor ")[2]))
+        (zero, at_zero), (absolute, at_absolute), (date, at_date) = axes
+        assert (zero[0], zero[-1], at_zero) == ("0", "s", "at 9.690000 s")
+        assert ("10" in absolute, absolute[-1], at_absolute) == (True, "s", "at 10.690000 s")
+        assert (date[0][-6:], date[-1]) == (":00:10", date_text(S)[:10])
+        assert at_date == f"at {date_text(10_690_000)}"
+
+    at_desk(GraphPanel, act, settings={"signals": ["181[0]"]}, session=ramp())
