@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any, Final, NamedTuple, TypeVar
+from typing import Any, Final, NamedTuple
 
 from tickrig.device.canopen.slave import Application, CanopenSlave
 from tickrig.device.physical import InputSignal, SignalType
@@ -14,6 +14,7 @@ from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.emulators.testing.properties.contract import check_period
+from tickrig.emulators.testing.properties.device_bench import shortened
 from tickrig.wire.can import CanFrame
 
 # What a device is told, as a user writes it.
@@ -42,30 +43,6 @@ def check_words(name: str, words: object, on_can: bool) -> None:
         if isinstance(word, str) is not on_can:
             wanted = "on CAN: a frame as '705#7F'" if on_can else "on a line: bytes"
             raise ValueError(f"{name}: this device is {wanted}, got {word!r:.60}")
-
-
-# The acts that a finding needs.
-
-_T = TypeVar("_T")
-
-
-def _shortened(acts: list[_T], fails: Callable[[list[_T]], bool]) -> list[_T]:
-    """Leave out each act without which the same goes wrong.
-
-    Args:
-        acts: with all of them it does.
-        fails: returns whether it does so with fewer.
-
-    >>> _shortened([1, 2, 3, 4], lambda fewer: 2 in fewer and 4 in fewer)
-    [2, 4]
-    """
-    at = len(acts) - 1
-    while at >= 0:
-        fewer = acts[:at] + acts[at + 1 :]
-        if fails(fewer):
-            acts = fewer
-        at -= 1
-    return acts
 
 
 # What bytes mean as acts: lines or frames, noise, changed inputs, pauses, power cuts.
@@ -268,7 +245,7 @@ class DeviceFuzz:
             self._run(acts)
         except Exception as error:
             wanted = type(error)
-            needed = _shortened(acts, lambda fewer: self._fails_so(fewer, wanted))
+            needed = shortened(acts, lambda fewer: self._fails_so(fewer, wanted))
             error.add_note("\n".join(["what was done:", *map(str, needed)]))
             raise
 

@@ -67,7 +67,11 @@ class _OneInput:
     def __call__(self, data: bytes) -> None:
         try:
             self._fuzz(data)
-        except Exception as error:
-            if self._runs.failure is not None:
-                error.add_note(note_of(self._runs, self._runs.failure))
-            raise
+        except Exception:
+            failure = self._runs.failure
+            if failure is None:
+                raise
+            shortest = self._runs.shorten(failure)
+            failed = shortest or failure
+            failed.error.add_note(note_of(self._runs, failed, repeats=shortest is not None))
+            raise failed.error from None

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any, Final
 
@@ -23,6 +24,7 @@ from tickrig.emulators.testing.properties.device_bench import (
     DeviceBench,
     TicksDifferError,
     explain_ticks,
+    shortened,
 )
 from tickrig.emulators.testing.properties.strategies import Session
 from tickrig.host.text.names import near
@@ -106,6 +108,7 @@ def _search(
         Exception: what the check raised of the shortest found, with a note of what was met.
     """
     found: dict[str, Exception] = {}
+    met: dict[str, dict[str, Session]] = {}
     tries = [_TRIES]
 
     @settings(
@@ -127,13 +130,47 @@ def _search(
         try:
             check(**sessions)
         except Exception as error:
-            found[key] = error
+            found[key], met[key] = error, sessions
             raise
 
     try:
         it_meets()
     except Flaky:  # chance: it was so once
         raise min(found.items(), key=lambda each: len(each[0]))[1] from None
+    except Exception as error:
+        key = next((key for key, one in found.items() if one is error), "")
+        if not key:
+            raise  # a strategy has raised it
+        raise _shortest(check, met[key], error) from None
+
+
+def _shortest(
+    check: Callable[..., None], sessions: Mapping[str, Session], error: Exception
+) -> Exception:
+    """Leave out acts without which a check raises the same; return what it raises then."""
+    shortest, needed = error, dict(sessions)
+    for name in sessions:
+
+        def fails(fewer: list[Any], name: str = name) -> bool:
+            nonlocal shortest
+            try:
+                check(**{**needed, name: fewer})
+            except Exception as again:
+                if type(again) is type(error) and _kind(again) == _kind(error):
+                    shortest = again
+                    return True
+            return False
+
+        needed[name] = shortened(needed[name], fails)
+    if shortest is not error:
+        words = [f"{name}={session!r}" for name, session in needed.items()]
+        shortest.add_note("no act can be left out: " + ", ".join(words))
+    return shortest
+
+
+def _kind(error: Exception) -> str:
+    """Return the text of an error up to its first number, which another session may change."""
+    return re.split(r"[0-9]", str(error.args[0] if error.args else ""), maxsplit=1)[0]
 
 
 WireMaker = Callable[[], ByteLine | CanWire]

@@ -6,7 +6,7 @@ import copy
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.record.recorder import TracedDevice, TraceFile
@@ -224,3 +224,30 @@ def explain_ticks(bench: Callable[..., DeviceBench], start: Session, session: Se
         for each in (sparse, dense):
             each.do(act)
     return ""
+
+
+# The acts that a finding needs.
+
+_T = TypeVar("_T")
+
+
+def shortened(acts: Sequence[_T], fails: Callable[[list[_T]], bool]) -> list[_T]:
+    """Leave out each act without which the same goes wrong, until all that are left are needed.
+
+    Args:
+        acts: with all of them it does.
+        fails: returns whether it does so with fewer.
+
+    >>> shortened([1, 2, 3, 4], lambda fewer: 2 in fewer and 4 in fewer)
+    [2, 4]
+    >>> shortened([1, 2, 3], lambda fewer: fewer in ([1, 2], [2]))
+    [2]
+    """
+    left, before = list(acts), -1
+    while len(left) != before:
+        before = len(left)
+        for at in reversed(range(before)):
+            fewer = left[:at] + left[at + 1 :]
+            if fails(fewer):
+                left = fewer
+    return left

@@ -672,6 +672,7 @@ def test_bytes_are_runs_too(capsys: pytest.CaptureFixture[str]) -> None:
 
     with pytest.raises(AssertionError, match="it is too fast") as caught:
         throw()
+    assert ", 1 step\n" in caught.value.__notes__[-1]  # no other can be left out
     assert "call drive(speed=30)" in caught.value.__notes__[-1]
     assert capsys.readouterr().err == caught.value.__notes__[-1] + "\n"
 

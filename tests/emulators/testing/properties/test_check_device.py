@@ -150,6 +150,28 @@ def test_a_device_that_breaks_a_rule_is_found(
         check_device(bad, traffic=SPEAKS)
 
 
+class Fragile(Echo):
+    """Raises if it hears b"on" after b"off", whatever else it hears."""
+
+    def reset(self) -> None:
+        super().reset()
+        self.off = False
+
+    def tick(self, now_us: int, rx: bytes, /) -> bytes:
+        if b"on" in rx and getattr(self, "off", False):
+            raise LookupError("it breaks")
+        self.off = getattr(self, "off", False) or b"off" in rx
+        return super().tick(now_us, rx)
+
+
+def test_no_act_of_what_is_found_can_be_left_out() -> None:
+    with pytest.raises(LookupError, match="it breaks") as caught:
+        check_device(Fragile, traffic=SPEAKS)
+    (note,) = [note for note in caught.value.__notes__ if note.startswith("no act can be left out")]
+    assert note.count("'send'") <= 2
+    assert "'set'" not in note
+
+
 def test_frames_are_noise_too() -> None:
     with pytest.raises(ValueError, match="odd"):
         check_device(partial(CanEcho, refuses=True), wire=CanWire)
