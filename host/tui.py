@@ -73,14 +73,14 @@ _HEIGHT_BITS: Final = 6
 
 
 class LineView(ScrollView, can_focus=True):
-    """Shows lines; only those that changed are painted again.
+    """Shows lines; only changed lines are painted again.
 
-    Not all lines need be there: of many, those around the ones in view do.
+    Of many lines, only those around the visible ones are needed.
 
     Attributes:
-        lines: those that are there.
+        lines: the lines that it has.
         begin: the number of the first of them, from 0.
-        follows: the last line shall stay in view: nobody has scrolled up from it.
+        follows: whether the last line stays visible: the user has not scrolled up.
     """
 
     DEFAULT_CSS = "LineView { scrollbar-size-horizontal: 0; }"
@@ -151,7 +151,7 @@ class LineView(ScrollView, can_focus=True):
 
     def scroll_to(self, x: float | None = None, y: float | None = None, **how: Any) -> None:
         """Scroll at once: what is animated, the next picture would undo."""
-        if y is not None and not how.get("force"):  # somebody scrolls; the screen may be moving
+        if y is not None and not how.get("force"):  # the user scrolls; the screen may be moving
             self.follows = y >= self.max_scroll_y
         super().scroll_to(x, y, **{**how, "animate": False})
 
@@ -223,8 +223,8 @@ class Key(NamedTuple):
     """A key.
 
     Attributes:
-        name: as Textual calls it.
-        shown: as people do.
+        name: its name in Textual.
+        shown: its displayed name.
         description: what it does.
     """
 
@@ -239,7 +239,7 @@ class Key(NamedTuple):
 
 
 def key_rows(keys: Iterable[Key], width: int) -> list[list[Key]]:
-    """Return the keys on lines of so many columns, a blank between two; none is cut or left out."""
+    """Return the keys on lines of a width, a blank between two; none is cut or left out."""
     rows: list[list[Key]] = [[]]
     left = width
     for key in keys:
@@ -374,7 +374,7 @@ class FramedApp(App[None]):
             yield
 
     def end(self) -> None:
-        """End the app, from a signal handler or another thread, also before it has begun."""
+        """End the app, from a signal handler or another thread, also before it has started."""
         self._ended = True
         if self._events is not None and not self._events.is_closed():
             self._events.call_soon_threadsafe(self.exit)
@@ -386,7 +386,7 @@ class FramedApp(App[None]):
             self.exit()
 
     def get_driver_class(self) -> type[Driver]:
-        """Return the driver of Textual, on POSIX with output that nobody waits for."""
+        """Return the driver of Textual, on POSIX with output that does not block."""
         driver = super().get_driver_class()
         if driver.__name__ != _POSIX_DRIVER:
             return driver
@@ -452,7 +452,7 @@ class _FramedDriver(Driver):
             self._output.write(data, last=self._leaving)
 
     def stop_application_mode(self) -> None:
-        """Give the terminal back."""
+        """Restore the terminal."""
         self._leaving = True
         super().stop_application_mode()  # type: ignore[safe-super] # of Textual's driver
 

@@ -52,21 +52,21 @@ _LEAVE_ADJUST: Final = "2"
 
 
 class UrgClient:
-    """Reads what kind of sensor it is, lets it measure without end, and takes its scans.
+    """Reads the type of the sensor, starts continuous measurement, and receives its scans.
 
-    It begins with SCIP2.0 for a sensor that speaks SCIP 1.1, and with TM2 and QT, so that one
-    which still does something for somebody before is quiet. After the time of five scans
-    without a good one it begins again. A scan that came garbled is left out.
+    It first sends SCIP2.0 for a sensor in SCIP 1.1, and TM2 and QT to stop a measurement that an
+    earlier host has started. After the time of five scans without a valid one it starts again. A
+    garbled scan is skipped.
 
     Args:
         link: the line.
-        cluster: steps for each number, 1..99.
-        interval: scans that are left out after each, 0..9.
+        cluster: steps per value, 1..99.
+        interval: scans that are skipped after each one, 0..9.
 
     Attributes:
-        specification: what the sensor told of itself, None before.
-        garbled: replies and scans that were none.
-        restarts: how often it began again.
+        specification: the specification that the sensor sent, None before.
+        garbled: number of garbled replies and scans.
+        restarts: number of restarts.
     """
 
     def __init__(self, link: Link[bytes], cluster: int = 1, interval: int = 0) -> None:

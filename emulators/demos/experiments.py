@@ -140,7 +140,11 @@ LEADER: Final = Experiment(
                 "con {pose1} Follower2.leader",
             ),
         ),
-        _Act(38, "removal: Ref-Hard follows nobody, and waits", ("dis {pose3} Follower0.leader",)),
+        _Act(
+            38,
+            "removal: Ref-Hard has nothing to follow, and waits",
+            ("dis {pose3} Follower0.leader",),
+        ),
         _Act(44, "joining again: Ref-Hard follows Omni-Wheel", ("con {pose3} Follower0.leader",)),
         _Act(58, ""),
     ),

@@ -334,7 +334,7 @@ class _Act:
 
 
 def _acts() -> Iterator[_Act]:
-    """Give the steps of the report's table, then a slow turn back."""
+    """Yield the steps of the report's table, then a slow turn back."""
     for volts in _STEPS_V:
         yield _Act(
             f"The potentiometer is set to {volts} V.", _STEP_US, partial(_held, volts), is_step=True
@@ -398,7 +398,7 @@ def _turn(stage: _Fig120Stage, echo: _Echo) -> list[CurveSample]:
 
 
 def _arrival(samples: list[CurveSample]) -> str:
-    """Say where the shaft rests, and when it came within 0.01 deg of the last reference."""
+    """Return where the shaft rests, and when it came within 0.01 deg of the last reference."""
     wanted = samples[-1].reference_deg
     late = [sample for sample in samples if abs(sample.angle_deg - wanted) > _AT_REST_DEG]
     after_s = (late[-1].time_s if late else samples[0].time_s) - samples[0].time_s

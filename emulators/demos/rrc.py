@@ -130,7 +130,7 @@ def play(link: Link[bytes], request: _Request, echo: _Echo) -> None:
 
 
 def _chapters(rrc: RrcClient, link: Link[bytes], request: _Request, echo: _Echo) -> Iterator[str]:
-    """Give the title of each chapter, then play it."""
+    """Yield the title of each chapter, then play it."""
     yield "Begin as the manual advises: a dummy command, a pause, then talk."
     rrc.start()
     yield "The operator presses the power button."

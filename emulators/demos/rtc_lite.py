@@ -157,7 +157,7 @@ class _DemoRun:
         self._deadline_us = self._now_us + _PATIENCE_US
 
     def run(self) -> None:
-        """Give the title of each chapter, then play it."""
+        """Yield the title of each chapter, then play it."""
         for name, place in self._setup.places.items():
             self._echo(f"{name} is an emulated PIC on {place}.")
         self._echo("Times are seconds.")

@@ -29,8 +29,8 @@ class RobotSample(NamedTuple):
     Attributes:
         time_s: since the start.
         pose: where it is.
-        planned: where it is told to be; None if nothing tells it.
-        gap_m: how far it is from the robot that it follows, None if it follows none.
+        planned: where it is commanded to be; None without a command.
+        gap_m: distance to the robot that it follows, None if it follows none.
     """
 
     time_s: float
@@ -74,7 +74,7 @@ class RobotTrack:
 
 
 class Mark(NamedTuple):
-    """A moment at which somebody changed something.
+    """A moment at which something was changed.
 
     Attributes:
         time_s: since the start.

@@ -17,7 +17,7 @@ from tickrig.emulators.testing.properties.contract import check_period
 from tickrig.emulators.testing.properties.device_bench import shortened
 from tickrig.wire.can import CanFrame
 
-# What a device is told, as a user writes it.
+# The acts on a device, as a user writes them.
 
 Word = bytes | str
 """Bytes of a serial line, or a frame in candump's notation."""
@@ -72,7 +72,7 @@ class FuzzAct(NamedTuple):
     wait_us: int
 
     def __str__(self) -> str:
-        """Write it as people read it.
+        """Return it as text.
 
         >>> str(FuzzAct("send", b"on", 500)), str(FuzzAct("set", ("stick", 3), 0))
         ('send on, wait 500 us', 'set stick 3, wait 0 us')

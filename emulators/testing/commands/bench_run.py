@@ -37,15 +37,15 @@ _INTERRUPTED: Final = 130
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _BenchOptions(RunOptions):
-    """The command line.
+    """The options of the command line.
 
     Attributes:
-        virtual: in virtual time, as fast as it goes.
-        for_us: how long; None until somebody ends it.
-        plots: signals to draw, each a diagram.
-        files: where they are drawn; none for the terminal.
+        virtual: whether to run in virtual time, as fast as possible.
+        for_us: duration; None until it is ended.
+        plots: signals to draw, one diagram each.
+        files: files to draw to; empty for the terminal.
         report: the page of the run.
-        command: what repeats the run.
+        command: the command that repeats the run.
     """
 
     virtual: bool = False
@@ -57,7 +57,7 @@ class _BenchOptions(RunOptions):
 
     @property
     def in_real_time(self) -> bool:
-        """Unless virtual time is asked for."""
+        """The default, without virtual time."""
         return not self.virtual
 
     @property

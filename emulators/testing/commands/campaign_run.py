@@ -50,28 +50,28 @@ else:
 # Theory of operation
 # ===================
 #
-# A campaign is a list of runs (test x seed), each with a number. What was done is in the
-# journal and nowhere else: whoever is killed, and whenever, the next start reads it, leaves
-# out what it has, and goes on. From that follow the rules here:
+# A campaign is a list of runs (test x seed), each with a number. Only the journal records what was
+# done: after a kill at any time, the next start reads it, skips what it contains, and continues.
+# This gives the rules:
 #
 # - A verdict counts when it is on the disk (`CampaignJournal.add` syncs), not when it
 #   arrives. The bar and the table are made of what `add` returned.
-# - A verdict depends on test and seed alone, so it does not matter who did a run, how
-#   often, or in which order. A run that was done twice is written once.
+# - A verdict depends on test and seed alone, so the worker, the number of repetitions and the order
+#   of runs do not matter. A run that was done twice is written once.
 # - The head of the journal (`CampaignPlan.head`) has what a verdict depends on: tests,
-#   seeds, shard, rig file, version, and a digest of the files of the tests. A journal with
-#   another head is refused, or results of two programs would stand in one table.
+#   seeds, shard, rig file, version, and a digest of the files of the tests. A journal with another
+#   head is refused, so that one table never has results of two programs.
 # - Workers only answer. One may die (its run is tried three times, then it is `died`) or
 #   hang (it is killed, its run is `hung`): crew.py waits for each verdict with a time-out,
 #   so that a batch always ends.
 #
-# Batches. A run takes a millisecond or a minute, and nobody knows before. A batch grows
+# Batches. A run takes a millisecond or a minute, which is unknown before. A batch grows
 # while it takes less than a second and shrinks above four, its time in the queue included;
-# towards the end batches get smaller, so that all workers end together. Two batches a
-# worker are under way: one is done, one waits.
+# towards the end batches get smaller, so that all workers end together. Each worker has two
+# batches: one runs, one waits.
 #
 # Three ends: all done (table written, journal removed), interrupted or full disk (journal
-# kept, the command to go on is printed), refused (nothing begun). The table is written
+# kept, the command to go on is printed), refused (nothing started). The table is written
 # before the journal goes.
 
 # A running campaign: runs are submitted, and verdicts returned, until all are done.
@@ -329,7 +329,7 @@ class _CampaignRun:
     def _end(self, status: int, why: str) -> NoReturn:
         """Stop early, and print how to continue."""
         if not hasattr(self, "_journal"):
-            say(f"{why}; nothing was begun")
+            say(f"{why}; nothing was started")
         else:
             done, size = len(self._journal.verdicts), self._plan.size()
             command = shlex.join(["tickrig", *[word for word in sys.argv[1:] if word != "--fresh"]])

@@ -149,25 +149,25 @@ def invariant() -> Callable[[F], F]:
 
 
 class BenchMachine:
-    r"""A bench and a host of yours, to be tried with any order of calls, faults and hands.
+    r"""A bench and your host, for random orders of calls, faults and inputs.
 
-    Derive from it: make the bench, connect the host, and write a `host_rule` for each thing that
-    the host may be asked for. `check_host` searches; `replay_host` does again what it found. Each
-    run begins with the same bench, warm if `warm_up` makes it so, and with a host of its own.
+    Derive from it: make the bench, connect the host, and write a `host_rule` for each operation of
+    the host. `check_host` searches; `replay_host` repeats what it found. Each run begins with the
+    same bench, prepared by `warm_up`, and with a host of its own.
 
     Attributes:
         bench: the bench, in virtual time.
-        world: what may happen to the bench beside the host's calls.
-        faults: names of the faults that may come, each for a while; all of the bench unless given.
-            One that has arguments of its own may be written with them: `"sdo_slow=2s"`.
-        inputs: names of the inputs and buttons that may change; all of the bench unless given.
-        traffic: what somebody else may send: frames in candump's notation, or bytes in hex to a
-            device; where there are several wires with a device before them: `drive/705#00`.
-        fault_for: how long faults stay, as `("100ms", "300ms")`.
-        patience: how much time of the bench one call may take: a host that waits for ever is a
-            finding. A search is the faster the less it is, as each such call is waited for so long.
-        longest: how much time of the bench a whole run may take.
-        patched: whether hosts that call `time.sleep` and `time.monotonic` live in the bench's time.
+        world: what may happen to the bench besides the host's calls.
+        faults: names of possible temporary faults; by default all of the bench. A fault with
+            arguments may be written with them: `"sdo_slow=2s"`.
+        inputs: names of the inputs and buttons that may change; by default all of the bench.
+        traffic: what other participants may send: frames in candump's notation, or bytes in hex to
+            a device; with several wires, prefixed by a device: `drive/705#00`.
+        fault_for: how long faults stay, such as `("100ms", "300ms")`.
+        patience: bench time that one call may take: a host that waits without end is a finding. A
+            smaller value makes a search faster, because each such call takes this time.
+        longest: bench time that a whole run may take.
+        patched: whether `time.sleep` and `time.monotonic` of hosts use the bench's time.
 
     >>> class Chair(BenchMachine):
     ...     faults = ()

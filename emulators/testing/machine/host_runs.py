@@ -335,7 +335,7 @@ class HostRuns:
         self._snapshot = bench.snapshot(machine)
 
     def _time(self) -> AbstractContextManager[object]:
-        """Return what hosts live in meanwhile; it takes 0.1 ms, and nobody else should be in it."""
+        """Return the patches for hosts; they take 0.1 ms, and only one user may hold them."""
         return self.machine.bench.patched_time() if self.machine.patched else nullcontext()
 
     def __exit__(self, *exception: object) -> None:
@@ -343,14 +343,14 @@ class HostRuns:
         self._stack.close()
 
     def run(self, steps: Sequence[HostStep]) -> None:
-        """Do the steps from the snapshot on; raise what the host does wrong.
+        """Run the steps from the snapshot on; raise the error of the host.
 
         Raises:
-            _HostHangsError: the host waits for ever.
-            Exception: what the machine, or the host in it, raised.
+            _HostHangsError: the host waits without end.
+            Exception: the error of the machine, or of the host in it.
         """
-        # All runs begin at one snapshot: the same objects, so hosts that hold a device need
-        # not be told.
+        # All runs begin at one snapshot with the same objects, so hosts that hold a device need no
+        # update.
         self._snapshot.restore()
         self._done, self._broken, self._broken_by = [], None, ""
         self._end_us = self.machine.bench.now_us + us_of(self.machine.longest)
@@ -440,9 +440,9 @@ class HostRuns:
         return method
 
     def _judged(self, act: Any, *args: Any, **arguments: Any) -> None:
-        """Do something of the host; raise what was broken meanwhile, if a host has swallowed it.
+        """Run an operation of the host; raise a violation even if the host has caught it.
 
-        One that waits for ever is told so wherever it waits: a search shortens one mistake then.
+        Endless waiting is one error regardless of the place: so a search shortens a single error.
         """
         self._back_us = self.machine.bench.now_us + us_of(self.machine.patience)
         hangs = ""
@@ -459,7 +459,7 @@ class HostRuns:
             raise self._broken
 
     def _hangs(self, now_us: int) -> str:
-        """Say how the host does not come back, if it does not."""
+        """Raise if the host does not recover."""
         if now_us > self._back_us:
             return f"the host does not come back within {self.machine.patience}"
         if now_us > self._end_us:

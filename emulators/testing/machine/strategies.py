@@ -81,7 +81,7 @@ def operator(bench: Bench, names: Sequence[str] | None = None) -> st.SearchStrat
 
 
 def traffic(words: Sequence[str]) -> st.SearchStrategy[HostStep]:
-    """Draw what somebody else sends; `step.do(bench)` sends it.
+    """Draw what other participants send; `step.do(bench)` sends it.
 
     Args:
         words: frames in candump's notation, or bytes in hex, as `HostStep.what` has them.
@@ -128,7 +128,7 @@ def _calls(rules: Mapping[str, Mapping[str, object]]) -> st.SearchStrategy[HostS
         name: st.fixed_dictionaries({each: _strategy(what) for each, what in given.items()})
         for name, given in rules.items()
     }
-    for name, given in rules.items():  # what is listed is looked at once
+    for name, given in rules.items():  # a listed input has an immediate effect
         for each, what in given.items():
             for value in what if isinstance(what, list | tuple) else ():
                 check_written(name, each, value, what)
@@ -146,11 +146,11 @@ def _calls(rules: Mapping[str, Mapping[str, object]]) -> st.SearchStrategy[HostS
 
 
 def steps(machine: BenchMachine, most: int) -> st.SearchStrategy[list[HostStep]]:
-    """Draw a run: calls, as often as all else together.
+    """Draw a run: half of the steps are calls.
 
     Args:
-        machine: whose rules there are, with its bench.
-        most: how many steps at most.
+        machine: the machine with the rules and its bench.
+        most: largest number of steps.
     """
     world, rules = machine.world, machine.rules()
     happens = [

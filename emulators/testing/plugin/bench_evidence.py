@@ -26,13 +26,13 @@ _MOST: Final = 4_000
 
 
 class SignalSampler:
-    """Takes the values of some signals; what stays as it is takes no room.
+    """Records the values of some signals; an unchanged value takes no memory.
 
     Args:
-        device: whose signals they are.
-        names: of inputs and outputs; ValueError if there is none of a name.
+        device: the device with the signals.
+        names: of inputs and outputs; ValueError if a name is unknown.
         prefix: before each name in the series, such as `left_drive/`.
-        most: how many samples of a signal are kept, at least 4.
+        most: number of samples kept per signal, at least 4.
     """
 
     def __init__(
@@ -62,7 +62,7 @@ class SignalSampler:
             self._latest[name] = now_us, value
 
     def series(self) -> tuple[bench_report.SignalSeries, ...]:
-        """Return what was taken: numbers with a fraction as lines, all else as steps."""
+        """Return the recorded signals: fractional numbers as lines, others as steps."""
         return tuple(self._series_of(name, points) for name, points in self._points.items())
 
     def _series_of(self, name: str, points: list[bench_report.Point]) -> bench_report.SignalSeries:

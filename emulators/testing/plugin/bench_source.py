@@ -95,7 +95,7 @@ class WantedBench(NamedTuple):
         made = source() if callable(source) else source
         if made is None:
             raise ValueError(
-                "nobody says what is on the bench: write a fixture bench_config, or give "
+                "the bench has no configuration: write a fixture bench_config, or give "
                 "--bench RIG.TOML"
             )
         return self._replace(source=_placed(made, self.folder))
@@ -104,9 +104,9 @@ class WantedBench(NamedTuple):
         """Make the bench.
 
         Raises:
-            ValueError: it cannot be made of that.
+            ValueError: the configuration is not valid.
             NotOnThisBench: not in this mode.
-            BenchBlocked: a port is not there, or somebody said no.
+            BenchBlocked: a port is missing, or the user refused.
             OSError: a file cannot be read.
         """
         if isinstance(self.source, Path):
@@ -220,17 +220,17 @@ def allowed_of(item: pytest.Item) -> tuple[str, ...]:
 
 
 def needs_of(item: pytest.Item) -> tuple[str, ...]:
-    """Return what all markers `needs` of a test name, in the order of writing.
+    """Return the names in all markers `needs` of a test, in the order of writing.
 
     Raises:
-        ValueError: something that nobody could have.
+        ValueError: an unknown name.
     """
     needs = _words_of(item, "needs")
     for choice in (choice for need in needs for choice in need.split(_OR)):
         kind, _, name = choice.partition(":")
         if choice not in (*MODES, HAND) and not (kind in KINDS and name):
             kinds = [*MODES, HAND, *(f"{kind}:{name or 'NAME'}" for kind in KINDS)]
-            raise ValueError(f"needs({choice!r}): nobody has that; {near(choice, kinds)}")
+            raise ValueError(f"needs({choice!r}): unknown; {near(choice, kinds)}")
     return needs
 
 
@@ -258,11 +258,11 @@ def check_needs(needs: Iterable[str], bench: Bench) -> None:
 
 
 def _lack(choice: str, bench: Bench) -> str:
-    """Say why a bench has not what is needed; empty if it has."""
+    """Return why a bench lacks what is needed; empty if it lacks nothing."""
     if choice in MODES:
         return "" if choice == bench.mode else f"this bench is {bench.mode}"
     if choice == HAND:
-        return "" if bench.describe().inputs else "nobody can set anything here"
+        return "" if bench.describe().inputs else "nothing can be set on this bench"
     kind, _, name = choice.partition(":")
     there = [each.rpartition("/")[2] for each in KINDS[kind](bench)]  # of any device
     if name in there or name in KINDS[kind](bench):
@@ -299,7 +299,7 @@ KINDS: Final[Mapping[str, Callable[[Bench], Iterable[str]]]] = {
     "output": lambda bench: bench.describe().outputs,
     "device": lambda bench: bench.devices,
 }
-"""What can be needed by name: how a bench tells what it has."""
+"""The names for `needs`, and how a bench tells whether it has them."""
 
 
 # Benches that have done something before the test: once for each test, then out of a snapshot.

@@ -105,8 +105,8 @@ class _BenchedTest(TestWithBench):
         """Open the bench.
 
         Raises:
-            NotOnThisBench: it has not what the test needs.
-            ValueError: the test asks for what nobody has.
+            NotOnThisBench: it lacks what the test needs.
+            ValueError: the test needs something unknown.
         """
         needs, self._allowed = bench_source.needs_of(self.item), bench_source.allowed_of(self.item)
         bench_source.check_mode(needs, self.wanted.mode)
@@ -125,7 +125,7 @@ class _BenchedTest(TestWithBench):
         return bench
 
     def _listen(self) -> None:
-        """Hear of what goes wrong where no assert looks, from before the bench is open."""
+        """Collect errors that no assert checks, from before the bench is opened."""
         if THREADS not in self._allowed:
             self._stack.enter_context(dead_threads(self.unheard.append))
         self._stack.enter_context(never_awaited(self._misused))
@@ -204,12 +204,12 @@ class _BenchedTest(TestWithBench):
     def judge(
         self, report: pytest.TestReport, call: pytest.CallInfo[None], *, mistaken: bool
     ) -> None:
-        """Say what blocked a phase of the test, and tell with a failure what there is to know.
+        """Report what blocked a phase of the test, and add the evidence to a failure.
 
         Args:
-            report: of the phase.
-            call: what it did.
-            mistaken: the test has made a mistake.
+            report: report of the phase.
+            call: the call of the phase.
+            mistaken: whether the test itself is wrong.
         """
         try:
             self._judge(report, call, mistaken=mistaken)

@@ -142,7 +142,7 @@ class Compare:
                 self._hashes[str(report.nodeid)] = str(properties[_HASH])
 
     def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
-        """Say how many tests were compared, and the hash of all."""
+        """Report how many tests were compared, and the hash of all."""
         lines = [f"{nodeid} {digest}\n" for nodeid, digest in sorted(self._hashes.items())]
         digest = sha256("".join(lines).encode()).hexdigest()
         same = "1 test was" if len(lines) == 1 else f"{len(lines)} tests were"

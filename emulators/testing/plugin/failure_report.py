@@ -1,4 +1,4 @@
-"""What is told after a failure: what was asked, what happened last, and how to repeat it."""
+"""The text after a failure: what was requested, what happened last, and how to repeat it."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def keep(bench: Bench, folder: Path, nodeid: str) -> tuple[list[Path], list[str]
 
 
 def _cut(bench: Bench, path: Path) -> list[str]:
-    """Say that a file has the latest alone; a trace has all."""
+    """Add that a file has only the last lines; a trace has all."""
     missing = "" if path.suffix == _TRACE else missing_of(bench._mode.journal())
     return [f"{path} is not whole: {missing}"] if missing else []
 
@@ -102,7 +102,7 @@ _WRITERS: Final[dict[str, Callable[[Bench, Path], bool]]] = {
     ".log": _candump,
     ".txt": _transcript,
 }
-"""By suffix; each says whether there was something to write."""
+"""Writers by suffix; each returns whether there was something to write."""
 
 
 # How a test ended, and why, of the reports of its phases.
@@ -138,7 +138,7 @@ def _why_skipped(report: pytest.TestReport) -> str:
 
 
 _LINES: Final = 20
-"""So many lines and frames are told."""
+"""Number of lines and frames that are shown."""
 
 
 def sections_of(test: TestWithBench) -> list[tuple[str, str]]:

@@ -33,13 +33,13 @@ LOST: Final = "lost"
 
 
 class Health:
-    """Listens on a bench from its beginning.
+    """Watches a bench from its beginning.
 
-    What is on a wire, or lost there, is ordered if a fault of this wire, or of any device, came
-    before. A line on which no host spoke may overflow: nobody reads there.
+    Errors on a wire, or losses there, are intended if a fault of this wire, or of any device, came
+    before. A line on which no host has sent anything may overflow, because no host reads it.
 
     Args:
-        bench: the bench. Of real devices only the error frames are known.
+        bench: the bench. For real devices, only error frames are known.
     """
 
     def __init__(self, bench: Bench) -> None:
@@ -180,7 +180,7 @@ def _short(name: str, bench: Bench) -> str:
 
 
 def check_safe(bench: Bench, safe: SafeState) -> None:
-    """Raise ValueError if something is asked for that the bench has not."""
+    """Raise ValueError if something is requested that the bench does not have."""
     for name in safe if isinstance(safe, Mapping) and bench.mode != HARDWARE else ():
         bench.get(name)
 
@@ -209,10 +209,10 @@ THREADS: Final = "threads"
 
 @contextmanager
 def dead_threads(note: Callable[[str], None]) -> Iterator[None]:
-    """Note threads that are started meanwhile and die: name, where, of what.
+    """Record threads that start and die during the test: name, place and error.
 
-    Who was there before is told as ever: by pytest's warning, which comes for all of them. One
-    that ends by `sys.exit()` has not died, unless that names an error.
+    For older threads, only pytest's warning appears, which comes for all threads. A thread that
+    ends by `sys.exit()` has not died, unless it passes an error.
 
     Args:
         note: called in the thread that dies, with a line.
@@ -274,8 +274,8 @@ def never_awaited(note: Callable[[str], None]) -> Iterator[None]:
     """
     depth = sys.get_coroutine_origin_tracking_depth()
     with warnings.catch_warnings():
-        # By default only the first of a line is told; with "error" it is raised in a
-        # finalizer, where Python only prints it.
+        # By default only the first per line is reported; with "error" it is raised in a finalizer,
+        # where Python only prints it.
         warnings.filterwarnings("always", _WARNING, RuntimeWarning)
         show = warnings.showwarning
 

@@ -81,9 +81,9 @@ def decoded(bench: Bench) -> Iterator[tuple[WireLine, str]]:
 
 
 def last_lines(bench: Bench, count: int) -> str:
-    """Return the last that happened on a bench: time, where, direction, text.
+    """Return the last events on a bench: time, place, direction, text.
 
-    Lines that have begun and did not end stand below.
+    Incomplete lines are at the end.
     """
     described = list(decoded(bench))[-count:]
     begun = [(line, f"{escape(line.data)}  (not ended)") for line in bench._mode.unfinished()]

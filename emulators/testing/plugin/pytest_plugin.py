@@ -1,4 +1,4 @@
-"""The pytest plug-in: options, markers and fixtures; all else is imported when a test asks.
+"""The pytest plug-in: options, markers and fixtures; other modules are imported on demand.
 
 Entry point `pytest11`: every pytest of an environment with tickrig loads this module.
 """
@@ -79,7 +79,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_report_header(config: pytest.Config) -> str | None:
-    """Say what was asked for."""
+    """Return the settings of the command line."""
     return config.stash[SETTINGS].head or None
 
 

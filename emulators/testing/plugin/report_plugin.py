@@ -95,8 +95,8 @@ class ReportPlugin:
             session.exitstatus = session.exitstatus or pytest.ExitCode.INTERNAL_ERROR
 
     def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
-        """Say where the report is."""
-        done = f"bench: {self._settings.report} tells of {counted(len(self._records), 'test')}"
+        """Print where the report is."""
+        done = f"bench: {self._settings.report} has {counted(len(self._records), 'test')}"
         terminalreporter.write_line(self._error or done, red=bool(self._error))
         for line in self._shown():
             terminalreporter.write_line(f"bench: {line}")
@@ -112,7 +112,7 @@ class ReportPlugin:
         if untested := [row.name for row in listed if not row.tests]:
             yield f"no test names {', '.join(untested)}"
         if unknown := [row.name for row in rows if not row.listed]:
-            yield f"tests name what is no requirement: {', '.join(unknown)}"
+            yield f"tests name unknown requirements: {', '.join(unknown)}"
 
     def _tests(self) -> tuple[TestRecord, ...]:
         """Return the records as they stand in the files, in whatever order the tests were run."""
@@ -151,7 +151,7 @@ def _statement(item: pytest.Item, error: pytest.ExceptionInfo[BaseException]) ->
 
 
 def _is_reported(item: pytest.Item) -> bool:
-    """Return whether a report tells of a test: it has a bench, or shows a requirement."""
+    """Return whether a report contains a test: it has a bench, or shows a requirement."""
     return BENCHED in item.stash or item.get_closest_marker("req") is not None
 
 

@@ -68,19 +68,19 @@ class _BenchParameter(NamedTuple):
 
 
 class PluginSettings(NamedTuple):
-    """What was asked for.
+    """The settings of the command line.
 
     Attributes:
-        rig_file: of the bench, None if tests say themselves what is on it.
+        rig_file: of the bench, None if tests define it themselves.
         ordered: whether the command line names the rig file.
-        modes: each test runs in each of them.
-        seed: of all chance, None if what is on the bench says it.
-        artifacts: folder for what is kept, None if nothing is.
-        every: whether passed tests are kept too.
+        modes: modes in which each test runs.
+        seed: of all randomness, None to use that of the rig file or test.
+        artifacts: folder for kept files, None for none.
+        every: whether to keep files of passed tests too.
         compare: whether each test runs twice.
         report: file for the report, None if there is none.
-        requirements: file with what the tests have to show, None if nobody says it.
-        parameters: of tests, each with the values that they run with.
+        requirements: file with the requirements, None if there is none.
+        parameters: parameters of tests, each with its values.
     """
 
     rig_file: Path | None = None
@@ -140,12 +140,12 @@ def _path(config: pytest.Config, name: str, text: str) -> Path | None:
 
 
 def _requirements(config: pytest.Config, wanted: Mapping[str, str]) -> Path | None:
-    """Return where the requirements are, if there is a report that tells of them."""
+    """Return the file of requirements, if a report needs it."""
     path = _path(config, "bench_requirements", wanted["bench_requirements"])
     if path is None or wanted["bench_report"]:
         return path
     if config.getoption("bench_requirements") is not None:
-        raise pytest.UsageError("--bench-requirements: a report tells of them: add --bench-report")
+        raise pytest.UsageError("--bench-requirements: they belong in a report: add --bench-report")
     return None
 
 
@@ -153,7 +153,9 @@ def _modes(text: str) -> tuple[str, ...]:
     modes = tuple(word.strip() for word in text.split(","))
     for mode in modes:
         if mode not in MODES:
-            raise pytest.UsageError(f"--bench-mode {text}: {mode!r} is none of {', '.join(MODES)}")
+            raise pytest.UsageError(
+                f"--bench-mode {text}: {mode!r} is not one of {', '.join(MODES)}"
+            )
     return tuple(dict.fromkeys(modes))
 
 

@@ -19,19 +19,19 @@ if TYPE_CHECKING:
 
 
 class TestWithBench(ABC):
-    """A test that asked for a bench, as hooks and reports see it.
+    """A test with a bench, as hooks and reports see it.
 
     Args:
         item: the test.
-        wanted: what it asked for.
+        wanted: what it requested.
 
     Attributes:
-        bench: its bench, from the moment at which it is open.
-        evidence: what a report shows of it, when it is closed.
+        bench: its bench, once it is open.
+        evidence: what a report shows of it, once it is closed.
         blocked: why the test came to no verdict, empty if it did.
-        unheard: what went wrong beside its body and was not told yet, each in a line.
-        kept: files that were kept of it.
-        not_kept: why other files were not, or not whole, each in a line.
+        unheard: errors outside its body that were not reported yet, one line each.
+        kept: files that were kept.
+        not_kept: why other files were not kept, or not completely, one line each.
     """
 
     __test__ = False
@@ -46,7 +46,7 @@ class TestWithBench(ABC):
         self.not_kept: list[str] = []
 
     def take_unheard(self) -> list[str]:
-        """Return what went wrong beside the body of the test, and was not told yet."""
+        """Return the errors outside the body of the test that were not reported yet."""
         told = list(self.unheard)
         del self.unheard[: len(told)]
         return told

@@ -20,7 +20,7 @@ _MISTAKES: Final = (TypeError, AttributeError, NameError, ImportError, SyntaxErr
 """What is wrong with a program, however late it runs."""
 
 _REFUSALS: Final = (ValueError, LookupError, BenchError)
-"""How the bench refuses what it is asked for."""
+"""How the bench refuses a request."""
 
 _OF_STATE: Final = ("WireError", "RtcRefused", "ServerRefused")
 """Refusals that depend on what has come, or on the state of a component."""
@@ -31,7 +31,7 @@ _CHECKS: Final = tuple(
 """What judges devices and hosts by AssertionError."""
 
 _LIBRARIES: Final = sys.stdlib_module_names | {"can", "canopen", "serial"}
-"""What raises for whoever has called it."""
+"""Errors that mean a mistake of the caller."""
 
 
 class MisusedError(pytest.fail.Exception):  # type: ignore[name-defined,misc]  # pytest has it
@@ -45,13 +45,13 @@ def blocked(
     *,
     mistaken: bool = False,
 ) -> str:
-    """Say why a phase of a test came to no verdict about the device; empty if it did.
+    """Return why a phase of a test gave no verdict about the device; empty if it did.
 
     Args:
-        report: of the phase.
-        call: what it did.
+        report: report of the phase.
+        call: the call of the phase.
         bench: of the test, None if it was not opened.
-        mistaken: the test has made a mistake; see `is_mistake`.
+        mistaken: whether the test itself is wrong; see `is_mistake`.
     """
     error = None if call.excinfo is None else call.excinfo.value
     if isinstance(error, BenchBlocked):
@@ -114,7 +114,7 @@ def _package_of(entry: TracebackType) -> str:
 def make_error(report: pytest.TestReport, reason: str) -> None:
     """Make an error of the bench out of what would be a failure of the device, or expected."""
     report.outcome = "failed"
-    report.__dict__.pop("wasxfail", None)  # nobody expects the bench to be at fault
+    report.__dict__.pop("wasxfail", None)  # a fault of the bench is unexpected
     if report.when == "call":
         report.when = "setup"  # pytest and JUnit call it an error then
     report.sections.append(("bench: blocked", reason))

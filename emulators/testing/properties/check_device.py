@@ -1,4 +1,4 @@
-"""One call that tests what every device must keep, whoever wrote it."""
+"""One call that tests what every device must guarantee."""
 
 from __future__ import annotations
 
@@ -36,15 +36,15 @@ _VERBS: Final = ("send", "set", "reset")
 
 
 def _check_start(start: Session, device: Any, nothing: Any) -> None:
-    """Look whether each act of `start` can be done.
+    """Check that each act of `start` can be done.
 
     Args:
         start: the acts.
-        device: one of its kind; it is looked at only.
-        nothing: traffic without anything in it.
+        device: a device of this type; it is not changed.
+        nothing: empty traffic.
 
     Raises:
-        ValueError: one cannot; the text says which, and why.
+        ValueError: one cannot; the message says which, and why.
     """
     for number, act in enumerate(start):
         try:
@@ -87,7 +87,7 @@ def _check_traffic(what: Any, nothing: Any) -> None:
 _SLOW: Final = (HealthCheck.too_slow, HealthCheck.data_too_large)
 
 _TRIES: Final = 200
-"""So often something shorter is looked for, once something was found."""
+"""Number of attempts to shorten a failing session."""
 
 
 def _search(
@@ -188,38 +188,37 @@ def check_device(  # noqa: PLR0913 - by name
 ) -> None:
     r"""Test a type of device with any session: bytes or frames, inputs, resets, pauses.
 
-    - It has what a device has, and what it returns is of the types that are wanted; `tick` clears
+    - It has the attributes of a device, and returns values of the right types; `tick` clears
       `inputs.changed`.
-    - Nothing that it meets raises.
-    - A fresh device that meets the same does the same; on a line from its trace, too.
+    - No traffic and no input makes it raise.
+    - A new device with the same traffic behaves the same, also from its trace on a line.
     - Ticks at which it is not due change nothing (dense = sparse), up to a day later.
-    - A host that writes in pieces is answered as one that writes at once. One of the words of
-      `strategies.chunks` that comes in two ticks is answered as one that comes in one.
-    - A reset device is as one that was made anew, with the same inputs.
-    - A copy, by `copy.deepcopy`, by pickle and with its rig, goes on as the original; what is
-      done to it leaves the original unchanged. One that is put back by a snapshot goes on as
-      it was.
+    - A host that writes in pieces gets the same answers as one that writes at once. A word of
+      `strategies.chunks` that arrives in two ticks is answered like one that arrives in one.
+    - A reset device equals a new one with the same inputs.
+    - A copy, by `copy.deepcopy`, by pickle and with its rig, behaves like the original; changes to
+    it do not change the original. A device that
+      a snapshot restores continues from there.
 
     Args:
-        device_type: what makes the device: its `DeviceType` or the name of one, a class or
+        device_type: the factory of the device: its `DeviceType` or the name of one, a class or
             function.
         traffic: what a host sends at once, `strategies.chunks(...)` or `strategies.frames(...)`;
             noise unless given.
-        wire: makes what the device is on, as `CanWire`; that of its type, or a serial line,
-            unless given.
-        start: what is done before each session, so that the device is at work, one after the
-            other: `(5_000, "send", b"ON\n")` sends after 5 ms, `(0, "set", ("jam", 1))` sets an
-            input, `(0, "reset", None)` resets.
+        wire: factory of its wire, such as `CanWire`; by default that of its type, or a serial line.
+        start: acts before each session that start the device, one after the other: `(5_000, "send",
+            b"ON\n")` sends after 5 ms, `(0, "set", ("jam", 1))` sets an input, `(0, "reset", None)`
+            resets.
         max_examples: how many sessions for each of the tests.
-        remembers: a reset leaves more than configuration and inputs: stored parameters, or where
-            an axis is.
-        pauses: what a host sends means the same with pauses in it; not where a pause ends it, as
-            in Modbus RTU.
+        remembers: whether a reset keeps more than configuration and inputs: stored parameters, or
+            the position of an axis.
+        pauses: whether pauses within a word do not matter; not if a pause ends a frame, as in
+            Modbus RTU.
 
     Raises:
-        AssertionError: one of these does not hold; the text says when and what, a note has the
+        AssertionError: one of these does not hold; the message says when and what, a note has the
             shortest session found.
-        ValueError: an act of `start` cannot be done, or there is no type of this name.
+        ValueError: an act of `start` cannot be done, or there is no type with this name.
 
     >>> check_device("rrc", traffic=strategies.chunks([b"hello\n", b"device\n"]), max_examples=2)
     """

@@ -23,12 +23,11 @@ from tickrig.host.text.trace import Header
 # Theory of operation
 # ===================
 #
-# Each check plays a drawn session on two benches that differ in one thing which must not
-# matter, and compares what was sent, with its time, and all outputs: dense and sparse
-# ticks, pieces and whole writes, a pause inside a word, one reset and two, a device that
-# was reset and a fresh one, an original and its copy, a recording and its replay. No check
-# knows what the device should do; the device is compared with itself. So they hold for
-# devices that nobody here has seen.
+# Each check plays a random session on two benches that differ in one aspect that must not matter,
+# and compares what was sent, with its time, and all outputs: dense and sparse ticks, pieces and
+# whole writes, a pause inside a word, one reset and two, a device that was reset and a fresh one,
+# an original and its copy, a recording and its replay. No check knows what the device should do;
+# the device is compared with itself. So they work for any device.
 #
 # The order in `check_ticks` is by cost and by what a finding means: two fresh devices
 # first, because chance or shared state would make every later comparison fail for the wrong
@@ -36,16 +35,16 @@ from tickrig.host.text.trace import Header
 # rest.
 #
 # `_check_due_us` finds timers of hours without ticking for hours. A tick before `due_us`
-# must change nothing, so copies are ticked at a few times up to just before it: whatever
-# changes shows that `due_us` was too late. `_refuse` then looks for the first such tick by
-# halving, for the message.
+# must change nothing, so copies are ticked at a few times up to just before it: any change shows
+# that `due_us` was too late. `_refuse` then finds the first such tick by bisection, for the
+# message.
 #
-# What is not compared: state that no output shows. It is found where it acts, when a word
-# is sent after such a tick (`check_answers`).
+# What is not compared: state that no output shows. It is found when it has an effect, for example
+# when a word is sent after such a tick (`check_answers`).
 #
-# Devices that work ahead (`horizon`) are looked at between ticks here, so copies are made
-# to work tick by tick. RS485 lines are left out of the check of pieces: there each piece
-# ends on a whole microsecond, and that is the line's doing.
+# Devices that work ahead (`horizon`) are observed between ticks here, so copies work tick by tick.
+# RS485 lines are excluded from the check of pieces: there each piece ends on a whole microsecond,
+# because of the line.
 
 # Words that come with a pause in them: a line means the same, whenever its second half comes.
 
@@ -56,7 +55,7 @@ _Answer = tuple[bytes, list[Any]]
 """What is sent, and the outputs then."""
 
 _TICKS: Final = 20
-"""So many ticks an answer is waited for."""
+"""Number of ticks to wait for an answer."""
 
 
 def _check_pauses(played: device_bench.DeviceBench, session: Session) -> None:
@@ -109,7 +108,7 @@ def _message(word: Word, at: int, wanted: _Answer, got: _Answer) -> str:
     told += f"after {bytes(word)!r} at once {once}"
     if got[1] != wanted[1]:
         told += f"; its outputs are {got[1]!r} and {wanted[1]!r}"
-    return f"{told}. Where a pause ends what is sent, as in Modbus RTU: check_device(pauses=False)"
+    return f"{told}. If a pause ends a frame, as in Modbus RTU: check_device(pauses=False)"
 
 
 # Ticks long before and just before a device is due: they must change nothing.
@@ -126,7 +125,7 @@ _MOST_INPUTS: Final = 8
 """So many inputs are tried at the end of a session."""
 
 _SETTLES: Final = 50
-"""In so many ticks a device comes to rest after an input has changed, or is not looked at."""
+"""Ticks in which a device comes to rest after an input has changed; else it is not checked."""
 
 
 def _check_due_us(bench: Callable[..., device_bench.DeviceBench], session: Session) -> None:
@@ -191,7 +190,7 @@ def _probe_after(played: device_bench.DeviceBench, item: InputSignal) -> None:
 def _copy(device: Any) -> Any:
     copied = twin(device)
     if hasattr(copied, "horizon"):
-        copied.horizon = None  # somebody looks after each tick
+        copied.horizon = None  # an observer after each tick
     return copied
 
 
@@ -345,7 +344,7 @@ class DeviceChecks:
             _same(once, one, others[-1], _KEEPS, "after a reset", "of a fresh one")
 
     def check_replay(self, session: Session) -> None:
-        """A device that is made anew does the same from its trace."""
+        """A device made from its trace does the same."""
         bench, wanted = self._bench, self._bench().play(session)
         if not hasattr(bench().device, "inputs") or bench().nothing != b"":
             return

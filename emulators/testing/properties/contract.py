@@ -1,4 +1,4 @@
-"""What a device must have, and of which types: told in a line with the name of its class."""
+"""The attributes of a device and their types; an error names the class in one line."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ def must(holds: bool, text: str) -> None:
 
 
 def check_members(device: Any, nothing: Any) -> None:
-    """Look whether a device has what every device has.
+    """Check that a device has the attributes of every device.
 
     Args:
-        device: it is looked at only.
-        nothing: traffic without anything in it.
+        device: the device; it is not changed.
+        nothing: empty traffic.
 
     Raises:
-        AssertionError: something is not there, or a period is none.
+        AssertionError: an attribute is missing, or a period is invalid.
     """
     kind = type(device).__name__
     for name, text in (_MEMBERS | _SIGNALS if nothing == b"" else _MEMBERS).items():

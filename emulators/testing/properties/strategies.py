@@ -30,7 +30,7 @@ def chunks(lines: Sequence[bytes] = (), max_bytes: int = 40) -> st.SearchStrateg
 
 
 class Word(bytes):
-    """What a device understands, as `chunks` was told."""
+    """The words that a device understands, as passed to `chunks`."""
 
     __slots__ = ()
 
@@ -97,12 +97,12 @@ def input_changes(device: Device[Any]) -> st.SearchStrategy[tuple[str, float]]:
 def sessions(
     device: Device[Any], traffic: st.SearchStrategy[Any], most: int = 15
 ) -> st.SearchStrategy[Session]:
-    """Draw what a host and the world do to a device, one after the other.
+    """Draw acts of a host and of the environment on a device, one after the other.
 
     Args:
-        device: one of its kind; it is looked at only.
+        device: a device of this type; it is not changed.
         traffic: what a host sends at once, see `chunks` and `frames`.
-        most: how many acts.
+        most: largest number of acts.
     """
     wait = waits(device.tick_us)
     sent = st.tuples(wait, st.just("send"), traffic)

@@ -42,14 +42,14 @@ class Outcome(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class RunEnvironment:
-    """Where and how tests were run; all workers of a parallel run give the same.
+    """Where and how tests ran; all workers of a parallel run give the same.
 
     Attributes:
-        date: when it began, as people write it.
+        date: when it began, as text.
         mode: `virtual`, `real` or `hardware`.
-        seed: of what is left to chance, None if nothing is.
+        seed: of all randomness, None if there is none.
         rig_file: name of the rig file, empty if there is none.
-        rig_text: what stands in it.
+        rig_text: its content.
         tickrig: version of tickrig.
         python: version of Python.
         platform: system and machine.
@@ -89,15 +89,15 @@ class Requirement:
 
 @dataclass(frozen=True, slots=True)
 class PlannedFault:
-    """A fault that a test ordered, or that came without an order.
+    """A fault that a test requested, or that came without a request.
 
     Attributes:
-        name: as it was ordered, with device and rate: `left_drive/flip=0.01`.
-        from_us: when it began; None if what it waited for never came.
+        name: as it was requested, with device and rate: `left_drive/flip=0.01`.
+        from_us: when it began; None if its trigger never came.
         to_us: when it ended; None if it stayed.
-        when: what it waited for, such as `the 3rd OK:output`, or a time that never came; empty
-            if it came by time.
-        ordered_us: when it was ordered; None if nobody says, as where a hand made it.
+        when: its trigger, such as `the 3rd OK:output`, or a time that never came; empty if it came
+            by time.
+        ordered_us: when it was requested; None if unknown, as for a manual one.
     """
 
     name: str
@@ -212,10 +212,11 @@ class BenchReport:
     """A test run, or several that were merged.
 
     Attributes:
-        title: of the page.
-        runs: where and how, each once.
+        title: title of the page.
+        runs: where and how, without duplicates.
         tests: in the order in which they are shown.
-        requirements: what has to be shown, also what no test names; none if nobody says it.
+        requirements: all requirements, including those that no test names; empty if there is no
+            list.
     """
 
     title: str = "Bench report"
@@ -263,14 +264,14 @@ _GROUP: Final = 4
 
 
 def thinned(points: Sequence[Point], most: int) -> list[Point]:
-    """Return at most so many samples: the first, the last, and least and greatest of every four.
+    """Return at most `most` samples: the first, the last, and the extremes of every four.
 
-    Of four with words among them the first and the last stay; where that are too many samples
-    still, it is done again.
+    Of four that include words, the first and the last stay; this is repeated while there are too
+    many samples.
 
     Args:
         points: in the order of time.
-        most: how many may stay, at least 4.
+        most: largest number of samples, at least 4.
     """
     if len(points) <= most:
         return list(points)

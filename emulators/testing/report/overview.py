@@ -27,7 +27,7 @@ from tickrig.emulators.testing.report.bench_report import (
 _SLOWEST: Final = 10
 _LONGEST_ANCHOR: Final = 120
 UNWELL: Final = (Outcome.FAILED, Outcome.ERROR, Outcome.BLOCKED)
-"""What somebody has to look at."""
+"""Verdicts that need attention."""
 
 _NO_ANCHOR: Final = re.compile(r"[\W_]+")
 
@@ -71,7 +71,7 @@ class _RequirementRow:
         name: of the requirement.
         text: what it demands.
         tests: those that name it.
-        listed: it is among the requirements, or nobody has said which there are.
+        listed: whether it is in the list of requirements, or there is no list.
     """
 
     name: str

@@ -94,7 +94,7 @@ def _size_of(text: str) -> int:
 
 
 def _cut(text: str, most: int) -> tuple[str, int]:
-    """Return whole lines of at most so many characters from the beginning, and how many are cut."""
+    """Return whole lines up to a length from the beginning, and the number of omitted ones."""
     if len(text) <= most:
         return text, 0
     end = text.rfind("\n", 0, most) + 1 or most
@@ -102,22 +102,22 @@ def _cut(text: str, most: int) -> tuple[str, int]:
 
 
 _MOST_OPEN: Final = 12
-"""Up to so many failed tests are unfolded at once."""
+"""Number of failed tests that are unfolded at once."""
 
 
 @dataclass(frozen=True, slots=True)
 class _TestOnPage:
-    """A test with what of it has room.
+    """A test with the parts of it that have room on the page.
 
     Attributes:
         place: the test, its anchor and name.
         timeline: its time line, None if there is none, or no room.
-        longrepr: what pytest told.
+        longrepr: the text of pytest.
         journal: its last lines.
-        journal_left_out: how many earlier lines there were.
+        journal_left_out: number of earlier lines.
         trace: its trace.
-        left_out: what is not on the page, for people.
-        opened: it is unfolded when the page opens.
+        left_out: what is not on the page, in words.
+        opened: whether it is unfolded when the page opens.
     """
 
     place: overview.ReportedTest

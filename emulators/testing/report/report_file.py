@@ -105,7 +105,7 @@ def _read(file: TextIO) -> BenchReport:
     try:
         report = _written_by_us(_Scanner(file))
     except (ValueError, RecursionError):
-        report = None  # what is wrong is told below
+        report = None  # errors are reported below
     finally:
         if collects:
             gc.enable()
@@ -310,7 +310,7 @@ def _enum_reader(kind: type[Enum]) -> _Reader:
             return kind(data)
         except ValueError:
             known = ", ".join(str(member.value) for member in kind)
-            raise ReportError(f": {data!r:.40} is none of {known}") from None
+            raise ReportError(f": {data!r:.40} is not one of {known}") from None
 
     return read
 

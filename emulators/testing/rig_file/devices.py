@@ -184,15 +184,15 @@ def _sdo_limits(values: Mapping[str, Any]) -> SdoLimits:
 def kind_of(
     text: str, folder: Path, types: Callable[[], list[str]] = DEVICES.names
 ) -> tuple[plan.DeviceKind, str]:
-    """Return what a type names, and the same with the path that it has for this program.
+    """Return the kind of a type, and the type with its path for this program.
 
     Args:
-        text: as the file has it.
-        folder: where files are looked for.
-        types: returns the names of all device types; called if it is none of ours.
+        text: as in the file.
+        folder: where files are searched.
+        types: returns the names of all device types; called if the type is not built in.
 
     Raises:
-        ValueError: it names nothing that there is.
+        ValueError: there is no such type or file.
     """
     if not text.isprintable():
         raise ValueError(f"no device {shown(text)}")

@@ -131,19 +131,19 @@ class DevicePlan:
     """One device.
 
     Attributes:
-        name: what tests and its signals call it.
-        kind: what `type` names.
+        name: its name for tests and signals.
+        kind: kind of `type`.
         type: name of a device type (`DEVICES`) or of a model (`MODELS`), path of an EDS or DCF,
             `FILE.yml:NODE` or `FILE.py:Class`.
         wire: name of its wire, of `RigPlan.wires`.
-        config: of a device type, its options by name, as the file has them.
+        config: options of a device type by name, as in the file.
         node_id: 1..127, `UNCONFIGURED`, or None for that of the DCF or model.
         profile: of a file: `choices.PROFILES`; None for `auto`.
-        store: file in which a CANopen node keeps what 1010h and LSS store.
-        sdo: what the SDO servers of a CANopen node put up with.
-        start: inputs at the start by name, members of groups each for itself: a value, or the
-            signal that drives it.
-        made: the device, if the reader has made it and no bench has taken it.
+        store: file in which a CANopen node stores what 1010h and LSS store.
+        sdo: limits of the SDO servers of a CANopen node.
+        start: inputs at the start by name, members of groups individually: a value, or the signal
+            that drives it.
+        made: the device, if the reader has made it and no bench uses it yet.
     """
 
     name: str
@@ -358,7 +358,7 @@ def summary(plan: RigPlan) -> Iterator[str]:
 
 
 def _wire_text(wire: WirePlan) -> str:
-    """Say what a wire is, as far as the file says it.
+    """Return the wire in words, as far as the file defines it.
 
     >>> _wire_text(WirePlan(name="a", bit_rate=9600))
     'serial line 9600 8N1'
@@ -371,7 +371,7 @@ def _wire_text(wire: WirePlan) -> str:
 
 
 def device_text(device: DevicePlan) -> str:
-    """Say what a device is.
+    """Return the device in words.
 
     >>> from tickrig.emulators.testing.rig_file.plan import DeviceKind
     >>> device_text(DevicePlan(name="left", kind=DeviceKind.MODEL, type="epos", wire="a"))
@@ -394,7 +394,7 @@ def _places(plan: RigPlan, wire: str) -> Iterator[str]:
 
 
 def bus_text(bus: BusPlan) -> str:
-    """Say which bus of python-can it is.
+    """Return the bus of python-can in words.
 
     >>> bus_text(BusPlan(interface="socketcan", channel="can0"))
     'socketcan can0'

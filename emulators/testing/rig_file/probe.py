@@ -216,7 +216,7 @@ class _UnknownInputs:
 
 
 class _UnknownDevice:
-    """Stands in for a device that cannot be made: that is told, and nothing more about it."""
+    """Replaces a device that cannot be made: the error is reported, and no further ones."""
 
     tick_us = 1_000
     inputs = _UnknownInputs()

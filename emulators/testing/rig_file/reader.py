@@ -79,7 +79,7 @@ _SCENARIO: Final = re.compile(
 
 
 def _no_rig_file(text: str) -> str:
-    r"""Say what a text is that no bench can be made of; empty if nothing is known of it.
+    r"""Return what a text is that is not a rig file; empty if unknown.
 
     >>> _no_rig_file("# drive\n0.1s press power_button\n")
     'it is a scenario: --scenario FILE plays it'
@@ -159,14 +159,14 @@ def _bus_as_rig(path: Path) -> Section:
 
 
 def _with_nodes(top: Section, folder: Path, *, alone: bool = False) -> Section:
-    """Return a rig file in which each node of the bus.yml that it names is a device.
+    """Return a rig file in which each node of its bus.yml is a device.
 
-    What the file says of a device of the same name is kept.
+    Keys of the file for a device with the same name are kept.
 
     Args:
         top: the whole file.
-        folder: where the bus.yml is looked for.
-        alone: there is only the bus.yml, and what cannot be read is an OSError.
+        folder: where the bus.yml is searched.
+        alone: whether there is only the bus.yml; then an unreadable file is an OSError.
     """
     given = top.values.get(_BUS)
     if given is None:
@@ -345,7 +345,7 @@ def _mirrored(section: Section, names: tuple[str, ...], wheels: list[str]) -> tu
 
 _SEED: Final = "seed"
 _MAX_MB: Final = 4
-"""Size of a rig file at most, in MB of 2^20 bytes; somebody's log or trace is told to be none."""
+"""Largest size of a rig file, in MB of 2^20 bytes; larger files, such as logs, are refused."""
 
 
 def read_rig_file(path: Path) -> RigPlan:

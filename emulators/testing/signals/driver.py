@@ -122,7 +122,7 @@ class _SignalScope:
         order[key] = None
 
 
-class _Order(ValueError):  # noqa: N818 - told as a mistake
+class _Order(ValueError):  # noqa: N818 - reported as a mistake
     """Why there is no order: the reason, and the signal."""
 
 
@@ -167,7 +167,7 @@ def _check(scope: _SignalScope, key: str) -> Iterator[SignalMistake]:
 
 
 def _near(scope: _SignalScope, key: str, wanted: str) -> str:
-    """Say what a formula could mean, or list what it could name, its own device first."""
+    """Return what a formula may mean, or the names that it may use, its own device first."""
     own = key.partition(SLASH)[0]
     names = [name for name in scope.signals if SLASH not in name]
     for name in sorted(scope.devices, key=lambda name: name != own):
@@ -215,32 +215,29 @@ def _check_target(scope: _SignalScope, key: str) -> Iterator[SignalMistake]:
 #
 # Signals are a graph: sources of time (ramp, wave, noise, table), formulas of other signals
 # and of what devices show, and filters with a memory (lag, integral). `SignalDriver`
-# evaluates it at the ticks of the rig and sets inputs whose value is another. It is a
-# coupling: the rig calls `act` between the ticks of devices, and a device sees an input at
-# its next tick.
+# evaluates it at the ticks of the rig and sets inputs whose value has changed. It is a coupling:
+# the rig calls `act` between the ticks of devices, and a device sees an input at its next tick.
 #
 # One evaluation has three passes, in this order:
 #
-# 1. filters move on, up to now, by what they saw before
-# 2. all others take their value of now, each behind those that it needs (`SignalScope.ordered`)
-# 3. filters look at what moves them (`observe`)
+# 1. filters advance to the current time, with the values observed before
+# 2. all others get their current value, each after those that it needs (`SignalScope.ordered`)
+# 3. filters observe their sources (`observe`)
 #
-# A filter is therefore one step behind its source, and that is what makes circles through a
-# filter possible: a formula may use a lag that follows the formula. Circles without a
-# filter are refused.
+# A filter is therefore one step behind its source, which makes cycles through a filter possible: a
+# formula may use a lag that follows the formula. Cycles without a filter are refused.
 #
-# Values must not depend on how often somebody asks. Sources of time are pure functions of
-# time, noise is drawn by number and not in order, and a filter moves in steps of `every_us`
-# whatever the ticks are. `due_us` is the earliest time at which a value may be another: it
-# may be too early, never too late. A rig that jumps there sees the same as one that ticks
-# all the time.
+# Values must not depend on how often they are read. Sources of time are pure functions of time,
+# noise is drawn by number and not in order, and a filter advances in steps of `every_us` regardless
+# of the ticks. `due_us` is the earliest time at which a value may change: it may be too early,
+# never too late. A rig that jumps there sees the same as one that ticks all the time.
 #
-# At the start the graph is evaluated as many times as there are filters, and once more: a
-# lag without a start begins where its source is, which may be another lag.
+# At the start the graph is evaluated as many times as there are filters, and once more: a lag
+# without a start begins at the value of its source, which may be another lag.
 #
 # An input that was set by hand keeps that value until its signal changes, because `_Target`
-# compares with what the signal had and not with what the input has. nan leaves an input
-# alone, and is told once.
+# compares with the last value of the signal and not with the input. nan does not change an input,
+# and is reported once.
 
 
 class _RunningSignal(Copyable):
@@ -462,7 +459,7 @@ class SignalDriver(Copyable):
         self.due_us = min((node.due_us for node in self._nodes.values()), default=NEVER)
 
     def value(self, name: str) -> Setting:
-        """Return the present value of a signal; KeyError if there is none of this name."""
+        """Return the current value of a signal; KeyError if there is no such signal."""
         return self._nodes[name].setting
 
     @property

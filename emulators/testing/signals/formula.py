@@ -1,11 +1,11 @@
-"""Formulas over signals: what they are made of, and what they come to.
+"""Formulas over signals: their parts, and their values.
 
 >>> Formula("t + load", _Call("+", (_Name("t"), _Name("load"))), ("load",), True).value(
 ...     {"t": 1.5, "load": 3.0}
 ... )
 4.5
 
-Arithmetic over other signals, as text: a syntax tree is looked at, nothing is executed.
+Arithmetic over other signals, as text: it is parsed into a tree, and no code is executed.
 
 >>> parse_formula("12.6 - 0.1 * left.current_a").names
 ('left.current_a',)

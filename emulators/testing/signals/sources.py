@@ -1,4 +1,4 @@
-"""Values that depend on time alone: pure functions, the same whoever asks how often; their fields.
+"""Values that depend on time alone, as pure functions; and the fields of their tables.
 
 >>> RampSource(12.0, 9.5, over_us=10_000_000).value(4_000_000)
 11.0
@@ -28,7 +28,7 @@ class SignalSource(Protocol):
 
     @property
     def ends(self) -> tuple[float, ...]:
-        """Values that it reaches and does not leave; none where nobody can say."""
+        """Limits of its values; empty if they are unknown."""
         ...
 
     def value(self, t_us: int, /) -> Setting:
@@ -154,15 +154,15 @@ class Wave(Immutable):
 
 @dataclass(frozen=True, slots=True)
 class Noise(Immutable):
-    """Chance, drawn anew each `every_us`: the draw of a time is always the same.
+    """Random values, drawn again each `every_us`: the value of a time is always the same.
 
     Attributes:
-        first: the mean of gaussian noise; the least of uniform noise.
-        second: its standard deviation; the greatest.
-        uniform: all between two values as likely; else gaussian.
-        every_us: how long a draw stays.
-        seed: of the draws; None takes that of the bench.
-        stream: what noise this is; other streams of a seed are independent.
+        first: the mean of gaussian noise; the smallest value of uniform noise.
+        second: its standard deviation; the largest value of uniform noise.
+        uniform: uniform between two values; else gaussian.
+        every_us: how long a value stays.
+        seed: of the values; None for that of the bench.
+        stream: number of the noise; streams of a seed are independent.
     """
 
     first: float
@@ -222,7 +222,7 @@ class ValueTable(Immutable):
             return self.values[max(0, right - 1)]
         left, then = self.values[right - 1 : right + 1]
         if left == then:
-            return left  # to the bit: it is said not to change
+            return left  # exactly, because it is documented not to change
         left_us, right_us = self.times_us[right - 1 : right + 1]
         way = (at_us - left_us) / (right_us - left_us)
         return left * (1 - way) + then * way
@@ -244,7 +244,7 @@ class ValueTable(Immutable):
 # A signal as it was asked for: where its values come from, and what is made of them.
 
 _SETTLED: Final = 1e-9
-"""A lag that is so near to its source, as a part of it, has arrived."""
+"""A lag this near to its source, as a fraction of it, has arrived."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,7 +24,7 @@ from tickrig.host.text.names import near
 from tickrig.host.text.section import anything, flag, text
 
 _EVERY_US: Final = 10_000
-"""How often noise is drawn, and lags and integrals move on, unless told otherwise."""
+"""Default interval at which noise is drawn, and lags and integrals advance."""
 
 _Fields = Mapping[str, Any]
 """The values of a table's keys, each as its reader has left it."""

@@ -143,7 +143,7 @@ def _csv_points(
 
 
 def _rows(lines: Sequence[str]) -> Iterator[tuple[int, list[str]]]:
-    """Yield the cells of each line, with its number; the first tells what is between them."""
+    """Yield the cells of each line, with its number; the first line determines the separator."""
     comma = ""
     for line, text in enumerate(lines, 1):
         if not text.strip() or text.startswith("#"):

@@ -119,7 +119,7 @@ def test_a_project_may_build_on_the_fixture(pytester: pytest.Pytester, run: Run)
 @pytest.mark.parametrize(
     ("source", "said"),
     [
-        ("None", "nobody says what is on the bench: write a fixture bench_config"),
+        ("None", "the bench has no configuration: write a fixture bench_config"),
         ("{}", "a bench has at least one device"),
         ("'teapot'", "teapot"),
         ("ONE", "a device that a test has used"),

@@ -71,7 +71,10 @@ def test_a_rig_file_of_a_test_stands_beside_it(pytester: pytest.Pytester, run: R
     [
         ("--bench nowhere.toml", "ERROR: */nowhere.toml: No such file or directory"),
         ("--bench bad.toml", "ERROR: */bad.toml:2: *teapot*"),
-        ("--bench-mode vitual", "ERROR: --bench-mode vitual: 'vitual' is none of virtual, real, *"),
+        (
+            "--bench-mode vitual",
+            "ERROR: --bench-mode vitual: 'vitual' is not one of virtual, real, *",
+        ),
         ("--bench-seed dice", "ERROR: --bench-seed dice: it is a number from 0 on, or random"),
         ("--bench-artifacts-of none", "ERROR: --bench-artifacts-of none: it is failed or every"),
         ("--bench-report no/out.html", "ERROR: report */no/out.html: no directory */no"),

@@ -86,7 +86,7 @@ def test_a_report_tells_of_each_test_that_has_a_bench(
     pytester.makepyfile(TESTS)
     options = ("--bench-report", "run.json", "--bench-seed", "5")
     result = run_apart("-n1", *options) if in_a_worker else run(*options)
-    result.stdout.fnmatch_lines(["bench: */run.json tells of 8 tests"])
+    result.stdout.fnmatch_lines(["bench: */run.json has 8 tests"])
     report = read_run(pytester.path / "run.json")
     tests = by_name(report)
     assert {name: test.outcome for name, test in tests.items()} == OUTCOMES
@@ -262,7 +262,7 @@ def test_requirements_that_no_test_names_are_shown(pytester: pytest.Pytester, ru
         [
             "bench: 0 of 3 requirements shown",
             "bench: no test names SAF-4",
-            "bench: tests name what is no requirement: SAF-3",
+            "bench: tests name unknown requirements: SAF-3",
         ]
     )
     report = read_run(pytester.path / "run.json")
@@ -282,7 +282,7 @@ def test_requirements_that_no_test_names_are_shown(pytester: pytest.Pytester, ru
             "ERROR: */saf.txt:3: A stands in line 1 *",
         ),
         ("A\n\udcff", "--bench-report run.json", "ERROR: */saf.txt: not UTF-8 at byte 2"),
-        ("A\n", "", "ERROR: --bench-requirements: a report tells of them: add --bench-report"),
+        ("A\n", "", "ERROR: --bench-requirements: they belong in a report: add --bench-report"),
     ],
 )
 def test_requirements_that_cannot_be_read_are_a_line(

@@ -73,7 +73,7 @@ def test_what_is_left_out_has_its_default() -> None:
         ('{"tickrig-report": 1, "runs": [{}]}', ".runs[0]: no date"),
         (
             to_json(REPORT).replace('"failed"', '"lost"'),
-            ".tests[0].outcome: 'lost' is none of failed, error, blocked, passed, skipped",
+            ".tests[0].outcome: 'lost' is not one of failed, error, blocked, passed, skipped",
         ),
         (
             to_json(REPORT).replace("[10000,", "[true,"),

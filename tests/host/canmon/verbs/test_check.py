@@ -141,7 +141,7 @@ def test_what_a_good_log_has_is_told_to_be_usual(tmp_path: Path) -> None:
         (("--init", "--no-emcy"), "--init learns all rules: leave --no-emcy out"),
         (("learnt.toml", "--no-emcy"), "and no others: leave --no-emcy out"),
         (("learnt.toml", "other.toml"), "and no others: leave another file out"),
-        (("bad.toml",), "rules bad.toml: learnt.can0: 'nodes' is none of"),
+        (("bad.toml",), "rules bad.toml: learnt.can0: 'nodes' is not one of"),
     ],
 )
 def test_learnt_rules_stand_alone(

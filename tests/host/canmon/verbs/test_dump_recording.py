@@ -128,7 +128,11 @@ def test_the_recording_ends_at_its_limit_and_nothing_is_wrong(tmp_path: Path) ->
         (["--at-limit", "end"], 2, "--at-limit goes with disk"),
         (["--trigger", "emcy and"], 2, "--trigger: filter 'emcy and', column"),
         (["--trigger", "none.toml"], 2, "--trigger none.toml: No such file"),
-        (["--trigger", "{folder}/wrong.toml"], 2, "wrong.toml: line 1: rule 'colour' is none of"),
+        (
+            ["--trigger", "{folder}/wrong.toml"],
+            2,
+            "wrong.toml: line 1: rule 'colour' is not one of",
+        ),
         (["--trigger", "{folder}/load.toml"], 2, "load.toml: a limit of the load needs"),
         (["--pre", "1 moment"], 2, "--pre '1 moment' is neither frames"),
         (["--rotate", "1M", "-l", "{folder}/no/run.log"], 3, "run.index.jsonl: No such file"),

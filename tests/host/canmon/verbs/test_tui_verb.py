@@ -36,7 +36,7 @@ def test_without_a_terminal_it_names_top() -> None:
         ("[bus\n", "line 1: "),
         ("[bus]\nsource = 3\n", "line 2: bus.source: is no array of texts"),
         ("[trace]\n\nfilter = 'node ='\n", "line 3: trace.filter: filter 'node =', column"),
-        ("[statistics]\nsort = 'size'\n", "line 2: statistics.sort: 'size' is none of id, rate"),
+        ("[statistics]\nsort = 'size'\n", "line 2: statistics.sort: 'size' is not one of id, rate"),
     ],
 )
 def test_a_broken_workspace_is_told_with_its_line_and_left_alone(

@@ -40,7 +40,7 @@ def test_nothing_known_is_a_rule_and_nothing_said_is_none() -> None:
 @pytest.mark.parametrize(
     ("words", "reason"),
     [
-        ({"emcy": True}, "rule 'emcy' is none of no_emcy, no_sdo_abort,"),
+        ({"emcy": True}, "rule 'emcy' is not one of no_emcy, no_sdo_abort,"),
         ({"no_emcy": 1}, "no_emcy = 1 is not true or false"),
         ({"max_load": "60"}, "max_load '60' is not 0 to 100 percent"),
         ({"max_load": 101}, "max_load 101 is not 0 to 100 percent"),

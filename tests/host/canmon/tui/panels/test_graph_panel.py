@@ -48,7 +48,7 @@ def test_signals_are_added_with_their_past_and_taken_out() -> None:
         assert list(desk.panel.graph.series[0].values) == [float(s) for s in range(1, 23)]
         await desk.press("x")
         await desk.answer("281[0]")
-        assert desk.static("#wrong") == "'281[0]' is none of 181[0]"
+        assert desk.static("#wrong") == "'281[0]' is not one of 181[0]"
         await desk.answer("181[0]")
         assert desk.panel.graph.words == []
 

@@ -79,7 +79,7 @@ def test_its_settings_come_back() -> None:
     panel = StatisticsPanel(drive_session())
     panel.load(settings)
     assert panel.save() == settings
-    with pytest.raises(SettingError, match="sort: 'size' is none of id, rate, jitter, gap, age"):
+    with pytest.raises(SettingError, match="sort: 'size' is not one of id, rate, jitter, gap, age"):
         panel.load({"sort": "size"})
 
 

@@ -206,7 +206,7 @@ def test_its_settings_come_back() -> None:
     ("settings", "reason"),
     [
         ({"bits": 1}, "bits: 1 is neither true nor false"),
-        ({"time": "x"}, "time: 'x' is none of z, d, a, A"),
+        ({"time": "x"}, "time: 'x' is not one of z, d, a, A"),
         ({"filter": 3}, "filter: 3 is no text"),
         ({"filter": "node ="}, "column"),
     ],
