@@ -120,7 +120,7 @@ class Cart(RtComponent):
 
 ROWS: Final[tuple[tuple[str, type[RtComponent], str, str], ...]] = (
     ("numbers out, no engine", Number, "", ""),
-    ("Int32 out, nobody reads", Number, "std_msgs/msg/Int32", ""),
+    ("Int32 out, without a reader", Number, "std_msgs/msg/Int32", ""),
     ("Int32 out", Number, "std_msgs/msg/Int32", "read"),
     ("Odometry out", Pose, "nav_msgs/msg/Odometry", "read"),
     ("Twist in", Cart, "geometry_msgs/msg/Twist", "write"),

@@ -162,7 +162,7 @@ def frames() -> None:
     sink_all(server)
     pdos = [CanFrame(0x280 + 1 + n % NODES, bytes(8)) for n in range(FRAMES)]
     strangers = [CanFrame(0x4FF, bytes(8))] * FRAMES
-    for what, traffic in (("PDO to a port", pdos), ("a frame for nobody", strangers)):
+    for what, traffic in (("PDO to a port", pdos), ("a frame without a receiver", strangers)):
 
         def work(traffic: list[CanFrame] = traffic) -> None:
             for frame in traffic:

@@ -779,5 +779,5 @@ def open_live(
 
 
 def is_live(word: str) -> bool:
-    """Say whether a SOURCE word names something that goes on: no log file."""
+    """Return whether a SOURCE word names something without an end: not a log file."""
     return not isinstance(parse_source(word), FileSpec)

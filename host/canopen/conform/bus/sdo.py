@@ -20,7 +20,7 @@ from tickrig.wire.canopen.sdo import Abort
 T = TypeVar("T")
 
 SizeOf = Callable[[Address], int | None]
-"""Returns the bytes of an object by index and sub-index, 0 or None if unknown."""
+"""Returns the size of an object in bytes by index and sub-index, 0 or None if unknown."""
 
 
 _NUMBER_BYTES: Final = range(1, 5)
