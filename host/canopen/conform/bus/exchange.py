@@ -153,7 +153,7 @@ _FOREIGN_LOAD: Final = 0.5
 
 
 class _Allowance:
-    """Limits what the tester sends: to the allowed share of the bit rate, in windows of `_WINDOW_US`.
+    """Limits the tester to its share of the bit rate, in windows of `_WINDOW_US`.
 
     Args:
         bit_rate: of the bus in bit/s.
