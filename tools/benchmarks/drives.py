@@ -79,11 +79,14 @@ def run(seconds: float) -> None:
     """Print how many seconds of the drives pass in a second."""
     for drives, cycle_us in ((32, CYCLE_US), (127, 4 * CYCLE_US)):
         what = f"{drives} drives in csp, SYNC {cycle_us // 1_000} ms"
-        turn = partial(_simulate, drives, cycle_us, SIMULATED_S)
+        turn = partial(swinging(drives, cycle_us).run_for, SIMULATED_S * 1_000_000)
         rates(what, SIMULATED_S, "x real time", turn)
-    turn = partial(_simulate, 1, CYCLE_US, ALONE_S)
+    turn = partial(swinging(1, CYCLE_US).run_for, ALONE_S * 1_000_000)
     rates("one drive in csp, SYNC 10 ms", ALONE_S, "x real time", turn)
 
 
-def _simulate(drives: int, cycle_us: int, seconds: int) -> None:
-    rig(drives, cycle_us).run_for(seconds * 1_000_000)
+def swinging(drives: int, cycle_us: int) -> Rig:
+    """Return a rig whose drives have been made and follow the cosine."""
+    made = rig(drives, cycle_us)
+    made.run_for(1_000_000)
+    return made
