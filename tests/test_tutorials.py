@@ -14,7 +14,7 @@ from tests.page_runner import PageRunner
 from tickrig.emulators.testing.rig_file.reader import read_rig_file
 
 OURS = (
-    "nobody says what is on the bench",
+    "the bench has no configuration",
     "nothing will ever happen for which this body waits",
     "a second thread cannot make virtual time pass",
     "the machine was too slow: ",

@@ -75,7 +75,7 @@ def test_a_frame_is_sent_again_with_counter_and_checksum(wire: Wire) -> None:
     [
         (["123"], "'123' is neither a frame as 123#DEADBEEF nor a PDO as 5.rpdo1"),
         (["123#1"], "'123#1' is not a frame like 705#7F"),
-        (["5.rpdo1"], "nobody described node 5; give --eds 5=FILE"),
+        (["5.rpdo1"], "no description of node 5; give --eds 5=FILE"),
         (["5.rpdo1", "speed=1", "--eds", f"5={EDS}"], "it has controlword, target_velocity"),
         (["080#", "--eds", "5"], "--eds '5' is not NODE=FILE with a node-ID 1..127"),
         (["080#", "--eds", "200=a"], "--eds '200=a' is not NODE=FILE"),
@@ -298,7 +298,7 @@ def test_lines_are_sent_too(wire: Wire, tmp_path: Path) -> None:
     [
         (["--var", "id"], "'id' is not NAME=NUMBER, as id=3"),
         (["--var", "node_number=5"], "does not name it"),
-        ([], "start.toml:6: 3.rpdo1: nobody described node 3; give --eds 3=FILE"),
+        ([], "start.toml:6: 3.rpdo1: no description of node 3; give --eds 3=FILE"),
     ],
 )
 def test_a_sequence_that_cannot_be_is_refused(

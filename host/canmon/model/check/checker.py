@@ -412,7 +412,7 @@ class AlarmState(StrEnum):
 
     HOLDS = "holds"
     BROKEN = "BROKEN"
-    WAS_BROKEN = "until it is acknowledged"  # until somebody acknowledges it
+    WAS_BROKEN = "was broken"  # until it is acknowledged
 
 
 @dataclass(slots=True)

@@ -17,7 +17,7 @@ class TransferDirection(StrEnum):
 
     UPLOAD = "upload"
     DOWNLOAD = "download"
-    UNKNOWN = "only an abort was seen"  # an abort alone was heard
+    UNKNOWN = "transfer of"  # only an abort was seen
 
 
 class TransferMode(StrEnum):

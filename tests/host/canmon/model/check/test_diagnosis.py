@@ -289,7 +289,7 @@ def test_what_a_good_log_has_is_usual() -> None:
         ("[learnt.can0.node.128]", "'128' is not a node-ID from 1 to 127"),
         ("[learnt.can0.frame.18]", "'18' is not a CAN-ID"),
         ('[learnt.can0.frame.181]\nperiod = "10"', "is not like 10ms±20%"),
-        ('[learnt.can0.frame.181]\nkind = "often"', "is none of cyclic, sync, event"),
+        ('[learnt.can0.frame.181]\nkind = "often"', "is not one of cyclic, sync, event"),
         ("[learnt.can0.frame.181]\nlengths = [65]", "65 is not a whole number from 0 to 64"),
     ],
 )

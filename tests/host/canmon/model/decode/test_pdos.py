@@ -134,7 +134,7 @@ def test_a_pdo_beyond_the_fourth_needs_its_cob_id() -> None:
 def test_a_cob_id_without_a_mapping_names_the_pdo_alone() -> None:
     decoded = last("585#4301180185010000 185#3702")
     assert (decoded.kind, decoded.source) == ("tpdo2", "seen")
-    assert decoded.text == "unmapped: 1A01h was not heard"
+    assert decoded.text == "unmapped: 1A01h is unknown"
 
 
 def test_a_short_pdo_is_not_processed() -> None:

@@ -297,7 +297,7 @@ def test_a_further_sdo_server_is_followed_once_its_cob_ids_are_known() -> None:
 
 def test_receipts_of_segments_that_were_not_heard_are_no_data() -> None:
     found = decode("605#2107200003000000 585#6007200000000000 585#2000000000000000")
-    assert found[-1].text.startswith("receipt of no segment that was heard")
+    assert found[-1].text.startswith("confirmation of a missing segment")
 
 
 def test_a_short_frame_in_a_block_is_no_segment() -> None:

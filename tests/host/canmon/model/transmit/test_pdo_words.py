@@ -63,7 +63,7 @@ def test_what_is_sent_by_name_is_decoded_by_the_same_names(words: PdoFrames) -> 
     ("text", "said"),
     [
         ("hello", "'hello' is neither a frame as 123#DEADBEEF nor a PDO as 5.rpdo1"),
-        ("7.rpdo1", "7.rpdo1: nobody described node 7; give --eds 7=FILE"),
+        ("7.rpdo1", "7.rpdo1: no description of node 7; give --eds 7=FILE"),
         ("5.rpdo0", "PDOs are numbered 1 to 512"),
         ("5.rpdo1 speed=1", "no 'speed'; it has controlword, target_velocity"),
         ("6.rpdo1 tor=1", "more than one 'tor'; it has torque, torque_mode, brake, 2003h:00"),

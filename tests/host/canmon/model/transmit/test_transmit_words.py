@@ -65,7 +65,7 @@ def test_a_row_sends_what_it_says() -> None:
         ("123#00 --every 1s --every 2s", "--every is given 2 times"),
         ("123#00 --name 'a", "no closing quotation"),
         ("123#0", "'123#0' is not a frame like"),
-        ("9.rpdo1", "nobody described node 9"),
+        ("9.rpdo1", "no description of node 9"),
         ("123#00 --every soon", "'soon' is not a time"),
         ("123#00 --every 0s", "--every takes a time above 0, as 10ms"),
         ("123#00 --counter 1:0..3", "no byte 1 for a counter or checksum"),

@@ -78,7 +78,7 @@ def test_another_one_takes_the_place_of_one_that_runs() -> None:
     [
         ("", r"editor:1: no \[\[step\]\]"),
         ("+x 080#", "editor:1: '\\+x 080#' is not"),
-        ('[[step]]\nsend = "9.rpdo1"', "editor:2: 9.rpdo1: nobody described node 9"),
+        ('[[step]]\nsend = "9.rpdo1"', "editor:2: 9.rpdo1: no description of node 9"),
         ('[[step]]\nexpect = "node="', "editor:2: "),
     ],
 )

@@ -203,7 +203,11 @@ BEATS = "1 703#05\n1.1 703#05\n1.2 703#05"
         ("sync counts", "1 080#\n2 080#", "no two values of sync came from one sender"),
         ("sync steps under 5", "1 080#01", "no two values of sync came from one sender"),
         ("sync changes within 1s", "1 080#01", "no two values of sync came from one sender"),
-        ("tpdo1 dlc", "1 183#00", "no frame of tpdo1 came whose length is known; PDOs came that"),
+        (
+            "tpdo1 dlc",
+            "1 183#00",
+            "no frame of tpdo1 came whose length is known; PDOs without a known",
+        ),
         ("emcy dlc", BEATS, "no frame of emcy came whose length is known"),
         ("guard toggle", "1 703#R\n1.01 703#05", "no two answers of guard to guarding came"),
         ("heartbeat every ..20ms", "1 703#05\n1 703#05", "all frames have one time"),
