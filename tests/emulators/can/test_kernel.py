@@ -177,6 +177,10 @@ class Played:
         )
 
 
+_PASSING = {"_sound", "next", "_first", "received"}
+"""What holds for one call: the next `advance_until_received` sets `received`."""
+
+
 def state_of(item: Any) -> dict[str, object]:
     """Return what a twin would begin with, of values that say themselves what they are."""
     slots = item.__getstate__()[1]
@@ -184,7 +188,7 @@ def state_of(item: Any) -> dict[str, object]:
     return {
         name: (type(value).__name__, value)
         for name, value in slots.items()
-        if isinstance(value, plain) and name not in {"_sound", "next", "_first"}
+        if isinstance(value, plain) and name not in _PASSING
     }
 
 
