@@ -190,7 +190,7 @@ class BusDecoder:
         return route if alone or isinstance(getattr(route, "__self__", None), PdoDecoder) else None
 
     def heartbeat(self, can_id: int) -> Route | None:
-        """Return what decodes heartbeats of a node that nobody guards, None for other CAN-IDs.
+        """Return what decodes heartbeats of a node that is not guarded, None for other CAN-IDs.
 
         It holds until a remote frame comes. A boot-up changes more: it goes through `take`.
         """
