@@ -203,6 +203,15 @@ def test_a_load_makes_no_difference(master: tuple[int, int, float], steps: list[
     assert ahead.play(steps) == plain.play(steps) == guessing.play(steps, UNSEEN_US)
 
 
+def test_a_tpdo_that_is_switched_on_follows_each_change() -> None:
+    steps: list[Step] = [
+        (10_000, "later", (4_744, "supply_v", 24.0)),
+        (300_000, "write", (0x1801, 0x281, 1)),
+    ]
+    ahead, plain = (Bench(Master(10, 60_000, 0.1), {}, dense=dense) for dense in (False, True))
+    assert ahead.play(steps, UNSEEN_US) == plain.play(steps, UNSEEN_US)
+
+
 @pytest.mark.unmeasured
 @settings(max_examples=60, deadline=None)
 @given(MASTERS, STORED, STEPS)

@@ -59,6 +59,7 @@ from tickrig.device.canopen.ds402.modes.mode import DriveView, Mode
 from tickrig.device.canopen.ds402.modes.modes import MODES, offered, supported
 from tickrig.device.canopen.ds402.stretch import Stretch
 from tickrig.device.canopen.ds402.trapezoid import RampShape
+from tickrig.device.canopen.pdo.tpdo import PdoProducer
 from tickrig.device.canopen.slave import TICK_US, Application, CanopenSlave
 from tickrig.wire.canopen.datatypes import Value
 from tickrig.wire.canopen.drive import Controlword, DriveState
@@ -269,6 +270,7 @@ class Ds402(Application):
         axis = self._axis
         axis.motor.release()
         axis.zero, axis.homed = float(axis.motor.counts), False
+        PdoProducer.of(self.node).on_watched = [self._values_watched]
 
     def without_power(self, now_us: int) -> int:
         """Let the shaft coast; see `Application.without_power`."""
@@ -446,6 +448,11 @@ class Ds402(Application):
         if self._winding_dc != motor.winding_dc:
             self._winding_dc = motor.winding_dc
             self.schedule(now_us + _COOLING_US)
+
+    def _values_watched(self) -> None:
+        """Work tick by tick from now on: a TPDO follows each change of an actual value."""
+        if self._stretch.ahead:
+            self.request()
 
     def _controlled(self, entry: Entry) -> None:
         """Act on a new controlword with the configuration before it."""

@@ -83,6 +83,11 @@ class Stretch(Part):
             run.steps -= steps
             self._take(servo, servo.run_ahead(self._line, steps, self._bounds))
 
+    @property
+    def ahead(self) -> bool:
+        """Whether there are computed ticks."""
+        return self._run is not None
+
     def drop(self) -> None:
         """Discard the computed ticks, because something is about to change."""
         self.catch_up()
