@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Final
 
 from tickrig.host.text.names import near
@@ -60,7 +61,7 @@ TRANSITIONS: Final = {
     (DriveState.QUICK_STOP_ACTIVE, DriveState.OPERATION_ENABLED): _ENABLE_OPERATION,  # 16
 }
 
-_ENABLING: Final = {
+_ENABLING: Final[Mapping[DriveState | None, DriveState]] = {
     DriveState.FAULT_REACTION_ACTIVE: DriveState.FAULT,
     DriveState.FAULT: DriveState.SWITCH_ON_DISABLED,
     DriveState.NOT_READY_TO_SWITCH_ON: DriveState.SWITCH_ON_DISABLED,
@@ -74,11 +75,7 @@ _ENABLING: Final = {
 
 def next_state(state: DriveState | None, goal: DriveState) -> DriveState:
     """Return the next state on the way: the state itself, except for Operation enabled."""
-    return (
-        _ENABLING.get(state, goal)
-        if state is not None and goal is DriveState.OPERATION_ENABLED
-        else goal
-    )
+    return _ENABLING.get(state, goal) if goal is DriveState.OPERATION_ENABLED else goal
 
 
 def lead(controlword: int, state: DriveState | None, following: DriveState) -> int | None:

@@ -28,6 +28,11 @@ def test_a_state_is_named_by_its_words() -> None:
         state_named("Switchd on")
 
 
+def test_only_operation_enabled_has_states_on_the_way() -> None:
+    off = DriveState.SWITCH_ON_DISABLED
+    assert next_state(DriveState.READY_TO_SWITCH_ON, off) is off
+
+
 def test_no_controlword_leads_out_of_an_unknown_state() -> None:
     assert next_state(None, DriveState.OPERATION_ENABLED) is DriveState.OPERATION_ENABLED
     assert lead(0, None, DriveState.OPERATION_ENABLED) is None
