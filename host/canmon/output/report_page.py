@@ -98,6 +98,7 @@ def report_page(survey: Survey, verdict: Verdict, head: ReportHead) -> str:
         "policy": escape(content_policy(style, script)),
         "title": escape(one_line(head.title)),
         "summary": escape(" ".join(map(one_line, summary(survey, verdict, head)))),
+        "plain": _plain(survey, verdict),
         "style": style,
         "script": script,
         # Nothing in the text of strangers ends the element that holds it.
@@ -106,6 +107,17 @@ def report_page(survey: Survey, verdict: Verdict, head: ReportHead) -> str:
     pieces = _HERE.joinpath("page.html").read_text("utf-8").split("@")
     pieces[1::2] = [parts[name] for name in pieces[1::2]]
     return "".join(pieces)
+
+
+def _plain(survey: Survey, verdict: Verdict) -> str:
+    """Return the findings without a script, as mail programs show a page."""
+    faults = verdict.diagnosis.faults[:_MOST_FAULTS]
+    items = (
+        f"<li>{survey.since(one.first_us) / 1e6:.6f} s, {escape(one_line(_title(one.rule)))}: "
+        f"{escape(one_line(_fault_text(one)))}</li>"
+        for one in faults
+    )
+    return f"<ol>{''.join(items)}</ol>" if faults else ""
 
 
 def _page_json(value: object) -> str:

@@ -53,16 +53,16 @@ _TOGGLE_ABORT: Final = 0x0503_0000
 
 RULES: Final = {
     "no-error-frames": "error frames",
-    "no-emcy": "EMCY but error reset",
+    "no-emcy": "an error that a node reports (EMCY)",
     "no-reboot": "a boot-up without an NMT reset of a node that sent frames before",
     "nmt-stop": "an NMT stop",
     "nmt-state": "an NMT state without a command",
-    "guard-toggle": "the toggle bit of guarding",
+    "guard-toggle": "a guarding answer with a wrong toggle bit",
     "remote-heartbeat": "a remote frame to a node that sends heartbeats",
     "doubled-node": "two nodes with one node-ID",
     "no-sdo-abort": "aborted SDO transfers",
     "sdo-unanswered": "SDO requests without an answer",
-    "sdo-toggle": "the toggle bit of SDO segments",
+    "sdo-toggle": "an SDO segment with a wrong toggle bit",
 }
 """The rules that are judged here, and what each finds."""
 

@@ -430,7 +430,7 @@ def test_all_that_is_wrong_in_a_rule_file_is_said_with_its_line(log: str, tmp_pa
     head, *lines = check(log, rules).stderr.splitlines()
     assert head == f"Error: rules {rules}: 3 mistakes"
     assert [line[:31] for line in lines] == [
-        "  line 1: rule 'no_emci' is non",
+        "  line 1: rule 'no_emci' is not",
         "  line 2: '20' has no unit: wri",
         "  line 5: rule 'emcy nevr', col",
     ]

@@ -73,7 +73,7 @@ def data(log: str, tmp_path: Path) -> dict[str, Any]:
 def test_three_sentences_say_what_there_was(log: str, tmp_path: Path) -> None:
     lines = report(log, "-o", tmp_path / "run.html", "-b", "500k").stdout.splitlines()
     assert lines[0].startswith("run.log holds 358 frames of can0 in 5.90 s, from 2020-09-13 12:26")
-    assert lines[1] == "1 node has sent a frame; at the end 3 is operational."
+    assert lines[1] == "1 node was present; at the end 3 is operational."
     assert re.match(r"[0-9]+ faults found; the first, at 0\.", lines[2])
     page = unescape((tmp_path / "run.html").read_text("utf-8"))
     assert " ".join(lines) in page
