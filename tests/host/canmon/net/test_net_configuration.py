@@ -246,7 +246,11 @@ def test_a_node_that_dies_in_the_middle_is_told(
         (("dcf", "5", "{eds}"), 2, "has no ParameterValue of an object that can be written"),
         (("dcf", "6", "{dcf}", "--skip", "1017"), 0, ""),
         (("dcf", "5", "{dcf}", "--skip", "hartbeat"), 2, "no object 'hartbeat' of node 5"),
-        (("dcf", "5", "{r1}"), 2, "this EDS is of another device: device type 000F0191h in the EDS"),
+        (
+            ("dcf", "5", "{r1}"),
+            2,
+            "of another device: device type 000F0191h in the EDS",
+        ),
         (("compare", "5", "nosuch"), 2, "FILE nosuch: No such file"),
         (("compare", "5", "128"), 2, "128 is no node-ID 1..127"),
         (("compare", "5", "7"), 1, "node 7: 1005h:00 cob_id_sync: no answer within 500 ms"),
