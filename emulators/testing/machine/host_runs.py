@@ -235,7 +235,7 @@ _LAST_LINES: Final = 12
 _NO_FAILURES: Final = ("KeyboardInterrupt", "Skipped", "Exit", "UnsatisfiedAssumption", "StopTest")
 
 
-class _HostHangsError(AssertionError):
+class HostHangsError(AssertionError):
     """A host does not come back: a call, or a whole run, takes longer than the machine says."""
 
 
@@ -346,7 +346,7 @@ class HostRuns:
         """Run the steps from the snapshot on; raise the error of the host.
 
         Raises:
-            _HostHangsError: the host waits without end.
+            HostHangsError: the host waits without end.
             Exception: the error of the machine, or of the host in it.
         """
         # All runs begin at one snapshot with the same objects, so hosts that hold a device need no
@@ -453,8 +453,8 @@ class HostRuns:
                 raise
         finally:
             self._back_us = NEVER
-        if hangs or isinstance(self._broken, _HostHangsError):
-            raise _HostHangsError(hangs or str(self._broken))
+        if hangs or isinstance(self._broken, HostHangsError):
+            raise HostHangsError(hangs or str(self._broken))
         if self._broken is not None:
             raise self._broken
 
@@ -471,7 +471,7 @@ class HostRuns:
         if hangs := self._hangs(now_us):
             # Raised in the rig, amid the host's call; and kept, because a host may swallow
             # it.
-            self._broken = _HostHangsError(hangs)
+            self._broken = HostHangsError(hangs)
             raise self._broken
         if self._broken is None:
             try:

@@ -20,7 +20,6 @@ from tickrig.emulators.testing.plugin.parameters import words_of
 from tickrig.emulators.testing.plugin.settings import SETTINGS
 from tickrig.emulators.testing.plugin.stash import BENCHED, TestWithBench
 from tickrig.emulators.testing.report.bench_report import Outcome
-from tickrig.host.text.trace import Mark
 from tickrig.host.text.values import format_time, list_item
 from tickrig.host.text.whole_file import write_whole
 from tickrig.wire.can import LogLine
@@ -83,9 +82,9 @@ def _trace(bench: Bench, path: Path) -> bool:
 def _candump(bench: Bench, path: Path) -> bool:
     buses = buses_of(bench)
     frames = [
-        f"{LogLine(line.at_us, line.source, frame_of(line))}\n"
+        f"{LogLine(line.at_us, line.source, frame)}\n"
         for line in bench._mode.journal()
-        if line.source in buses and line.mark is not Mark.PHYSICAL
+        if line.source in buses and (frame := frame_of(line)) is not None
     ]
     if frames:
         write_whole(path, "".join(frames))

@@ -75,7 +75,7 @@ def decoded(bench: Bench) -> Iterator[tuple[WireLine, str]]:
         _meaning(meanings, line)
     for line in bench._mode.journal():
         text = escape(line.data)
-        if line.source in buses and line.mark is not Mark.PHYSICAL:
+        if line.source in buses:
             text = f"{text}  {_meaning(meanings, line)}".rstrip()
         yield line, text
 
@@ -93,8 +93,10 @@ def last_lines(bench: Bench, count: int) -> str:
     )
 
 
-def frame_of(line: WireLine) -> CanFrame | ErrorFrame:
-    """Return the frame that a line of a CAN bus says."""
+def frame_of(line: WireLine) -> CanFrame | ErrorFrame | None:
+    """Return the frame in a line of a CAN bus; None for a fault, and for what it did to a frame."""
+    if line.mark in {Mark.PHYSICAL, Mark.WIRE}:
+        return None
     text = line.data.decode()
     with suppress(FramingError):
         return ErrorFrame.parse(text)
@@ -102,4 +104,7 @@ def frame_of(line: WireLine) -> CanFrame | ErrorFrame:
 
 
 def _meaning(meanings: decoder.Decoder, line: WireLine) -> str:
-    return meanings.take(frames.Record(line.at_us, line.source, frame_of(line))).text
+    frame = frame_of(line)
+    return (
+        "" if frame is None else meanings.take(frames.Record(line.at_us, line.source, frame)).text
+    )

@@ -197,8 +197,7 @@ def check_device(  # noqa: PLR0913 - by name
       `strategies.chunks` that arrives in two ticks is answered like one that arrives in one.
     - A reset device equals a new one with the same inputs.
     - A copy, by `copy.deepcopy`, by pickle and with its rig, behaves like the original; changes to
-    it do not change the original. A device that
-      a snapshot restores continues from there.
+      it do not change the original. A device that a snapshot restores continues from there.
 
     Args:
         device_type: the factory of the device: its `DeviceType` or the name of one, a class or

@@ -27,7 +27,7 @@ from tickrig.host.text.trace import Mark
 from tickrig.wire.can import Frames
 
 
-class _BusGone(PortGone, can.CanOperationError):
+class BusGone(PortGone, can.CanOperationError):
     """A bus is gone; for hosts, python-can's own error."""
 
 
@@ -65,7 +65,7 @@ class _Watched(can.BusABC):
             code = error.error_code if isinstance(error, can.CanError) else error.errno
             if code not in can_link.GONE:
                 raise
-            raise _BusGone(f"{self.channel_info}: {first_line(error)}", code) from error
+            raise BusGone(f"{self.channel_info}: {first_line(error)}", code) from error
 
     def _pass_on(self, mark: Mark, frames: Seen) -> None:
         if frames:
@@ -85,13 +85,13 @@ def _open_bus(plan: BusPlan, options: dict[str, Any]) -> can.BusABC:
         options: further options of `can.Bus`.
 
     Raises:
-        _BusGone: it cannot be opened.
+        BusGone: it cannot be opened.
     """
     rate = {} if plan.bit_rate is None else {"bitrate": plan.bit_rate}
     try:
         bus = can.Bus(plan.channel, plan.interface, **{**rate, **dict(plan.options), **options})
     except (can.CanError, OSError, ValueError, ImportError, AttributeError) as error:
-        raise _BusGone(f"cannot open {_name_of(plan)}: {can_link.bus_reason(error)}") from None
+        raise BusGone(f"cannot open {_name_of(plan)}: {can_link.bus_reason(error)}") from None
     can_link.prepare_bus(bus, plan.interface)
     return bus
 
@@ -103,7 +103,7 @@ def open_watched_bus(plan: BusPlan, watch: HostPace, options: dict[str, Any]) ->
     reads = can_link.BusReceiver(
         bus,
         _name_of(plan),
-        gone=_BusGone,
+        gone=BusGone,
         raises=(can.CanError, OSError),
         read=partial(kind.recv, bus),
     )
@@ -120,7 +120,7 @@ def frame_link(plan: BusPlan, watch: HostPace) -> StampedLink:
     """Return a link to a bus, which does not receive its own frames.
 
     Raises:
-        _BusGone: it cannot be opened.
+        BusGone: it cannot be opened.
     """
     link = can_link.CanLink(_open_bus(plan, {}), _name_of(plan))
     link.on_error_frame = lambda frame: watch.passed(Mark.FROM_DEVICE, (frame,))
@@ -136,7 +136,7 @@ def join_bus(end: CanEnd, plan: BusPlan, stack: ExitStack) -> CanBridge:
         stack: closes it at the end.
 
     Raises:
-        _BusGone: it cannot be opened.
+        BusGone: it cannot be opened.
     """
     bus = _open_bus(plan, {})
     stack.callback(can_link.close_bus, bus)

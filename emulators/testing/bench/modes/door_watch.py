@@ -159,7 +159,7 @@ class WatchedFrameLink(WatchedLink[Frames]):
 # A monitored pyserial port.
 
 
-class _SerialGone(PortGone, serial.SerialException):
+class SerialGone(PortGone, serial.SerialException):
     """A port is gone; for hosts, pyserial's own error."""
 
 
@@ -177,7 +177,7 @@ class WatchedPort(serial.SerialBase):
         except serial.PortNotOpenError:
             raise
         except serial.SerialException as error:
-            raise _SerialGone(f"{self.port}: {error}") from error
+            raise SerialGone(f"{self.port}: {error}") from error
         if data:
             self._watch.passed(Mark.FROM_DEVICE, data)
         if len(data) < size and wanted_s is not None:
@@ -193,7 +193,7 @@ class WatchedPort(serial.SerialBase):
         except (serial.PortNotOpenError, serial.SerialTimeoutException):
             raise
         except serial.SerialException as error:
-            raise _SerialGone(f"{self.port}: {error}") from error
+            raise SerialGone(f"{self.port}: {error}") from error
         self._watch.passed(Mark.TO_DEVICE, bytes(data))
         return written
 
@@ -207,7 +207,7 @@ def open_watched_serial(url: str, watch: HostPace, options: dict[str, Any]) -> s
         options: those of `serial.Serial`.
 
     Raises:
-        _SerialGone: it cannot be opened.
+        SerialGone: it cannot be opened.
         ValueError: an option is out of range.
     """
     try:
@@ -217,7 +217,7 @@ def open_watched_serial(url: str, watch: HostPace, options: dict[str, Any]) -> s
         port.open()
         let_wait(port)
     except (serial.SerialException, OSError) as error:
-        raise _SerialGone(f"cannot open {url!r}: {explain_open_error(url, error)}") from error
+        raise SerialGone(f"cannot open {url!r}: {explain_open_error(url, error)}") from error
     return port
 
 

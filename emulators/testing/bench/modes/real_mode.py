@@ -230,7 +230,7 @@ class _Answers(RequestDispatcher):
 _IN_REAL_TIME: Final = Tolerances(stick_pct=0, time_us=100_000)
 
 
-class _HostInCondition(BaseException):
+class HostInCondition(BaseException):
     """A condition that is asked between two ticks cannot wait for a device."""
 
 
@@ -243,7 +243,7 @@ class _Watch(HostPace):
 
     def used(self) -> None:
         if self._thread.here:
-            raise _HostInCondition
+            raise HostInCondition
 
 
 class RealMode(EmulatedMode):
@@ -323,7 +323,7 @@ class RealMode(EmulatedMode):
         the caller instead, once per tick.
         """
         if self._judging and self._thread.here:
-            raise _HostInCondition
+            raise HostInCondition
         self._begin()
         until_us = self.now_us + within_us
         ask = partial(self._judge, done)
@@ -332,7 +332,7 @@ class RealMode(EmulatedMode):
                 return True
             self._sleep_until(until_us)
             return self._thread.call(ask)
-        except _HostInCondition:
+        except HostInCondition:
             return self._ask_until(done, until_us)
 
     def _judge(self, done: Callable[[], bool]) -> bool:

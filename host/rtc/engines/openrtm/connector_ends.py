@@ -212,7 +212,7 @@ _GONE: Final = (CORBA.TRANSIENT, CORBA.TIMEOUT, CORBA.COMM_FAILURE, CORBA.OBJECT
 _EMPTY: Final = (PortStatus.BUFFER_EMPTY, PortStatus.BUFFER_TIMEOUT)
 
 
-class _NoAnswerError(Exception):
+class NoAnswerError(Exception):
     """A peer is not there, hangs, or has no such object any more."""
 
 
@@ -233,7 +233,7 @@ class _Complaints:
     def raised(self, error: CORBA.SystemException) -> None:
         """Take what a call raised; NoAnswerError if that is no answer."""
         if isinstance(error, _GONE):
-            raise _NoAnswerError(explain(error)) from None
+            raise NoAnswerError(explain(error)) from None
         self.wrong(f"the peer answers with {type(error).__name__}")
 
 
@@ -494,7 +494,7 @@ def _call(operation: Callable[[], None], watch: peer_ports.PeerWatch) -> None:
     try:
         operation()
     except CORBA.SystemException as error:
-        watch.unanswered(_NoAnswerError(explain(error)))
+        watch.unanswered(NoAnswerError(explain(error)))
     else:
         watch.answered(PortStatus.PORT_OK)
 

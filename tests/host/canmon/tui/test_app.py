@@ -269,7 +269,7 @@ def test_what_a_workspace_has_beside_is_told_and_a_foreign_change_too(tmp_path: 
         monitor.save()
         await pilot.pause()
         assert len(said(monitor)) == 2
-        assert "changed by somebody else" in said(monitor)[1]
+        assert "changed by another program" in said(monitor)[1]
         assert path.read_text("utf-8") == "[trace]\n"
 
     on_monitor(

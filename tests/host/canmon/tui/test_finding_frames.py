@@ -252,7 +252,7 @@ def test_a_silent_bus_leads_to_a_scan_and_the_scan_finds_the_nodes() -> None:
     session = RigSession(eds=False)
 
     async def act(desk: Desk[NodesPanel]) -> None:
-        hint = f"f asks all node-IDs, as canmon net {BUS} scan"
+        hint = f"f queries all node-IDs, as canmon net {BUS} scan"
         assert desk.lines()[0] == f"no node has sent a frame; {hint}"
         await desk.press("f")
         assert not desk.asked  # it is not armed

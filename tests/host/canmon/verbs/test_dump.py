@@ -255,7 +255,7 @@ def test_a_filter_says_which_of_its_signals_never_came(tmp_path: Path, verb: lis
     wanted = "emyc or 5.statusword.fault or 9.statusword > 1"
     assert canmon(verb[0], DRIVE, *out, "-F", wanted).stderr.splitlines() == [
         "the filter asks for '9.statusword': no such signal came",
-        "the filter asks for 'emyc': no such signal came",
+        "the filter asks for 'emyc': no such signal came; did you mean 'emcy'?",
     ]
     assert canmon(verb[0], DRIVE, *out, "-F", "node=5 and pdo").stderr == ""
 
