@@ -28,9 +28,9 @@ class CanopenPort(Generic[T]):
     Args:
         name: a letter, then up to 31 letters, digits and underscores.
         port_type: type of its values; `SHORT.sequence(4)` makes a port of four.
-        cob_id: CAN-ID of its PDO; None for that of the pre-defined connection set, which the
-            first four of each direction have. Without one the PDO is off.
-        transport: None for a PDO if the type fits into one, else SDO.
+        cob_id: CAN-ID of its PDO; None for the CAN-ID of the pre-defined connection set, which
+            only the first four ports of each direction have. Without a CAN-ID the PDO is off.
+        transport: None selects a PDO if the type fits into one PDO, else SDO.
     """
 
     direction: ClassVar[rtc_canopen.PortDirection]
@@ -90,12 +90,15 @@ class CanopenInPort(CanopenPort[T]):
 
 
 class CanopenOutPort(CanopenPort[T]):
-    """A port that the component writes; its TPDO is sent once in a tick with a write."""
+    """A port that the component writes.
+
+    Its TPDO is sent once in a tick in which the component writes the port.
+    """
 
     direction: ClassVar[rtc_canopen.PortDirection] = rtc_canopen.PortDirection.OUT
 
     def write(self, value: T) -> None:
-        """Set the value; it is sent in Active, even if it has not changed.
+        """Set the value; it is sent in the state Active, even if it has not changed.
 
         Raises:
             ValueError: the value is not one of the port's type.
@@ -111,17 +114,18 @@ class CanopenOutPort(CanopenPort[T]):
 class CanopenComponent(DeviceComponent):
     """A component on a CANopen device; a subclass defines its properties and callbacks.
 
-    Ports have objects from 2100h on in order of declaration. Reset Node makes a new
+    The objects of the ports begin at 2100h, in the order of declaration. Reset Node makes a new
     component, as power-on does.
 
     Attributes:
-        type_name: type of the component; see `RtcProfile` for these six.
-        version: as 1.0.
-        vendor: who made it.
-        category: what it is.
+        type_name: type of the component; `RtcProfile` describes this and the next five
+            attributes.
+        version: version of the component, such as 1.0.
+        vendor: maker of the component.
+        category: category of the component.
         rate_hz: how often `on_execute`, `error_check` and `on_error` run (DECISION K12).
-        product_code: 1018h:02, 0 derives one from the type name.
-        strict_cia301: whether NMT commands leave Error as in CiA 301 (DECISION K9).
+        product_code: value of 1018h:02; 0 derives it from the type name.
+        strict_cia301: whether NMT commands leave the state Error as in CiA 301 (DECISION K9).
 
     Raises:
         ValueError: invalid profile or ports.
@@ -188,11 +192,14 @@ class CanopenEcho(CanopenComponent):
 # States of a DeviceRTC and the callbacks of each transition (NEDO report, 3.4.43.3, Table 3, Fig.
 # 110).
 #
-# Where figure and table leave a case open, decisions K6 to K13 of the project apply.
+# Where the figure and the table leave a case open, decisions K6 to K13 of the project apply.
 
 
 class RtcState(Enum):
-    """State of a component (OMG RTC 1.1, LifeCycleState), and one for the time after the end."""
+    """State of a component (OMG RTC 1.1, LifeCycleState).
+
+    One additional state stands for the time after the end of the component.
+    """
 
     CREATED = "Created"
     INACTIVE = "Inactive"
@@ -273,9 +280,9 @@ _ENDING: Final = {
 class CanopenLifeCycle(CallbackRunner[CanopenComponent]):
     """Runs the callbacks of a component before and after its node changes its NMT state.
 
-    The NMT state is the state of the component, once the component is initialized. The same
-    callbacks run whether the master, the error behaviour or the component itself changes the state;
-    they run at once, after all services have been notified.
+    Once the component is initialized, the NMT state of the node is the state of the component.
+    The same callbacks run whether the master, the error behaviour or the component itself changes
+    the state. They run at once, after all services have been notified.
 
     Args:
         node: the slave.
@@ -415,8 +422,8 @@ def _text_of(life: CanopenLifeCycle, name: str) -> float | str:
 class DeviceRtc(Application):
     """Runs a component with the NMT state of its node (NEDO report, 3.4.43.3, Fig. 110).
 
-    Callbacks take no time. The periodic callback runs for the first time one period after the state
-    was entered.
+    Callbacks take no time. The periodic callback runs for the first time one period after the
+    component has entered the state.
 
     Not emulated: service ports, configuration sets, several components on one node.
 

@@ -40,7 +40,7 @@ def whole_number(value: Value) -> int:
 # ===================
 #
 # An entry keeps the bytes that go over the wire, and no other form of the value. Four methods
-# change them, and differ in what is checked and who is notified:
+# change these bytes. They differ in what they check and whom they notify:
 #
 #            access  size  guard  limits   watchers  written   used by
 # download     x      x     x      x          x         x      SDO
@@ -48,26 +48,27 @@ def whole_number(value: Value) -> int:
 # force                                       x         x      tools inside, in place of the bus
 # assign                                      x                the device itself, resets
 #
-# `watchers` are called when a value has changed, `written` after each write, even of the same
-# value. A service whose object starts something when it is written (1017h, "save") takes `written`,
-# one that follows a value takes `watch`.
+# `watchers` are called when a value has changed. `written` is called after each write, even if
+# the value is the same. A service that starts something when its object is written (1017h,
+# "save") uses `written`. A service that follows a value uses `watch`.
 #
-# The order of the checks is that of the abort codes which a client gets: access (0601
-# 0001h, 2h), size (0607 0012h, 13h), what the object itself refuses (its own code), limits
-# (0609 0031h, 32h). The guard stands before the limits because its code says more.
-# Conformance checks judge these codes.
+# The checks run in this order, which decides the abort code that a client gets: access (0601
+# 0001h, 2h), size (0607 0012h, 13h), the check of the object itself (its own code), limits (0609
+# 0031h, 32h). The guard runs before the limits because its code is more specific. Conformance
+# checks judge these codes.
 #
-# `source` makes bytes when the bus reads them (`present`), and then `data` is old. `value`
-# and `number` ask it only if `measured` says that asking has no consequences; a source
-# without it may clear what it reads (interrupt sources of CiA 401) or raise (1003h).
+# `source` makes the bytes when the bus reads them (`present`); `data` is then out of date.
+# `value` and `number` call `source` only if `measured` is set, because then the call has no side
+# effects. A source without `measured` may clear what it reads (interrupt sources of CiA 401) or
+# raise an exception (1003h).
 #
-# `takes_all` opens the straight way for RPDOs (`pdo_mapping._make_write`): with no guard,
-# no `written` and no limits, `download` would end in `assign` anyway. Therefore guards must
-# be hung onto an entry when services are made, before a PDO prepares its mapping; a guard
-# that comes later is not seen until the mapping is prepared again.
+# `takes_all` allows RPDOs to write an entry directly (`pdo_mapping._make_write`). Without a
+# guard, `written` and limits, `download` would only call `assign` anyway. Therefore a service
+# must attach its guard when the service is made, before a PDO prepares its mapping. A PDO ignores
+# a guard that is attached later until the mapping is prepared again.
 #
-# The description of a dictionary is shared by all slaves of one type and never changes;
-# values are of one slave. `by_multiplexer` is a cache and holds readable entries only (see
+# The description of a dictionary is shared by all slaves of one type and never changes. Each
+# slave has its own values. `by_multiplexer` is a cache that holds readable entries only (see
 # sdo.py).
 
 # One entry of the object dictionary of a slave: its value, and who acts on it.
@@ -93,11 +94,11 @@ class Entry(Part):
         guard: called with a value that comes over the bus; raises SdoAbort to refuse it.
         written: called after a value came over the bus.
         source: returns the bytes to read instead of `data`; may raise SdoAbort.
-        measured: `source` returns a measured value at any time; it never raises and has no side
-            effects.
-        watchers: called whenever the value has changed, from the bus or from the inside.
-        takes_commands: writes are commands such as "save": only the guard checks them, because the
-            limits apply to the value read.
+        measured: whether `source` can be called at any time: it returns a measured value, never
+            raises and has no side effects.
+        watchers: called whenever the value has changed, by the bus or by the device.
+        takes_commands: whether writes are commands such as "save". Then only the guard checks a
+            write, because the limits apply to the value read.
     """
 
     __slots__ = (
@@ -145,7 +146,7 @@ class Entry(Part):
 
     @property
     def takes_all(self) -> bool:
-        """Whether every value of the right size is accepted, and no callback acts on a write."""
+        """Whether the entry accepts every value of the right size and no callback reacts to it."""
         low, high, kind = self.description.low, self.description.high, self.data_type
         free = low is None and high is None and kind is not DataType.BOOLEAN
         return free and self.guard is None and self.written is None
@@ -185,7 +186,10 @@ class Entry(Part):
                 changed(self)
 
     def force(self, data: bytes) -> None:
-        """Change the value from the inside; its owner acts as if the bus had written it."""
+        """Change the value from inside the device.
+
+        The owner of the object acts as if the bus had written the value.
+        """
         self.assign(data)
         if self.written is not None:
             self.written(self)
@@ -310,7 +314,7 @@ class Dictionary(Part):
     Attributes:
         description: names, types, access, limits and defaults.
         by_multiplexer: cache of readable entries, by the three bytes of their multiplexer.
-        answers: cache of their entries, values and SDO frames, likewise.
+        answers: cache of the entries, their values and their SDO frames, by the same three bytes.
 
     >>> from tickrig.wire.canopen.datatypes import DataType
     >>> from tickrig.wire.canopen.eds.object_table import RW
@@ -483,9 +487,11 @@ def check_time_cob_id(entry: Entry, value: Value) -> None:
 def _check(entry: Entry, value: Value, unknown: int, in_use: Callable[[int], bool]) -> None:
     """Refuse an invalid COB-ID with 0609 0030h.
 
-    Invalid are: bits that are neither flags nor an 11-bit CAN-ID (29-bit CAN-IDs are not
-    emulated), a restricted CAN-ID in use, and another CAN-ID while the old one is in use
-    and stays so.
+    These COB-IDs are invalid:
+
+    - one with bits that are neither flags nor an 11-bit CAN-ID (29-bit CAN-IDs are not emulated)
+    - one that is in use and has a restricted CAN-ID
+    - one in use with another CAN-ID than the old COB-ID, if the old one is in use, too
     """
     cob_id, old = value if isinstance(value, int) else unknown, entry.number
     can_id = cob_id & CAN_ID_MASK

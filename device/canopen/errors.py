@@ -27,33 +27,33 @@ from tickrig.wire.errors import FramingError
 # Theory of operation
 # ===================
 #
-# Three services turn one event into frames and states, and their order in stack.py is part
-# of it:
+# Three services turn one event into frames and states. Their order in stack.py matters:
 #
 # ErrorStateEmcy, NodeGuarding, HeartbeatConsumer, ...   see the cause: node.emergency(...)
 # EmcyProducer        keeps what is active, 1001h and 1003h, and sends
 # ErrorBehaviour      changes the NMT state afterwards (1029h)
 #
-# An error is a pair of code and five manufacturer-specific bytes, and it is active until the same
-# pair is cleared. `emergency` of an active error does nothing, so a service that sees a cause may
-# raise it in each tick; `emergency_clear` of one that is not active does nothing either. Two RPDOs
-# that are late are two errors, because their numbers are in the bytes. 1001h is the union of the
-# register bits of all that is active, so clearing one error must not clear a bit that another one
-# holds.
+# An error is a pair of a code and five manufacturer-specific bytes. It is active until the same
+# pair is cleared. `emergency` has no effect for an active error, so a service may call it in each
+# tick in which it sees the cause. `emergency_clear` has no effect for an error that is not
+# active. Two late RPDOs are two errors, because the bytes contain their numbers. 1001h is the
+# union of the register bits of all active errors, so clearing one error must not clear a bit that
+# another error sets.
 #
-# Two messages of one error, raised and gone, with node-ID 5 and the heartbeat of node 7:
+# Two messages of one error, when it is raised and when it is cleared, for node-ID 5 and the
+# heartbeat of node 7:
 #
 # 085   30 81 11 07 00 00 00 00    8130h, register: generic and communication, node 7
 # 085   00 00 00 07 00 00 00 00    0000h, nothing is left, the same bytes
 #
-# The register in a message is that of its own moment: `_queue_message` reads it when the
-# message is queued, not when it is sent. Messages wait in Stopped (no EMCY there), in
-# bus-off, and for the inhibit time; 16 at most, and later ones are lost. A reset forgets
-# errors and messages; a service that still sees the cause must raise it again
-# (`ErrorStateEmcy.booted` does). It does so one tick later, because the boot-up message has
-# the larger CAN-ID and would leave behind the EMCY.
+# The register in a message is the one at the time of the event: `_queue_message` reads it when
+# the message is queued, not when the message is sent. Messages wait in Stopped (where EMCY is not
+# allowed), in bus-off, and for the inhibit time. At most 16 messages wait; later ones are lost. A
+# reset deletes errors and messages. A service that still sees the cause must raise its error
+# again, as `ErrorStateEmcy.booted` does. It raises the error one tick later: the boot-up message
+# has the larger CAN-ID, so in the same tick the EMCY would be sent before it.
 #
-# Numbers: codes and register bits are CiA 301's; the length of the queue is a choice.
+# Codes and register bits are those of CiA 301. The length of the queue is a choice.
 
 # Error behaviour (CiA 301, object dictionary; object 1029h).
 
@@ -76,12 +76,13 @@ class _Behaviour(IntEnum):
 class ErrorBehaviour(Service):
     """Changes the NMT state on a communication error, or on an error of the device.
 
-    Without its sub-index of 1029h a communication error acts as with 0, and other errors have no
-    effect. It acts after the EMCY producer, so that the EMCY is sent before the slave is Stopped.
-    Undefined values are refused with 0609 0030h.
+    If 1029h lacks the sub-index of a communication error, the error acts as with the value 0.
+    Other errors without their sub-index have no effect. The service acts after the EMCY producer,
+    so that the EMCY is sent before the slave is Stopped. Writing an undefined value to 1029h is
+    refused with 0609 0030h.
 
-    Not emulated: sub-indices of other profiles and of manufacturers; an application may call
-    `node.enter` itself.
+    Not emulated: sub-indices of other profiles and of manufacturers. Instead, an application may
+    call `node.enter` itself.
     """
 
     def __init__(self, node: CanopenSlave, slot: int) -> None:
@@ -147,12 +148,13 @@ _QUEUE_LENGTH: Final = 16
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class EmcyProducer(Service):
-    """Reports errors, once when they occur and once when they are gone (0000h).
+    """Reports each error once when it occurs and once when it is cleared (0000h).
 
-    An error is known by its code and its text. 1001h is the union of the active errors, with the
-    generic bit while there is one. The end of each error is reported, with the remaining register.
-    In Stopped and in bus-off the messages wait; they are sent afterwards. A reset clears errors and
-    messages; a service whose cause remains must raise the error again.
+    An error is identified by its code and its text. 1001h is the union of the active errors; its
+    generic bit is set while any error is active. The message at the end of an error carries the
+    register of the remaining errors. In Stopped and in bus-off messages wait and are sent
+    afterwards. A reset clears errors and messages. A service whose cause remains must raise its
+    error again.
 
     Not emulated: 29-bit CAN-IDs.
     """
@@ -220,8 +222,8 @@ class EmcyProducer(Service):
     def tick(self, now_us: int) -> None:
         """Send the messages that the inhibit time allows."""
         cob_id = self._cob_id
-        # Without a valid 1014h nothing will ever be sent: old messages must not come out
-        # when it is set.
+        # Without a valid 1014h no message can be sent. Drop the messages, so that old ones are
+        # not sent when 1014h becomes valid.
         if cob_id is None or not is_valid(cob_id.number):
             self._queue.clear()
             return
@@ -247,12 +249,13 @@ class EmcyProducer(Service):
 class _ErrorHistory(Part):
     """Keeps the latest errors, the newest at sub-index 1.
 
-    Sub-index 0 counts them; writing 0 clears them all, other values are refused with 0609 0030h.
-    Reading a sub-index without an error returns 0800 0024h. A field is the error code with the
-    first two manufacturer-specific bytes above it. The end of an error is not recorded.
+    Sub-index 0 counts the errors. Writing 0 to it clears all errors; other values are refused
+    with 0609 0030h. Reading a sub-index without an error is refused with 0800 0024h. A field
+    contains the error code in its low half and the first two manufacturer-specific bytes above
+    it. The end of an error is not recorded.
 
     Args:
-        dictionary: with or without 1003h.
+        dictionary: the objects of the slave; 1003h may be missing.
     """
 
     def __init__(self, dictionary: Dictionary) -> None:
@@ -270,8 +273,8 @@ class _ErrorHistory(Part):
         count = min(self._count.number + 1, len(self._fields))
         for sub in reversed(range(1, count)):
             self._fields[sub].assign(self._fields[sub - 1].data)
-        # 1003h:01 = 07 00 81 30h as a number: the error code in the low half, additional
-        # information above.
+        # Example: 1003h:01 is the number 07 00 81 30h, with the error code in the low half and
+        # additional information above.
         self._fields[0].assign(code.to_bytes(2, "little") + text[:2].ljust(2, b"\0"))
         self._count.assign(bytes([count]))
 
@@ -297,7 +300,7 @@ _MAX_NODES: Final = 127
 
 
 class EmcyConsumer(Service):
-    """Consumes the EMCY of other nodes: the sub-index is their node-ID.
+    """Consumes the EMCY of other nodes; the sub-index is the node-ID of the producer.
 
     The application decides on the reaction. An EMCY without exactly eight bytes is ignored.
 
@@ -355,7 +358,7 @@ class ErrorStateEmcy(Service):
     """Reports error-passive (8120h) and recovery from bus-off (8140h).
 
     8120h is cleared when the controller is error-active again. Bus-off is a communication error
-    (1029h). 8140h is sent after recovery and cleared at once.
+    (1029h). 8140h is sent after the recovery from bus-off and cleared at once.
 
     Not emulated: the recovery of the controller itself.
 

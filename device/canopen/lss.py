@@ -46,10 +46,10 @@ _IDENTIFY: Final[tuple[_Test, ...]] = ((0, eq), (1, eq), (2, le), (2, ge), (3, l
 
 
 class MessageSequence(Part):
-    """One request in several messages; a wrong or missing message ends it.
+    """One request that consists of several messages; a wrong or missing message cancels it.
 
     Args:
-        tests: one for each message, in their order.
+        tests: one test for each message, in the order of the messages.
     """
 
     def __init__(self, tests: tuple[_Test, ...]) -> None:
@@ -57,8 +57,9 @@ class MessageSequence(Part):
 
     def take(self, step: int, address: LssAddress, number: int) -> bool:
         """Take a message; return whether it was the last one and all of them match."""
-        # 40h vendor, 41h product, 42h revision, 43h serial number: the first one starts again, and
-        # one that does not fit or is out of order spoils the whole until the next first one.
+        # 40h vendor, 41h product, 42h revision, 43h serial number. Message 40h starts the request
+        # again. A message that does not match or is out of order cancels the request until the
+        # next 40h.
         if step == 0:
             self._step = 0
         part, fits = self._tests[step]
@@ -85,8 +86,8 @@ class FastScanner(Part):
         # Bits from 31 down to `bit_check` must agree; those below are not compared yet.
         if (address[self._sub] ^ request.id_number) >> request.bit_check:
             return None
-        # Bit 0 agrees, so the whole part is known: only then the scan goes on to the next
-        # one.
+        # Bit 0 matches, so the whole number is known. Only then does the scan continue with the
+        # next number.
         if request.bit_check:
             return LssMode.WAITING
         return self._advance(request)
@@ -102,12 +103,14 @@ class FastScanner(Part):
 class LssSlave(Service):
     """Obeys the LSS master, in every NMT state.
 
-    A node-ID takes effect at the next reset; an unconfigured slave boots with it when LSS returns
-    to waiting. Without storing, it is lost at power-off. Any reset returns to waiting. Selective
-    switching and fastscan act in waiting only, fastscan and identify non-configured in a slave that
-    has no active and no pending node-ID. A bit rate takes effect when activated: the slave is
-    silent for two switch delays and switches in between (`node.on_bit_rate`). Without all of
-    1018h:01 to 04 there is no LSS.
+    A new node-ID takes effect at the next reset. An unconfigured slave boots with it when LSS
+    returns to the waiting state. A node-ID that is not stored is lost at power-off. Any reset
+    returns LSS to the waiting state.
+
+    Selective switching and fastscan work only in the waiting state. Fastscan and "identify
+    non-configured" work only in a slave that has neither an active nor a pending node-ID. A new
+    bit rate takes effect when it is activated: the slave sends nothing for two switch delays and
+    switches between the two (`node.on_bit_rate`). LSS is off if one of 1018h:01 to 04 is missing.
 
     Not emulated: manufacturer-specific bit timing tables, automatic bit rate
     detection (index 9); both are refused with error 1.
@@ -216,9 +219,9 @@ class LssSlave(Service):
         self._acknowledge(LssCommand.CONFIGURE_BIT_TIMING, allowed)
 
     def _activate_bit_timing(self, data: bytes) -> None:
-        # 15 ll hh: switch delay in ms. It passes twice: until the switch, so that all nodes
-        # are quiet when the first of them changes, and after it, so that all have changed
-        # when the first one sends.
+        # 15 ll hh: switch delay in ms. The slave waits for it twice. The delay before the switch
+        # makes sure that all nodes are quiet when the first one changes its bit rate. The delay
+        # after the switch makes sure that all nodes have changed when the first one sends.
         delay_us = int.from_bytes(data[1:3], "little") * 1_000
         self._switch_us = self.node.now_us + delay_us
         self.node.silent_until_us = self._switch_us + delay_us

@@ -45,8 +45,8 @@ class NmtSlave(Service):
         )
         self.node.enter(nmt.NmtState.PRE_OPERATIONAL)
         startup = self.node.dictionary.find(_NMT_STARTUP)
-        # 1F80h = 8: bits 0 (is the NMT master), 2 and 3 are 0, 0 and 1; bit 1 concerns
-        # masters only.
+        # Value 8 of 1F80h: bit 0 (node is the NMT master) is 0, bit 2 is 0, bit 3 is 1. Bit 1
+        # concerns masters only.
         if startup is not None and startup.number & _SELF_START_MASK == _SELF_START:
             self.node.enter(nmt.NmtState.OPERATIONAL)
 
@@ -88,8 +88,8 @@ class NmtSlave(Service):
 class HeartbeatProducer(Service):
     """Sends the NMT state each producer heartbeat time.
 
-    The boot-up message counts as the first heartbeat. Writing the time, over the bus or from the
-    inside, restarts the period, so the first heartbeat follows one period later.
+    The boot-up message counts as the first heartbeat. A write to the heartbeat time, over the bus
+    or by the device itself, restarts the period: the next heartbeat follows one period later.
     """
 
     def __init__(self, node: CanopenSlave, slot: int) -> None:
@@ -138,12 +138,13 @@ _TOGGLE: Final = 0x80
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class NodeGuarding(Service):
-    """Answers guarding requests with the NMT state, and supervises that they arrive.
+    """Answers guarding requests with the NMT state, and checks that requests arrive in time.
 
-    The toggle bit starts at 0 after a reset and changes with each answer. Life guarding begins
-    with the first request. If none follows within guard time times life time factor, EMCY 8130h and
-    a communication error (1029h) are raised until the next request. Heartbeat has priority: with
-    1017h set, requests are not answered and not supervised. Without 100Ch there is no guarding.
+    The toggle bit is 0 after a reset and changes with each answer. Life guarding begins with the
+    first request. If no request follows within guard time times life time factor, the slave
+    raises EMCY 8130h and a communication error (1029h); both last until the next request.
+    Heartbeat has priority: while 1017h is not 0, requests are neither answered nor supervised.
+    Without 100Ch node guarding is off.
     """
 
     def __init__(self, node: CanopenSlave, slot: int) -> None:
@@ -224,8 +225,8 @@ class Monitor(Part):
         node_id: the monitored node.
         period_us: the consumer heartbeat time.
         watch: the monitoring state.
-        nmt_state: the NMT state that the node sent last, None before.
-        deadline_us: when its heartbeat is late.
+        nmt_state: the NMT state that the node sent last; None before its first heartbeat.
+        deadline_us: time from which its heartbeat is late.
     """
 
     __slots__ = ("_consumer", "deadline_us", "nmt_state", "node_id", "period_us", "watch")
@@ -242,8 +243,8 @@ class Monitor(Part):
             return
         self.nmt_state = frame.data[0]
         before, self.watch = self.watch, Watch.ALIVE
-        # The deadline moves, the schedule stays: the service wakes at the old one and looks
-        # again. Rescheduling at each heartbeat would cost more than that one look.
+        # The deadline moves but the schedule does not: the service wakes at the old deadline and
+        # checks the new one. Rescheduling at each heartbeat would cost more than that one check.
         self.deadline_us = self._consumer.node.now_us + self.period_us
         if before is not Watch.ALIVE:
             if before is Watch.LOST:
@@ -266,11 +267,13 @@ class Monitor(Part):
 class HeartbeatConsumer(Service):
     """Monitors the heartbeats of other nodes.
 
-    Monitoring begins with the first heartbeat; the boot-up message counts as one. A missing
-    heartbeat raises EMCY 8130h, whose first manufacturer-specific byte is the node-ID, and a
-    communication error (1029h). The error is cleared when a heartbeat arrives again, or when its
-    entry is changed. An entry with time 0 or a node-ID that is not 1..127 is not used. A second one
-    for the same node-ID is refused with 0604 0043h, reserved bits with 0609 0030h.
+    Monitoring begins with the first heartbeat; the boot-up message counts as a heartbeat. A
+    missing heartbeat raises a communication error (1029h) and EMCY 8130h, whose first
+    manufacturer-specific byte is the node-ID. The error is cleared when a heartbeat arrives
+    again, or when the entry of 1016h is changed.
+
+    An entry with time 0 or with a node-ID outside 1..127 is not used. A second entry for the same
+    node-ID is refused with 0604 0043h. An entry with reserved bits is refused with 0609 0030h.
 
     Attributes:
         monitors: the entries in use.

@@ -43,15 +43,16 @@ _VOLATILE: Final = frozenset((0x1003, 0x1010, 0x1011, 0x1013))
 class ParameterStore(Service):
     """Stores parameters on "save", restores the defaults on "load".
 
-    Sub-index 1 stands for all, 2 for 1000h to 1FFFh, 3 for 6000h to 9FFFh, 4 and above for 2000h to
-    5FFFh, where CiA 301 leaves the choice. A parameter is an object that the bus may read and
-    write, except domains and process outputs (objects for RPDOs only). Default values are not
-    stored, so that COB-IDs continue to follow the node-ID. "load" acts with the next reset, of the
-    node or, for 1000h to 1FFFh, of communication. Another signature is refused with 0800 0020h.
-    Storing works in every NMT state with SDOs, whatever value the objects have when read: that is
-    their default.
+    Sub-index 1 stands for all parameters, 2 for 1000h to 1FFFh, 3 for 6000h to 9FFFh. CiA 301
+    leaves sub-indices from 4 on to the device: here they stand for 2000h to 5FFFh. A parameter is
+    an object that the bus may read and write, except domains and process outputs (objects for
+    RPDOs only). Default values are not stored, so that COB-IDs continue to follow the node-ID.
 
-    Not emulated: the time it takes, failing memory, automatic saving.
+    "load" takes effect at the next reset of the node; for 1000h to 1FFFh, a reset of
+    communication is enough. Another signature is refused with 0800 0020h. Storing works in every
+    NMT state in which SDOs work. The value read from 1010h or 1011h is always its default.
+
+    Not emulated: the time that storing takes, failing memory, automatic saving.
 
     Attributes:
         volatile: indices that are never stored; a device profile may add to them.
@@ -156,18 +157,19 @@ class FlashError(IntEnum):
 
 
 class BootLoader(Part):
-    """Stops, clears, takes and starts the program of a device.
+    """Stops, clears, downloads and starts the program of a device.
 
-    A device whose program is stopped resets, and boots with the objects of the boot loader only: no
-    others exist, and NMT start is ignored. The same happens at power-on if there is no program. A
-    downloaded program is stored and identified by its CRC-32 (1F56h) but not executed: a running
-    device behaves as before. A command that does not fit the state is refused with 0800 0022h.
+    A device whose program is stopped resets and boots with the objects of the boot loader only.
+    All other objects are missing, and NMT start is ignored. A device without a program does the
+    same at power-on. A downloaded program is stored and identified by its CRC-32 (1F56h) but not
+    executed: a running device behaves as before the download. A command that does not fit the
+    state is refused with 0800 0022h.
 
     Not emulated: verification of the download, several programs, 1F52h to 1F55h
     and 1F58h, writing by blocks of the flash.
 
     Args:
-        node: its slave, with the objects of `add_program_objects`.
+        node: the slave, with the objects of `add_program_objects`.
         built_in: the program of a new device.
     """
 
