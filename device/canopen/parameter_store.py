@@ -50,7 +50,8 @@ class ParameterStore(Service):
 
     "load" takes effect at the next reset of the node; for 1000h to 1FFFh, a reset of
     communication is enough. Another signature is refused with 0800 0020h. Storing works in every
-    NMT state in which SDOs work. The value read from 1010h or 1011h is always its default.
+    NMT state in which SDOs work, regardless of the value that the objects have when read: that
+    value is their default.
 
     Not emulated: the time that storing takes, failing memory, automatic saving.
 

@@ -48,14 +48,15 @@ if TYPE_CHECKING:
 # Theory of operation
 # ===================
 #
-# A server is in one state at a time, and a state is the method that takes the next request
-# (`State`). Without a transfer that is `_without_transfer`; a transfer object (segmented or
-# block, up or down) hands its own methods to `SdoServer.wait` and ends with `end`. There is
-# one transfer at a time, and the object holds everything about it, so that dropping the
-# state drops the transfer.
+# A server is in one state at a time. A state is the method that takes the next request (`State`).
+# Without a transfer the state is `_without_transfer`. A transfer object (segmented or block,
+# upload or download) passes its own methods to `SdoServer.wait` and finishes with `end`. There is
+# one transfer at a time, and its object holds everything about it, so that dropping the state
+# drops the transfer.
 #
-# The frames, client left and server right (CiA 301, 7.2.4.3): toggle bit 10h, n unused bytes,
-# last segment 01h. ii ii ss is the multiplexer: index with its low byte first, sub-index.
+# The table shows the frames, the client on the left and the server on the right (CiA 301,
+# 7.2.4.3). The toggle bit is 10h, the last segment has 01h, n is the number of unused bytes. ii
+# ii ss is the multiplexer: the index with its low byte first, then the sub-index.
 #
 # read, up to 4 bytes     40 17 10 00 ..             4B 17 10 00 E8 03   (43 47 4B 4F: 4 to 1)
 # read, segments          40 08 10 00 ..             41 08 10 00 0A 00 00 00   10 bytes follow
@@ -76,31 +77,32 @@ if TYPE_CHECKING:
 #
 # Rules that hold for all transfers:
 #
-# - A value is taken or given whole: an upload gives the value of the moment of its first
-#   request, a download changes the object with its last frame or not at all. Watchers and
-#   RPDOs may change the object in between; a half-written one is never visible.
-# - Refusals are exceptions: whatever raises SdoAbort while a request is worked on (entry,
-#   guard, size check, transfer) ends the transfer in `receive`, with the multiplexer of the
-#   transfer or 0.
-# - A request that does not continue the transfer is judged by `initiate`: a new initiate
-#   ends the old transfer silently, an abort ends it, anything else is 0504 0001h. For
-#   segments a wrong toggle bit is 0503 0000h first. Inside a block there is no such
-#   judgement: each frame but 80h is a segment.
-# - The clock (`due_us`) starts again with each request; after `timeout_us` of silence
-#   `tick` aborts with 0504 0000h. `wait` also wakes the service, `go_on` does not: it runs
-#   for each segment, and the service comes back at the old deadline and sees that there is
-#   a later one.
-# - What comes is counted against the announced size, the object and the memory while it
-#   comes (`_DownloadSize`), so that a client cannot fill the memory before it is refused.
+# - A value is read and written as a whole. An upload returns the value at the time of its first
+#   request. A download changes the object with its last frame or not at all. Watchers and RPDOs
+#   may change the object in between; a partly written value is never visible.
+# - Refusals are exceptions. When anything that works on a request (entry, guard, size check,
+#   transfer) raises SdoAbort, `receive` ends the transfer. The abort has the multiplexer of the
+#   transfer, or 0 without a transfer.
+# - `initiate` handles a request that does not continue the transfer. A new initiate request ends
+#   the old transfer silently, an abort ends it, anything else is aborted with 0504 0001h. In
+#   segmented transfers, a wrong toggle bit is checked first and aborted with 0503 0000h. Inside a
+#   block there is no such check: each frame except 80h is a segment.
+# - The time-out (`due_us`) starts again with each request. After `timeout_us` without a request
+#   `tick` aborts with 0504 0000h. `wait` also schedules the service. `go_on` does not, because it
+#   runs for each segment: the service wakes at the old deadline and finds that there is a later
+#   one.
+# - Received bytes are checked while they arrive (`_DownloadSize`): against the announced size,
+#   the object and the memory. So a client cannot fill the memory before it is refused.
 #
-# `_without_transfer` answers the commonest request itself: reading up to four bytes without a
-# `source`. It must answer exactly as `initiate` would; `by_multiplexer` holds readable entries
-# only, for that reason. `answers` keeps the latest frame of each; it holds as long as the entry
-# has the very bytes object that the frame was made of, and the server its CAN-ID.
+# `_without_transfer` itself answers the most common request: reading up to four bytes from an
+# entry without a `source`. It must answer exactly as `initiate` would; for that reason
+# `by_multiplexer` holds readable entries only. `answers` keeps the latest frame of each such
+# entry. The frame is valid as long as the entry has the same bytes object that the frame was made
+# of and the server has the same CAN-ID.
 #
-# Other ends of this dialogue: `wire/canopen/sdo_frame.py` has the command bytes, the client
-# is `host/canopen`. A change of the rules has to be made with the rules of `canmon` and the
-# conformance checks in mind, which judge exactly these points.
+# Related files: `wire/canopen/sdo_frame.py` has the command bytes, `host/canopen` has the client.
+# Before you change these rules, check the rules of `canmon` and the conformance checks, which
+# judge exactly these points.
 
 # Segmented transfer of one object (CiA 301, SDO download and SDO upload segment).
 
@@ -109,7 +111,7 @@ _REQUESTED: Final = SPECIFIER | TOGGLE
 _UPLOAD_SEGMENT: Final = int(ClientCommand.UPLOAD_SEGMENT)
 _DOWNLOAD_SEGMENT: Final = int(ClientCommand.DOWNLOAD_SEGMENT)
 _HEADS: Final = {toggle: bytes([toggle]) for toggle in (0, TOGGLE)}
-"""First byte of an uploaded segment that is not the last one, by its toggle bit."""
+"""First byte of an uploaded segment, by its toggle bit; not for the last segment."""
 _TAKEN: Final = {
     toggle: bytes([ServerCommand.DOWNLOAD_SEGMENT | toggle]) + bytes(SEGMENT_BYTES)
     for toggle in (0, TOGGLE)
@@ -123,14 +125,14 @@ class _DownloadSize(Part):
     Args:
         server: the server, with the memory limit of the slave.
         entry: the object to write.
-        announced: bytes that the client is going to send, None if not indicated.
+        announced: number of bytes that the client announces; None if it announces none.
 
     Raises:
         SdoAbort: the entry is not writable, or the announced size does not fit.
 
     Attributes:
         announced: as given.
-        most: largest number of bytes; above it `check` raises the reason.
+        most: largest number of bytes; `check` raises the reason if there are more.
     """
 
     def __init__(self, server: SdoServer, entry: Entry, announced: int | None) -> None:
@@ -230,10 +232,11 @@ _END_MASK: Final = 0xE1
 class _BlockDownload(Part):
     """Downloads a value in blocks; the object changes when the client has ended the transfer.
 
-    A segment out of sequence is dropped, and the end of the block is acknowledged with the last one
-    in sequence. If the end itself is lost, the client must notice, or the transfer times out: a
-    client may be slow inside a block. The size is checked before the CRC. Inside a block every
-    frame but an abort is a segment.
+    A segment out of sequence is dropped. At the end of the block the server acknowledges the last
+    segment in sequence. If the last segment of the block is lost, the client must notice the
+    loss, or the transfer times out. The server waits until then, because a client may be slow
+    inside a block. The size is checked before the CRC. Inside a block every frame except an abort
+    is a segment.
     """
 
     def __init__(self, server: SdoServer, entry: Entry, request: bytes) -> None:
@@ -276,8 +279,8 @@ class _BlockDownload(Part):
 
     def _acknowledge(self) -> None:
         """Acknowledge the received part of the block, and start the next."""
-        # The number of data bytes in the last segment comes only at the end: seven bytes may be
-        # fill.
+        # The number of data bytes in the last segment is known only at the end of the transfer:
+        # up to seven bytes may be padding.
         self._size.check(len(self._data) - SEGMENT_BYTES)
         self._block_size = self._server.block_size
         # A2, the last one in sequence (0 for none), segments of the next block.
@@ -291,8 +294,8 @@ class _BlockDownload(Part):
         if request[0] & _END_MASK != BLOCK_END:
             self._server.initiate(request)
             return
-        # C1 with n in bits 4 to 2: bytes of the last segment that are no data. CRC in bytes
-        # 1 and 2.
+        # C1 with n in bits 4 to 2: number of bytes in the last segment that contain no data. The
+        # CRC is in bytes 1 and 2.
         data = bytes(self._data[: len(self._data) - (request[0] >> 2 & 7)])
         self._size.check(len(data))
         if len(data) < (self._size.announced or 0):
@@ -305,12 +308,15 @@ class _BlockDownload(Part):
 
 
 class _BlockUpload(Part):
-    """Uploads a value in blocks, one block in a tick, as it was at the first request.
+    """Uploads a value in blocks, one block in a tick.
 
-    A value no longer than the client's protocol switch threshold is sent by expedited or segmented
-    upload. After a lost segment, sending continues from it in a new block. The block size of the
-    last acknowledgement is ignored. The server indicates CRC support only to clients with CRC
-    support: some clients check the CRC whenever the server supports it.
+    The client receives the value at the time of its first request.
+
+    A value that is not longer than the protocol switch threshold of the client is sent by
+    expedited or segmented upload. After a lost segment, a new block starts with the lost segment.
+    The block size in the last acknowledgement is ignored. The server indicates CRC support only
+    to clients with CRC support, because some clients check the CRC whenever the server supports
+    it.
     """
 
     def __init__(self, server: SdoServer, data: bytes, request: bytes) -> None:
@@ -393,9 +399,9 @@ class SdoLimits(Immutable):
     """SDO server limits that CiA 301 leaves to the device.
 
     Attributes:
-        timeout_us: silence of the client after which a transfer is aborted, at least 1.
-        memory_bytes: memory of all strings and domains of the slave together; the limit of a single
-            object is in its description.
+        timeout_us: time without a request after which a transfer is aborted, at least 1.
+        memory_bytes: memory of all strings and domains of the slave together. The limit of a
+            single object is in its description.
     """
 
     timeout_us: int = _TIMEOUT_US
@@ -421,7 +427,10 @@ _INITIATE: Final[dict[int, int]] = {
     ClientCommand.BLOCK_UPLOAD: BLOCK_SUBCOMMAND,
     ClientCommand.BLOCK_DOWNLOAD: BLOCK_END & BLOCK_SUBCOMMAND,
 }
-"""Commands that begin a transfer; bits of a block command that are 0 in an initiate request."""
+"""Commands that begin a transfer.
+
+The value of a block command is the mask of the bits that are 0 in its initiate request.
+"""
 _UPLOAD: Final = int(ClientCommand.UPLOAD)
 _EXPEDITED: Final = tuple(
     bytes([ServerCommand.UPLOAD | EXPEDITED | SIZE_INDICATED | EXPEDITED_BYTES - size << 2])
@@ -432,11 +441,15 @@ _FILL: Final = tuple(bytes(EXPEDITED_BYTES - size) for size in range(EXPEDITED_B
 
 
 class SdoServer(Part):
-    """Serves one client: one transfer at a time, all kinds of CiA 301.
+    """Serves one client, one transfer at a time, with all transfer types of CiA 301.
 
-    In cases that CiA 301 leaves open: requests without exactly 8 bytes are ignored. A new initiate
-    request ends a running transfer silently. An invalid request in the present state is aborted
-    with 0504 0001h, with multiplexer 0 if no transfer runs. Reserved bits are ignored.
+    The server decides these cases, which CiA 301 leaves open:
+
+    - A request without exactly 8 bytes is ignored.
+    - A new initiate request ends a running transfer silently.
+    - A request that is invalid in the present state is aborted with 0504 0001h. The multiplexer
+      of the abort is 0 if no transfer runs.
+    - Reserved bits are ignored.
 
     Not emulated: network indication, the time that a real server needs.
 
@@ -448,7 +461,8 @@ class SdoServer(Part):
     Attributes:
         request_id: CAN-ID from client to server.
         response_id: CAN-ID from server to client.
-        block_size: segments in a block that it offers for block download, 1..127.
+        block_size: number of segments in a block that the server offers for block download,
+            1..127.
         due_us: when the transfer times out.
     """
 
@@ -572,14 +586,14 @@ class SdoServer(Part):
     def _begin_download(self, entry: Entry, request: bytes) -> None:
         """Download a value at once, or start a segmented download.
 
-        Expedited data without a size fills the object; further bytes are ignored.
+        Expedited data without an indicated size fill the object; additional bytes are ignored.
         """
         command = request[0]
         if not command & EXPEDITED:
             SegmentedDownload(self, entry, request)
             return
-        # 23, 27, 2B, 2F: 4, 3, 2, 1 bytes; without bit 0 (22h) the size is that of the
-        # object.
+        # 23, 27, 2B, 2F: 4, 3, 2, 1 bytes. Without bit 0 (22h) the number of bytes is the size of
+        # the object.
         size = EXPEDITED_BYTES - (command >> 2 & 3)
         if not command & SIZE_INDICATED:
             size = min(entry.size or EXPEDITED_BYTES, EXPEDITED_BYTES)
@@ -618,10 +632,11 @@ class _Additional(NamedTuple):
 class SdoServers(Service):
     """The default server and the additional ones.
 
-    The default server exists even without 1200h; 1200h, if present, always shows its COB-IDs and is
-    read-only. An additional server is active as soon as both its COB-IDs are valid; a CAN-ID
-    changes only while its own COB-ID is invalid. Bit 30 (dynamic) is kept and has no effect.
-    Transfers end silently when the slave leaves Pre-operational and Operational.
+    The default server exists even without 1200h. If 1200h exists, it is read-only and always
+    shows the COB-IDs of the default server. An additional server is active when both its COB-IDs
+    are valid; a CAN-ID changes only while its own COB-ID is invalid. Bit 30 (dynamic) is stored
+    and has no effect. Transfers end silently when the slave enters an NMT state other than
+    Pre-operational and Operational.
 
     Not emulated: 29-bit CAN-IDs, a check of two servers on one CAN-ID.
 

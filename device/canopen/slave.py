@@ -22,50 +22,62 @@ from tickrig.wire.instant import NEVER
 # Theory of operation
 # ===================
 #
-# A slave is a dictionary, an NMT state and a list of services. Services know the node and
-# the dictionary and, with few exceptions, not each other: what one has to tell another goes
-# through an entry (`watch`, `guard`, `written`, `source`) or through the node (`emergency`,
-# `enter`, SYNC).
+# A slave is a dictionary, an NMT state and a list of services. Services know the node and the
+# dictionary; with few exceptions they do not know each other. One service informs another through
+# an entry (`watch`, `guard`, `written`, `source`) or through the node (`emergency`, `enter`,
+# SYNC).
 #
 # A tick has two halves:
 #
-# 1. Frames, one after the other in the order of the wire. Each goes to the handler of its
-#    CAN-ID, and acts at once: an NMT command between two PDOs separates them, an SDO that
-#    changes a mapping counts for the next frame of the same tick.
-# 2. Services that are due, in the order of their slots (stack.py has the order and its
-#    reasons). A service that is woken by one before it acts in the same tick; one that is
-#    woken by one behind it acts in the next.
+# 1. Frames are handled one after the other, in their order on the wire. Each frame goes to the
+#    handler of its CAN-ID and takes effect at once. An NMT command between two PDOs applies to
+#    the second PDO only. An SDO that changes a mapping applies to the next frame of the same
+#    tick.
+# 2. Services that are due act in the order of their slots (stack.py has the order and its
+#    reasons). A service that is woken by an earlier service acts in the same tick. A service that
+#    is woken by a later one acts in the next tick.
 #
-# Then the frames of the tick leave, sorted by CAN-ID, those of one CAN-ID in the order in
-# which they were made. So nothing may depend on the order in which services call `send`.
+# Then the frames of the tick are sent, sorted by CAN-ID. Frames with the same CAN-ID keep the
+# order in which they were made. Therefore nothing may depend on the order in which services call
+# `send`.
 #
-# `handlers(state)` is asked only in `rewire`. Code that changes its result (a
-# COB-ID, a transmission type, the state) must call `rewire`, or the slave listens to the
-# old CAN-IDs. It also sets `accepts`, by which the bus does not even deliver the other
-# frames. A frame in the middle of a tick may change `accepts`; the bus has filtered the
-# frames behind it before it knew. Therefore `reconfigured_by` names the CAN-IDs whose
-# frames may do so, and the bus lets everything pass behind one of them. A service whose
-# frames can lead to `rewire` must name them there.
+# `handlers(state)` is called only in `rewire`. Code that changes its result (a COB-ID, a
+# transmission type, the state) must call `rewire`; otherwise the slave listens to the old
+# CAN-IDs. `rewire` also sets `accepts`, which keeps the bus from delivering other frames.
 #
-# Time: a service says when it wants its `tick` by `schedule`, and only then gets it.
+# A frame in the middle of a tick may change `accepts` after the bus has already filtered the
+# frames that follow. Therefore `reconfigured_by` names the CAN-IDs of frames that may do so, and
+# the bus passes all frames after such a frame. A service whose frames can lead to `rewire` must
+# name their CAN-IDs in `reconfigured_by`.
+#
+# Time: a service requests its `tick` by `schedule`, and gets it only then. `due_us` is the
+#     earliest of these times; a rig in virtual time jumps to it. Waking too early is harmless,
+#     because each service checks its own deadlines. Waking too late is an error that shows only
+#     in virtual time.
 # `due_us` is the earliest of these; a rig in virtual time jumps there. Waking too early is
 # harmless, because each service looks at its own deadlines; waking too late is a fault that
 # only virtual time shows.
 #
-# Reset, in this order, and none of it can be exchanged:
+# A reset runs these steps; their order must not change:
 #
 # 1. the pending node-ID becomes the node-ID
-# 2. entries of the area get their stored or default values; watchers run, still in the old state
-# 3. `enter(INITIALISING)`: services see the end of the old state
-# 4. all schedules are dropped (also those of step 2), each service `start`s with the new values
+# 2. entries of the area get their stored or default values; watchers run while the node is still
+#    in the old state
+# 3. `enter(INITIALISING)`: services are notified of the end of the old state
+# 4. all schedules are dropped (also those of step 2), then each service runs `start` with the new
+#    values
 # 5. `rewire`, then `booted` in slot order: NMT sends the boot-up message and enters
-#    Pre-operational, and only then the heartbeat counts its first period
+#    Pre-operational; the first period of the heartbeat starts afterwards
 #
-# A slave without a node-ID (FFh) stops after step 5 without `booted`: only LSS listens.
-# `reset` (loss of power) does nothing but note it; the first tick afterwards is the
-# power-on, and frames that came before are dropped.
+# A slave without a node-ID (FFh) omits `booted` in step 5: only LSS listens. `reset` (loss of
+# power) only records that power was lost. The first tick afterwards is the power-on, and frames
+# that came before it are dropped.
 #
-# Numbers: the tick of 1 ms is a choice; everything about states and services is CiA 301,
+# The tick of 1 ms is a choice. All other facts about states and services are from CiA 301, cited
+#     at each service. Speed matters in this file more than in most others: a network of 127
+#     slaves runs this loop 127 times a millisecond. `__slots__`, tuples in place of lists and
+#     positions in place of names in `tick` are optimizations with measured gains, noted beside
+#     them.
 # cited beside each service. Speed matters here as in few files: a network of 127 slaves
 # runs this loop 127 times a millisecond. `__slots__`, tuples in place of lists and places
 # in place of names in `tick` are measured, with the gain beside them.
@@ -82,7 +94,8 @@ class Nonvolatile:
         node_id: node-ID stored by LSS, None if none was.
         bit_rate_index: bit timing index stored by LSS, None if none was.
         version: counts every change, so that an emulator knows when to write its file.
-        program: downloaded (1F50h), empty where it was cleared; None for the one it was made with.
+        program: the downloaded program (1F50h), empty if it was cleared; None for the built-in
+            program.
     """
 
     parameters: dict[int, bytes] = field(default_factory=dict)
@@ -114,7 +127,7 @@ class Service(Copyable):
     Attributes:
         node: the slave that it belongs to.
         slot: its place in the order of a tick.
-        asked_us: when its `tick` is due, `NEVER` for not at all; `schedule` sets it.
+        asked_us: when its `tick` is due; `NEVER` if it is not scheduled. `schedule` sets it.
     """
 
     __slots__ = ("asked_us", "node", "slot")
@@ -169,7 +182,7 @@ class Service(Copyable):
         return iter(())
 
     def reconfigured_by(self, state: NmtState) -> Iterator[int]:
-        """Yield the CAN-IDs whose frames may change the CAN-IDs that the node listens to.
+        """Yield the CAN-IDs of frames that may change which CAN-IDs the node listens to.
 
         An acceptance filter passes all frames after such a frame.
 
@@ -224,7 +237,7 @@ class Service(Copyable):
         """
 
     def follow_cob_id(self, entry: Entry) -> None:
-        """Listen to another CAN-ID; a watcher of a COB-ID.
+        """Update the CAN-IDs that the node listens to; the watcher of a COB-ID calls it.
 
         Args:
             entry: the COB-ID, which has changed.
@@ -245,7 +258,7 @@ class Service(Copyable):
 _REMOTE: Final = 0x2000_0000
 
 _shared: Final[Callable[[frozenset[int]], frozenset[int]]] = lru_cache(frozenset)
-"""Return the one set shared by all slaves with the same CAN-IDs; it stays in the cache."""
+"""Return the set of CAN-IDs; slaves with the same CAN-IDs share one set, which stays cached."""
 
 
 def _frame_handlers(services: Iterable[Service], state: NmtState) -> dict[int, Handler]:
@@ -291,16 +304,15 @@ ServiceMaker = Callable[["CanopenSlave", int], Service]
 class CanopenSlave(Copyable):
     """A `Device[Frames]` that is a CANopen slave (CiA 301).
 
-    Frames of a tick are handled in the order in which they came over the wire.
-    Then services act in the order in which they are listed: SYNC, RPDO, SDO,
-    application, TPDO, EMCY, heartbeat. The frames of one tick leave sorted by priority, that
-    is by CAN-ID; those of one CAN-ID keep their order.
+    Frames of a tick are handled in their order on the wire. Then services act in the order of the
+    list: SYNC, RPDO, SDO, application, TPDO, EMCY, heartbeat. The frames that one tick sends are
+    sorted by priority, that is by CAN-ID; frames with the same CAN-ID keep their order.
 
     Not emulated: the time that a real slave's processor needs.
 
     Args:
         dictionary: the objects; they determine the services.
-        node_id: 1..127, or `UNCONFIGURED`; LSS may have stored another.
+        node_id: 1..127, or `UNCONFIGURED`. A node-ID that LSS has stored takes precedence.
         services: factories of the services, in the order of a tick.
         nonvolatile: the memory that survives a power cycle.
 
@@ -311,26 +323,29 @@ class CanopenSlave(Copyable):
         dictionary: its objects.
         services: its services, in the order of a tick.
         node_id: the active node-ID.
-        configured_id: the node-ID it was made with.
+        configured_id: the node-ID that was passed to the constructor.
         pending_id: the node-ID that takes effect at the next reset (CiA 305).
         state: NMT state.
         now_us: time of the latest tick.
         due_us: when the next service is due.
-        accepts: CAN-IDs that it listens to, for the acceptance filter of a wire; None,
-            for all, from power-on or a reset to the first tick.
+        accepts: CAN-IDs that it listens to, for the acceptance filter of a wire. None stands for
+            all CAN-IDs, from power-on or a reset until the first tick.
         reconfigured_by: CAN-IDs of the frames that may change `accepts` when handled.
-        on_accepts: called when these two have changed.
-        time_of_day: the latest TIME stamp that was received, None before the first.
-        silent_until_us: nothing is sent before this time, while LSS switches the bit rate.
+        on_accepts: called when `accepts` or `reconfigured_by` has changed.
+        time_of_day: the TIME stamp that was received last; None before the first one.
+        silent_until_us: the slave sends nothing before this time, while LSS switches the bit
+            rate.
         on_state: called with the old and the new state on each change of the NMT state.
-        on_sync: called with the counter of each SYNC, 0 if it has none.
+        on_sync: called with the counter of each SYNC, or with 0 if the SYNC has no counter.
         on_bit_rate: called with the bit rate in bit/s that LSS has switched to.
-        sync_handlers: the same as `on_sync`, for parts of the slave: RPDOs, TPDOs, then
-            the application.
-        horizon: how far its application may compute ahead; None, without a rig, for tick by tick.
-        model: name of its model, empty without one; for traces.
-        boots: returns at the end of Initialising whether the node boots or stays there.
-        admits: returns before each NMT command whether it is carried out.
+        sync_handlers: called like `on_sync`, for parts of the slave: RPDOs, TPDOs, then the
+            application.
+        horizon: how far its application may compute ahead. None (no rig) means that it works tick
+            by tick.
+        model: name of its model for traces; empty if it has none.
+        boots: called at the end of Initialising; returns whether the node boots or stays in
+            Initialising.
+        admits: called before each NMT command; returns whether the command is carried out.
         entered: called like `on_state`, but before it; for parts of the slave.
     """
 
@@ -412,8 +427,8 @@ class CanopenSlave(Copyable):
         if not out:
             return ()
         self._out = ()
-        # While LSS switches the bit rate the node is mute; what it would have sent is lost,
-        # not late.
+        # While LSS switches the bit rate the node sends nothing. Frames of this time are dropped,
+        # not delayed.
         if now_us < self.silent_until_us:
             return ()
         return out if len(out) == 1 else tuple(sorted(out, key=_priority))
@@ -436,7 +451,9 @@ class CanopenSlave(Copyable):
         self._out += (frame,)
 
     def emergency(self, code: int, register: int, text: bytes = b"") -> None:
-        """Raise an error: it is active until it is cleared; raising it again has no effect.
+        """Raise an error, which stays active until it is cleared.
+
+        Raising an active error again has no effect.
 
         Args:
             code: emergency error code; see `EmcyCode`.
@@ -448,7 +465,7 @@ class CanopenSlave(Copyable):
                 service.emergency(code, register, text)
 
     def emergency_clear(self, code: int, text: bytes | None = None) -> None:
-        """Clear an error; an error that is not active is ignored.
+        """Clear an error; the call has no effect if the error is not active.
 
         Args:
             code: emergency error code, as it was raised.
@@ -622,11 +639,16 @@ def _admits(command: NmtCommand) -> bool:
 class Application(Service):
     """Works on the objects after the RPDOs and SDOs of a tick, before its TPDOs.
 
-    By itself it does nothing. A device profile overrides `on_execute`, which is called in the ticks
-    that it requests: by `request`, by `schedule`, when one of its watched objects has changed, and
-    when a physical input was set. It reacts to NMT states (`state_changed`), to resets (`start`),
-    to lost masters (`communication_error`) and, if it enters itself in `node.sync_handlers`, to
-    each SYNC; it reports errors by `node.emergency`.
+    The base class does nothing. A device profile overrides `on_execute`, which is called in these
+    ticks:
+
+    - ticks requested by `request` or `schedule`
+    - when one of its watched objects has changed
+    - when a physical input was set
+
+    The application reacts to NMT states (`state_changed`), to resets (`start`) and to lost
+    masters (`communication_error`). It also reacts to each SYNC if it adds itself to
+    `node.sync_handlers`. It reports errors by `node.emergency`.
 
     Attributes:
         inputs: physical inputs of the device; `has_inputs` makes them.

@@ -23,8 +23,9 @@ SERVICES: Final[tuple[ServiceMaker, ...]] = (
     # Listens in every state, also without a node-ID.
     LssSlave,
     TimeStamp,
-    # The slave's own SYNC: RPDOs act on it at once, the application and TPDOs behind it in this
-    # tick. A SYNC from the bus is announced when its frame comes.
+    # The slave's own SYNC: RPDOs act on it at once; the application and TPDOs, which come later
+    # in the order, act on it in the same tick. A SYNC from the bus is announced when its frame
+    # arrives.
     Sync,
     PdoConsumer,
     # Requests act when they come; at this place a server only looks for silent clients.
@@ -63,7 +64,8 @@ def make_slave(
         dictionary: the objects, with default values.
         node_id: 1..127, or 255 for a slave that waits for LSS.
         nonvolatile: memory kept from an earlier run.
-        application: factory of the application, such as a device profile; None for no application.
+        application: factory of the application, such as a device profile; None for no
+            application.
         sdo: limits of its SDO servers.
 
     Returns:

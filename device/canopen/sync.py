@@ -30,13 +30,13 @@ _NOT_IN_A_CAN_ID: Final = nmt.EXTENDED | 0x1FFF_F800
 class Sync(Service):
     """Consumes SYNC, and produces it if bit 30 of 1005h is set and 1006h is not 0.
 
-    `node.on_sync` is called for each SYNC, also for the slave's own, in order among the frames of a
-    tick. A SYNC whose length does not fit 1019h is ignored and raises EMCY 8240h, which the next
-    valid one clears. The first own SYNC comes one period after 1005h, 1006h or 1019h was written or
-    the node left Initialising or Stopped, and counts from 1.
+    `node.on_sync` is called for each SYNC, including the slave's own, in the order of the frames
+    of a tick. A SYNC whose length does not fit 1019h is ignored and raises EMCY 8240h, which the
+    next valid SYNC clears. The slave's own SYNC starts one period after a write to 1005h, 1006h
+    or 1019h, or one period after the node left Initialising or Stopped. Its counter starts at 1.
 
-    Not emulated: 29-bit CAN-IDs; periods below the tick, which give one SYNC per tick; an EMCY for
-    a missing SYNC, which CiA 301 leaves open.
+    Not emulated: 29-bit CAN-IDs; periods shorter than a tick (the slave sends one SYNC per tick);
+    an EMCY for a missing SYNC, which CiA 301 leaves open.
     """
 
     __slots__ = (
@@ -169,9 +169,9 @@ _PRODUCES: Final = nmt.FLAG_30
 class TimeStamp(Service):
     """Keeps the time of day.
 
-    Bit 31 of 1012h makes it consume TIME; `node.time_of_day` is the latest received time stamp,
-    `now` the clock that runs on from it. Bit 30 allows the application to send TIME by `produce`.
-    Invalid times of day are ignored.
+    If bit 31 of 1012h is set, the slave consumes TIME. `node.time_of_day` is the time stamp that
+    was received last; `now` is the clock that continues from it. If bit 30 is set, the
+    application may send TIME by `produce`. Invalid times of day are ignored.
 
     Not emulated: the error of a real clock; high resolution time stamps (1013h).
     """
@@ -197,7 +197,7 @@ class TimeStamp(Service):
             yield cob_id & nmt.CAN_ID_MASK, self._receive
 
     def produce(self, time: TimeOfDay) -> None:
-        """Set the clock in the next tick, and send TIME then if 1012h and NMT state allow it.
+        """Set the clock in the next tick; also send TIME if 1012h and the NMT state allow it.
 
         Raises:
             FieldError: invalid time.
