@@ -25,14 +25,14 @@ class Converter(Immutable):
     Not emulated: offset and gain errors, noise, the conversion time.
 
     Attributes:
-        suffix: end of the channel's name: `ai1_v`.
-        unit: for people.
+        suffix: end of the channel's name, such as `v` in `ai1_v`.
+        unit: unit of the quantity, for display.
         low: smallest quantity.
         high: largest quantity.
-        high_raw: steps at `high`.
-        low_raw: steps at `low`.
+        high_raw: converter steps at the quantity `high`.
+        low_raw: converter steps at the quantity `low`.
         shift: number of bits by which the counts are left-shifted in the object (CiA 401).
-        width: bits of the object with the counts.
+        width: number of bits of the object that contains the counts.
 
     Raises:
         ValueError: an empty range, or counts that the object cannot hold.
@@ -77,7 +77,7 @@ _REAL32_MAX: Final = (2 - 2.0**-23) * 2.0**127
 
 
 def _quantity(entry: Entry | None, default: float = 0) -> float:
-    """Return the number in an object, the default if there is no object or no number in it."""
+    """Return the number in an object; the default if the object or its number is missing."""
     value = default if entry is None else entry.value
     return value if isinstance(value, int | float) else default
 
@@ -99,9 +99,10 @@ def _show(entry: Entry, value: float) -> None:
 class _AnalogueChannel(Part):
     """One channel: its objects, its converter, its scaling.
 
-    The widest integer object has the counts; narrower ones have their upper bits. A REAL32 object
-    has the physical quantity if there is a converter, else the counts, else the value that the
-    world sets. Scaled value = value x scaling + offset.
+    The widest integer object contains the counts; narrower objects contain their upper bits. A
+    REAL32 object contains the physical quantity if the channel has a converter. Without a
+    converter it contains the counts, or without counts the value that the outside world sets.
+    Scaled value = value x scaling + offset.
 
     Args:
         prefix: `ai` or `ao`.
@@ -109,7 +110,7 @@ class _AnalogueChannel(Part):
         converter: None for plain counts.
 
     Attributes:
-        name: of the physical input or output.
+        name: name of the physical input or output.
         integers: integer objects, the narrowest first.
         real: the REAL32 object, None if there is none.
         converter: see above.
@@ -184,13 +185,13 @@ class _EventRule(Part):
     | 3   | it is below what was sent last by more than the negative delta |
     | 4   | it is above what was sent last by more than the positive delta |
 
-    A limit is an event when it is crossed, not as long as it is exceeded. Without an object there
-    is no limit, and a delta is 0.
+    A limit causes an event when it is crossed, not for as long as it is exceeded. A missing limit
+    object means no limit; a missing delta object means a delta of 0.
 
     Args:
         dictionary: the objects of the device.
-        number: of the channel.
-        index: of the upper limit; the other four follow.
+        number: number of the channel.
+        index: index of the upper limit; the other four objects follow it.
         entry: the value to check.
 
     Attributes:
@@ -264,14 +265,14 @@ def _read(entry: Entry) -> bytes:
 class AnalogueInput(Part):
     """Converts and scales one channel and detects its events.
 
-    Integer limits and deltas are right-aligned: in the unit of the widest integer
-    object. Those of REAL32 are in the unit of 6403h. Without any of them each
-    change is an event.
+    Integer limits and deltas are right-aligned, in the unit of the widest integer object. REAL32
+    limits and deltas are in the unit of 6403h. Without any limit or delta, each change is an
+    event.
 
     Attributes:
         number: 1..254.
         channel: its objects.
-        entries: those with its value.
+        entries: the entries that contain its value.
     """
 
     def __init__(self, dictionary: Dictionary, number: int, converter: Converter | None) -> None:
@@ -377,15 +378,15 @@ def _justified(counts: int, from_bits: int, to_bits: int) -> int:
 class AnalogueOutput(Part):
     """Drives one output channel.
 
-    Integer error values are right-aligned: in the unit of the object, and limited
-    to it. If several objects name the channel, the one that changed last counts;
-    the others do not follow. A NaN or infinity leaves the output unchanged.
+    Integer error values are right-aligned: they are in the unit of the object and limited to its
+    range. If several objects contain the value of the channel, the one that changed last is used;
+    the others keep their values. A NaN or infinity leaves the output unchanged.
 
     Attributes:
         number: 1..254.
         channel: its objects.
         level: the physical value.
-        failed: the error value is output instead of the written value.
+        failed: whether the error value is output instead of the written value.
     """
 
     def __init__(self, dictionary: Dictionary, number: int, converter: Converter | None) -> None:

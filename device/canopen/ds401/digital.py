@@ -32,8 +32,8 @@ class _View(NamedTuple):
 
     Attributes:
         entry: the element.
-        lines: its lines, as bits among all lines.
-        shift: number of lines before its first one.
+        lines: its lines, as a mask among all lines.
+        shift: number of lines before the first line of the element.
     """
 
     entry: Entry
@@ -52,17 +52,17 @@ class _View(NamedTuple):
 class _Bits(Part):
     """The value of one family of objects for all lines; line 1 is the lowest bit.
 
-    If objects of several widths name a line, a change of one changes the others.
-    Where their power-on values differ, the object of the highest index counts.
+    If objects of several widths contain a line, a change of one object changes the others. Where
+    their power-on values differ, the object with the highest index takes precedence.
 
     Args:
         dictionary: the objects of the device.
-        family: which of them.
+        family: the indices of the objects in the family.
         default: 0 or -1, for lines without an object.
 
     Attributes:
         value: the bits.
-        changed: called with the element that the bus has changed.
+        changed: called with an element that the bus has changed.
     """
 
     def __init__(self, dictionary: Dictionary, family: DigitalObjects, default: int = 0) -> None:
@@ -114,7 +114,10 @@ def _view(entry: Entry, width: int, shift: int) -> _View:
 
 
 FILTER_US: Final = 10_000
-"""Time for which a filtered line must be stable; the profile leaves it to the device."""
+"""Time for which a filtered line must be stable.
+
+The profile leaves this time to the device.
+"""
 
 
 class DigitalInputs(Part):

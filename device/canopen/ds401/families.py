@@ -1,9 +1,9 @@
 """Families of objects for the same lines or channels, by width (CiA 401, object dictionary).
 
-Objects of several widths refer to the same physical lines: 6100h:01 shows what 6000h:01
-and 6000h:02 show. Indices as two public profile tables have them (CanFestival,
-DS-401.prf; tonyrog/canopen, DS-401.def), the meaning of single ones as in the
-manuals of Turck BL20, WAGO 750 and VIPA 300V.
+Objects of several widths refer to the same physical lines: 6100h:01 shows the lines of 6000h:01
+and 6000h:02. The indices are those of two public profile tables (CanFestival, DS-401.prf;
+tonyrog/canopen, DS-401.def). The meaning of single indices is that of the manuals of Turck BL20,
+WAGO 750 and VIPA 300V.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from tickrig.wire.canopen.datatypes import DataType
 
 
 class DigitalObjects(NamedTuple):
-    """The index of a property of lines, by lines in an element.
+    """The indices of a property of lines, by the number of lines in an element.
 
-    Single lines have eight indices in a row, each of up to 128 lines.
+    Objects for single lines have eight consecutive indices, each for up to 128 lines.
     """
 
     single: int
@@ -104,7 +104,7 @@ DEFAULTS: Final[dict[int, int]] = {
         for index in (objects.real_scaling, objects.integer_scaling)
     },
 }
-"""Of each element by index, -1 for all bits; 0 if not listed (CiA 401, default values)."""
+"""Default of each element by index: -1 for all bits; 0 if not listed (CiA 401, default values)."""
 
 
 def elements(dictionary: Dictionary, index: int) -> Iterator[tuple[int, Entry]]:

@@ -27,36 +27,37 @@ from tickrig.wire.canopen.nmt import NmtState
 # Theory of operation
 # ===================
 #
-# The module works once a tick, in `on_execute`, and only in ticks in which something asks
-# for it: a physical input was set, one of its objects was written, the NMT state changed,
-# or the input filter of the digital inputs is due. In it, in this order:
+# The module works once a tick, in `on_execute`, and only in ticks in which it has a reason: a
+# physical input was set, one of its objects was written, the NMT state changed, or the filter of
+# the digital inputs is due. It works in this order:
 #
 # 1. faults of the module: EMCY and 1029h; outputs go to their error values at once
-# 2. digital inputs: filter, polarity, then which objects changed by the interrupt masks
-# 3. analogue inputs: converter, scaling, then limits and deltas (`EventRule`)
-# 4. outputs: from the objects, or the error values while `failed`
+# 2. digital inputs: filter, then polarity, then the interrupt masks decide which objects changed
+# 3. analogue inputs: converter, then scaling, then limits and deltas (`EventRule`)
+# 4. outputs: the values of the objects, or the error values while `failed` is set
 #
-# Inputs come before TPDOs and outputs after RPDOs because the application stands between
-# both in the tick (stack.py). A value that is read at 2 or 3 leaves in the TPDO of the same
+# Inputs are handled before TPDOs and outputs after RPDOs, because the application is between the
+# two in the tick (stack.py). A value that is read in step 2 or 3 is sent in the TPDO of the same
 # tick.
 #
-# Who decides about an event: the PDO producer takes each change of a mapped object for one,
-# unless its key is in `quiet`. The module puts all its input objects there in `power_on`
-# and calls `request_for` itself. So a mapped input whose masks forbid the event stays
-# silent, though its object changes. `_sent` closes the circle: deltas of analogue inputs
-# count from what was sent last, by whatever TPDO and for whatever reason, so the producer
-# reports each transmission.
+# How an event is decided: the PDO producer treats each change of a mapped object as an event,
+# unless its key is in `quiet`. The module adds all its input objects to `quiet` in `power_on` and
+# calls `request_for` itself. So a mapped input whose masks forbid the event sends nothing,
+# although its object changes. The deltas of analogue inputs count from the value that was sent
+# last, by any TPDO and for any reason. Therefore the producer reports each transmission to
+# `_sent`.
 #
-# `power_on` sets these lists again and does not append: it runs at each power-on of the same
-# objects.
+# `power_on` replaces these lists and does not append to them, because it runs at each power-on of
+# the same objects.
 #
-# Outputs have two masters, the objects and the error mode. Stopped, a communication error
-# (lost heartbeat, bus-off) and a fault set `failed`; Operational ends it, unless a fault
-# that stops outputs is still there. Both directions go through `_fail`, which asks for a
-# tick: `state_changed` and `communication_error` may come in ticks in which nothing else
-# happens.
+# The objects or the error mode determine the outputs. Stopped, a communication error (lost
+# heartbeat, bus-off) and a fault set `failed`. Operational clears it, unless a fault that stops
+# outputs is still present. Both changes go through `_fail`, which requests a tick, because
+# `state_changed` and `communication_error` may be called in ticks in which nothing else happens.
 #
-# Sources: CiA 401 for objects, masks, triggers, error modes and defaults (families.py has
+# Sources: CiA 401 for objects, masks, triggers, error modes and defaults (families.py has its
+#     tables). If an object is missing, digital events (6005h) and analogue events (6423h) are on.
+#     A scaling of 0 counts as 1, because many EDS files have 0.
 # its tables); where an object is missing, digital events are on (6005h), analogue ones too
 # (6423h), and a scaling of 0 counts as 1, because many EDS files leave it so.
 
@@ -71,8 +72,8 @@ class _DeviceFault(Immutable):
     """A physical fault that the module detects.
 
     Attributes:
-        name: of the physical input.
-        text: description for people.
+        name: name of the physical input.
+        text: description for display.
         code: emergency error code.
         register: bits of the error register.
         behaviour: sub-index of 1029h that determines the NMT state.
@@ -122,8 +123,8 @@ class _FaultDetector(Part):
     """Detects faults and their end: sends EMCY, and applies 1029h.
 
     Args:
-        node: where it is reported.
-        faults: those that the module can have.
+        node: the slave that reports the faults.
+        faults: the faults that the module can have.
 
     Attributes:
         faults: see above.
@@ -143,7 +144,7 @@ class _FaultDetector(Part):
         self._present.clear()
 
     def look(self, inputs: QuantityBank) -> bool:
-        """Report new faults, and those that have ended.
+        """Report new faults and faults that have ended.
 
         Returns:
             Whether a new fault stops the outputs.
@@ -220,20 +221,22 @@ class Ds401(Application):
     """Digital and analogue inputs and outputs, as described in the dictionary.
 
     Events are detected once a tick. A change of an input is an event for TPDOs only if the
-    interrupt masks, or the trigger with its limits and deltas, allow it (see `EventRule`). Stop, a
-    communication error and a failure of the device output the error values; an output leaves its
-    error value when the node becomes Operational or when it is written with another value.
+    interrupt masks, or the trigger with its limits and deltas, allow it (see `EventRule`). NMT
+    Stop, a communication error and a failure of the device switch the outputs to the error
+    values. An output leaves its error value when the node becomes Operational or when the output
+    is written with another value.
 
-    Without 6005h digital events are on, without 6423h analogue ones.
+    Digital events are on if 6005h is missing, analogue events if 6423h is missing.
 
-    Not emulated: joysticks; objects of the manufacturer (6404h, 6414h); SI units
-    (6430h, 6450h are kept without effect); the conversion time.
+    Not emulated: joysticks; objects of the manufacturer (6404h, 6414h); SI units (6430h and 6450h
+    are stored and have no effect); the conversion time.
 
     Args:
         node: the slave.
-        slot: its place in the tick.
-        inputs: converters of the analogue inputs, from the first one on; plain counts without.
-        outputs: those of the analogue outputs.
+        slot: its place in the order of a tick.
+        inputs: converters of the analogue inputs, starting with the first input. Inputs without a
+            converter use plain counts.
+        outputs: converters of the analogue outputs, likewise.
 
     Attributes:
         analogue_inputs: its analogue inputs.

@@ -74,8 +74,8 @@ MEASURES: Final[Mapping[int, Measure]] = {
 class ActualValues(Part):
     """The actual values of the objects that the device has, as the latest tick left them.
 
-    They are computed when read, those with watchers in each tick: a bus reads two of thirteen each
-    10 ms (1.5 times as many drives).
+    An object is computed when it is read; objects with watchers are computed in each tick. A bus
+    reads two of thirteen objects every 10 ms, so 1.5 times as many drives run in real time.
 
     Args:
         drive: the drive; its `measures` compute the values.

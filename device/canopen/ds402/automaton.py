@@ -148,7 +148,7 @@ class Automaton(Part):
             now_us: the time.
 
         Returns:
-            True if nothing is left to do until an input changes.
+            True if the drive has no work until an input changes.
         """
         match self.state:
             case DriveState.NOT_READY_TO_SWITCH_ON:
@@ -204,7 +204,7 @@ class Bounds(Immutable):
     Attributes:
         supply_mv: lowest and highest supply.
         winding_dc: highest temperature of the winding, in tenths of a degree Celsius.
-        winding_warning_dc: temperature from which it warns.
+        winding_warning_dc: temperature of the winding from which the drive warns.
         stall_us: how long the motor may stand at a limit although motion is demanded.
     """
 
@@ -219,13 +219,13 @@ class Supervision(Part):
 
     Args:
         axis: the supervised axis.
-        bounds: limits without a fault.
+        bounds: limits within which the drive reports no fault.
 
     Attributes:
         wired: faults that the electronics detect from the present inputs.
-        has_supply: the supply is not too low (bit 4 of the statusword).
-        waiting: a time-out runs.
-        not_following: the following error is larger than 6065h.
+        has_supply: whether the supply is high enough (bit 4 of the statusword).
+        waiting: whether a time-out is running.
+        not_following: whether the following error is larger than 6065h.
     """
 
     def __init__(self, axis: Axis, bounds: Bounds) -> None:
@@ -257,7 +257,8 @@ class Supervision(Part):
         """Check for one tick.
 
         Returns:
-            The present faults, and those that show only in motion with power.
+            The present faults, and the faults that can be detected only while the motor moves
+            with power.
         """
         found, self.waiting = self.present(powered=powered), False
         self.has_supply = ErrorCode.UNDER_VOLTAGE not in found

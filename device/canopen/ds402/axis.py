@@ -29,7 +29,8 @@ class Reference(Part):
     """The demanded motion; it belongs to the drive and survives a change of mode.
 
     Quantities that a mode does not control follow the motor: the position in velocity modes,
-    position and velocity in torque modes. So each mode starts from a reference without a jump.
+    position and velocity in torque modes. Therefore the reference has no jump when the next mode
+    starts.
 
     Attributes:
         position: counts of the motor's encoder.
@@ -48,8 +49,8 @@ class Reference(Part):
 
         Args:
             velocity: counts per second.
-            acceleration: of the step away from zero, positive.
-            deceleration: of the step towards zero, positive.
+            acceleration: acceleration of a step away from zero, positive.
+            deceleration: acceleration of a step towards zero, positive.
         """
         before = self.velocity
         braking = abs(velocity) < abs(before) or velocity * before < 0
@@ -148,7 +149,7 @@ _COUNTS_S2_PER_A: Final = 1_000.0
 class IdealMotor(Part):
     """A motor that reaches each demanded position and velocity at once.
 
-    It stops at once when it is released. A current turns it as a mass without
+    When the motor is released, it stops at once. A current accelerates it like a mass without
     friction: 1 A gives 1000 counts per second per second.
 
     Not emulated: load, temperature, limits of current and voltage.
@@ -238,7 +239,7 @@ class Axis(Part):
         control: the control loop used in this tick.
         settings: the present configuration.
         zero: counts of the encoder at position 0 of the user.
-        homed: whether a homing has set it.
+        homed: whether a homing has set `zero`.
         standstill: velocity up to which the motor counts as standing, in counts per second.
     """
 
@@ -396,7 +397,7 @@ class Stopping(Part):
         """Make a step of a ramp.
 
         Returns:
-            True if the motor stands, or need not be slowed down.
+            True if the motor stands or does not need to be slowed down.
         """
         axis, settings = self._axis, self._axis.settings
         if ramp == Ramp.NONE:
@@ -439,11 +440,11 @@ INPUTS: Final[tuple[InputSignal, ...]] = (
 class Switches(Part):
     """The switches as the drive sees them, pressed by hand or by the shaft at an angle.
 
-    Negative and positive are the user's directions, after the polarity 607Eh.
+    Negative and positive are the directions of the user, that is with the polarity 607Eh applied.
 
     Attributes:
         word: bits 0 to 2 of 60FDh.
-        by_angle: the shaft presses at least one of them.
+        by_angle: whether the shaft presses at least one of the switches.
     """
 
     def __init__(self) -> None:
@@ -527,9 +528,10 @@ class Limits(Part):
         return _clamp(wanted_a, -min(backward, most), min(forward, most))
 
     def reached(self) -> ErrorCode | None:
-        """Return the limit that ends the motion of the reference, None while there is none.
+        """Return the limit that ends the motion of the reference; None if no limit does.
 
-        The limit is a pressed limit switch, or a software limit that could otherwise not be kept.
+        The limit is a pressed limit switch, or a software limit that the motion would exceed if
+        it did not brake now.
         """
         axis, reference = self._axis, self._axis.reference
         towards = reference.velocity
