@@ -236,7 +236,7 @@ class Ds401(Application):
         slot: its place in the order of a tick.
         inputs: converters of the analogue inputs, starting with the first input. Inputs without a
             converter use plain counts.
-        outputs: converters of the analogue outputs, likewise.
+        outputs: converters of the analogue outputs, in the same way.
 
     Attributes:
         analogue_inputs: its analogue inputs.

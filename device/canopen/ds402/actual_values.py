@@ -75,7 +75,7 @@ class ActualValues(Part):
     """The actual values of the objects that the device has, as the latest tick left them.
 
     An object is computed when it is read; objects with watchers are computed in each tick. A bus
-    reads two of thirteen objects every 10 ms, so 1.5 times as many drives run in real time.
+    reads two of thirteen objects every 10 ms. (This allows 1.5 times as many drives.)
 
     Args:
         drive: the drive; its `measures` compute the values.

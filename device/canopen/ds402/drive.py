@@ -3,36 +3,42 @@
 # Theory of operation.
 #
 # A drive is an `Application` of its slave: it works in the ticks that are requested. A tick
-# (`on_execute`) goes one way: the motor moves up to now (`step_to`), inputs and shaft are read,
-# `Supervision` says which faults there are, `Automaton` runs the state machine and in it one step
-# of the mode of operation, the motor gets its new demand, actual values are shown. What objects
-# change (controlword, mode, target, configuration) is noted by watchers, which ask for a tick
-# (`request`); a controlword acts at once, before the tick, with the configuration before it.
+# (`on_execute`) has these steps:
+#
+# 1. The motor moves up to the present time (`step_to`).
+# 2. Inputs and shaft are read, and `Supervision` detects the faults.
+# 3. `Automaton` runs the state machine, and in it one step of the mode of operation.
+# 4. The motor gets its new demand, and the actual values are updated.
+#
+# Watchers detect changes of objects (controlword, mode, target, configuration) and request a tick
+# (`request`). A controlword takes effect at once, before the tick, with the configuration before
+# it.
 #
 # At the end of a tick `_sleep` schedules the next one: never while nothing moves and the mode has
-# settled, each second while the winding cools, else in the next millisecond.
+# settled, each second while the winding cools, otherwise in the next millisecond.
 #
-# Run-ahead. Between two SYNCs a drive in csp does the same each millisecond. `Stretch.plan`, asked
-# by `_sleep`, works such ticks out in one loop over floats, to the bit as single ticks do. For that
-#   - the rig must allow it (`Horizon.until_us`), and
-#   - the next ticks must be plain (`goes_on_plainly`): Operation enabled, no input or configuration
-#     has changed, no fault is waiting, no limit switch is in reach, no actual value is watched.
-# The loop ends before the first tick in which anything else would happen: heat is due, a demand is
-# cut, the following error is too large, the shaft stands or sticks. That tick is an `on_execute`.
-# How many ticks are worth it is what the latest quiet lasted, less one: a SYNC that comes a tick
-# early must not make the loop run twice.
+# Run-ahead. Between two SYNCs a drive in csp does the same work each millisecond. `_sleep` calls
+# `Stretch.plan`, which computes such ticks in one loop over floats. The result is equal to that
+# of single ticks to the bit. This has two conditions:
+#   - The rig must allow it (`Horizon.until_us`).
+#   - The next ticks must be plain (`goes_on_plainly`): the state is Operation enabled, no input
+#     or configuration has changed, no fault is waiting, no limit switch is in reach, no actual
+#     value is watched.
+# The loop ends before the first tick in which anything else would happen: heat must be computed,
+# a demand is cut, the following error is too large, the shaft stands or sticks. `on_execute` runs
+# that tick. The loop computes as many ticks as the latest quiet period had, less one: a SYNC that
+# comes a tick early must not make the loop run twice.
 #
-# The result (`RunAhead`) is not the drive's state before time has come there. Who asks earlier gets
-# it: `axis`, `limited`, `read` and the objects call `Stretch.catch_up`, which takes the ticks up to
-# `Horizon.passed_us` and computes the rest again. What changes the drive calls `_interrupt` first:
-# it catches up, drops what is ahead and writes down the actual values, so that they are those of
-# the tick before. A drive without `horizon` (no rig, dense, couplings, watchers) works tick by
-# tick.
-# Actual values are computed when they are read (`ActualValues`): `begin` shows what is
-# written while the drive works, `renew` lets them follow again and writes those that are watched.
+# The result (`RunAhead`) becomes the state of the drive only as time passes. Code that reads the
+# state earlier gets the state at that time: `axis`, `limited`, `read` and the objects call
+# `Stretch.catch_up`, which applies the ticks up to `Horizon.passed_us` and computes the rest
+# again. Code that changes the drive calls `_interrupt` first. It catches up, drops the ticks
+# ahead and writes the actual values, so that they are those of the tick before. A drive without
+# `horizon` (no rig, dense, couplings, watchers) works tick by tick.
 #
-# A second table of limits, homing or a mode belongs to `modes/`; what all modes obey (limits,
-# switches, stopping) is in `axis`; objects and their units are in `settings`.
+# Where to add code: homing or another mode belongs to `modes/`, also if it has its own table of
+# limits. What all modes obey (limits, switches, stopping) is in `axis`; objects and their units
+# are in `settings`.
 
 from __future__ import annotations
 
@@ -125,34 +131,37 @@ class _AbortConnection(IntEnum):
 class Ds402(Application):
     """A drive of one axis.
 
-    The controlword acts when it changes; from Ready to switch on, Enable operation leads through
-    Switched on at once. On a lost connection or NMT Stop the drive reacts according to 6007h while
-    the motor has power. A mode that the drive does not have is refused with 0609 0030h. Without a
-    servo, the motor is an ideal motor. A pressed limit switch, or a software limit that could
-    otherwise not be kept, stops the motor with the quick stop deceleration; it can be moved back.
+    A controlword takes effect when it changes. From Ready to switch on, Enable operation leads
+    through Switched on at once. After a lost connection or NMT Stop the drive reacts according to
+    6007h while the motor has power. A mode that the drive does not have is refused with 0609
+    0030h. Without a servo, the motor is an ideal motor.
+
+    A pressed limit switch stops the motor with the quick stop deceleration. So does a software
+    limit that the motion would exceed if it did not brake. Afterwards the motor can be moved
+    back.
 
     Not emulated: a brake, the velocity mode 2 of frequency converters, touch probes.
 
     Args:
         node: the slave.
-        slot: its place in the tick.
+        slot: its place in the order of a tick.
         servo: motor, power stage and load.
         defaults: values of objects that the dictionary does not have, by (index, sub-index).
 
     Attributes:
         modes: the modes that the drive has, by number.
         measures: functions for the actual values, by index.
-        bounds: limits without a fault.
-        encoder_error: error code of a pulled encoder.
-        limits_are_faults: reaching a limit is a fault, not only a stop.
+        bounds: limits within which the drive reports no fault.
+        encoder_error: error code of an encoder that is pulled out.
+        limits_are_faults: whether reaching a limit is a fault and not only a stop.
         more_targets: manufacturer-specific objects whose change is a new target.
         outputs: its physical outputs; `read` returns their values.
         parameters: its objects, by index.
-        offered: the modes that both the drive and its dictionary have, by number.
-        limits: of position and velocity.
+        offered: by number, the modes that both the drive and its dictionary have.
+        limits: limits of position and velocity.
         automaton: the state machine of CiA 402.
-        supervision: of supply, temperature, encoder and following error.
-        actual_values: the objects that show what is measured.
+        supervision: detects faults of supply, temperature, encoder and following error.
+        actual_values: the objects that show measurements.
         switches: limit switches and home switch.
         mode: the active mode of operation.
         mode_number: its number, as in 6061h.
@@ -259,7 +268,10 @@ class Ds402(Application):
         return terminals.READ[name](self)
 
     def fault(self, code: int) -> None:
-        """Set a fault with an emergency error code; a fault that is already present is ignored."""
+        """Set a fault with an emergency error code.
+
+        The call has no effect if the fault is already present.
+        """
         if code not in self._faults:
             self._note(code)
             self.node.emergency(code, settings.register_of(code))
@@ -349,13 +361,13 @@ class Ds402(Application):
         super().request()
 
     def skip(self, ticks: int, now_us: int, position: float, velocity: float) -> None:
-        """Take over the state after ticks that a stretch has computed.
+        """Set the state of the drive to the one after ticks that a stretch has computed.
 
         Args:
-            ticks: how many.
+            ticks: number of these ticks.
             now_us: time of the last of them.
-            position: of the reference.
-            velocity: of the reference.
+            position: position of the reference.
+            velocity: velocity of the reference.
         """
         axis = self._axis
         axis.reference.place(position, velocity)
@@ -394,7 +406,7 @@ class Ds402(Application):
         self.mode.enter(enabled=enabled)
 
     def _operate(self, now_us: int) -> bool:
-        """Run one control period of the mode, or brake if the motion leads beyond a limit."""
+        """Run one control period of the mode, or brake if the motion would exceed a limit."""
         mode, axis = self.mode, self._axis
         axis.control = mode.control
         position, velocity = axis.reference.position, axis.reference.velocity

@@ -15,15 +15,15 @@ _STEP_US: Final = 1_000
 
 
 class LatchedSetPoint(Mode):
-    """Follows a set-point that stays latched until another one is written.
+    """Follows a set-point that stays valid until another one is written.
 
-    At the start it brakes, and the object of the set-point shows the reference: nothing moves
-    before the master writes a set-point.
+    At the start the mode brakes, and the object of the set-point shows the reference. So nothing
+    moves before the master writes a set-point.
 
     Attributes:
         index: object of the target.
-        sub: its sub-index.
-        offset: object that is added to it, 0 for none.
+        sub: sub-index of the target.
+        offset: object whose value is added to the target; 0 for none.
     """
 
     halts = False
@@ -75,12 +75,13 @@ class LatchedSetPoint(Mode):
 class CyclicPosition(LatchedSetPoint):
     """Moves to the target position within an interpolation period, on a straight line.
 
-    A SYNC begins a line, and so does another target without SYNC. At the end of the line it stops.
+    A SYNC begins a new line. Another target begins one, too, without SYNC. At the end of the line
+    the motion stops.
 
     Not emulated: extrapolation when SYNC is late; the torque offset.
 
     Attributes:
-        rests: a line that goes nowhere counts as one that has ended.
+        rests: whether a line of length 0 counts as one that has ended.
     """
 
     shows_following_error = True
@@ -136,11 +137,11 @@ class CyclicPosition(LatchedSetPoint):
 class InterpolatedPosition(CyclicPosition):
     """Moves to the data record 60C1h:01 within an interpolation period, on a straight line.
 
-    It does so while bit 4 of the controlword is set; bit 12 of the statusword is then set.
-    Otherwise it brakes with the profile deceleration. A SYNC begins a line, and so does another
-    record without SYNC. Bit 10: the line has ended.
+    It moves while bit 4 of the controlword is set; bit 12 of the statusword is then set.
+    Otherwise it brakes with the profile deceleration. A SYNC begins a new line. Another record
+    begins one, too, without SYNC. Bit 10 is set when the line has ended.
 
-    Not emulated: a buffer of records (60C4h); sub-modes beside 0 (60C0h).
+    Not emulated: a buffer of records (60C4h); sub-modes other than 0 (60C0h).
     """
 
     halts = True
@@ -184,8 +185,8 @@ class InterpolatedPosition(CyclicPosition):
 class CyclicVelocity(Mode):
     """Reaches the target velocity at the end of an interpolation period, on a straight ramp.
 
-    When the mode is chosen while the drive is enabled, the target velocity becomes
-    that of the reference.
+    When the mode is chosen while the drive is enabled, the target velocity becomes the velocity
+    of the reference.
     """
 
     control: ClassVar[Control] = Control.VELOCITY
@@ -231,9 +232,9 @@ SETTINGS: Final = (_CURRENT_SETTING, _POSITION_SETTING, _VELOCITY_SETTING)
 
 
 class _PositionSetting(LatchedSetPoint):
-    """Position mode, -1: 2062h in position units.
+    """Position mode, -1: moves to 2062h, in position units.
 
-    That bit 8 of the controlword does nothing in these modes is DECISION K21.
+    Bit 8 of the controlword has no effect in these modes (DECISION K21).
     """
 
     index = _POSITION_SETTING
@@ -245,10 +246,10 @@ class _PositionSetting(LatchedSetPoint):
 
 
 class _VelocitySetting(Mode):
-    """Velocity mode, -2: 206Bh in velocity units.
+    """Velocity mode, -2: turns at 206Bh, in velocity units.
 
-    When the mode is chosen while the drive is enabled, 206Bh takes the present
-    velocity (DECISION K21).
+    When the mode is chosen while the drive is enabled, 206Bh is set to the present velocity
+    (DECISION K21).
     """
 
     control = Control.VELOCITY
@@ -269,10 +270,10 @@ class _VelocitySetting(Mode):
 
 
 class _CurrentSetting(Mode):
-    """Current mode, -3: 2030h in milliamperes.
+    """Current mode, -3: applies 2030h, in milliamperes.
 
-    When the mode is chosen while the drive is enabled, 2030h takes the present
-    current (DECISION K21).
+    When the mode is chosen while the drive is enabled, 2030h is set to the present current
+    (DECISION K21).
     """
 
     control = Control.CURRENT

@@ -26,12 +26,12 @@ class HomingMethod(NamedTuple):
     """A homing method: where home is and how to find it.
 
     Attributes:
-        switch: the switch whose edge counts, None if none does.
+        switch: the switch whose edge counts; None if the method uses no switch.
         first: direction of the search when the switch is not active.
-        approach: direction in which the edge, then the index pulse, is crossed at the end.
-        active: whether the switch is active behind the edge, seen in that direction.
+        approach: direction in which the axis crosses the edge, then the index pulse, at the end.
+        active: whether the switch is active after the edge, in the direction of `approach`.
         turns: whether the search reverses at the limit switch of its first direction.
-        by_index: whether home is the next index pulse behind the edge.
+        by_index: whether home is the next index pulse after the edge.
     """
 
     switch: Switch | None
@@ -62,7 +62,10 @@ _EDGES: Final = {
     29: (_HOME, -1, +1, True, True),
     30: (_HOME, -1, -1, False, True),
 }
-"""Methods that end at an edge, as rows of `HomingMethod`; 16 less goes on to the index pulse."""
+"""Methods that end at an edge, as rows of `HomingMethod`.
+
+The method whose number is 16 less continues to the index pulse.
+"""
 
 METHODS: Final[dict[int, HomingMethod]] = {
     **{number - 16: HomingMethod(*edge, by_index=True) for number, edge in _EDGES.items()},
@@ -94,14 +97,14 @@ class Phase(Enum):
 class HomingSearch(Part):
     """Searches for home with a method.
 
-    The edge that counts is crossed slowly in every case: an axis that hits the switch in the
-    search, or that cannot brake within a narrow switch, goes back first. So home is the same
+    The axis always crosses the edge that counts slowly. If it hits the switch during the search,
+    or cannot brake within a narrow switch, it moves back first. Therefore home is the same
     position from every start. An edge counts only while the axis moves as demanded.
 
     Attributes:
         method: the homing method.
         phase: phase of the search.
-        direction: -1 or +1; 0 to stop.
+        direction: direction of the motion, -1 or +1; 0 to stop.
     """
 
     def __init__(self, method: HomingMethod, switches: Switch) -> None:
@@ -125,9 +128,9 @@ class HomingSearch(Part):
         """Update the search with the switches of one control step.
 
         Args:
-            switches: those that are active.
+            switches: the active switches.
             moving: sign of the demanded velocity.
-            crawling: whether that is at most the slow speed.
+            crawling: whether the demanded velocity is at most the slow speed.
             index: whether the index pulse came since the last step.
         """
         before, self._before = self._before, switches
@@ -195,14 +198,21 @@ _FLAGS: Final = {
 class Homing(Mode):
     """Searches for the home position, gives it the position 607Ch, and returns to it.
 
-    The axis brakes beyond the edge or the index pulse that is home, and returns: in the end 6064h
-    is 607Ch. An index pulse comes whenever the encoder has turned by its counts; it is found to the
-    count, an edge to what the axis moves in a tick. Halt and the falling edge of bit 4 end a homing
-    in progress; a rising edge starts a new one. The result of a homing is valid until the next one
-    begins.
+    The axis brakes beyond the edge or index pulse that is home, and then returns to it: at the
+    end 6064h equals 607Ch. An index pulse occurs each time the encoder has turned by its counts.
+    The position of an index pulse is exact to the count; the position of an edge is exact to the
+    way that the axis moves in a tick. Halt and the falling edge of bit 4 end a homing in
+    progress; a rising edge starts a new one. The result of a homing is valid until the next
+    homing begins.
 
-    Bits 13, 12, 10: 000 in progress, 001 not started or interrupted, 010 home is
-    attained, 011 and the axis stands, 100 an error, 101 and the axis stands.
+    Values of bits 13, 12 and 10:
+
+    - 000: in progress
+    - 001: not started or interrupted
+    - 010: home is attained
+    - 011: home is attained and the axis stands
+    - 100: an error
+    - 101: an error and the axis stands
 
     Not emulated: methods 15, 16, 31, 32, 36 and those of manufacturers; a time-out.
     """
@@ -306,7 +316,7 @@ class Homing(Mode):
 
 
 def index_pulse(before: int, after: int, per_turn: int) -> int | None:
-    """Return the first index pulse between two positions in counts, None if there is none.
+    """Return the first index pulse between two positions in counts; None if there is none.
 
     >>> index_pulse(1990, 2010, 2000), index_pulse(2000, 2010, 2000), index_pulse(1, 0, 2000)
     (2000, None, 0)

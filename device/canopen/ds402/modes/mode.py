@@ -26,7 +26,7 @@ class DriveView:
         limits: limits of the axis.
         stopping: brakes according to the option codes.
         controlword: the latest controlword.
-        fresh: a SYNC came or a target changed since the last step.
+        fresh: whether a SYNC came or a target changed since the last step.
     """
 
     parameters: Parameters
@@ -41,19 +41,20 @@ class DriveView:
 class Mode(Part):
     """No mode: the motor comes to a standstill and is held there.
 
-    A mode moves the reference of the axis and starts from the one the previous mode left; the drive
-    then commands the motor.
+    A mode moves the reference of the axis. It starts from the reference at the end of the
+    previous mode. The drive then commands the motor.
 
     Args:
         drive: the parts of the drive that it uses.
 
     Attributes:
         control: the control loop of the motor.
-        halts: bit 8 of the controlword stops it.
-        minds_limits: limit switches and software limits stop it; homing checks them itself.
-        shows_following_error: bit 13 shows a following error.
-        flags: its bits in the statusword: 10, 12, 13 and further bits it owns.
-        limited: a limit cut a demand in the last step (bit 11 of the statusword).
+        halts: whether bit 8 of the controlword stops it.
+        minds_limits: whether limit switches and software limits stop it; homing checks them
+            itself.
+        shows_following_error: whether bit 13 shows a following error.
+        flags: its bits in the statusword: 10, 12, 13 and additional bits of the mode.
+        limited: whether a limit cut a demand in the last step (bit 11 of the statusword).
     """
 
     control: ClassVar[Control] = Control.POSITION
@@ -100,11 +101,11 @@ class Mode(Part):
         return self.halt(now_us)
 
     def ahead(self) -> Line | None:
-        """Return what the reference does in the next steps, without input.
+        """Return the motion of the reference in the next steps if no input changes.
 
         Returns:
-            The line, with what ends it: a limit that would cut it, for one. None if each step needs
-            a single `step`.
+            The line and the limits at which it ends, such as a limit that would cut it. None if
+            each step needs a separate call of `step`.
         """
         return None
 
@@ -141,7 +142,7 @@ class Window(Part):
     """Detects a condition that has been true for long enough: windows and thresholds.
 
     Attributes:
-        waiting: the condition is true, and the time runs.
+        waiting: whether the condition is true and the time runs.
     """
 
     __slots__ = ("_since_us", "waiting")

@@ -23,11 +23,11 @@ from tickrig.wire.canopen.drive import Statusword
 class _ProfileVelocity(Mode):
     """Ramps to the target velocity with 6083h and 6084h.
 
-    Bit 10: the velocity is within 606Dh of the target for 606Eh; without a window,
-    the ramp has ended. Bit 12: the speed is not above 606Fh for 6070h; without a
-    threshold, it stands.
+    Bit 10: the velocity has been within the window 606Dh of the target for the time 606Eh;
+    without a window, the ramp has ended. Bit 12: the speed has not been above the threshold 606Fh
+    for the time 6070h; without a threshold, the motor stands.
 
-    Not emulated: the maximum slippage, bit 13; ramps of other shapes (6086h).
+    Not emulated: the maximum slippage (bit 13); ramps of other shapes (6086h).
     """
 
     control: ClassVar[Control] = Control.VELOCITY
@@ -67,10 +67,10 @@ class _ProfileVelocity(Mode):
 class _ProfileTorque(Mode):
     """Ramps the current to the target torque, 6071h, with the slope 6087h.
 
-    The torque equals the current: rated torque at rated current, without
-    friction. Halt ramps it to zero. Bit 10: the ramp has ended.
+    The torque is proportional to the current: rated torque at rated current, without friction.
+    Halt ramps the torque to zero. Bit 10: the ramp has ended.
 
-    Not emulated: other torque profiles than the linear ramp (6088h).
+    Not emulated: torque profiles other than the linear ramp (6088h).
     """
 
     control: ClassVar[Control] = Control.CURRENT
@@ -97,8 +97,8 @@ class _ProfileTorque(Mode):
 class _CyclicTorque(Mode):
     """Applies the torque 6071h plus the offset 60B2h at once.
 
-    When the mode is chosen while the drive is enabled, the target torque becomes
-    that of the motor.
+    When the mode is chosen while the drive is enabled, the target torque becomes the torque of
+    the motor.
     """
 
     control: ClassVar[Control] = Control.CURRENT
@@ -133,7 +133,7 @@ MODES: Final[dict[int, type[Mode]]] = {
 
 
 def offered(modes: Mapping[int, type[Mode]], listed: int) -> Mapping[int, type[Mode]]:
-    """Return the modes that a dictionary lists in its 6502h, all if it lists none.
+    """Return the modes that a dictionary lists in its 6502h; all modes if it lists none.
 
     >>> sorted(offered(MODES, 0b101))
     [0, 1, 3]

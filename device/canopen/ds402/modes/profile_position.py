@@ -24,9 +24,9 @@ class _SetPoint(Immutable):
 
     Attributes:
         target: counts.
-        limits: of the way.
+        limits: limits of the path.
         end_velocity: speed at the target, counts per second.
-        cut: a software limit moved the target.
+        cut: whether a software limit moved the target.
     """
 
     target: float
@@ -36,14 +36,17 @@ class _SetPoint(Immutable):
 
 
 class ProfilePosition(Mode):
-    """Moves to set-points; one more may wait.
+    """Moves to set-points; while it moves to one set-point, one more may wait.
 
-    Target, velocities and ramps of a set-point are latched when bit 4 rises; later changes apply to
-    the next one. Bit 12 falls when bit 4 has fallen and no set-point waits; while one waits, only a
-    set-point with immediate change is accepted. A relative target is added to the previous target.
-    With bit 9 the present set-point is passed at its profile velocity, unless the direction
-    reverses there. Bit 10: nothing waits, the profile has ended, and the motor is within 6067h of
-    the target for 6068h. After an end velocity the motor continues at it.
+    The target, velocities and ramps of a set-point are latched when bit 4 rises; later changes
+    apply to the next set-point. Bit 12 falls when bit 4 has fallen and no set-point waits. While
+    a set-point waits, only a set-point with immediate change is accepted. A relative target is
+    added to the previous target. If bit 9 is set, the motor passes the present set-point at its
+    profile velocity, unless the direction reverses at that set-point.
+
+    Bit 10 is set when no set-point waits, the profile has ended, and the motor has been within
+    6067h of the target for the time 6068h. After a set-point with an end velocity the motor
+    continues at that velocity.
 
     Not emulated: 60F2h positioning option code; more than one waiting set-point.
     """
