@@ -30,15 +30,18 @@
 # comes a tick early must not make the loop run twice.
 #
 # The result (`RunAhead`) becomes the state of the drive only as time passes. Code that reads the
-# state earlier gets the state at that time: `axis`, `limited`, `read` and the objects call
+# drive earlier gets the state at that moment: `axis`, `limited`, `read` and the objects call
 # `Stretch.catch_up`, which applies the ticks up to `Horizon.passed_us` and computes the rest
-# again. Code that changes the drive calls `_interrupt` first. It catches up, drops the ticks
-# ahead and writes the actual values, so that they are those of the tick before. A drive without
-# `horizon` (no rig, dense, couplings, watchers) works tick by tick.
+# again. Code that changes the drive calls `_interrupt` first. `_interrupt` catches up, drops the
+# ticks ahead and writes the actual values, so that they are those of the tick before. A drive
+# without `horizon` (no rig, dense, couplings, watchers) works tick by tick.
 #
-# Where to add code: homing or another mode belongs to `modes/`, also if it has its own table of
-# limits. What all modes obey (limits, switches, stopping) is in `axis`; objects and their units
-# are in `settings`.
+# Actual values are computed when they are read (`ActualValues`). `begin` makes the written values
+# visible while the drive works. `renew` makes the values follow the drive again and writes those
+# that are watched.
+#
+# Homing, another mode or another table of limits belongs to `modes/`. What all modes obey
+# (limits, switches, stopping) is in `axis`. Objects and their units are in `settings`.
 
 from __future__ import annotations
 

@@ -61,7 +61,7 @@ def is_controllable(code: int) -> bool:
 
 
 def register_of(code: int) -> ErrorRegister:
-    """Return the bit of the error register.
+    """Return the bit of the error register for an emergency error code.
 
     >>> [register_of(code).name for code in (0x3220, 0x8130, 0x8611)]
     ['VOLTAGE', 'COMMUNICATION', 'DEVICE_PROFILE']
@@ -75,10 +75,10 @@ def register_of(code: int) -> ErrorRegister:
 
 
 class Parameters(Part):
-    """Reads objects with defaults, and writes those that exist.
+    """Reads objects, with defaults for missing ones, and writes those that exist.
 
     Args:
-        dictionary: of the slave.
+        dictionary: the dictionary of the slave.
         defaults: values of objects that the device does not have, by (index, sub-index).
     """
 
@@ -88,12 +88,18 @@ class Parameters(Part):
         self._dictionary, self._defaults = dictionary, defaults
 
     def number(self, index: int, sub: int = 0) -> int:
-        """Return the value of an object, or its default (0 without one) if it is missing."""
+        """Return the value of an object.
+
+        For a missing object, return its default, or 0 if it has no default.
+        """
         entry = self._dictionary.find(index, sub)
         return self._defaults.get((index, sub), 0) if entry is None else entry.number
 
     def write(self, index: int, value: int, sub: int = 0) -> None:
-        """Set a value if the device has the object; a value out of range is limited."""
+        """Set a value if the device has the object.
+
+        A value out of range is limited.
+        """
         entry = self._dictionary.find(index, sub)
         if entry is not None:
             entry.value = clamped(value, 8 * entry.size, signed=entry.description.signed)
@@ -153,22 +159,27 @@ CONFIGURATION: Final = (
 class Units(Part):
     """Converts between objects and the counts of the motor's encoder.
 
-    A position unit is one count, or what 6091h and 6092h make of a revolution of the motor, which
-    has as many counts as 608Fh says; or an angle behind the gear of 6091h if 60A8h selects it, with
-    the power of ten in it. A velocity unit is a position unit per second, or revolutions of the
-    motor per minute if 60A9h or 608Ch selects it, with the power of ten in them; an acceleration
-    unit is a velocity unit per second. 607Eh turns the signs.
+    A position unit is one of these:
+
+    - one count
+    - a part of a revolution of the motor according to 6091h and 6092h; a revolution has the
+      number of counts in 608Fh
+    - an angle after the gear of 6091h, if 60A8h selects it, with the power of ten in 60A8h
+
+    A velocity unit is a position unit per second. If 60A9h or 608Ch selects it, the unit is
+    revolutions of the motor per minute, with the power of ten in that object. An acceleration
+    unit is a velocity unit per second. 607Eh reverses the signs.
 
     Not emulated: 6090h, 6093h to 6097h; other dimensions.
 
     Args:
         parameters: the objects.
-        counts_per_turn: of the motor's encoder, if 608Fh does not exist.
+        counts_per_turn: counts per revolution of the motor's encoder, if 608Fh does not exist.
 
     Attributes:
-        per_position: counts in a position unit, with its sign.
-        per_velocity: counts per second in a velocity unit, with its sign.
-        per_acceleration: the same without sign.
+        per_position: counts in a position unit, with the sign of 607Eh.
+        per_velocity: counts per second in a velocity unit, with the sign of 607Eh.
+        per_acceleration: counts per second per second in an acceleration unit, without sign.
     """
 
     def __init__(self, parameters: Parameters, counts_per_turn: int) -> None:
@@ -185,20 +196,21 @@ class Units(Part):
 class Settings(Immutable):
     """A snapshot of the configuration.
 
-    Positions are in counts from where the encoder was switched on less the home
-    position, velocities in counts per second, accelerations in counts per second
-    per second, all of them without sign; `inf` stands for no limit.
+    Positions are in counts from the position at which the encoder was switched on, less the home
+    position. Velocities are in counts per second and accelerations in counts per second per
+    second, both without sign. `inf` means no limit.
 
     Attributes:
-        units: of the user.
-        max_velocity: the smaller one of 607Fh and 6080h (revolutions per minute of the motor).
-        software_limits: 607Dh with the home offset, as distances from the zero of the user.
+        units: units of the user.
+        max_velocity: the smaller one of 607Fh and 6080h (6080h is in revolutions per minute of
+            the motor).
+        software_limits: 607Dh with the home offset, as distances from the user's zero.
         following_error_us: how long the error may be too large (6066h).
-        interpolation_us: 60C2h.
-        rated_current_a: 6075h.
-        max_current_a: by 6072h, 6073h.
-        torque_slope_a_s: 6087h as amperes per second.
-        limits_a: by 60E0h and 60E1h, both positive.
+        interpolation_us: the interpolation period 60C2h.
+        rated_current_a: the rated current 6075h.
+        max_current_a: the largest current, from 6072h and 6073h.
+        torque_slope_a_s: the torque slope 6087h, in amperes per second.
+        limits_a: the current limits from 60E0h and 60E1h, both positive.
     """
 
     units: Units

@@ -17,17 +17,18 @@ _FEWEST: Final = 2
 
 
 class Stretch(Part):
-    """The ticks ahead of a drive in which nothing but plain motion happens.
+    """The coming ticks of a drive in which it only continues a plain motion.
 
-    Between two SYNCs a drive in csp does the same each millisecond. If its rig allows it, the drive
-    computes as many such ticks as the latest quiet period lasted; when a value is read, or the next
-    tick with work comes, it takes over the ticks that have passed. The first tick in which anything
-    else would happen is left to `on_execute`: a cut demand, a following error, standstill, too hot
-    a winding, the end of the range. (32 drives in csp: 2.5 times as fast.)
+    Between two SYNCs a drive in csp does the same work each millisecond. If its rig allows it,
+    the drive computes as many such ticks at once as the latest quiet period lasted. When a value
+    is read, or when the next tick with work comes, the drive applies the ticks that have passed.
+    The first tick in which anything else would happen is left to `on_execute`: a cut demand, a
+    following error, standstill, a winding that is too hot, the end of the range. (32 drives in
+    csp: 2.5 times as fast.)
 
     Args:
         drive: the drive.
-        axis: of the drive.
+        axis: the axis of the drive.
         servo: its motor; without one there is no run-ahead.
     """
 
@@ -43,7 +44,7 @@ class Stretch(Part):
 
         Args:
             now_us: the time.
-            requested: the tick was requested; it was not due by itself.
+            requested: whether the tick was requested, as opposed to being due by schedule.
 
         Returns:
             The duration of these ticks in microseconds.

@@ -14,11 +14,11 @@ from tickrig.device.twin import Immutable, Part
 
 # Motion profiles: the path to a position or a velocity within limits, in closed form.
 #
-# A path is planned when the target or a limit changes, from the motion at that
-# moment, and evaluated at any later time. So it is exact: it ends on its
-# target, with no drift, whenever the control steps come. Each of its ramps has
-# the shape of 6086h; the way along a ramp is the mean of its two velocities times
-# its duration in every shape, so that one plan serves them all.
+# A path is planned when the target or a limit changes, from the motion at that moment. It is
+# evaluated at any later time. Therefore it is exact: it ends on its target without drift,
+# whatever the times of the control steps are. Each ramp of a path has the shape of 6086h. In
+# every shape, the distance of a ramp is the mean of its two velocities times its duration, so one
+# plan serves all shapes.
 
 _US_PER_S: Final = 1_000_000
 
@@ -43,9 +43,9 @@ class PathLimits(Immutable):
     """Limits of a path, all greater than 0.
 
     Attributes:
-        velocity: the fastest.
-        acceleration: the steepest ramp away from standstill; the peak of a sin^2 ramp.
-        deceleration: likewise towards standstill.
+        velocity: the highest velocity.
+        acceleration: the steepest ramp away from standstill. For a sin^2 ramp it is the peak.
+        deceleration: the steepest ramp towards standstill, in the same way.
         shape: of the ramps.
     """
 
@@ -96,7 +96,7 @@ class Path(Part):
     Attributes:
         began_us: when it was planned.
         end_s: its duration.
-        end: position and velocity where it ends.
+        end: position and velocity at its end.
     """
 
     __slots__ = ("_ramps", "began_us", "end", "end_s")
@@ -113,7 +113,7 @@ class Path(Part):
 
         Args:
             now_us: when it begins.
-            start: where it begins.
+            start: position and velocity at the beginning.
             legs: its parts.
             shape: of the ramps.
             target: exact end position, if known.
@@ -146,7 +146,7 @@ class Path(Part):
 def to_velocity(now_us: int, start: Motion, velocity: float, limits: PathLimits) -> Path:
     """Plan a change of velocity; it is not limited to the velocity limit.
 
-    A change of direction brakes to standstill first, and accelerates then.
+    For a change of direction the path brakes to standstill first and then accelerates.
     """
     legs = _ramps(start.velocity, velocity, _effective(limits))
     return Path(now_us, start, legs, limits.shape)
@@ -157,16 +157,16 @@ def to_position(
 ) -> Path:
     """Plan the fastest path to a position.
 
-    A motion away from the target, or too fast to stop there, brakes to standstill and returns; a
-    motion above the velocity limit brakes to it first.
+    A motion that leads away from the target, or is too fast to stop there, first brakes to
+    standstill and then returns. A motion above the velocity limit first brakes to that limit.
 
     Args:
         now_us: when it begins.
         start: position and velocity at that time.
         target: end position.
         limits: limits of the path.
-        end_velocity: speed at the target in the direction of motion, at least 0. If the path is too
-            short, the speed there is as near as the limits allow.
+        end_velocity: speed at the target in the direction of motion, at least 0. If the path is
+            too short for it, the speed at the target is as near to it as the limits allow.
     """
     distance = target - start.position
     legs = _legs(start.velocity, distance, _effective(limits), min(end_velocity, limits.velocity))
@@ -222,7 +222,7 @@ def _forward(velocity: float, distance: float, limits: PathLimits, end: float) -
 class PathFollower(Part):
     """Keeps the reference on a path, as long as nothing else moves it.
 
-    A mode finds the reference of the previous tick: a path begins there.
+    Each path begins at the reference of the previous tick.
 
     Args:
         reference: the reference of the drive.

@@ -82,12 +82,12 @@ PROFILE: Final = CommunicationProfile(
 class Epos(Ds402):
     """A drive with Maxon's own modes, units and error codes.
 
-    Velocities are revolutions of the motor per minute, accelerations the same per
-    second, positions counts of the motor's encoder. Bits 8 and 15 of the statusword:
-    the current offset is measured, and the position refers to a home position.
+    Velocities are in revolutions of the motor per minute, accelerations in revolutions per minute
+    per second, positions in counts of the motor's encoder. Bit 8 of the statusword means that the
+    current offset is measured. Bit 15 means that the position refers to a home position.
 
-    Not emulated: gains of the loops, digital and analogue inputs, master encoder and
-    step modes, RS232.
+    Not emulated: gains of the loops, digital and analogue inputs, the modes master encoder and
+    step, RS232.
     """
 
     modes: ClassVar[Mapping[int, type[Mode]]] = {**modes.MODES, **maxon.MODES}
@@ -107,7 +107,7 @@ def make_epos(node_id: int = NODE_ID, nonvolatile: Nonvolatile | None = None) ->
 
     Args:
         node_id: 1..127, or 255 for a slave that waits for LSS.
-        nonvolatile: stored parameters from an earlier run; nothing if omitted.
+        nonvolatile: stored parameters from an earlier run; empty memory if omitted.
 
     Returns:
         A slave that boots in its first tick.

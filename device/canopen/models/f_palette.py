@@ -60,7 +60,7 @@ def make_f_palette(node_id: int = NODE_ID, nonvolatile: Nonvolatile | None = Non
 
     Args:
         node_id: 1..127, or 255 for a slave that waits for LSS.
-        nonvolatile: stored parameters from an earlier run; nothing if omitted.
+        nonvolatile: stored parameters from an earlier run; empty memory if omitted.
 
     Returns:
         A slave that boots in its first tick.

@@ -1,6 +1,6 @@
 """The I/O module f-palette with a boot loader: its program is downloaded over the bus (CiA 302-3).
 
-The module's document describes no boot loader; it exists to test downloads.
+The document of the module describes no boot loader. This model exists to test downloads.
 """
 
 from __future__ import annotations

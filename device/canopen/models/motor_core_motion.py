@@ -35,7 +35,8 @@ CHANGE_UDEG_S: Final = _MAX_ACCELERATION_UDEG_S2 * CONTROL_US // 1_000_000
 """Largest change of the velocity in a control tick."""
 
 _NDEG: Final = CONTROL_US // 2_000
-"""Nanodegrees that a tick adds for 1 udeg/s at its start, and for 1 udeg/s at its end."""
+"""Nanodegrees that a tick adds per udeg/s of the velocity at its start, and the same for its end.
+"""
 
 _LANDING_NDEG: Final = 1_000
 """A microdegree: the remainder that whole velocities may leave at the end of an approach."""
@@ -48,8 +49,8 @@ class Trajectory:
     Not emulated: a limit of the jerk.
 
     Attributes:
-        position_ndeg: at the end of the present control tick.
-        velocity_udeg_s: likewise.
+        position_ndeg: position at the end of the present control tick.
+        velocity_udeg_s: velocity at the end of the present control tick.
         begin_ndeg: position at the start of the control tick.
         begin_udeg_s: velocity at the start of the control tick.
     """
@@ -69,7 +70,7 @@ class Trajectory:
 
         Args:
             target_ndeg: where to stop.
-            limit_udeg_s: velocity, positive.
+            limit_udeg_s: the velocity limit, positive.
         """
         distance = target_ndeg - self.position_ndeg
         last = _NDEG * self.velocity_udeg_s
@@ -92,7 +93,7 @@ class Trajectory:
         """Return position in deg, velocity in deg/s and acceleration in deg/s^2 within the tick.
 
         Args:
-            since_us: since the start of the control tick, 0..`CONTROL_US`.
+            since_us: time since the start of the control tick, 0..`CONTROL_US`.
         """
         acceleration = (self.velocity_udeg_s - self.begin_udeg_s) / CONTROL_US
         since_s, begin = since_us / 1e6, self.begin_udeg_s / 1e6
@@ -104,11 +105,12 @@ class Trajectory:
 
 
 def _stoppable_udeg_s(distance_ndeg: int) -> int:
-    """Return the velocity at the end of a tick from which it can just stop within a distance.
+    """Return the velocity at the end of a tick that still allows a stop within a distance.
 
-    The distance is what the tick itself adds for its end velocity v, plus the braking distance:
-    full brake ticks, the last one shorter. With m full ones it is (2 (m + 1) v - m (m + 1) CHANGE)
-    * _NDEG; at v = m * CHANGE, m (m + 1) * CHANGE * _NDEG.
+    The distance is the sum of the part that the tick itself adds for its end velocity v and the
+    braking distance. Braking takes full brake ticks and a shorter last one. With m full brake
+    ticks, the distance is (2 (m + 1) v - m (m + 1) CHANGE) * _NDEG. At v = m * CHANGE it is m (m
+    + 1) * CHANGE * _NDEG.
     """
     full = (isqrt(1 + 4 * (distance_ndeg // (_NDEG * CHANGE_UDEG_S))) - 1) // 2
     return (distance_ndeg // _NDEG + full * (full + 1) * CHANGE_UDEG_S) // (2 * (full + 1))
@@ -130,8 +132,8 @@ _MAX_CURRENT_MA: Final = 10_000
 class References(Part):
     """Reference, limits and full scales.
 
-    Full scale is 32767. After a failure, if 6443h:01 is not 0, the error value of 6444h:01 is the
-    reference until another one arrives.
+    Full scale is 32767. If 6443h:01 is not 0, the error value 6444h:01 is the reference from a
+    failure until another reference arrives.
 
     Args:
         node: the slave.
@@ -139,7 +141,7 @@ class References(Part):
 
     Attributes:
         entries: the objects.
-        failed: no reference has arrived since the failure.
+        failed: whether no reference has arrived since the failure.
     """
 
     def __init__(self, node: CanopenSlave, on_reference: Callable[[], None]) -> None:
@@ -243,7 +245,9 @@ def _limited(value: int, most: int) -> int:
 
 
 class Shaft(Part):
-    """The angle of the shaft from the counts of the motor encoder; the gear encoder defines 0.
+    """The angle of the shaft, from the counts of the motor encoder.
+
+    The gear encoder defines the angle 0.
 
     Args:
         servo: motor, gear and loops.
@@ -346,18 +350,19 @@ _LOOPS: Final = (Action.TURN, Action.POINT, Action.BRAKE)
 
 
 class Motion(Part):
-    """Plans one control tick at a time, and commands the motor each ms.
+    """Plans one control tick at a time, and commands the motor each millisecond.
 
-    Each action starts from the present motion: the planned velocity if there
-    is one, or else the measured one, the measured angle, the present current.
+    Each action starts from the present motion: the planned velocity (the measured velocity if
+    none is planned), the measured angle, the present current.
 
     Args:
-        shaft: the motor behind its gear.
+        shaft: the shaft after the gear of the motor.
         references: the demands.
 
     Attributes:
-        action: action of the motor.
-        reached: the planned motion has ended at the reference, and the motor has reached it.
+        action: what the motor does at present.
+        reached: whether the planned motion has ended at the reference and the motor has reached
+            it.
     """
 
     def __init__(self, shaft: Shaft, references: References) -> None:
@@ -423,7 +428,7 @@ class Motion(Part):
         """Command the motor until the next ms.
 
         Args:
-            since_us: since the start of the control tick.
+            since_us: time since the start of the control tick.
         """
         position_deg, velocity_deg_s, acceleration_deg_s2 = self._trajectory.at(since_us)
         match self.action:
@@ -486,9 +491,9 @@ class Display(Part):
     """Writes 2001h and 6401h, once a control tick.
 
     Args:
-        dictionary: of the unit.
+        dictionary: the dictionary of the unit.
         shaft: the measurements.
-        references: have the full scales.
+        references: contain the full scales.
     """
 
     def __init__(self, dictionary: Dictionary, shaft: Shaft, references: References) -> None:

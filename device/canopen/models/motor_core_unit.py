@@ -32,18 +32,18 @@ class _Measurements(Immutable):
     """Measurements of the unit.
 
     Attributes:
-        on: the power stage is on.
-        loops: a velocity is demanded.
-        tripped: the comparator of the power stage has switched it off.
+        on: whether the power stage is on.
+        loops: whether a velocity is demanded.
+        tripped: whether the comparator of the power stage has switched it off.
         supply_mv: supply of the motor.
-        winding_dc: temperature of the winding, 0.1 degC.
-        housing_dc: temperature of the housing and of the power stage in it, 0.1 degC.
-        velocity_deg_s: velocity of the shaft by the motor encoder.
+        winding_dc: temperature of the winding, in 0.1 degC.
+        housing_dc: temperature of the housing and of the power stage in it, in 0.1 degC.
+        velocity_deg_s: velocity of the shaft, measured by the motor encoder.
         current_ma: current in the motor.
-        limited: limits or the supply keep the current below the demand of the loops.
-        deviates: the motor is far from its demand.
-        spare_mv: voltage of the supply above the back-EMF, available for current.
-        overloaded: the I2t of the power stage is used up.
+        limited: whether limits or the supply keep the current below the demand of the loops.
+        deviates: whether the motor is far from its demand.
+        spare_mv: voltage of the supply above the back-EMF, which is available for current.
+        overloaded: whether the I2t of the power stage is used up.
         slip_deg: difference between motor encoder and gear encoder.
     """
 
@@ -67,12 +67,12 @@ class _Fault(Immutable):
     """One row of the table.
 
     Attributes:
-        name: for people.
+        name: name for display.
         code: emergency error code (CiA 402-1).
         register: bits of the error register.
         seen: whether the cause is present.
-        gone: whether the cause has ended; not always the opposite of `seen`.
-        after_us: how long the cause must be seen.
+        gone: whether the cause has ended; it is not always the opposite of `seen`.
+        after_us: how long the cause must be present before the fault is reported.
     """
 
     name: str
@@ -170,7 +170,9 @@ _FAULTS: Final = (
 
 
 class _Supervision(Part):
-    """The present faults; each is reported by EMCY when it occurs and when it is cleared.
+    """The present faults.
+
+    Each fault is reported by EMCY when it occurs and when it is cleared.
 
     Args:
         node: the slave.
@@ -272,7 +274,7 @@ def _apply_inputs(servo: Servo, inputs: QuantityBank) -> None:
 _MODE: Final = 0x2000
 
 _COOLING_US: Final = 1_000_000
-"""Period at which a motor at rest is updated until it has the temperature of the air."""
+"""Update period of a motor at rest, until it has the temperature of the air."""
 
 _COOLED_C: Final = 0.1
 
@@ -281,9 +283,10 @@ _COOLED_C: Final = 0.1
 class MotorCoreUnit(Application):
     """A brushless motor with strain wave gear, two encoders and driver (NEDO report, Table 5).
 
-    A reference acts only in Operational; in other NMT states a motor that has a mode brakes to
-    standstill and is held there. A control tick lasts 10 ms; an event that wakes a unit at rest
-    starts one. Faults switch off the motor until a write to 2000h after their causes have ended.
+    A reference takes effect only in Operational. In other NMT states a motor that has a mode
+    brakes to standstill and is held there. A control tick lasts 10 ms; an event that wakes a unit
+    at rest starts a control tick. A fault switches off the motor. The motor stays off until 2000h
+    is written after the causes of all faults have ended.
 
     Not emulated: commutation, torque ripple, elasticity and play of the gear, power that flows back
     into the supply while braking, failure of the control supply.
@@ -476,7 +479,7 @@ def make_motor_core_unit(
 
     Args:
         node_id: 1..127, or 255 for a slave that waits for LSS.
-        nonvolatile: stored parameters from an earlier run; nothing if omitted.
+        nonvolatile: stored parameters from an earlier run; empty memory if omitted.
 
     Returns:
         A slave that boots in its first tick.

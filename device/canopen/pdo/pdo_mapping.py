@@ -28,7 +28,7 @@ class Slot(NamedTuple):
     """One mapped object.
 
     Attributes:
-        entry: None for a dummy, which fills bits of an RPDO.
+        entry: the object; None for a dummy, which fills bits of an RPDO.
         bits: length in the PDO.
     """
 
@@ -50,7 +50,7 @@ def total_bits(slots: tuple[Slot, ...]) -> int:
 
 
 def alone_in(slots: tuple[Slot, ...]) -> Entry | None:
-    """Return the entry whose bytes equal those of a TPDO; None if no single entry does."""
+    """Return the entry whose bytes are all the bytes of a TPDO; None if no single entry is."""
     entry = slots[0].entry if len(slots) == 1 and slots[0].whole else None
     return None if entry is None or entry.source is not None else entry
 
@@ -58,7 +58,7 @@ def alone_in(slots: tuple[Slot, ...]) -> Entry | None:
 def make_pack(slots: tuple[Slot, ...]) -> Pack:
     """Return a function that packs the entries into the bytes of a TPDO.
 
-    An object that is mapped with fewer bits than it has contributes its low bits.
+    Of an object that is mapped with fewer bits than it has, the TPDO contains the low bits.
     """
     entries = [slot.entry for slot in slots if slot.entry is not None]
     if not all(slot.whole for slot in slots):
@@ -70,10 +70,10 @@ def make_pack(slots: tuple[Slot, ...]) -> Pack:
 
 
 def make_unpack(slots: tuple[Slot, ...]) -> Unpack:
-    """Return a function that unpacks the bytes of an RPDO, which must be enough, into the entries.
+    """Return a function that unpacks the bytes of an RPDO into the entries.
 
-    An object that is mapped with fewer bits than it has gets zeros above, as in CANopenNode; bytes
-    after the last object are ignored.
+    The RPDO must have enough bytes; bytes after the last object are ignored. An object that is
+    mapped with fewer bits than it has gets zeros in its upper bits, as in CANopenNode.
     """
     if not all(slot.whole or (slot.entry is None and slot.bits % 8 == 0) for slot in slots):
         return _Bits(slots).unpack
@@ -87,7 +87,10 @@ def make_unpack(slots: tuple[Slot, ...]) -> Unpack:
 
 
 def _make_write(entry: Entry) -> Unpack:
-    """Return a function that writes an entry from a PDO: directly if the entry has no checks."""
+    """Return a function that writes an entry from a PDO.
+
+    The function writes directly if the entry has no checks.
+    """
     # A read-only object that a default mapping names is written, too; `download` would
     # refuse it.
     straight = entry.takes_all or not entry.description.writable
@@ -95,7 +98,10 @@ def _make_write(entry: Entry) -> Unpack:
 
 
 def _present(entry: Entry) -> bytes:
-    """Return the bytes of an entry, computed on demand if needed; the last ones if that fails."""
+    """Return the bytes of an entry, computed on demand if needed.
+
+    If the computation fails, return the previous bytes.
+    """
     try:
         return entry.present()
     except SdoAbort:
@@ -181,9 +187,10 @@ def _list_values(dictionary: Dictionary, lists: range) -> Iterator[int]:
 
 
 class MpdoQueue(TpdoMode):
-    """MPDOs: one frame per object and per inhibit time, in the order of events.
+    """MPDOs, in the order of events: one frame per object and per inhibit time.
 
-    An event of an object that is already waiting adds no frame: the newest data are sent.
+    An event of an object whose frame is already waiting adds no frame. The frame is sent with the
+    newest data.
     """
 
     timed: ClassVar[bool] = True
@@ -195,7 +202,10 @@ class MpdoQueue(TpdoMode):
         self._waiting: dict[object, bytes | Entry] = {}
 
     def put(self, key: object, frame: bytes | Entry) -> None:
-        """Send a frame, or the later value of an entry, as soon as the inhibit time allows."""
+        """Queue a frame and send it as soon as the inhibit time allows.
+
+        If a frame of the entry is already waiting, it gets the later value.
+        """
         self._waiting[key] = frame
         self.due_us = self._free_us
         self.sender.wake(self.due_us)
@@ -219,7 +229,7 @@ class MpdoQueue(TpdoMode):
 class DamProducer(MpdoQueue):
     """MPDO in destination address mode: the application chooses object and destination.
 
-    Its own mapping entry is not used.
+    The MPDO does not use its own mapping entry.
     """
 
     def send_to(self, node_id: int, index: int, sub: int, data: bytes) -> None:
@@ -239,8 +249,8 @@ class SamProducer(MpdoQueue):
 class DamConsumer(Part):
     """Writes the object that an MPDO in destination address mode names.
 
-    An MPDO for another node is ignored. One for a missing object raises EMCY 8230h, which the next
-    valid one clears.
+    An MPDO for another node is ignored. An MPDO for a missing object raises EMCY 8230h, which the
+    next valid MPDO clears.
     """
 
     def __init__(self, node: CanopenSlave) -> None:
@@ -267,7 +277,7 @@ class DamConsumer(Part):
 class SamConsumer(Part):
     """Writes the object that the dispatching list assigns to an object of a producer.
 
-    Objects that are not in the list are ignored.
+    An MPDO with an object that is not in the list is ignored.
     """
 
     def __init__(self, dictionary: Dictionary) -> None:
@@ -303,16 +313,17 @@ _NOTHING: Final = pdo.MappedObject(0, 0, 0)
 class PdoMapping(Part):
     """The mapping of a PDO, and the procedure to change it.
 
-    An object is mapped while the PDO is invalid and sub-index 0 is 0; it is checked at once, and
-    all are checked again when sub-index 0 is set. 0 removes an object. A default mapping is used
-    even if the dictionary does not declare an object mappable, as in many EDS files; one with
-    missing objects or too many bits disables the PDO.
+    An object can be mapped while the PDO is invalid and sub-index 0 is 0. The object is checked
+    at once, and all objects are checked again when sub-index 0 is set. Writing 0 to a mapping
+    entry removes its object. A default mapping is used even if the dictionary does not declare
+    its objects as mappable, because many EDS files do not. A default mapping with missing objects
+    or too many bits disables the PDO.
 
     Args:
-        dictionary: where the mapped objects are.
-        index: of the mapping parameter.
+        dictionary: contains the mapped objects.
+        index: index of the mapping parameter.
         direction: Access.RPDO or Access.TPDO.
-        parameters: the communication parameters, which tell whether the PDO is valid.
+        parameters: the communication parameters, which determine whether the PDO is valid.
     """
 
     def __init__(
@@ -365,8 +376,8 @@ class PdoMapping(Part):
             raise SdoAbort(AbortCode.NOT_MAPPABLE)
 
     def _check_object(self, entry: Entry, value: Value) -> None:
-        # Mapping procedure (CiA 301, PDO mapping parameter): bit 31 of the COB-ID, then
-        # sub-index 0 to 0, then the objects, then sub-index 0, then the COB-ID.
+        # Mapping procedure (CiA 301, PDO mapping parameter): first set bit 31 of the COB-ID, then
+        # write 0 to sub-index 0, then the objects, then sub-index 0, then the COB-ID.
         if self._parameters.valid or self.count:
             raise SdoAbort(AbortCode.UNSUPPORTED_ACCESS)
         mapped = pdo.MappedObject.parse(whole_number(value))

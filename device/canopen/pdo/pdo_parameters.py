@@ -35,15 +35,15 @@ _NOT_IN_A_CAN_ID: Final = EXTENDED | 0x1FFF_F800
 class PdoParameters(Part):
     """The communication parameters of a PDO: CAN-ID, transmission type and timing.
 
-    The CAN-ID, the inhibit time and the SYNC start value change only while the
-    PDO is invalid, transmission type and event timer at any time. Bit 30 may
-    change while it is valid. A write that breaks these rules is refused with 0609 0030h.
+    The CAN-ID, the inhibit time and the SYNC start value change only while the PDO is invalid.
+    The transmission type and the event timer change at any time, and bit 30 may change while the
+    PDO is valid. A write that breaks these rules is refused with 0609 0030h.
 
     Not emulated: PDOs with a 29-bit CAN-ID; bit 29 is refused.
 
     Args:
-        dictionary: with or without these objects.
-        index: of the communication parameter.
+        dictionary: the objects of the slave; the objects of the PDO may be missing.
+        index: index of the communication parameter.
         types: allowed transmission types.
         changed: called with each entry whose value has changed.
     """
@@ -68,8 +68,8 @@ class PdoParameters(Part):
     def valid(self) -> bool:
         """Whether the PDO exists and has an allowed CAN-ID."""
         cob_id = self._number(COB_ID, INVALID)
-        # A default of an EDS may hold a value that a write could not set: such a PDO does
-        # not exist.
+        # The default in an EDS may be a value that a write could not set. A PDO with such a
+        # default does not exist.
         return not cob_id & (INVALID | _NOT_IN_A_CAN_ID) and not is_restricted(cob_id & CAN_ID_MASK)
 
     @property
@@ -156,10 +156,10 @@ class TpdoMode(Part):
 
     Attributes:
         due_us: when it is due to run.
-        synchronous: whether it acts on SYNC.
-        timed: whether it ever needs to run by time.
+        synchronous: whether it reacts to SYNC.
+        timed: whether it ever needs to run at a given time.
         on_change: whether a change of a mapped object is an event.
-        on_sync: called with the counter of each SYNC, 0 if it has none.
+        on_sync: called with the counter of each SYNC, or with 0 if the SYNC has no counter.
     """
 
     __slots__ = ("due_us", "on_sync", "sender")
@@ -215,10 +215,10 @@ class SynchronousAcyclic(TpdoMode):
 
 
 class SynchronousCyclic(TpdoMode):
-    """Types 1 to 240: sent with each n-th SYNC, first with the n-th.
+    """Types 1 to 240: sent with each n-th SYNC; the n-th SYNC after the start is the first one.
 
-    With a SYNC start value, and if SYNC carries a counter, the first is the SYNC whose counter has
-    that value, as in CANopenNode.
+    If a SYNC start value is set and SYNC carries a counter, the TPDO is sent first with the SYNC
+    whose counter has that value, as in CANopenNode.
     """
 
     __slots__ = ("_left", "_period", "_start")
@@ -274,7 +274,8 @@ class RtrSynchronous(TpdoMode):
 class EventDriven(TpdoMode):
     """Types 254 and 255: sent at the start, on an event and when the event timer has elapsed.
 
-    It is not sent before the inhibit time after the last one has passed, then with the newest data.
+    The next transmission waits until the inhibit time has passed since the last one. It then has
+    the newest data.
     """
 
     timed: ClassVar[bool] = True

@@ -33,17 +33,18 @@ _Target = tuple[pdo_mapping.Unpack, int]
 class Rpdo(Part):
     """Writes received data to the mapped objects, at once or with the next SYNC.
 
-    A frame with too few bytes is dropped: EMCY 8210h. One with too many is used up to the length of
-    the mapping: EMCY 8220h. The next correct one clears both. The event timer is the deadline, EMCY
-    8250h; each usable frame restarts it. These EMCYs carry the number of the RPDO. A synchronous
-    RPDO that arrives after the synchronous window (1007h) is dropped.
+    A frame with too few bytes is dropped and raises EMCY 8210h. A frame with too many bytes is
+    used up to the length of the mapping and raises EMCY 8220h. The next correct frame clears
+    both. The event timer is the deadline for the next frame; a missed deadline raises EMCY 8250h,
+    and each usable frame restarts the timer. These EMCYs carry the number of the RPDO. A
+    synchronous RPDO that arrives after the synchronous window (1007h) is dropped.
 
     Args:
         consumer: the service that it belongs to.
         number: 1..512.
 
     Attributes:
-        deadline_us: when the next frame is late.
+        deadline_us: time from which the next frame is late.
     """
 
     def __init__(self, consumer: PdoConsumer, number: int) -> None:
@@ -76,15 +77,18 @@ class Rpdo(Part):
         return self.parameters.transmission_type in SYNCHRONOUS
 
     def listen(self) -> Handler | None:
-        """Prepare to receive; return the handler of its frames, None if the RPDO does not exist."""
+        """Prepare to receive.
+
+        Return the handler of the frames, or None if the RPDO does not exist.
+        """
         target = self._target() if self.parameters.valid else None
         if target is None:
             self.stop()
             return None
         self._unpack, self._length = target
         self._event_us = self.parameters.event_us
-        # With no error noted and no deadline a frame of the right length has nothing to
-        # judge: the common case is one comparison in `_take` and `_keep`.
+        # Without an active error or a deadline, a frame of the right length needs no check: this
+        # common case is one comparison in `_take` and `_keep`.
         self._supervised = bool(self._errors or self._event_us)
         if self.synchronous:
             return self._keep
@@ -190,12 +194,12 @@ _SYNCHRONOUS_WINDOW_LENGTH: Final = 0x1007
 class PdoConsumer(Service):
     """Receives PDOs in Operational.
 
-    On SYNC the synchronous RPDOs of the cycle reach their objects at once, in the order of their
-    numbers, before the synchronous TPDOs of the same SYNC are made. The order on the wire decides
-    which frames come before the SYNC, also within a tick.
+    On SYNC, the synchronous RPDOs of the cycle are written to their objects at once, in the order
+    of their numbers, before the synchronous TPDOs of the same SYNC are made. The order of the
+    frames on the wire decides which RPDOs come before the SYNC, also within a tick.
 
     Attributes:
-        rpdos: those that the dictionary has.
+        rpdos: the RPDOs that the dictionary has.
         on_rpdo: called with the number of an RPDO when its objects have been written.
     """
 

@@ -18,13 +18,13 @@ from tickrig.wire.instant import NEVER
 # Theory of operation
 # ===================
 #
-# A TPDO is parameters (1800h..), a mapping (1A00h..) and a mode, which is its transmission
-# type at work. Parameters and mapping live as long as the slave; the mode lives from
-# `begin` to `end`, that is while the node is Operational and the PDO as it is now. Every
-# change of a parameter but the event timer makes a new mode, so a mode never has to follow
-# a change, and what it remembers (a mark, an inhibit time, a count of SYNCs) ends with it.
-# A valid TPDO begins with an event, therefore each event-driven one is sent once when the
-# node becomes Operational, as CANopenNode does it.
+# A TPDO consists of parameters (1800h..), a mapping (1A00h..) and a mode, which carries out its
+# transmission type. Parameters and mapping exist as long as the slave. The mode exists from
+# `begin` to `end`: while the node is Operational and the PDO is unchanged. Every change of a
+# parameter, except the event timer, makes a new mode. So a mode never has to follow a change, and
+# its memory (a mark, an inhibit time, a count of SYNCs) ends with it. A valid TPDO begins with an
+# event; therefore each event-driven TPDO is sent once when the node becomes Operational, as in
+# CANopenNode.
 #
 # Causes of a transmission:
 #
@@ -35,22 +35,22 @@ from tickrig.wire.instant import NEVER
 # 253         -                                  a remote frame fetches the present values
 # 254, 255    -                                  event or event timer, inhibit time permitting
 #
-# Everything is sent at the place of the producer in the tick (stack.py): SYNC only notes
-# its counter in `_counters`, an event only sets `due_us` and wakes the producer. So a TPDO
-# carries what RPDOs and application have left at the end of the tick, and one tick sends
-# one frame for ten events. Only the answer to a remote frame leaves at once; every type
-# gives it, if bit 30 of the COB-ID is 0.
+# All frames are sent at the place of the producer in the tick (stack.py): SYNC only records its
+# counter in `_counters`, and an event only sets `due_us` and wakes the producer. Therefore a TPDO
+# carries the values that RPDOs and the application have left at the end of the tick, and one tick
+# sends one frame for ten events. Only the answer to a remote frame is sent at once. Every type
+# answers remote frames if bit 30 of the COB-ID is 0.
 #
 # An event is the change of a mapped object (watched from `begin` to `end`), unless a device
-# profile says when there is one: then its entries are in `quiet`, and the profile calls
-# `request_for`. `quiet` must be complete before the node is Operational, as `begin` reads
-# it.
+# profile decides when an event occurs. Then the entries of the profile are in `quiet`, and the
+# profile calls `request_for`. `quiet` must be complete before the node is Operational, because
+# `begin` reads it.
 #
-# The bytes are made by a function that is chosen once (`make_pack`): for one whole object
-# that is its own bytes (`_alone`), else joined objects, else bits. Entries with a `source`
-# are asked each time. `on_change` modes must be made before they are watched and unwatched
-# before they are dropped: `begin` calls `end` first, and `end` takes the bound method of
-# the old mode off the entries.
+# A function that is chosen once (`make_pack`) makes the bytes. For one whole object it returns
+# the object's own bytes (`_alone`); otherwise it joins whole objects or, if necessary, bits.
+# Entries with a `source` are computed each time. `on_change` modes must be made before they are
+# watched, and unwatched before they are dropped. For this, `begin` calls `end` first, and `end`
+# removes the bound method of the old mode from the entries.
 
 _TPDO_PARAMETERS: Final = range(0x1800, 0x1A00)
 _TPDO_MAPPINGS: Final = 0x1A00
@@ -64,7 +64,7 @@ _RTR_MODES: Final[dict[int, type[pdo_parameters.TpdoMode]]] = {
 class Tpdo(Part):
     """Sends the mapped objects according to its transmission type.
 
-    To its mode it is the sender: parameters, `pack`, `send`, `wake`.
+    Its mode sees it as the sender: it offers parameters, `pack`, `send` and `wake`.
 
     Args:
         producer: the service that it belongs to.
@@ -180,16 +180,16 @@ class Tpdo(Part):
 class PdoProducer(Service):
     """Sends PDOs in Operational.
 
-    They are packed at the place of TPDOs in the tick, after the application: a TPDO of a SYNC has
-    the values after the RPDOs of this SYNC and the application. It is sent in the same tick, so
-    never after the synchronous window (1007h). Each event-driven TPDO is sent once when the node
-    enters Operational or the TPDO is switched on, as in CANopenNode. Remote frames are answered by
-    each TPDO whose bit 30 is 0, whatever its type.
+    PDOs are packed at the place of TPDOs in the tick, after the application. A TPDO of a SYNC
+    contains the values after the RPDOs of this SYNC and after the application. It is sent in the
+    same tick, so it is never sent after the synchronous window (1007h). Each event-driven TPDO is
+    sent once when the node enters Operational or when the TPDO is switched on, as in CANopenNode.
+    Each TPDO whose bit 30 is 0 answers remote frames, whatever its type.
 
     Attributes:
-        tpdos: those that the dictionary has.
-        quiet: keys of entries whose change is not an event, because a profile decides on events;
-            set it before the node is Operational.
+        tpdos: the TPDOs that the dictionary has.
+        quiet: keys of entries whose change is not an event, because a profile decides on their
+            events. Set it before the node is Operational.
         on_sent: called with the mapped objects of each TPDO that has been sent.
         on_watched: called when a TPDO begins to watch the mapped objects.
     """
@@ -230,7 +230,7 @@ class PdoProducer(Service):
         """Write an object of other nodes by the first MPDO in destination address mode.
 
         Args:
-            node_id: 0 for all.
+            node_id: the destination; 0 for all nodes.
             data: up to four bytes.
         """
         for tpdo in self.tpdos:
