@@ -48,7 +48,7 @@ class CanopenPort(Generic[T]):
         self.entries: Sequence[Entry] = ()
 
     def join(self, entries: Sequence[Entry], event: Callable[[Entry], None]) -> None:
-        """Keep its value in these objects; `event` sends the TPDOs that carry one."""
+        """Keep the value of the port in these objects; `event` sends the TPDOs of an object."""
         self.entries, self._event = entries, event
 
     @property
@@ -75,7 +75,7 @@ class CanopenInPort(CanopenPort[T]):
     is_new: bool = False
 
     def join(self, entries: Sequence[Entry], event: Callable[[Entry], None]) -> None:
-        """Keep its value in these objects, and note each write."""
+        """Keep the value of the port in these objects, and record each write."""
         super().join(entries, event)
         for entry in entries:
             entry.written = self._on_written
@@ -256,7 +256,7 @@ _STRICT_ERROR: Final[_Effects] = {
     NmtCommand.START: ("on_reset",),
     NmtCommand.ENTER_PRE_OPERATIONAL: ("on_reset",),
 }
-"""The same in Error with `strict_cia301` (K9)."""
+"""Permitted commands and their callbacks in Error with `strict_cia301` (K9)."""
 
 _ENTERED: Final[Mapping[tuple[NmtState, NmtState], tuple[str, ...]]] = {
     (NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL): ("on_activated",),  # M2

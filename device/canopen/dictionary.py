@@ -179,7 +179,7 @@ class Entry(Part):
         self.watchers = tuple(watcher for watcher in self.watchers if watcher != changed)
 
     def assign(self, data: bytes) -> None:
-        """Change the value from the inside; watchers are called."""
+        """Change the value from inside the device, and call the watchers."""
         if data != self.data:
             self.data = data
             for changed in self.watchers:

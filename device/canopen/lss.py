@@ -93,7 +93,10 @@ class FastScanner(Part):
         return self._advance(request)
 
     def _advance(self, request: FastScan) -> LssMode | None:
-        """Go on to the next part; an earlier next part means that all were found."""
+        """Continue with the next part.
+
+        A next part that comes before the present one means that the scan found all parts.
+        """
         if request.next_sub > _MAX_SUB:
             return None
         self._sub = request.next_sub

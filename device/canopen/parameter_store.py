@@ -73,7 +73,7 @@ class ParameterStore(Service):
             entry.takes_commands = True
 
     def start(self) -> None:
-        """Set the values that the objects read as."""
+        """Set the values that a client reads from the objects."""
         for entry in self._entries:
             _show_capability(entry)
 

@@ -278,7 +278,7 @@ class _BlockDownload(Part):
             self._server.go_on()
 
     def _acknowledge(self) -> None:
-        """Acknowledge the received part of the block, and start the next."""
+        """Acknowledge the received part of the block, and start the next block."""
         # The number of data bytes in the last segment is known only at the end of the transfer:
         # up to seven bytes may be padding.
         self._size.check(len(self._data) - SEGMENT_BYTES)
@@ -517,7 +517,7 @@ class SdoServer(Part):
         self.initiate(request)
 
     def free_bytes(self, entry: Entry) -> int:
-        """Return the memory left for a string or domain beside all others."""
+        """Return the memory that all other strings and domains leave for this one."""
         others = (one for one in self.node.dictionary if not one.size and one is not entry)
         return self._memory_bytes - sum(len(one.data) for one in others)
 
@@ -703,12 +703,12 @@ class SdoServers(Service):
         return (can_id for can_id, _ in self.handlers(state))
 
     def state_changed(self, old: NmtState, new: NmtState) -> None:
-        """Drop transfers when leaving the states with SDO."""
+        """Drop transfers when the slave leaves the NMT states with SDO."""
         if new not in ALIVE:
             self._end_all()
 
     def tick(self, now_us: int) -> None:
-        """Check for clients that have been silent too long."""
+        """Abort transfers of clients whose time-out has passed."""
         for server in self.servers:
             if server.due_us <= now_us:
                 server.abort(AbortCode.TIMEOUT)

@@ -51,12 +51,9 @@ from tickrig.wire.instant import NEVER
 # name their CAN-IDs in `reconfigured_by`.
 #
 # Time: a service requests its `tick` by `schedule`, and gets it only then. `due_us` is the
-#     earliest of these times; a rig in virtual time jumps to it. Waking too early is harmless,
-#     because each service checks its own deadlines. Waking too late is an error that shows only
-#     in virtual time.
-# `due_us` is the earliest of these; a rig in virtual time jumps there. Waking too early is
-# harmless, because each service looks at its own deadlines; waking too late is a fault that
-# only virtual time shows.
+# earliest of these times; a rig in virtual time jumps to it. Waking too early is harmless,
+# because each service checks its own deadlines. Waking too late is an error that shows only in
+# virtual time.
 #
 # A reset runs these steps; their order must not change:
 #
@@ -74,13 +71,9 @@ from tickrig.wire.instant import NEVER
 # that came before it are dropped.
 #
 # The tick of 1 ms is a choice. All other facts about states and services are from CiA 301, cited
-#     at each service. Speed matters in this file more than in most others: a network of 127
-#     slaves runs this loop 127 times a millisecond. `__slots__`, tuples in place of lists and
-#     positions in place of names in `tick` are optimizations with measured gains, noted beside
-#     them.
-# cited beside each service. Speed matters here as in few files: a network of 127 slaves
-# runs this loop 127 times a millisecond. `__slots__`, tuples in place of lists and places
-# in place of names in `tick` are measured, with the gain beside them.
+# at each service. Speed matters in this file more than in most others: a network of 127 slaves
+# runs this loop 127 times a millisecond. `__slots__`, tuples in place of lists and positions in
+# place of names in `tick` are optimizations with measured gains, noted beside them.
 
 # What a slave keeps when its power is cut.
 

@@ -177,13 +177,13 @@ class _EventRule(Part):
 
     Each bit of the interrupt trigger selection (6421h) is an event of its own:
 
-    | bit | event                                               |
-    |-----|-----------------------------------------------------|
-    | 0   | the value was below the upper limit and is no more  |
-    | 1   | the value was at the lower limit or above and is below |
-    | 2   | it differs from what was sent last by more than the delta |
-    | 3   | it is below what was sent last by more than the negative delta |
-    | 4   | it is above what was sent last by more than the positive delta |
+    | bit | event                                                                  |
+    |-----|------------------------------------------------------------------------|
+    | 0   | the value was below the upper limit and no longer is                   |
+    | 1   | the value was at or above the lower limit and is now below it          |
+    | 2   | the value differs from the value sent last by more than the delta      |
+    | 3   | the value is below the value sent last by more than the negative delta |
+    | 4   | the value is above the value sent last by more than the positive delta |
 
     A limit causes an event when it is crossed, not for as long as it is exceeded. A missing limit
     object means no limit; a missing delta object means a delta of 0.

@@ -81,7 +81,7 @@ class _Bits(Part):
         return max((view.lines.bit_length() for view in self.views), default=0)
 
     def assign(self, value: int) -> None:
-        """Change the bits from the inside; all objects follow."""
+        """Change the bits from inside the device, and update all objects."""
         self.value = value
         for view in self.views:
             view.entry.assign(view.out_of(value))
@@ -189,7 +189,7 @@ def _ones(bits: int) -> Iterator[int]:
 class DigitalOutputs(Part):
     """All digital outputs of a module; line 1 is the lowest bit.
 
-    Lines in the filter mask keep their level.
+    A line whose bit in the filter mask is 0 keeps its level.
 
     Attributes:
         value: what the bus writes.

@@ -79,7 +79,7 @@ ANALOGUE_OUTPUT: Final = AnalogueObjects(
 INTEGER_LIMITS: Final = 0x6424
 """Upper limit; after it lower limit, delta, negative delta, positive delta."""
 REAL_LIMITS: Final = 0x6429
-"""The same five as REAL32."""
+"""The limits and deltas as REAL32 objects."""
 ANALOGUE_ERROR_MODE: Final = 0x6443
 INTEGER_ERROR_VALUE: Final = 0x6444
 REAL_ERROR_VALUE: Final = 0x6445

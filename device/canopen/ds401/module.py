@@ -56,10 +56,8 @@ from tickrig.wire.canopen.nmt import NmtState
 # `state_changed` and `communication_error` may be called in ticks in which nothing else happens.
 #
 # Sources: CiA 401 for objects, masks, triggers, error modes and defaults (families.py has its
-#     tables). If an object is missing, digital events (6005h) and analogue events (6423h) are on.
-#     A scaling of 0 counts as 1, because many EDS files have 0.
-# its tables); where an object is missing, digital events are on (6005h), analogue ones too
-# (6423h), and a scaling of 0 counts as 1, because many EDS files leave it so.
+# tables). If an object is missing, digital events (6005h) and analogue events (6423h) are on. A
+# scaling of 0 counts as 1, because many EDS files have 0.
 
 # Faults that a module detects in itself and reports.
 

@@ -94,7 +94,7 @@ class ActualValues(Part):
         self._kept, self.watched = True, False
 
     def keep(self) -> None:
-        """Write all values before something changes; they hold up to the end of the tick."""
+        """Write all values before something changes; they stay valid until the end of the tick."""
         if not self._kept:
             for entry in self._entries:
                 entry.assign(self._encoded(entry))

@@ -58,7 +58,7 @@ NEXT_STATE: Final = {
     (_QUICK_STOP, Command.DISABLE_VOLTAGE): _SOD,  # 12
     (_QUICK_STOP, Command.ENABLE_OPERATION): _ENABLED,  # 16, if 605Ah lets it stay
 }
-"""Transitions 0, 1, 13, 14 and 15 are made by the drive, by a fault and by its reset."""
+"""The drive, a fault or the reset of a fault makes transitions 0, 1, 13, 14 and 15."""
 
 _POWERED: Final = (_ENABLED, _QUICK_STOP, DriveState.FAULT_REACTION_ACTIVE)
 """States in which the motor may have torque."""
@@ -67,7 +67,7 @@ _RAMPS: Final = {
     DriveState.SWITCHED_ON: indices.DISABLE_OPERATION_OPTION,
     DriveState.READY_TO_SWITCH_ON: indices.SHUTDOWN_OPTION,
 }
-"""Option codes that say how Operation enabled is left: transitions 5 and 8."""
+"""Option codes for leaving Operation enabled by transitions 5 and 8."""
 
 
 def command_of(controlword: int) -> Command | None:
@@ -83,7 +83,7 @@ def command_of(controlword: int) -> Command | None:
 
 
 class Automaton(Part):
-    """Brakes before transitions 5 and 8 if their option codes ask for it.
+    """Brakes before transitions 5 and 8 if their option codes require it.
 
     Args:
         stopping: brakes according to the option codes.
@@ -203,8 +203,9 @@ class Bounds(Immutable):
 
     Attributes:
         supply_mv: lowest and highest supply.
-        winding_dc: highest temperature of the winding, in tenths of a degree Celsius.
-        winding_warning_dc: temperature of the winding from which the drive warns.
+        winding_dc: highest temperature of the winding, in 0.1 degC.
+        winding_warning_dc: temperature of the winding from which the drive warns, in
+            0.1 degC.
         stall_us: how long the motor may stand at a limit although motion is demanded.
     """
 
@@ -273,7 +274,7 @@ class Supervision(Part):
         return found
 
     def skip(self, now_us: int) -> None:
-        """Continue as after ticks up to `now_us` in which the motor followed."""
+        """Continue as if the motor had followed in all ticks up to `now_us`."""
         self._error_us = self._stall_us = now_us
 
     def _loses_reference(self, now_us: int) -> bool:

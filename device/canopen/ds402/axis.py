@@ -231,7 +231,9 @@ _STANDSTILL_TURNS_S: Final = 0.5
 
 
 class Axis(Part):
-    """Positions of the user are INTEGER32 and wrap at the ends of 607Bh.
+    """An axis, with its motor, its reference and the positions of the user.
+
+    Positions of the user are INTEGER32 and wrap at the ends of 607Bh.
 
     Attributes:
         motor: the motor.
@@ -257,7 +259,7 @@ class Axis(Part):
 
     @property
     def stands(self) -> bool:
-        """Whether the motor stands, as far as its encoder shows."""
+        """Whether the motor stands, according to its encoder."""
         return not self.is_fast(self.motor.velocity_counts_s)
 
     @property
@@ -438,13 +440,15 @@ INPUTS: Final[tuple[InputSignal, ...]] = (
 
 
 class Switches(Part):
-    """The switches as the drive sees them, pressed by hand or by the shaft at an angle.
+    """The switches as the drive reads them.
+
+    A switch is pressed by hand or by the shaft at an angle.
 
     Negative and positive are the directions of the user, that is with the polarity 607Eh applied.
 
     Attributes:
         word: bits 0 to 2 of 60FDh.
-        by_angle: whether the shaft presses at least one of the switches.
+        by_angle: whether the shaft can press at least one of the switches.
     """
 
     def __init__(self) -> None:

@@ -359,7 +359,7 @@ class Ds402(Application):
         self._sleep(now_us, settled and not self.supervision.waiting, requested=requested)
 
     def request(self) -> None:
-        """Ask for `on_execute` in this tick; between two ticks, in the next one."""
+        """Request `on_execute` in this tick; between two ticks, in the next one."""
         self._requested = True
         super().request()
 

@@ -177,8 +177,8 @@ class Units(Part):
         counts_per_turn: counts per revolution of the motor's encoder, if 608Fh does not exist.
 
     Attributes:
-        per_position: counts in a position unit, with the sign of 607Eh.
-        per_velocity: counts per second in a velocity unit, with the sign of 607Eh.
+        per_position: counts in a position unit, with the sign of the unit.
+        per_velocity: counts per second in a velocity unit, with the sign of the unit.
         per_acceleration: counts per second per second in an acceleration unit, without sign.
     """
 
@@ -198,7 +198,7 @@ class Settings(Immutable):
 
     Positions are in counts from the position at which the encoder was switched on, less the home
     position. Velocities are in counts per second and accelerations in counts per second per
-    second, both without sign. `inf` means no limit.
+    second. None of these values has the sign of the units. `inf` means no limit.
 
     Attributes:
         units: units of the user.

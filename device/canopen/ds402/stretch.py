@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from tickrig.device.servo.servo import Bounds, Line, RunAhead, Servo
 
 _FEWEST: Final = 2
-"""Smallest number of ticks that is worth the effort."""
+"""Smallest number of ticks that is worth computing together."""
 
 
 class Stretch(Part):
@@ -106,7 +106,7 @@ class Stretch(Part):
         return min(left_us - TICK_US if left_us > 0 else since_us, horizon.until_us - now_us)
 
     def _take(self, servo: Servo, run: RunAhead) -> None:
-        """Take the ticks of a run over."""
+        """Apply the ticks of a run to the drive."""
         self._line.go_on(run.steps, run.demand)
         self._began_us += run.steps * TICK_US
         servo.follow(run)

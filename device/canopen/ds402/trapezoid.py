@@ -203,7 +203,7 @@ def _legs(velocity: float, distance: float, limits: PathLimits, end: float) -> l
 
 
 def _forward(velocity: float, distance: float, limits: PathLimits, end: float) -> list[_Leg]:
-    """Return the legs of a path ahead: to the top velocity, along, to the end velocity."""
+    """Return the legs of a forward path: to the top speed, at that speed, to the end velocity."""
     up, down = limits.acceleration, limits.deceleration
     slowest = sqrt(max(0.0, velocity**2 - 2 * down * distance)) if end > 0.0 else 0.0
     end = max(slowest, min(end, sqrt(velocity**2 + 2 * up * distance)))

@@ -105,12 +105,12 @@ class Trajectory:
 
 
 def _stoppable_udeg_s(distance_ndeg: int) -> int:
-    """Return the velocity at the end of a tick that still allows a stop within a distance.
+    """Return the highest velocity at the end of a tick that allows a stop within a distance.
 
     The distance is the sum of the part that the tick itself adds for its end velocity v and the
     braking distance. Braking takes full brake ticks and a shorter last one. With m full brake
-    ticks, the distance is (2 (m + 1) v - m (m + 1) CHANGE) * _NDEG. At v = m * CHANGE it is m (m
-    + 1) * CHANGE * _NDEG.
+    ticks, the distance is (2 (m + 1) v - m (m + 1) CHANGE) * _NDEG.
+    At v = m * CHANGE it is m (m + 1) * CHANGE * _NDEG.
     """
     full = (isqrt(1 + 4 * (distance_ndeg // (_NDEG * CHANGE_UDEG_S))) - 1) // 2
     return (distance_ndeg // _NDEG + full * (full + 1) * CHANGE_UDEG_S) // (2 * (full + 1))

@@ -26,7 +26,7 @@ TPDO_TYPES: Final = frozenset((*SYNCHRONOUS, RTR_SYNCHRONOUS, RTR_EVENT, *EVENT_
 """All others are reserved (CiA 301, transmission type)."""
 
 COB_ID, TYPE, INHIBIT_TIME, RESERVED, EVENT_TIMER, SYNC_START = range(1, 7)
-"""Sub-indices. The reserved one (CiA 301, 7.5.2.37) is there only where an EDS describes it."""
+"""Sub-indices; the reserved one (CiA 301, 7.5.2.37) exists only if an EDS describes it."""
 
 _MAX_SYNC_START: Final = 240
 _NOT_IN_A_CAN_ID: Final = EXTENDED | 0x1FFF_F800

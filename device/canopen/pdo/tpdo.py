@@ -64,7 +64,7 @@ _RTR_MODES: Final[dict[int, type[pdo_parameters.TpdoMode]]] = {
 class Tpdo(Part):
     """Sends the mapped objects according to its transmission type.
 
-    Its mode sees it as the sender: it offers parameters, `pack`, `send` and `wake`.
+    Its mode uses it as the sender, by `parameters`, `pack`, `send` and `wake`.
 
     Args:
         producer: the service that it belongs to.
@@ -273,7 +273,7 @@ class PdoProducer(Service):
             self.node.await_tick(self, due_us)
 
     def tick(self, now_us: int) -> None:
-        """Send the TPDOs of SYNC, then those of events."""
+        """Send the TPDOs of SYNC, then the TPDOs with events."""
         if self._counters:
             # All SYNCs that came in this tick, each with its counter: two of them send two
             # frames.

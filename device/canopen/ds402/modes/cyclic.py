@@ -173,7 +173,7 @@ class InterpolatedPosition(CyclicPosition):
         return settled
 
     def ahead(self) -> Line | None:
-        """Return none: its bits in the statusword change on the way."""
+        """Return None, because the bits of the mode in the statusword change on the way."""
         return None
 
     def halt(self, now_us: int) -> bool:

@@ -84,7 +84,7 @@ class Mode(Part):
         """Act on the rising edge of bit 4 of the controlword, in Operation enabled."""
 
     def stop(self) -> None:
-        """Act on its falling edge."""
+        """Act on the falling edge of bit 4 of the controlword."""
 
     def step(self, now_us: int) -> bool:
         """Run one control period of the mode, or of a halt.
