@@ -36,12 +36,12 @@ class Pose(Immutable):
     def moved(self, left_m: float, right_m: float, tread_m: float) -> Pose:
         """Return the pose after both sides have rolled at steady speeds.
 
-        The path is an arc, which is taken exactly: its chord has the heading
-        of its middle.
+        The path is an arc. It is computed exactly: the chord of an arc has the heading that the
+        body has in the middle of the arc.
 
         Args:
-            left_m: way of the left wheels.
-            right_m: way of the right wheels.
+            left_m: distance that the left wheels rolled.
+            right_m: distance that the right wheels rolled.
             tread_m: distance between left and right wheels.
 
         >>> Pose().moved(1.0, 1.0, 0.4)
@@ -78,20 +78,20 @@ GRAVITY_M_S2: Final = 9.80665
 class Contact:
     """A wheel that carries its share of a body over the ground.
 
-    Without `friction` the ground goes with the wheel, and the wheel feels the
-    mass as inertia. With it, the ground's speed changes by at most
-    friction x gravity; what the wheel turns beyond that is slip. While it slips, the
-    wheel feels the force of friction instead of the mass.
+    Without `friction` the wheel never slips: it moves the ground at the speed of its rim and feels
+    the mass as inertia. With `friction` the ground's acceleration is at most friction x gravity.
+    The rest of the wheel's turning is slip. While the wheel slips, it feels the force of friction
+    instead of the mass.
 
-    Not emulated: a friction that depends on speed or direction, a share of the
-    weight that changes with acceleration.
+    Not emulated: a friction that depends on speed or direction, and a share of the weight that
+    changes with acceleration.
 
     Attributes:
         radius_m: of the wheel.
-        mass_kg: its share of the body.
-        friction: coefficient, None if it never slips.
-        speed_m_s: of the ground below it.
-        slip_m_s: speed of the rim beyond that, 0 with grip.
+        mass_kg: share of the body's mass that the wheel carries.
+        friction: coefficient, None if the wheel never slips.
+        speed_m_s: speed of the ground below the wheel.
+        slip_m_s: speed of the rim beyond the ground's speed, 0 with grip.
     """
 
     radius_m: float
@@ -144,7 +144,7 @@ class BodyParameters(Immutable):
         kind: of `SIDES`.
         wheel_radius_m: of each wheel.
         tread_m: distance between left and right wheels.
-        mass_kg: carried by the driven wheels, each the same share.
+        mass_kg: mass on the driven wheels; each carries the same share.
         friction: coefficient between wheels and ground, None if they never slip.
 
     Raises:
@@ -178,18 +178,18 @@ class BodyParameters(Immutable):
 class WheeledBody(Copyable):
     """A differential drive, or a skid steer whose sides move as the mean of their wheels.
 
-    It goes as far as its wheels have turned since the step before, on an exact
-    arc. Its mass lies above the wheels, at half the tread to each side: so each
-    wheel feels mass / number of wheels x radius squared, straight on as in a turn.
+    In each step it moves as far as its wheels have turned since the previous step, on an exact arc.
+    Its mass lies above the wheels, at half the tread to each side. So each wheel feels mass /
+    number of wheels x radius squared, both straight on and in a turn.
 
-    Not emulated: castors, the force that turns the wheels of a skid steer
-    sideways, rolling resistance, slopes, collisions.
+    Not emulated: castors, the force that turns the wheels of a skid steer sideways, rolling
+    resistance, slopes, collisions.
 
     Args:
         parameters: dimensions, mass and friction.
 
     Attributes:
-        pose: where it is; it may be put elsewhere.
+        pose: position and heading of the body; may be set.
         speed_m_s: forward, in the latest step.
         turn_rad_s: to the left, in the latest step.
         contacts: its wheels on the ground, by name.
@@ -242,7 +242,7 @@ def _mean(values: Sequence[float]) -> float:
 _OMNI_STEP_S: Final = 1e-3
 
 _BEARINGS: Final = (pi / 3, pi, -pi / 3)
-"""Directions of the wheels, from the front to the left; each rolls at right angles to that."""
+"""Bearings of the wheels, from the front to the left; each rolls at right angles to its bearing."""
 
 
 class Velocity(NamedTuple):
@@ -279,7 +279,7 @@ class OmniParameters(Immutable):
                 raise ValueError(f"{name} {value} is not above 0 and below 1000")
 
     def wheel_speeds(self, velocity: Velocity) -> tuple[float, ...]:
-        """Return the speeds of the wheels in rad/s; all are scaled down if one is too fast."""
+        """Return the speeds of the wheels in rad/s; if one is too fast, all are scaled down."""
         vx, vy, turn = velocity.vx, velocity.vy, velocity.w * self.base_radius_m
         rims = (vy * cos(at) - vx * sin(at) + turn for at in _BEARINGS)
         speeds = tuple(rim / self.wheel_radius_m for rim in rims)
@@ -308,7 +308,7 @@ class OmniBody(Copyable):
 
     Attributes:
         parameters: dimensions and response.
-        pose: where it is; it may be put elsewhere.
+        pose: position and heading of the body; may be set.
         velocity: in the latest step.
     """
 

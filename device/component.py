@@ -1,7 +1,7 @@
 """RT components on devices: base class, and the runner of its callbacks (OMG RTC 1.1).
 
-RTC-Lite nodes and DeviceRTCs on CANopen use them. Each adds its ports, the storage of their values,
-and the life cycle.
+RTC-Lite nodes and DeviceRTCs on CANopen use these classes. Each of the two adds its ports, the
+storage of the port values, and the life cycle.
 """
 
 from __future__ import annotations
@@ -40,14 +40,14 @@ Result = DeviceReturnCode | None
 class DeviceComponent(Copyable):
     """A component on a device; a subclass defines its properties and callbacks.
 
-    Ports are declared as attributes of the class; each component has its own. Callbacks are
-    optional. One that cannot fail is declared `-> None`; one that can returns `ERROR`. Power-on
-    makes a new component: values kept in `self` are the device's RAM.
+    Declare ports as attributes of the class; each component gets its own ports. Callbacks are
+    optional. Declare a callback that cannot fail as `-> None`; a callback that can fail returns
+    `ERROR`. Power-on makes a new component, so values kept in `self` behave like the device's RAM.
 
     Attributes:
         type_name: type of the component.
-        physical: physical inputs of the device beside its wire.
-        inputs: their values.
+        physical: physical inputs that the device has in addition to its wire.
+        inputs: values of the physical inputs.
     """
 
     type_name: ClassVar[str] = ""
@@ -95,8 +95,8 @@ class CallbackRunner(Generic[C]):
     Attributes:
         component: the component.
         latest: name of the callback that ran last, empty before the first.
-        calls: how many callbacks ran.
-        executed: how many of them were `on_execute`.
+        calls: number of callbacks that ran.
+        executed: number of `on_execute` callbacks among these calls.
     """
 
     def __init__(self, component: C) -> None:
@@ -114,9 +114,9 @@ class CallbackRunner(Generic[C]):
 
 @dataclass(slots=True)
 class Timer:
-    """A timer as execution context (RTC-Lite type 22h, DeviceRTC), with periods from its start.
+    """A timer as execution context (RTC-Lite type 22h, DeviceRTC).
 
-    It does not drift; missed periods are skipped.
+    Its periods are counted from its start, so it does not drift. Missed periods are skipped.
 
     Attributes:
         rate_hz: periods a second; a new rate applies from the next start.
@@ -155,7 +155,7 @@ class Timer:
 
 
 def declared(owner: type, kind: type[P]) -> Iterator[tuple[str, P]]:
-    """Yield the attributes of one kind of a class and its bases, the bases first.
+    """Yield the attributes of one kind that a class and its bases define, the bases first.
 
     >>> class Lamp:
     ...     bright, name = 5, "lamp"

@@ -21,12 +21,13 @@ class Device(Protocol[W]):
     def due_us(self) -> int:
         """The earliest time at which anything happens without input.
 
-        A rig in virtual time jumps to it. It may be in the past (the next tick then does the work)
-        or `NEVER`. A tick before it, without traffic, must have no visible effect.
+        A rig in virtual time jumps to this time. A time in the past means that the next tick does
+        the work. `NEVER` means that nothing happens without input. A tick before this time, without
+        traffic, must have no visible effect.
 
-        It may become earlier in `tick` and `reset`, and by changes between steps: inputs, a write
-        to the dictionary. A rig reads it again at each call that advances the time; within a step,
-        one device affects another only through the wire.
+        `due_us` may become earlier in `tick` and `reset`, and by changes between steps, such as
+        inputs or a write to the dictionary. A rig reads it again at each call that advances the
+        time. Within a step, one device affects another only through the wire.
         """
         ...
 
@@ -41,8 +42,8 @@ class Device(Protocol[W]):
             rx: traffic that arrived since the last tick, in wire order.
 
         Returns:
-            The traffic that the device sends in this tick, in wire order. It answers bad input as
-            the real device does, and never raises.
+            The traffic that the device sends in this tick, in wire order. The device answers bad
+            input as the real device does, and never raises.
         """
         ...
 
@@ -52,9 +53,10 @@ class UartDevice(Device[bytes], Protocol):
 
     @property
     def uart(self) -> UartSetting | None:
-        """The setting of its UART, as the latest tick or `reset` left it; None without a UART.
+        """The setting of its UART after the latest tick or `reset`; None without a UART.
 
-        The result of a tick is still sent with the setting before that tick. The new setting
-        applies after its last stop bit; from then on the device also receives with it.
+        The result of a tick is still sent with the setting that was valid before that tick. The new
+        setting applies after the last stop bit of that result. From then on the device also
+        receives with it.
         """
         ...

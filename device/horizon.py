@@ -13,8 +13,8 @@ class Horizon(Part):
 
     Attributes:
         passed_us: all ticks up to this time are done.
-        until_us: up to this time nothing reads a device between its ticks, except an action of the
-            event queue; only its traffic is observed.
+        until_us: up to this time only the traffic of a device is observed. Nothing reads the device
+            between its ticks, except an action of the event queue.
     """
 
     passed_us: int = 0

@@ -22,7 +22,7 @@ class Register(Immutable):
     """A number that a master can read.
 
     Attributes:
-        address: of its first register.
+        address: address of its first register.
         name: name in the device.
         text: description with the unit.
         words: number of registers, 1 or 2.
@@ -47,11 +47,12 @@ class Register(Immutable):
 class Registers(Part):
     """The numbers of a device.
 
-    A number of 32 bits is written as a whole; half of it is an illegal address.
+    A number of 32 bits must be written as a whole. Writing half of it is refused as an illegal
+    address.
 
     Args:
         table: the numbers.
-        measured: functions that compute numbers when a master reads them.
+        measured: functions that compute their numbers each time a master reads them.
     """
 
     def __init__(
@@ -99,8 +100,8 @@ class Registers(Part):
         """Write registers, all or none; return the written numbers by name.
 
         Raises:
-            Refusal: a register does not exist, is read-only, would be written by half, or its value
-                is out of range.
+            Refusal: a register does not exist or is read-only, only half of a number would be
+                written, or the value of a number is out of range.
         """
         written: dict[str, int] = {}
         at = first
@@ -140,17 +141,17 @@ def _joined(register: Register, words: Sequence[int]) -> int:
 class ModbusSlave(Copyable):
     """Answers a master on an RTU line.
 
-    A frame ends with silence; it is then served, and the answer is sent at once. Invalid frames and
-    frames for other slaves are ignored, as in the standard.
+    A frame ends with silence. The slave then serves the frame and sends the answer at once. It
+    ignores invalid frames and frames for other slaves, as the standard requires.
 
-    Not emulated: function codes beside 03, 06, 10h and 17h, diagnostics, the
-    refusal of frames with a gap of 1.5 characters.
+    Not emulated: function codes other than 03, 06, 10h and 17h, diagnostics, the refusal of frames
+    with a gap of 1.5 characters.
 
     Args:
         registers: the registers.
         written: called with the numbers that a master wrote, by name.
-        address: 1..247.
-        silence_us: silence that ends a frame.
+        address: address of this slave, 1..247.
+        silence_us: length of the silence that ends a frame.
 
     Attributes:
         served: requests for this slave that were answered or executed.

@@ -1,7 +1,7 @@
 """The physical side of a device: named inputs and outputs with units.
 
-Scenario files, the control socket, panels and tests all use these names, and
-nothing else reaches into a device.
+Scenario files, the control socket, panels and tests all use these names. They have no other access
+to a device.
 """
 
 from __future__ import annotations
@@ -43,9 +43,9 @@ class InputSignal(Immutable):
         high: largest value.
         unit: unit of the value, empty for a plain number.
         initial: value at the start of the rig.
-        real: accepts fractions; a device keeps it in a `QuantityBank`.
-        counts: of a converter: the counts of its object at `low` and at `high`, and of one step;
-            empty without a converter.
+        real: whether the input accepts fractions; a device keeps such an input in a `QuantityBank`.
+        counts: three numbers of the converter: the counts of its object at `low`, the counts at
+            `high`, and the counts of one step; empty without a converter.
     """
 
     name: str
@@ -82,12 +82,12 @@ class QuantityBank:
 
     Args:
         table: the inputs.
-        groups: names of several inputs that are set together, as `stick`.
+        groups: names that set several inputs together, such as `stick`.
         on_change: called after each change.
 
     Attributes:
         table: the inputs by name, in order of declaration.
-        groups: names of several inputs that are set together.
+        groups: names that set several inputs together.
         changed: whether an input was set since the device last checked.
 
     >>> bank = QuantityBank([InputSignal("supply_v", "supply", high=15, initial=12.5, real=True)])
@@ -196,16 +196,16 @@ class InputBank(QuantityBank):
 
     Args:
         table: the inputs.
-        groups: names of several inputs that are set together, as `stick`.
+        groups: names that set several inputs together, such as `stick`.
         on_change: called after each change.
 
     Attributes:
         table: the inputs by name, in order of declaration.
-        groups: names of several inputs that are set together.
+        groups: names that set several inputs together.
         changed: whether an input was set since the device last checked.
 
     Raises:
-        ValueError: an input of the table accepts fractions; use a `QuantityBank`.
+        ValueError: an input of the table accepts fractions, which needs a `QuantityBank`.
     """
 
     __slots__ = ()

@@ -16,43 +16,40 @@ from tickrig.device.twin import Copyable, Part
 # Theory of operation
 # ===================
 #
-# The base works in milliseconds: waiting orders, watchdog, stall, servo, ground, in this
-# order, in `_pass_to`. It is not ticked in each of them: one cycle of a master takes 8.3 ms
-# at 115 200 bit/s, and between two frames nothing is seen of the base but what `read`
-# shows, every `LOOK_US`. So
+# In each millisecond the base does the following, in this order, in `_pass_to`: waiting orders,
+# watchdog, stall, servo, ground. A rig does not call `tick` in each millisecond: one cycle of a
+# master takes 8.3 ms at 115 200 bit/s, and between two frames only `read` shows anything of the
+# base, every `LOOK_US`. Therefore:
 #
-# - `due_us` is the end of the frame on the line, or the next look; in between the base
-#   sleeps;
-# - a tick first makes the milliseconds that have passed (`_catch_up`), up to the one before
-#   now if something happens in this tick (a frame ends, an input was set, a reset), else
-#   with now;
-# - then a reset, inputs, bytes, and last the millisecond of now.
+# - `due_us` is the end of the frame on the line, or the next look. In between the base sleeps.
+# - A tick first computes the milliseconds that have passed (`_catch_up`). If something happens in
+#   this tick (a frame ends, an input was set, a reset), it computes those before now; otherwise it
+#   includes the millisecond of now.
+# - Then follow a reset, inputs, bytes, and last the millisecond of now.
 #
-# So a request is served from the state at the beginning of its millisecond, and an order
-# that is written in it takes effect in it. The order must not change: `tests/device/rh3/
-# test_milliseconds.py` compares a base that is left alone with one that is ticked each
-# millisecond, to the bit.
+# So a request is served from the state at the beginning of its millisecond, and an order that the
+# request writes takes effect in the same millisecond. The order of these steps must not change.
+# `tests/device/rh3/test_milliseconds.py` compares a base that sleeps with a base that is ticked
+# each millisecond; they must agree to the bit.
 #
-# Milliseconds that are alike are made in one call (`Driver.step`, `Side.drive` with
-# `steps`). They are alike while the targets are constant speeds, no order waits, the
-# watchdog does not expire and no wheel stalls; `Driver._alike` counts them. What is added
-# to the step of a millisecond must end the run there, or the two kinds of ticking differ.
+# Equal milliseconds are computed in one call (`Driver.step`, `Side.drive` with `steps`).
+# Milliseconds are equal while the targets are constant speeds, no order waits, the watchdog does
+# not expire and no wheel stalls. `Driver._alike` counts them. If you add something to the step of a
+# millisecond, `_alike` must end the run before it, or the two kinds of ticking differ.
 #
-# Side by side, with the same numbers in each: `SpeedLoop.drive` repeats `Wheel.step` over
-# locals, because the loop is the hot one; `Wheel.step` itself serves coasting and braking.
-# `Wheel.held` and `Side.resting` say when a step would change nothing: they are the same
-# condition as the one that holds the wheel in both, turned round.
+# Two pieces of code must compute the same numbers. `SpeedLoop.drive` repeats `Wheel.step` on local
+# variables, because this loop is the hot one; `Wheel.step` itself serves coasting and braking.
+# `Wheel.held` and `Side.resting` tell when a step would change nothing. Their condition is the
+# inverse of the one that holds the wheel in `SpeedLoop.drive` and `Wheel.step`.
 #
-# Units: counts and milliseconds inside, because the loop of the driver counts so (23 844.6
-# counts are a radian of the wheel); metres and radians begin at `Ground.roll`. Torque is in
-# per mille of the rated one. Gains have the units of the text of the register table in
-# driver.py.
+# Units: counts and milliseconds inside, because the loop of the driver uses them (23 844.6 counts
+# are a radian of the wheel). Metres and radians begin at `Ground.roll`. Torque is in per mille of
+# the rated torque. Gains have the units that the register table in driver.py gives.
 #
-# Numbers: geometry and gains from the functional specification of RH3, laws from
-# rh3-control, section 1.7 and 2.3; mass, friction, torque and current are choices and say
-# so in parameters.py. The wheels' true radii and tread are the calibrated ones (0.0995 and
-# 0.464 m), and commands are computed from 0.1 and 0.441 m by the host: that difference is
-# wanted.
+# Numbers: geometry and gains come from the functional specification of RH3, and the laws from
+# rh3-control, section 1.7 and 2.3. Mass, friction, torque and current are our choices;
+# parameters.py marks them as such. The wheels' true radii and tread are the calibrated ones (0.0995
+# and 0.464 m). The host computes commands from 0.1 and 0.441 m. This difference is intended.
 
 # The ground under a base: where its wheels have taken it.
 
@@ -102,13 +99,13 @@ class Ground(Part):
         """Advance by some milliseconds.
 
         Args:
-            lefts: counts by which the left wheel turned in each.
-            rights: the same of the right wheel.
+            lefts: counts by which the left wheel turned in each millisecond.
+            rights: counts by which the right wheel turned in each millisecond.
         """
         left, right, tread_m, place = self.left, self.right, self._tread_m, self._place
         grips, noise, left_m, right_m = self._grips, self._noise, 0.0, 0.0
-        # `grips` skips the slip model: without a coefficient of friction the rim goes where
-        # the wheel goes, in the same arithmetic.
+        # `grips` skips the slip model: without a coefficient of friction the rim and the wheel move
+        # alike, computed with the same arithmetic.
         for each, other in zip(lefts, rights):  # noqa: B905 - strict takes as long as a step
             left_rad, right_rad = each / COUNTS_PER_RAD, other / COUNTS_PER_RAD
             if grips:
@@ -183,10 +180,11 @@ LOOK_US: Final = 10_000
 class Rh3Base(Copyable):
     """The base of Reference Hardware 3 as a Modbus RTU slave; a `Device[bytes]`.
 
-    The real one speaks an unpublished protocol; rh3-control proposes Modbus RTU in its place, with
-    the register map of `register_map`. In each millisecond: bytes from the line, targets, watchdog
-    and faults, servo, ground. It need not be ticked in each of them: it computes the milliseconds
-    since the latest tick. `read` returns the outputs at the latest multiple of `LOOK_US`.
+    The real base speaks an unpublished protocol. rh3-control proposes Modbus RTU in its place, with
+    the register map of `register_map`. In each millisecond the base processes bytes from the line,
+    targets, watchdog and faults, servo, and ground, in this order. You need not call `tick` in each
+    millisecond: a tick computes the milliseconds since the latest tick. `read` returns the outputs
+    at the latest multiple of `LOOK_US`.
 
     Not emulated: the library libsvm, battery, heat, the outline of the robot.
 
@@ -268,8 +266,8 @@ class Rh3Base(Copyable):
             The bytes that it sends in this tick.
         """
         heard, before_us = self.slave.due_us <= now_us, now_us - _TICK_US
-        # Events of this tick must find the base as the millisecond before now has
-        # left it.
+        # Events of this tick must find the base in the state at the end of the previous
+        # millisecond.
         happens = heard or self.inputs.changed or self._restarted
         made = self._catch_up(before_us if happens else now_us) and not happens
         if self._restarted:

@@ -151,17 +151,17 @@ _DELAYED: Final = _TARGETS | {"mode", "command"}
 class Driver(Part):
     """Controls two wheels by its registers (rh3-control, drive protocol, register map A).
 
-    A fault of one wheel switches both off and shorts the motors; it stays until it is cleared and
-    its cause is gone. A master that is silent for `watchdog_ms` while the base moves stops it on
-    the ramp; a new target starts it again. An order to enable that cannot be executed is ignored;
-    the status shows it.
+    A fault of one wheel switches both wheels off and shorts the motors. The fault stays until it is
+    cleared and its cause is gone. If a master is silent for `watchdog_ms` while the base moves, the
+    driver stops the base on the ramp. A new target starts the base again. The driver ignores an
+    order to enable that it cannot execute; the status shows this.
 
     Args:
         parameters: of the base.
         inputs: its physical inputs.
 
     Attributes:
-        now_us: the present time, set before any other call.
+        now_us: the present time; set it before any other call.
         registers: the registers of the master.
         sides: left and right wheel with their loops.
     """
@@ -225,12 +225,12 @@ class Driver(Part):
             until_us: the last millisecond; `now_us` becomes the last one that was run.
 
         Returns:
-            The speeds of the wheels in each, counts/ms.
+            The speeds of the wheels in each millisecond, counts/ms.
         """
         if self._waiting:
             self._take_waiting()
-        # After the orders: a target that takes effect clears a trip, but not the silence that
-        # led to it. Without another request the base stops again.
+        # After the orders: a target that takes effect clears a trip of the watchdog. It does not
+        # end the silence that led to the trip, so without another request the base stops again.
         if self.now_us - last_request_us >= self._watch_us:
             self._watch()
         left, right = self.sides
@@ -262,9 +262,9 @@ class Driver(Part):
         left, right = self.sides
         if left.stalling or right.stalling:
             return 1
-        # The millisecond in which silence is long enough is not like the present one, nor
-        # that of the next waiting order; STALL_MS bounds the run, so that a stall is found
-        # in its millisecond.
+        # Two milliseconds differ from the present one: the one in which the silence becomes long
+        # enough, and the one of the next waiting order. STALL_MS bounds the run, so that a stall is
+        # found in its own millisecond.
         until_us = min(until_us, last_request_us + self._watch_us - 1)
         if self._waiting:
             until_us = min(until_us, self._waiting[0][0] - 1)
@@ -289,7 +289,7 @@ class Driver(Part):
             self._obey(self._waiting.popleft()[1])
 
     def _obey(self, values: Mapping[str, int]) -> None:
-        # Any new target ends a stop, of the watchdog too: a master that speaks again need
+        # Any new target ends a stop, also a stop of the watchdog. A master that sends again need
         # not clear it.
         if values.keys() & _TARGETS:
             self._tripped = self._stopped = False
@@ -298,8 +298,8 @@ class Driver(Part):
         self._mode = Mode(values.get("mode", self._mode))
         match values.get("command"):
             case Command.ENABLE:
-                # Enabling while a fault is present is ignored; bit 0 of the status shows
-                # that (map A has no answer for it).
+                # Enabling is ignored while a fault is present. Bit 0 of the status shows this,
+                # because map A has no answer for it.
                 self._enabled = not self._faulty
             case Command.DISABLE:
                 self._enabled = False

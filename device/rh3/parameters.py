@@ -26,19 +26,21 @@ class BaseParameters(Immutable):
     """Parameters of a base and the ground it stands on.
 
     Attributes:
-        address: of the driver on the line, 1..247.
-        radius_left_m: effective radius; 0.0995 is the calibrated one of the specification.
-        radius_right_m: effective radius.
+        address: address of the driver on the line, 1..247.
+        radius_left_m: effective radius of the left wheel; 0.0995 is the calibrated radius of the
+            specification.
+        radius_right_m: effective radius of the right wheel.
         tread_m: effective distance between the wheels; 0.464 is the calibrated one.
         mass_kg: of the robot; a choice, the specification gives none.
         friction: coefficient between wheels and ground, None if they never slip.
         response_s: time constant of the speed loop at the default gains without load.
-        delay_ms: from a command's arrival to its effect.
+        delay_ms: time from the arrival of a command to its effect.
         rated_nm: torque at a wheel at 1000 per mille; a choice.
         rated_ma: current at that torque; a choice.
-        friction_nm: of a motor with its gear; the driver compensates it while it moves.
-        noise: spread of a wheel's way over the ground, as a share of it.
-        seed: of the noise.
+        friction_nm: friction of a motor with its gear; the driver compensates it while the motor
+            moves.
+        noise: spread of the distance that a wheel moves over the ground, as a share of it.
+        seed: seed of the noise.
 
     Raises:
         ValueError: a number out of range.

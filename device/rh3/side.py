@@ -34,9 +34,9 @@ class _Wheel(Part):
         travel: counts since the start of the rig, with fractions.
         speed: counts/ms.
         load: torque against forward motion, per mille.
-        jammed: something holds the wheel.
-        friction: per mille of torque that it takes to turn it.
-        agility: counts/ms gained in a millisecond by a per mille of torque.
+        jammed: whether something holds the wheel.
+        friction: torque that it takes to turn the wheel, per mille.
+        agility: speed gained per millisecond and per mille of torque, counts/ms.
     """
 
     def __init__(self, parameters: BaseParameters) -> None:
@@ -66,8 +66,8 @@ class _Wheel(Part):
 
     def brake(self) -> None:
         """Run a millisecond with the motor shorted."""
-        # Never more than stops the wheel in this millisecond: a brake does not drive
-        # backward.
+        # Never more torque than stops the wheel in this millisecond: a brake does not drive the
+        # wheel backward.
         most = min(_BRAKE, abs(self.speed) / self.agility)
         self.step(-copysign(most, self.speed) if self.speed else 0.0)
 
@@ -82,7 +82,7 @@ class _PositionLoop(Part):
     """A PID loop from counts to counts/ms, with gains P in 1/s, I in 1/s2, D plain.
 
     Args:
-        registers: where its gains and limits are.
+        registers: the registers that hold its gains and limits.
     """
 
     def __init__(self, registers: Registers) -> None:
@@ -110,8 +110,8 @@ class _PositionLoop(Part):
             + registers["gain_i"] * self._sum / 1e6
             + registers["gain_d"] * change
         )
-        # v = sqrt(2 a s), in counts and milliseconds: from this speed the ramp still stops
-        # at the goal.
+        # v = sqrt(2 a s), in counts and milliseconds: the highest speed from which the ramp still
+        # stops at the goal.
         braking = sqrt(2 * registers["acceleration_limit"] / 1e6 * abs(error))
         return copysign(min(abs(wanted), braking), wanted)
 
@@ -123,18 +123,18 @@ _INTEGRAL_LIMIT: Final = 10_000.0
 class _SpeedLoop(Part):
     """A PID loop on the counts of each millisecond (rh3-control, wheel servo).
 
-    Torque in per mille = VP e + VI sum(e) + VD delta(e), with e in counts/ms, cut to the
-    rated torque; friction is compensated while the target moves.
+    Torque in per mille = VP e + VI sum(e) + VD delta(e), with e in counts/ms. The torque is limited
+    to the rated torque. Friction is compensated while the target moves.
 
     Args:
-        registers: where its gains and limits are.
+        registers: the registers that hold its gains and limits.
 
     Attributes:
-        reference: the target behind its ramp, counts/ms.
-        torque: of the latest millisecond, per mille.
+        reference: the target after its ramp, counts/ms.
+        torque: torque of the latest millisecond, per mille.
         limit: the highest speed, counts/ms.
         counted: counts of the latest millisecond.
-        stalled_ms: for how long full torque has not moved the wheel.
+        stalled_ms: time for which full torque has not moved the wheel.
     """
 
     def __init__(self, registers: Registers) -> None:
@@ -197,8 +197,8 @@ class _SpeedLoop(Part):
                 speed += (net - (friction if (speed or net) > 0 else -friction)) * agility
                 travel += speed
                 counted, counts = floor(travel) - counts, floor(travel)
-            # Encoder counts decide: a wheel that creeps below one count in a millisecond
-            # stands.
+            # Encoder counts decide: a wheel that moves less than one count in a millisecond stands
+            # still.
             stalled_ms = 0 if counted or abs(torque) < PER_MILLE else stalled_ms + 1
             speeds.append(speed)
         self.reference, self._error, self._change, self.torque = reference, before, change, torque
@@ -223,11 +223,11 @@ class Side(Part):
         registers: of the driver.
 
     Attributes:
-        name: which side it is.
+        name: `left` or `right`.
         wheel: the mechanics.
-        fault: the reason for switching it off.
-        clipped: its target was above the speed limit.
-        stalled: full torque has not moved it for too long, not yet handled.
+        fault: the reason for which the side was switched off.
+        clipped: whether its target was above the speed limit.
+        stalled: full torque has not moved the wheel for too long, and this is not handled yet.
     """
 
     def __init__(
@@ -337,8 +337,8 @@ class Side(Part):
 
         Args:
             steps: number of milliseconds; 1 towards a position, or while it is `stalling`.
-            stop: the target is standstill.
-            to_position: the target is a position, else a speed.
+            stop: whether the target is standstill.
+            to_position: whether the target is a position; otherwise it is a speed.
         """
         loop, wheel, limit = self._speed_loop, self.wheel, self._speed_loop.limit
         if stop:
@@ -357,8 +357,8 @@ class Side(Part):
     def coast(self, *, shorted: bool) -> list[float]:
         """Run a millisecond without power, or with the motor shorted; return the speed."""
         loop, wheel = self._speed_loop, self.wheel
-        # Without power the loop holds nothing; `take_over` gives it the speed of the wheel
-        # when power comes back, so that nothing jerks.
+        # Without power the loop holds no state. When power returns, `take_over` gives it the speed
+        # of the wheel, so that the wheel does not jerk.
         loop.take_over(0.0)
         loop.counted = loop.stalled_ms = 0
         self.clipped = False
@@ -370,8 +370,8 @@ class Side(Part):
 
     def _signed(self, value: int) -> int:
         """Negate a number if the wheel is configured to run backward; wrap it to 32 bits."""
-        # The one place for direction bits (002Bh), for targets on their way in and measured
-        # values on their way out. Cut to 32 bits: the position register wraps, as the
-        # counter of a driver does.
+        # Only this place handles the direction bits (002Bh): for targets on their way in and for
+        # measured values on their way out. The result is cut to 32 bits, because the position
+        # register wraps as the counter of a driver does.
         value = -value if self._backward else value
         return (value + _INT32 // 2) % _INT32 - _INT32 // 2

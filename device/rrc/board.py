@@ -95,14 +95,15 @@ _SHOWN_PERIODS: Final = 10
 class LoadAccount:
     """Work left over from past periods, in per cent of a period.
 
-    Each received line feed costs work, whatever happens to its line, and so do bytes that an
-    overflow discards. Two commands and a status line fill a period exactly, so the backlog stays;
-    with two OK lines they exceed it by 30, and VR2 stops in the tenth such tick.
+    Each received line feed costs work, whatever happens to its line. Bytes that an overflow
+    discards cost work, too. Two commands and a status line take exactly one period, so the backlog
+    stays constant. Two OK lines in addition exceed the period by 30 %, and VR2 stops in the tenth
+    such tick.
 
     Attributes:
         backlog_pct: work that is left over.
         extra_pct: work that a physical input adds, in per cent of a period.
-        settled: whether a period without traffic leaves everything unchanged.
+        settled: whether a period without traffic leaves this account unchanged.
     """
 
     backlog_pct: int = 0
@@ -128,8 +129,9 @@ class LoadAccount:
 
         Args:
             line_feeds: received line feeds.
-            overflows: of the receive buffer, plus one for each 256 further bytes discarded.
-            replies: lines sent, except overflow errors and the status line.
+            overflows: number of overflows of the receive buffer, plus one for each 256 further
+                bytes discarded.
+            replies: number of lines sent, except overflow errors and the status line.
             status: whether a status line was sent.
             extra_pct: work that a physical input adds, in per cent of a period.
         """
@@ -138,8 +140,8 @@ class LoadAccount:
         cost_pct = idle_pct + message.LINE_FEED_PCT * line_feeds + message.OVERFLOW_PCT * overflows
         cost_pct += message.REPLY_PCT * replies
         self.backlog_pct = max(0, self.backlog_pct + cost_pct - message.PERIOD_PCT)
-        # Only the idle cost of ten periods in a row is settled: until then `load_pct`, a
-        # mean of the last ten, still changes without traffic, and each tick has to be run.
+        # The account is settled after ten idle periods in a row. Until then `load_pct`, a mean of
+        # the last ten periods, still changes without traffic, so each tick must run.
         self._costs_pct = (*self._costs_pct[1:], cost_pct)
         self.settled = not self.backlog_pct and self._costs_pct == (idle_pct,) * _SHOWN_PERIODS
 
@@ -156,7 +158,7 @@ class Buzzer:
 
     Attributes:
         sounding: whether it sounded in the latest tick.
-        changes_at: the next tick at which that may change without input.
+        changes_at: the next tick at which `sounding` may change without input.
     """
 
     sounding: bool = False
@@ -166,11 +168,11 @@ class Buzzer:
     def play(self, tick: int, times: tuple[int, ...]) -> None:
         """Play on and off times in ticks from the next tick on, and drop the present pattern.
 
-        A zero time skips its phase; all zero is silence (DECISION R24).
+        A zero time skips its phase. If all times are zero, the buzzer is silent (DECISION R24).
         """
         self._phases.clear()
-        # A pattern begins in the tick after its command (R24): the first, silent, phase
-        # ends there.
+        # A pattern begins in the tick after its command (R24). The first phase is silent and ends
+        # in that tick.
         end = tick + 1
         self._phases.append((end, False))
         for number, ticks in enumerate(times):
@@ -191,8 +193,8 @@ class Buzzer:
         """
         while self._phases and tick >= self._phases[0][0]:
             self._phases.popleft()
-        # A pattern of the host has priority over the automatic alarm, also while it is
-        # silent (R18).
+        # A pattern of the host has priority over the automatic alarm, also during the silent phases
+        # of the pattern (R18).
         if self._phases:
             self.changes_at, self.sounding = self._phases[0]
         elif alarm_since is not None:
@@ -238,9 +240,9 @@ class PowerSequence:
         """Check the physical inputs, once a tick; Initialize does not see the button yet."""
         if state is RrcState.INITIALIZE and self._since is not None:
             return self._waiting(state, tick - self._since, inputs)
-        # An edge, not a level: a button that is held from one state into the next acts
-        # once. It is not followed in Initialize, so a press there counts in the first tick
-        # of the state after it.
+        # An edge counts, not a level: a button that is held from one state into the next acts once.
+        # Edges are not followed in Initialize, so a press in Initialize counts in the first tick of
+        # the state after it.
         pressed = inputs["power_button"] > self._button
         self._button = inputs["power_button"]
         if state in POWERED_ON:
@@ -255,17 +257,17 @@ class PowerSequence:
         """Return the next tick at which something happens without input."""
         holds = (since + self.config.fault_hold_ticks for since in self._faults.values())
         if self._since is None:
-            # No wait runs: the RRC waits for the button, or VR2 runs and a fault may be on
-            # its way.
+            # No wait is running. Either the RRC waits for the button, or VR2 runs and a fault may
+            # be about to be detected.
             return min(holds, default=NEVER)
         return self._since + self._wait_ticks(state)
 
     def _running(self, tick: int, inputs: InputBank, *, pressed: bool) -> Step:
         if pressed:
             return Step(RrcEvent.BY_BUTTON, Move.POWER_BUTTON)
-        # In the order of the table: of two faults that are detected in one tick the first
-        # one is the cause. `>=` with the tick of the first sight: 10 ticks are 100 ms (R25,
-        # corrected).
+        # In the order of the table: if two faults are detected in one tick, the first of them is
+        # the cause. `>=` is compared with the tick in which the fault was first seen: 10 ticks are
+        # 100 ms (R25, corrected).
         for name, event in _RUNNING_FAULTS.items():
             if not inputs[name]:
                 self._faults.pop(name, None)
@@ -301,8 +303,8 @@ class PowerSequence:
                 return Step(RrcEvent.POWER_OFF_FINISHED, Move.TRAFFIC_ENDED)
 
     def _power_on_result(self, waited: int, inputs: InputBank) -> Step:
-        # Without an answer of VR2 the test cannot end; it goes on until the time-out, or
-        # until the connector is put in again.
+        # Without an answer of VR2 the test cannot end. It continues until the time-out, or until
+        # the connector is plugged in again.
         if inputs["bus_unplugged"]:
             if waited < self.config.power_on_timeout_ticks:
                 return _NOTHING
@@ -315,7 +317,7 @@ class PowerSequence:
 
     def _power_on_failed(self, event: RrcEvent) -> Step:
         self._since = None
-        # No move keeps state and settings (R3); with one, `_move` goes through Initialize
-        # and wipes.
+        # Without a move, state and settings stay (R3). With a move, `_move` passes through
+        # Initialize and wipes the settings.
         again = self.config.power_on_fail_target is FailTarget.INITIALIZE
         return Step(event, Move.POWER_ON_FAILED if again else None)

@@ -23,9 +23,9 @@ _BUTTON_MODES: Final = {(0, 0): 0, (1, 0): 1, (0, 1): 2, (1, 1): 3}
 def count_button_edges(inputs: InputBank, settings: Settings) -> bool:
     """Count button edges and apply the speed buttons.
 
-    A counter is odd while its button is pressed (RRC manual, SA #7 to #9); so a
-    counter whose parity differs from the button is the edge itself. Edges count
-    whether or not the lock is on (DECISION R23).
+    A counter is odd while its button is pressed (RRC manual, SA #7 to #9). So an edge has occurred
+    when the parity of the counter differs from the button. Edges count whether or not the lock is
+    on (DECISION R23).
 
     Returns:
         Whether the alarm button has just been pressed.
@@ -95,7 +95,7 @@ class Gearbox:
             tick: number of the tick.
             mode: reverse mode, from #7 or the buttons.
             stick: translation and rotation as received; they choose the gear.
-            shaped: the same after shaping; they drive the motors (DECISION R18).
+            shaped: translation and rotation after shaping; they drive the motors (DECISION R18).
             knobs: #8 to #10.
         """
         v_pct, w_pct = shaped
@@ -105,13 +105,13 @@ class Gearbox:
             return max(v_pct, 0), w_pct
         if self._rests(tick, stick, knobs.neutral_pct):
             return 0, 0
-        # The gear follows the raw stick and only the values are shaped (R18): a dead zone
-        # or exponent must not move the angle at which a person reaches the backward gear.
+        # The gear follows the raw stick; only the output values are shaped (R18). A dead zone or an
+        # exponent must not move the stick angle at which the backward gear engages.
         angle = _angle_deg(stick)
         if self.gear is Gear.NEUTRAL:
             self._engage(tick, Gear.REVERSE if angle <= knobs.switch_deg else Gear.FORWARD)
-        # Backward in gear F stands and turns: the stick left neutral more than `switch_deg`
-        # from straight back, and only neutral takes the gear out (R17).
+        # Backward stick in gear F gives standstill, with turning still possible: the stick left
+        # neutral more than `switch_deg` from straight back. Only neutral disengages the gear (R17).
         if self.gear is Gear.FORWARD:
             return max(v_pct, 0), w_pct
         if stick[0] > 0:
@@ -127,9 +127,9 @@ class Gearbox:
         if self.resets_at is None:
             self.resets_at = tick + _RESET_TICKS
         if tick >= self.resets_at:
-            # Twenty ticks after the first one inside the radius, not the twentieth of them:
-            # a duration is the difference of two tick times, as for the watchdog (spec,
-            # section 5, corrected).
+            # The gear is disengaged twenty ticks after the first tick inside the radius, not in the
+            # twentieth tick inside it. A duration is the difference of two tick times, as for the
+            # watchdog (spec, section 5, corrected).
             self.gear = Gear.NEUTRAL
         return True
 
@@ -153,8 +153,8 @@ def _fade(value_pct: int, angle: float, start_deg: int) -> int:
     """
     if angle <= start_deg:
         return value_pct
-    # `int` truncates toward zero, as R18 asks; `start_deg` = 90 never comes here, because
-    # no angle of gear R that drives is above 90.
+    # `int` truncates toward zero, as R18 requires. `start_deg` = 90 never reaches this line,
+    # because no angle at which gear R drives is above 90.
     return int(value_pct * (90 - angle) / (90 - start_deg))
 
 
@@ -167,13 +167,13 @@ def shape_table(low_pct: int, high_pct: int, exponent: int) -> tuple[int, ...]:
 
     Args:
         low_pct: largest value that counts as 0, 0..99 %.
-        high_pct: smallest value that counts as 100, above `low_pct`, at most 100 %.
+        high_pct: smallest value that counts as 100 %, above `low_pct`, at most 100 %.
         exponent: 0..15; the power is 1 + 0.1 * exponent.
     """
     span, power = high_pct - low_pct, 1 + 0.1 * exponent
     positions = [min(max(a - low_pct, 0), span) / span for a in range(101)]
-    # Half up, as R16 asks; 1e-9 keeps a product such as 0.5 * 100, which floating point may
-    # put a hair below the half, on its side.
+    # Half up, as R16 requires. Floating point may make a product such as 0.5 * 100 slightly smaller
+    # than the half; adding 1e-9 corrects this.
     return tuple(int(100 * s**power + 0.5 + 1e-9) for s in positions)
 
 
@@ -190,9 +190,9 @@ def shape(value_pct: int, low_pct: int, high_pct: int, exponent: int) -> int:
 def apply_limits(v_pct: int, w_pct: int, limit: Limit) -> tuple[int, int]:
     """Return translation and rotation within the limits, signs kept (RRC manual, `limit`).
 
-    First each input is clamped to its own limit. Then one common factor, which keeps the direction,
-    is the smallest that sum, product and radius require; all is integer and rounds down (DECISION
-    R19).
+    First each input is limited to its own limit. Then both values are multiplied by one common
+    factor, which keeps the direction. It is the smallest of the factors that the limits of sum,
+    product and radius require. All arithmetic is integer and rounds down (DECISION R19).
 
     >>> apply_limits(-100, -100, Limit(70, 100, 120, 30, 90))
     (-45, -65)
@@ -201,8 +201,8 @@ def apply_limits(v_pct: int, w_pct: int, limit: Limit) -> tuple[int, int]:
     candidates = [(a, b)]
     if a + b > limit.sum_pct:
         candidates.append((a * limit.sum_pct // (a + b), b * limit.sum_pct // (a + b)))
-    # Percent of a percent: 255 is then beyond the largest product, 100 * 100 / 100, and
-    # means "no limit" for #4 as it does for #3 and #5 (R19).
+    # The limit is a percentage of a percentage. The largest product is 100 * 100 / 100, so 255 is
+    # beyond it and means "no limit" for #4, as it does for #3 and #5 (R19).
     if a * b > (product := 100 * limit.product_pct):
         candidates.append((isqrt(product * a // b), isqrt(product * b // a)))
     if (square := a * a + b * b) > (most := limit.radius_pct * limit.radius_pct):
@@ -266,7 +266,7 @@ class Drive:
 def _driving_mode(state: RrcState, settings: Settings) -> int | None:
     """Return the reverse mode in which the stick drives, None if it does not."""
     if state is RrcState.LIMIT:
-        # The `joystick` command's #7, never what the buttons chose: that counts in Standby
-        # only (R8).
+        # This is #7 of the `joystick` command, never the mode that the buttons chose: the buttons'
+        # mode counts only in Standby (R8).
         return settings.joystick.reverse_mode
     return settings.button_mode if state is RrcState.STANDBY else None
