@@ -50,8 +50,8 @@ class Marker(Immutable):
 
     Attributes:
         ucode: 128 bits, 32 hex digits in capitals.
-        x_m: its place.
-        y_m: its place, to the left of x.
+        x_m: position along x.
+        y_m: position to the left of x.
 
     Raises:
         ValueError: invalid ucode or position.
@@ -92,9 +92,9 @@ def receive(
 
     Args:
         markers: the sending markers.
-        pose: of the reader.
-        parameters: its range and cone.
-        share: remaining share of the range, such as behind a dirty window, 0..1.
+        pose: pose of the reader.
+        parameters: range and cone of the reader.
+        share: share of the range that remains, such as behind a dirty window, 0..1.
     """
     range_m, half_rad = parameters.range_m * share, radians(parameters.cone_deg) / 2
     found = []
@@ -151,21 +151,23 @@ _DIRTY_SHARE: Final = 0.5
 class UcodeReader(Copyable):
     """A reader; a `Device[bytes]`.
 
-    It listens in rounds of 100 ms. At the end of each it sends a line for each marker that it
-    received, the nearest first and six at most, then one that ends the round. Its pose at the end
-    of the round applies.
+    It listens in rounds of 100 ms. At the end of each round it sends a line for each received
+    marker, the nearest first and six at most. Then it sends a line that ends the round. The pose of
+    the reader at the end of the round applies.
 
-    The report (3.4.43.3 (4), Fig. 123) shows the reader without a protocol: the lines and all
-    numbers are ours. Not emulated: walls, markers that disturb one another, bits of the light.
+    The report (3.4.43.3 (4), Fig. 123) shows the reader but no protocol. The lines and all numbers
+    are our choice.
+
+    Not emulated: walls, markers that disturb one another, bits of the light.
 
     Args:
         parameters: of the reader.
-        markers: in its environment, 1000 at most.
+        markers: the markers in its environment, 1000 at most.
 
     Attributes:
         type_name: name of its device type, for traces.
         inputs: its physical inputs, see `INPUTS`.
-        markers: they may be changed; the next round uses them.
+        markers: the markers in its environment; changes apply from the next round.
     """
 
     type_name: ClassVar[str] = "ucode-reader"

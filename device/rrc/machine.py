@@ -31,50 +31,50 @@ from tickrig.wire.rrc.replies import StatusA as Status
 # Theory of operation
 # ===================
 #
-# One tick is one internal command period of the RRC, 10 ms. Everything that happens in it
-# happens in `Rrc.tick`, in the order of DECISION R28, and the lines of a tick leave in that
-# order:
+# One tick is one internal command period of the RRC, 10 ms. `Rrc.tick` does everything that happens
+# in a tick, in the order of DECISION R28. The lines of a tick leave in the same order:
 #
 # 1. bytes of the line        ER:ReceiveBufferOverflow for each overflow
 # 2. buttons, faults, time    EV lines of power-on, power-off and faults
 # 3. lines, up to the quota   OK, ER, and the answers of device, version and date
 # 4. watchdog                 EV:PowerOffWaitByWatchdog
-# 5. motors, vehicle          nothing is sent; the SA line of step 6 shows what they get
+# 5. motors, vehicle          sends nothing; the SA line of step 6 shows what they get
 # 6. SA line, load account    SA, then EV:PowerOffWaitByOverTime
-# 7. buzzer                   nothing is sent
+# 7. buzzer                   sends nothing
 #
-# The order is part of the behaviour. Power events come before lines, so a command that
-# arrives in the tick of the power button meets the new state. The watchdog comes after the
-# lines, so a command in the tick of its expiry still renews it (R20). The motors come
-# before SA, so #3 and #4 show the values of this tick. The golden vectors
-# (`tests/device/rrc/test_vectors.py`) and a second, independent model (`reference_model.py`
-# there) both hold the order.
+# The order is part of the behaviour:
 #
-# What couples to what:
+# - Power events come before lines, so a command that arrives in the tick of the power button meets
+#   the new state.
+# - The watchdog comes after the lines, so a command in the tick of its expiry still renews it
+#   (R20).
+# - The motors come before SA, so #3 and #4 show the values of this tick.
 #
-# - `_move` is the only place that changes the state, and `NEXT_STATE` the only table. It
-#   also does what the change implies: a pass through Initialize wipes what commands have
-#   set (R5), crossing the border of `POWERED_ON` starts the power sequence and the load
-#   account afresh, entering Standby renews the watchdog (R20), and entering Limit takes the
-#   gear out (R18).
-# - `POWERED_ON` is the manual's "PowerOnSuccess period". Quota, watchdog, SA lines, load
-#   account, button counters and alarm all run in these three states only. A state that is
-#   added must be put into or left out of that tuple on purpose.
-# - `_wipe` resets exactly what Initialize resets. `config` and `inputs` survive a power
-#   cut, the receive buffer survives Initialize but not a power cut. State that is added
-#   elsewhere must be wiped in `_wipe` or in `reset`, or a second power-on differs from the
-#   first.
-# - Costs are charged where the bytes come in, not where lines are obeyed (R27): `rx.count`
-#   counts each LF that arrives, even one that an overflow throws away. `_replies` counts
-#   lines that answer a line, so EV, SA and overflow lines must not go through `_reply`.
-# - `_next_due` must name every tick in which anything changes without traffic. A rig in
-#   virtual time skips all others: a timer that is missing there works in real time and
-#   fails in virtual time. While SA lines run or the load account drains, each tick is due.
+# The golden vectors (`tests/device/rrc/test_vectors.py`) and a second, independent model
+# (`reference_model.py` in the same folder) both check the order.
 #
-# Numbers: the manual gives the period, the ranges and "about 2 commands per 10 ms".
-# Durations (R6), the load model (R27), buffer size and alarm pattern are decisions, listed
-# in the reference page of the device; hosts pace themselves by the same constants in
-# `tickrig.wire.rrc.message`.
+# What depends on what:
+#
+# - `_move` is the only place that changes the state, and `NEXT_STATE` the only table. `_move` also
+#   does what the change implies. A pass through Initialize wipes what commands have set (R5).
+#   Crossing the border of `POWERED_ON` restarts the power sequence and the load account. Entering
+#   Standby renews the watchdog (R20). Entering Limit disengages the gear (R18).
+# - `POWERED_ON` is the manual's "PowerOnSuccess period". Quota, watchdog, SA lines, load account,
+#   button counters and alarm all run in these three states only. If you add a state, decide whether
+#   it belongs in that tuple.
+# - `_wipe` resets exactly what Initialize resets. `config` and `inputs` survive a power cut. The
+#   receive buffer survives Initialize but not a power cut. If you add state elsewhere, wipe it in
+#   `_wipe` or in `reset`, or a second power-on differs from the first.
+# - Costs are charged where the bytes come in, not where lines are obeyed (R27): `rx.count` counts
+#   each LF that arrives, even one that an overflow discards. `_replies` counts lines that answer a
+#   line, so EV, SA and overflow lines must not go through `_reply`.
+# - `_next_due` must include every tick in which anything changes without traffic. A rig in virtual
+#   time skips all others: a timer that is missing from `_next_due` works in real time and fails in
+#   virtual time. While SA lines run or the load account drains, each tick is due.
+#
+# Numbers: the manual gives the period, the ranges and "about 2 commands per 10 ms". Durations (R6),
+# the load model (R27), buffer size and alarm pattern are decisions, listed in the reference page of
+# the device. Hosts pace themselves by the same constants in `tickrig.wire.rrc.message`.
 
 # Input from the line: waiting bytes, lines, commands and refusals.
 
@@ -83,8 +83,8 @@ from tickrig.wire.rrc.replies import StatusA as Status
 class ReceiveBuffer:
     """Received bytes that wait to be processed, split into lines (DECISION R27).
 
-    A byte that does not fit drops all waiting bytes; it and the following ones are discarded up to
-    the next LF.
+    A byte that does not fit drops all waiting bytes. The buffer then discards this byte and all
+    following ones up to the next LF.
 
     Attributes:
         size: capacity in bytes, line ends included.
@@ -140,8 +140,8 @@ class ReceiveBuffer:
 
 def _read_line(line: bytes, *, check_wanted: bool) -> Command | replies.Refusal | None:
     """Return the command of a line without LF, its refusal (DECISION R11), or None if empty."""
-    # One CR before the LF is taken off: terminals send CR LF (R11). An empty line is what a
-    # person who presses Enter sends; it has no reply.
+    # One CR before the LF is removed, because terminals send CR LF (R11). A person who presses
+    # Enter sends an empty line; it has no reply.
     message = line.removesuffix(b"\r")
     if not message:
         return None
@@ -170,9 +170,11 @@ _MOVES: Final[dict[type[cmd.Command], Move]] = {
 class Rrc(Copyable):
     """The Robotic Relay Communicator with the VR2 wheelchair around it; a `Device[bytes]`.
 
-    There is a vehicle if `config.vehicle` is set; its numbers are ours (vehicle.py).
-    Not emulated: the traffic on the VR2 bus itself, what the alarm button's horn
-    sounds like, the USB serial driver.
+    If `config.vehicle` is set, the wheelchair includes a vehicle; the numbers of the vehicle are
+    our choice (vehicle.py).
+
+    Not emulated: the traffic on the VR2 bus itself, the sound of the alarm button's horn, the USB
+    serial driver.
 
     Attributes:
         config: durations, names and sizes.
@@ -321,9 +323,9 @@ class Rrc(Copyable):
 
     def _work(self, tick: int) -> None:
         """Process as many lines as the period allows."""
-        # "About 1 command per 20 ms" without VR2: one in each even tick (R27). The quota is
-        # fixed before the first line, so `poweroff` as the first line still lets a second
-        # one through.
+        # "About 1 command per 20 ms" without VR2: one in each even tick (R27). The quota is fixed
+        # before the first line is processed. So if the first line is `poweroff`, a second line is
+        # still processed.
         quota = LINES_A_PERIOD if self.state in POWERED_ON else 1 - tick % 2
         while self._commands < quota and self._buffer:
             self._commands += 1
@@ -331,8 +333,8 @@ class Rrc(Copyable):
 
     def _answer(self, line: bytes, tick: int) -> None:
         """Execute a line; the reply uses the mode in which the line arrived (DECISION R21)."""
-        # Read before the command acts: `stablemode1` gets its OK, `stablemode0` with CHECK
-        # none (R21).
+        # Read the mode before the command acts: `stablemode1` still gets its OK, and `stablemode0`
+        # with CHECK gets none (R21).
         stable = self._settings.stable
         request = _read_line(line, check_wanted=stable)
         if request is None:
@@ -342,8 +344,8 @@ class Rrc(Copyable):
                 self._buzzer.silence()
             self._reply(request)
         elif self._obey(request, tick):
-            # Only an obeyed command renews the watchdog; ER renews nothing (RRC manual,
-            # `watchdog`).
+            # Only an obeyed command renews the watchdog; a line that is answered with ER does not
+            # (RRC manual, `watchdog`).
             self._renewed = tick
             if not stable:
                 self._reply(replies.Ok(request.name.decode()))
@@ -413,8 +415,8 @@ class Rrc(Copyable):
             load.spend(line_feeds, overflows, self._replies, status=status, extra_pct=extra_pct)
             if self.config.overtime and load.too_far_behind:
                 self._stop_by_force(replies.RrcEvent.BY_OVER_TIME, tick)
-                # The motors had their values for this tick already, in the state before;
-                # stop them now, not one tick later.
+                # The motors already had their values for this tick, from the state before. Stop
+                # them now, not one tick later.
                 self._drive.step(tick, self.state, self._settings, self.inputs)  # motors stop
 
     def _status(self) -> Status:
@@ -446,8 +448,8 @@ class Rrc(Copyable):
             self._load = LoadAccount()
         if state is RrcState.STANDBY:
             self._renewed = tick
-        # Leaving counts as well as entering: Initialize may last several ticks, and the commands
-        # that arrive in it are executed (R10) but their effects end with it.
+        # Leaving Initialize counts as well as entering it. Initialize may last several ticks; the
+        # commands that arrive in it are executed (R10), but their effects end with Initialize.
         if RrcState.INITIALIZE in (self.state, state):  # what commands set in there goes, too
             self._wipe()
         self.state, self._moved = state, tick

@@ -93,11 +93,11 @@ class RrcConfig(Immutable):
         power_on_ticks: from the power button to the result (DECISION R6).
         power_on_timeout_ticks: from the power button to `PowerOnTimeout` (DECISION R6).
         button_off_ticks: from the power button to `PowerOffFinished` (DECISION R6).
-        forced_off_ticks: the same after a forced stop (DECISION R6).
+        forced_off_ticks: from a forced stop to `PowerOffFinished` (DECISION R6).
         fault_hold_ticks: how long a fault must last to be detected (DECISION R25).
         buffer_bytes: size of the receive buffer (DECISION R27).
         overtime: whether too much work stops VR2 (DECISION R27).
-        vehicle: whether there is a vehicle behind VR2, with speed, way and battery.
+        vehicle: whether VR2 drives a vehicle, with speed, distance and battery.
         battery_wh: capacity of its battery, Wh.
 
     Raises:
@@ -154,11 +154,12 @@ class Settings:
         limit: limits of limit mode.
         output: values of output mode.
         joystick: stick shaping.
-        button_mode: reverse mode that the buttons chose in Standby; None: the stick
-            does not drive there.
-        speed_up_count: button counter of SA, 0..15; odd while pressed.
-        speed_down_count: the same.
-        alarm_count: the same.
+        button_mode: reverse mode that the buttons chose in Standby; None if the stick does not
+            drive in Standby.
+        speed_up_count: counter of the speed-up button in SA, 0..15; odd while the button is
+            pressed.
+        speed_down_count: counter of the speed-down button, likewise.
+        alarm_count: counter of the alarm button, likewise.
     """
 
     stable: bool = False

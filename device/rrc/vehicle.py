@@ -1,7 +1,7 @@
-"""The vehicle behind VR2: speed and battery as a result of the output.
+"""The vehicle behind VR2: its speed and battery, computed from the output.
 
-The manual has no numbers of the vehicle. All values here are ours: those of a common electric
-wheelchair with a top speed of 6 km/h.
+The manual has no numbers of the vehicle. All values in this module are our choice: those of a
+common electric wheelchair with a top speed of 6 km/h.
 """
 
 from __future__ import annotations
@@ -45,10 +45,10 @@ class Vehicle:
         battery_wh: capacity of the battery.
 
     Attributes:
-        gauge: charge that the input has set, 1..10.
+        gauge: level that the physical input has set on the battery gauge, 1..10.
         speed_mm_s: true speed, forward positive.
         turn_mrad_s: true turning speed, to the right positive.
-        distance_mm: way along its path; backing counts negative.
+        distance_mm: distance along its path; backing counts negative.
         heading_mrad: how far it has turned to the right.
         charge: charge of the battery, 0..1.
     """
@@ -111,7 +111,7 @@ class Vehicle:
 
 
 def _toward(value: float, wanted: float, speeding: float, slowing: float) -> float:
-    """Return the speed one period later; it passes zero before the direction reverses.
+    """Return the speed one period later; the speed reaches zero before the direction reverses.
 
     >>> _toward(0.0, 100.0, 800.0, 1_200.0), _toward(5.0, -100.0, 800.0, 1_200.0)
     (8.0, 0.0)

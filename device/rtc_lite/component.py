@@ -1,8 +1,7 @@
 r"""Base classes for components on small devices: ports, and callbacks for each state.
 
-Each data port of a component on a small device is a buffer of one value.
-
-A new value overwrites the previous one; reading it makes it old (RTno's NullBuffer).
+Each data port of a component on a small device is a buffer of one value. A new value overwrites the
+previous one. Reading the value marks it as old (RTno's NullBuffer).
 
 >>> from tickrig.wire.rtc_lite.values import LONG
 >>> inlet = LiteInPort("in", LONG)
@@ -32,7 +31,8 @@ class LitePort(Generic[T]):
     Args:
         name: 1 to 15 printable ASCII characters.
         port_type: type of its values.
-        most: the largest number of elements of a sequence; by default as many as fit into a frame.
+        most: the largest number of elements of a sequence; by default the number that fits into a
+            frame.
 
     Attributes:
         is_new: whether the value has not been read yet.
@@ -85,7 +85,7 @@ class LiteOutPort(LitePort[T]):
     """A port that the component writes; new values go to the proxy."""
 
     def write(self, value: T) -> bool:
-        """Store a value; return False without a change if it does not fit.
+        """Store a value; if it does not fit, return False and keep the previous value.
 
         Raises:
             ValueError: the value is not one of the port's type.
@@ -109,7 +109,7 @@ _MAX_PORTS: Final = 8
 class LiteComponent(DeviceComponent):
     """A component on a small device; a subclass defines its properties and callbacks.
 
-    Callbacks are those of the paper's Table 1.
+    The callbacks are those of Table 1 of the paper.
 
     Attributes:
         type_name: type of the component, 1 to 15 characters.
@@ -117,7 +117,8 @@ class LiteComponent(DeviceComponent):
         out_ports: the out-ports.
 
     Raises:
-        ValueError: missing type name, an input with fractions, or more than fits into a PIC.
+        ValueError: the type name is missing, an input accepts fractions, or the component does not
+            fit into a PIC.
 
     >>> from tickrig.wire.rtc_lite.values import LONG
     >>> class Doubler(LiteComponent):

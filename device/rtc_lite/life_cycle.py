@@ -78,8 +78,9 @@ class LiteLifeCycle(CallbackRunner[LiteComponent]):
         if self.call(move.callback):
             self.state = move.good
             return LiteStatus.OK
-        # A failing on_reset or on_error stays in Error and enters it not again: no
-        # on_aborting (vector L05). A failing on_initialize or on_finalize leads nowhere.
+        # If on_reset or on_error fails, the component stays in Error. It does not enter Error
+        # again, so on_aborting is not called (vector L05). If on_initialize or on_finalize fails,
+        # the state does not change.
         if move.bad is LiteState.ERROR and move.begin is not LiteState.ERROR:
             self._enter_error(left=move.callback == "on_deactivated")
         self.state = move.bad
@@ -94,8 +95,8 @@ class LiteLifeCycle(CallbackRunner[LiteComponent]):
 
     def _enter_error(self, *, left: bool = False) -> None:
         """Run the exit action of Active unless it has failed, then `on_aborting`."""
-        # Exit action of Active first, then on_aborting, as UML orders them (DECISION L3,
-        # vectors L04 and L06); what has just failed as on_deactivated is not called twice
+        # First the exit action of Active, then on_aborting, in the order of UML (DECISION L3,
+        # vectors L04 and L06). If on_deactivated has just failed, it is not called a second time
         # (L14).
         if not left:
             self.call("on_deactivated")

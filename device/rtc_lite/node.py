@@ -20,31 +20,30 @@ from tickrig.wire.rtc_lite.rtno import RtnoDecoder, encode_packet
 # Theory of operation
 # ===================
 #
-# The node is the main loop of a small processor: one thing at a time, and a receive buffer
-# of 64 bytes. In each tick of 1 ms, in this order:
+# The node models the main loop of a small processor. It does one thing at a time and has a receive
+# buffer of 64 bytes. In each tick of 1 ms, in this order:
 #
-# 1. supply: without power nothing happens, and everything is forgotten
-# 2. `_finish`: the answer whose dead time is over leaves; a frame that was broken off is dropped
-# 3. bytes of the line into the buffer, in pieces of at most 64, and after each piece
-#    the requests in it, one after the other, while the processor is free
-# 4. the timer of an execution context of type 22h, if the processor is free
+# 1. Supply: without power nothing happens, and the node loses its state.
+# 2. `_finish`: the answer whose dead time is over leaves; a frame that was broken off is dropped.
+# 3. Bytes of the line go into the buffer, in pieces of at most 64. After each piece the node serves
+#    the requests in it, one after the other, while the processor is free.
+# 4. The timer of an execution context of type 22h runs, if the processor is free.
 #
-# `_free_us` is the processor: 0 while it is free, else the time at which it is free again.
-# Callbacks act at once, and only their answer waits (`callback_ms` for each callback,
-# `slow_answer` beside). Until then no request is read and the timer does not execute: bytes
-# beyond 64 are lost and counted, which is how a proxy with a wrong time-out shows. Whatever
-# sends must go through `_send`, because the dead time begins there.
+# `_free_us` stands for the processor: 0 while it is free, else the time at which it is free again.
+# Callbacks act at once; only their answer waits (`callback_ms` for each callback, plus
+# `slow_answer`). Until the answer leaves, the node reads no request and the timer does not execute.
+# Bytes beyond 64 are lost and counted, which reveals a proxy with a wrong time-out. Everything that
+# sends must use `_send`, because the dead time begins in it.
 #
-# Time-outs of the receiver (DECISION L7) need the time of the latest byte, so they are here
-# and not in the decoder, which knows no time:
+# The time-outs of the receiver (DECISION L7) need the time of the latest byte. So they are in this
+# module and not in the decoder, which has no clock:
 #
-# - 100 ms of silence inside a frame: it is dropped and answered `F K`. Not while bytes wait
-#   in the buffer: those came in time, only the processor was busy.
-# - after `F U` (an unknown command, of unknown length) everything is dropped
-#   until 20 ms of silence; then the decoder begins to look for a header again.
+# - After 100 ms of silence inside a frame, the frame is dropped and answered `F K`. This does not
+#   apply while bytes wait in the buffer: those bytes came in time, and only the processor was busy.
+# - After `F U` (an unknown command, of unknown length) all bytes are dropped until 20 ms of
+#   silence. Then the decoder begins to look for a header again.
 #
-# The frames of a dialogue, proxy to device and back (vectors L01 to L14 of the
-# specification):
+# The frames of a dialogue, proxy to device and back (vectors L01 to L14 of the specification):
 #
 # 0A 43 58 9B                               C X        state?
 #       0A 43 58 40 43 1E                   C X '@' 'C'  OK, Created
@@ -54,16 +53,19 @@ from tickrig.wire.rtc_lite.rtno import RtnoDecoder, encode_packet
 #       0A 51 56 03 04 6F 75 74 2A .. 30    Q V        "out" = 42: before the reply (L12)
 #       0A 41 45 40 41 07                   A E '@' 'A'  OK, Active
 #
-# What couples to what: server.py answers a request and knows no time; life_cycle.py holds
-# states and callbacks; both can be used without a line. A new request needs its letters
-# (wire codes.py), its lengths in both directions (wire frame.py, because no frame says how
-# long it is) and a case in `LiteServer.answer`; in bridge mode it exists only if RTno has a
-# letter for it (wire rtno.py). The timer follows the state after each request
-# (`_update_timer`): Active and Error are timed, because `on_error` is called once a period
-# as `on_execute` is.
+# What depends on what: server.py answers a request and has no clock; life_cycle.py holds states and
+# callbacks. Both can be used without a line. A new request needs
 #
-# Numbers: 64 bytes and 100 ms are RTno's, 20 ms is L7's own, the tick a choice; rates go up
-# to 1000 Hz, what a tick of 1 ms can hold.
+# - its letters (wire codes.py),
+# - its lengths in both directions (wire frame.py, because no frame contains its length), and
+# - a case in `LiteServer.answer`.
+#
+# In bridge mode the request exists only if RTno has a letter for it (wire rtno.py). The timer
+# follows the state after each request (`_update_timer`). It runs in Active and in Error, because
+# `on_error` is called once a period, as `on_execute` is.
+#
+# Numbers: 64 bytes and 100 ms are RTno's values, 20 ms comes from L7, the tick is our choice. Rates
+# go up to 1000 Hz, the most that a tick of 1 ms allows.
 
 # Bytes from the line: a buffer of 64 bytes, its frames, and time-outs (DECISION L7).
 
@@ -115,8 +117,8 @@ class LiteReceiver:
         """Receive bytes from the line, up to the room in the buffer."""
         if not data:
             return
-        # Before the byte is noted: the silence is the time between the last byte and this
-        # one.
+        # Before the time of the byte is noted: the silence is the time between the last byte and
+        # this one.
         if self.decoder.lost and now_us - self._received_us >= SILENCE_US:
             self.decoder.clear()
         self._received_us = now_us
@@ -214,12 +216,12 @@ _TIMED: Final = (LiteState.ACTIVE, LiteState.ERROR)
 class RtcLiteNode(Copyable):
     """A PIC with an RTC-Lite component (Suzuki et al., RSJ 2007); a `Device[bytes]`.
 
-    In each tick: bytes from the line, time-outs, requests in order, timer. A
-    callback takes effect at once; with a dead time its answer comes late, and
-    until then the node only fills its receive buffer of 64 bytes.
+    In each tick the node processes bytes from the line, time-outs, requests in order, and the
+    timer. A callback takes effect at once. With a dead time its answer comes late. Until then the
+    node only fills its receive buffer of 64 bytes.
 
-    Not emulated: service ports, configuration sets, the baud rate generator,
-    framing errors of the UART, a watchdog, sleep.
+    Not emulated: service ports, configuration sets, the baud rate generator, framing errors of the
+    UART, a watchdog, sleep.
 
     Args:
         make: factory of the component, called at the start and at each power-up.
@@ -327,9 +329,9 @@ class RtcLiteNode(Copyable):
         if not self._on:
             self._boot()
         sent = self._finish(now_us) if self._free_us <= now_us else b""
-        # A tick may bring more than 64 bytes at a high bit rate; a free processor reads
-        # them as they come, so they must not count as one burst. `or 1`: what waits is
-        # served without bytes, too.
+        # At a high bit rate a tick may bring more than 64 bytes. A free processor reads them as
+        # they arrive, so they must not count as one burst. `or 1` makes the loop run without new
+        # bytes too, so that waiting bytes are served.
         for at in range(0, len(rx) or 1, BUFFER_BYTES):
             self._receiver.push(now_us, rx[at : at + BUFFER_BYTES])
             self._serve(now_us)

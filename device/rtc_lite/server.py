@@ -102,12 +102,12 @@ class LiteServer:
             status = LiteStatus.UNSUPPORTED
         else:
             status = self.life.obey(command)
-        # Refused in this state (`H`) or by the timer context (`!`): nothing ran, so nothing
-        # is new. After a failure (`x`) what on_execute wrote before it failed still goes
-        # out.
+        # If the state (`H`) or the timer context (`!`) refuses the command, nothing ran, so no
+        # value is new. After a failure (`x`) the values that on_execute wrote before it failed are
+        # still sent.
         executed = command is LiteCommand.EXECUTE and status in (LiteStatus.OK, LiteStatus.ERROR)
-        # The state after the command; with `!` the reply ends behind the status, because
-        # the parser of the proxy takes the length from it (spec, section 4).
+        # The state is the one after the command. With `!` the reply ends after the status, because
+        # the parser of the proxy derives the length from the status (spec, section 4).
         fields = bytes([self.life.state]) if status in WITH_FIELDS else b""
         reply = LiteFrame(command, messages.LiteReply(status, fields).encode())
         return [*self._fresh_data(), reply] if executed else [reply]

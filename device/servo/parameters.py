@@ -29,7 +29,7 @@ class MotorParameters(Immutable):
         viscous_nm_s: friction that grows with the speed, per rad/s.
         winding_housing_k_w: thermal resistance from the winding to the housing.
         housing_ambient_k_w: thermal resistance from the housing to the air.
-        winding_s: thermal time constant of the winding, the housing held.
+        winding_s: thermal time constant of the winding while the housing keeps its temperature.
         housing_s: thermal time constant of the housing.
         winding_max_c: highest permissible temperature of the winding.
     """
@@ -85,7 +85,7 @@ class GearParameters(Immutable):
     Attributes:
         ratio: turns of the motor per turn of the output shaft.
         efficiency: share of the power of an external torque that it transmits.
-        inertia_kg_m2: inertia at the output shaft, the motor's own not counted.
+        inertia_kg_m2: inertia at the output shaft, without the motor's own inertia.
         coulomb_nm: dry friction at the output shaft.
     """
 
@@ -106,7 +106,7 @@ class Encoders(Immutable):
 
     Attributes:
         counts_per_turn: quadrature counts per turn of the motor.
-        gear_counts_per_turn: counts of the absolute encoder; 0: there is none.
+        gear_counts_per_turn: counts of the absolute encoder; 0 if the servo has none.
     """
 
     counts_per_turn: int
@@ -122,7 +122,7 @@ class LoopGains(Immutable):
 
     Attributes:
         velocity_rad_s: natural frequency of the velocity loop.
-        damping: its damping; 1.5 leaves 0.47 at ten times the inertia.
+        damping: damping of the velocity loop; 1.5 leaves 0.47 at ten times the inertia.
         position_rad_s: bandwidth of the position loop.
     """
 
@@ -277,11 +277,11 @@ def free_speed_rad_s(servo: ServoParameters) -> float:
 def of_size(servo: ServoParameters, size: float) -> ServoParameters:
     """Return the parameters of several equal servos on one shaft.
 
-    Currents, torques, inertias and friction grow with the size, resistances to current and heat
-    fall with it; speeds, voltages, temperatures and all time constants stay.
+    Currents, torques, inertias and friction grow in proportion to the size. Electrical and thermal
+    resistances fall with it. Speeds, voltages, temperatures and all time constants stay the same.
 
     Args:
-        servo: one of them.
+        servo: the parameters of one servo.
         size: number of servos, above 0; a fraction gives a smaller servo.
     """
     motor, stage, gear = servo.motor, servo.stage, servo.gear

@@ -15,11 +15,11 @@ from tickrig.device.twin import Immutable, Part
 #     L di/dt = u - R i - k w
 #     J dw/dt = k i - b w + m        m: torque of load and friction
 #
-# is linear, so the state after a step is a matrix times the state before it. As
-# long as the voltage allows, the current regulator, which is much faster than a
-# step, leads the current on a straight line to its demand; else the voltage is
-# constant. The matrices come from exponentials of the two systems, once for each
-# inertia and resistance, so no step is too long and none can become unstable.
+# These equations are linear, so the state after a step is a matrix times the state before it. The
+# current regulator is much faster than a step. If the voltage allows, it leads the current on a
+# straight line to its demand; otherwise the voltage is constant. The matrices come from
+# exponentials of the two systems, computed once for each inertia and resistance. So no step is too
+# long, and no step can become unstable.
 
 STEP_S: Final = 0.001
 
@@ -31,17 +31,17 @@ _Matrix = list[list[float]]
 class Discretisation(Immutable):
     """One control step of winding and shaft as rows of numbers.
 
-    The rows of a led current multiply (current before, speed before, current
-    after, torque); those of a constant voltage (current before, speed before,
-    voltage, torque).
+    A step either leads the current to its demand or applies a constant voltage. The rows for a led
+    current multiply (current before, speed before, current after, torque). The rows for a constant
+    voltage multiply (current before, speed before, voltage, torque).
 
     Attributes:
         speed: speed after the step, current led, rad/s.
-        angle: way of the shaft, current led, rad.
+        angle: angle that the shaft turns in the step, current led, rad.
         voltage: constant voltage that ends at a current after the step, V.
         current_u: current after the step, voltage constant, A.
         speed_u: speed after the step, voltage constant, rad/s.
-        angle_u: way of the shaft, voltage constant, rad.
+        angle_u: angle that the shaft turns in the step, voltage constant, rad.
         square_u: weights of (di^2, di dw, dw^2) in the integral of the squared current;
             di and dw are distances from the state to which a constant voltage leads.
     """
@@ -120,10 +120,10 @@ def _square(
     """Solve the Lyapunov equation of the squared current over one step.
 
     Args:
-        current: what current and speed do to the slope of the current.
-        speed: what they do to that of the speed.
-        i: part of the current that is left after a step.
-        w: what the speed has done to the current by then.
+        current: effect of current and speed on the slope of the current.
+        speed: effect of current and speed on the slope of the speed.
+        i: share of the current that is left after a step.
+        w: change of the current by the speed in that step.
     """
     (a, b), (c, d) = current, speed
     s11, s12, s22 = i * i - 1, i * w, w * w
@@ -141,8 +141,8 @@ class _Losses:
     Attributes:
         electrical_j: energy from the power stage.
         copper_j: heat of the winding.
-        friction_j: heat of friction and gear, and of a shaft that was held.
-        square_a2s: integral of the squared current, used by the drive for heat.
+        friction_j: heat of friction and gear, and energy of a shaft when it is blocked.
+        square_a2s: integral of the squared current, from which the drive computes its heat.
     """
 
     electrical_j: float = 0.0
@@ -157,10 +157,12 @@ BREAKAWAY: Final = 1.02  # static friction by dry friction; it ends a creep, and
 class Plant(Part):
     """The electro-mechanical part of a servo, at the motor shaft.
 
-    Dry friction is a torque within bounds, just large enough to stop the shaft in this step if the
-    bounds allow (time stepping after Moreau). So there is no chatter, and a shaft at rest has speed
-    exactly 0. Not modelled: the ripple of current regulator and PWM, cogging, play and elasticity,
-    the loss of the gear on its inertia.
+    Dry friction is a torque within bounds. If the bounds allow, it is just large enough to stop the
+    shaft in this step (time stepping after Moreau). So the friction does not chatter, and a shaft
+    at rest has speed exactly 0.
+
+    Not modelled: the ripple of current regulator and PWM, cogging, play and elasticity, the loss of
+    the gear on its inertia.
 
     Attributes:
         current_a: current in the winding.
@@ -168,7 +170,8 @@ class Plant(Part):
         position: angle of the motor, counts.
         blocked: the shaft is held.
         load_nm: external torque at the motor shaft, before the loss of the gear.
-        friction_nm: bounds of the friction: against forward, against backward motion.
+        friction_nm: bounds of the friction: the torque against forward motion, and against backward
+            motion.
         inertia_kg_m2: present inertia at the motor shaft.
         resistance_ohm: present resistance of the winding.
         losses: energies since the start.
@@ -225,11 +228,11 @@ class Plant(Part):
     def bear(self, load_nm: float, efficiency: float) -> None:
         """Set an external torque; the gear's loss acts as friction.
 
-        Against a torque that opposes the motion the motor needs 1 / efficiency of it; from a torque
-        with the motion it gets only the transmitted share.
+        If the torque opposes the motion, the motor must supply 1 / efficiency of it. If the torque
+        acts with the motion, the motor gets only the transmitted share of it.
         """
-        # A gear that loses a part of the power acts like friction that depends on the load:
-        # the motor pays 1/efficiency against it and gets efficiency of it back.
+        # A gear that loses a part of the power acts like friction that depends on the load: the
+        # motor supplies 1/efficiency against the load and gets efficiency of it back.
         against, along = abs(load_nm) * (1 / efficiency - 1), abs(load_nm) * (1 - efficiency)
         forward, backward = (along, against) if load_nm > 0 else (against, along)
         self.load_nm = load_nm
@@ -238,16 +241,15 @@ class Plant(Part):
     def hold(self, blocked: bool) -> None:
         """Hold or release the shaft."""
         if blocked:
-            # The energy of the turning shaft goes into what holds it, so that the sum of
-            # the losses stays the work that was put in.
+            # The energy of the turning shaft goes into the part that holds it. So the sum of the
+            # losses stays equal to the work that was put in.
             self.losses.friction_j += self.inertia_kg_m2 * self.speed_rad_s**2 / 2
             self.speed_rad_s = 0.0
         self.blocked = blocked
 
     def open(self) -> None:
         """Run one step with the winding open; remaining current decays in the diodes."""
-        # The energy of the inductance, L i^2 / 2, ends as heat: there is no step in which
-        # it decays.
+        # The energy of the inductance, L i^2 / 2, becomes heat at once; no step models its decay.
         self.losses.copper_j += self._motor.inductance_h * self.current_a**2 / 2
         self.current_a = 0.0
         if self.speed_rad_s == 0.0 and self._sticks(0.0):
@@ -259,9 +261,9 @@ class Plant(Part):
 
     def drive(self, current_a: float, limit_v: float) -> int:
         """Run one step towards a current; return how the voltage cut it: -1, 0, 1."""
-        # Standstill is a case of its own: winding alone, without back-EMF. The general step
-        # has one friction for the whole step, which ends at speed 0 but lets the angle
-        # creep on the way.
+        # Standstill is handled separately: winding alone, without back-EMF. The general step uses
+        # one friction for the whole step; with it the shaft would end at speed 0, but its angle
+        # would creep during the step.
         if self.speed_rad_s == 0.0 and (cut := self._stay(current_a, limit_v)) is not None:
             return cut
         step, motor, i, w = self._step, self._motor, self.current_a, self.speed_rad_s
@@ -272,8 +274,8 @@ class Plant(Part):
         slope_v = motor.inductance_h * rise / STEP_S
         if (
             not -limit_v <= r * i + k * w + slope_v <= limit_v
-            # The voltage that leads the current there is checked at both ends of the step; between
-            # them the current goes straight.
+            # The voltage that leads the current to its demand is checked at both ends of the step.
+            # Between the ends the current changes linearly.
             or not -limit_v <= r * current_a + k * speed + slope_v <= limit_v
         ):
             return self._drive_constant(current_a, limit_v, friction)
@@ -289,8 +291,8 @@ class Plant(Part):
         v0, v1, v2, v3 = step.voltage
         u, cut = _within(v0 * i + v1 * w + v2 * current_a + v3 * (m + friction), limit_v)
         s0, s1, s2, s3 = step.speed_u
-        # The friction was worked out for a led current; the voltage is not enough for that
-        # one, and the shaft ends at another speed.
+        # The friction was computed for a led current. The voltage is not enough for that current,
+        # so the shaft ends at another speed.
         friction, speed = self._rub(s0 * i + s1 * w + s2 * u + s3 * m, s3)
         m += friction
         a0, a1, a2, a3 = step.angle_u
@@ -348,8 +350,8 @@ class Plant(Part):
     def _mean(self, current_a: float, speed: float, way: float) -> float:
         """Return the integral of current times speed, by Simpson's rule."""
         i, w = self.current_a, self.speed_rad_s
-        # Simpson backwards: the way of the shaft is known exactly, so it gives the speed in
-        # the middle of the step, and that the integral of i * w.
+        # Simpson's rule in reverse: the angle that the shaft turns is known exactly. It gives the
+        # speed in the middle of the step, and this speed gives the integral of i * w.
         middle = (6 * way / STEP_S - w - speed) / 4
         return (i * w + 2 * (i + current_a) * middle + current_a * speed) * STEP_S / 6
 

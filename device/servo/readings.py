@@ -23,9 +23,10 @@ _Temperatures = tuple[float, float]
 class ThermalModel(Part):
     """Winding and housing, heated by the current in the winding.
 
-    The heat is R I^2, and R grows with the temperature; the system stays linear, so its state at
-    any later time has a closed form. Not modelled: heat of friction and iron, the gear, the power
-    stage, moving air.
+    The heat is R I^2, and R grows with the temperature. The system stays linear, so its state at
+    any later time has a closed form.
+
+    Not modelled: heat of friction and iron, the gear, the power stage, moving air.
     """
 
     __slots__ = ("_capacities", "_motor")
@@ -62,9 +63,8 @@ class ThermalModel(Part):
         heat = square_a2 * self.resistance_ohm(winding_c)
         dw = (heat - flow) / winding
         dh = (flow - out * (housing_c - ambient_c)) / housing
-        # The eigenvalues of the two nodes are real, because b * c > 0: heat flows both ways
-        # through the same resistance. So the exponentials are plain ones, for any length of
-        # time.
+        # The eigenvalues of the two nodes are real, because b * c > 0: heat flows both ways through
+        # the same resistance. So the exponentials are real too, for any length of time.
         middle, spread = (a + d) / 2, sqrt(((a - d) / 2) ** 2 + b * c)
         slow, fast = _span(middle + spread, seconds), _span(middle - spread, seconds)
         mean, half = (slow + fast) / 2, (slow - fast) / (2 * spread)
@@ -77,8 +77,9 @@ class ThermalModel(Part):
 
 def _span(rate: float, seconds: float) -> float:
     """Return the integral of e^(rate t) over a time."""
-    # A slope of R above what the housing carries off makes a rate positive: the temperature
-    # runs away, and 50 keeps exp from overflowing long after `HOTTEST_C` has cut it.
+    # If R rises faster with the temperature than the housing can carry the heat off, a rate is
+    # positive and the temperature runs away. The limit of 50 keeps exp from overflowing;
+    # `HOTTEST_C` limits the temperature long before that.
     return expm1(min(rate * seconds, 50.0)) / rate if rate else seconds
 
 
@@ -88,9 +89,9 @@ def _span(rate: float, seconds: float) -> float:
 class I2t(Part):
     """The I2t protection of a power stage.
 
-    A budget of (peak^2 - continuous^2) * time fills by the square of the
-    current above the continuous one and drains by it below. Once full, only
-    the continuous current is allowed, until the budget is empty again.
+    A budget of (peak^2 - continuous^2) * time fills with the square of the current above the
+    continuous current, and drains with it below. When the budget is full, only the continuous
+    current is allowed until the budget is empty again.
 
     Attributes:
         filled_a2s: used part of the budget.
@@ -125,7 +126,7 @@ class I2t(Part):
         rate = current_a**2 - self._continuous_a2
         if rate < 0.0:
             return self.filled_a2s == 0.0 and not self.reduced
-        # Reduced and above the continuous current: the budget stands, and `bears` refuses
+        # Reduced and above the continuous current: the budget stays as it is, and `bears` refuses
         # the current.
         return rate == 0.0 or self.reduced
 
@@ -153,10 +154,10 @@ class Heat(Part):
     """Temperatures and I2t budget of a servo, from the squared current.
 
     Attributes:
-        since_us: the instant at which they were computed.
+        since_us: the instant of the latest computation.
         temperatures: temperatures at that instant.
-        winding_dc: that of the winding, 0.1 degC.
-        ambient_c: temperature of the air since then.
+        winding_dc: temperature of the winding at that instant, 0.1 degC.
+        ambient_c: temperature of the air since that instant.
         i2t: the overload of the power stage.
     """
 
@@ -219,8 +220,8 @@ class Heat(Part):
     def bears(self, current_a: float) -> bool:
         """Return whether a current may flow permanently without changing a limit."""
         last, _ = self._after(_AGES_S, current_a**2)
-        # The limit falls with the temperature, so the hottest of now and of the far future
-        # counts.
+        # The current limit falls with the temperature. So the highest of the temperatures now and
+        # in the far future counts.
         hottest = max(last, self.temperatures[0])
         return self.i2t.settled(current_a) and abs(current_a) <= self._limit_at(hottest)
 
@@ -351,7 +352,7 @@ class ServoSettings(Copyable):
 class Readings(ServoSettings):
     """Readings of a servo; `Servo` describes its attributes.
 
-    Integers are measurements of the drive, floats are for observers.
+    Integers are measurements of the drive; floats are exact values for observers.
     """
 
     __slots__ = (

@@ -14,46 +14,49 @@ from tickrig.device.twin import Part
 # Theory of operation
 # ===================
 #
-# A servo is four parts in three files: `_Loops` (what current is wanted), `Plant` in
-# plant.py (what winding, shaft and friction do with it), `Heat` in readings.py
-# (temperatures and I2t, from the squared current), and `Servo`, which lets them act. One
-# control step is 1 ms, whatever the tick of the drive: `step_to(now_us)` makes as many as
-# have passed. In each step
+# A servo has four parts in three files:
 #
-# 1. the loops turn position and velocity demand into a current (`_push`),
-# 2. the plant leads the current there if limit and voltage allow, and moves (`Plant.drive`),
-# 3. the encoder counts whole counts, unless it is unplugged,
-# 4. each 20 ms heat and I2t are worked out from the current since then (`_update_limit`),
-# 5. the servo begins to rest if the step has changed nothing (`_rest`).
+# - `_Loops` computes which current is wanted.
+# - `Plant` in plant.py computes how winding, shaft and friction react to this current.
+# - `Heat` in readings.py computes temperatures and I2t from the squared current.
+# - `Servo` calls the other three.
+#
+# One control step is 1 ms, whatever the tick of the drive. `step_to(now_us)` makes the steps for
+# the time that has passed. In each step:
+#
+# 1. The loops turn position and velocity demand into a current (`_push`).
+# 2. If limit and voltage allow, the plant leads the current to this demand; then it moves
+#    (`Plant.drive`).
+# 3. The encoder counts whole counts, unless it is unplugged.
+# 4. Every 20 ms, heat and I2t are computed from the current since the previous time
+#    (`_update_limit`).
+# 5. If the step has changed nothing, the servo begins to rest (`_rest`).
 #
 # Rules that hold this together:
 #
-# - Set after stepping. What the world does and what the drive wants holds from the instant
-#   up to which `step_to` has gone. A setter that is called first changes the past.
-# - Derived numbers have one writer. `changed` computes plant load, friction bounds, inertia
-#   and limits from the settings; heat changes the resistance and `_limit_a` in
-#   `_update_limit`. A new setting needs its property in `ServoSettings` and its line in
-#   `changed`.
-# - Resting is exact. A servo rests only when a step leaves position, current, integral and
-#   cut as they were to the bit; floating point makes that possible because dry friction
-#   stops the shaft at exactly 0.0 (plant.py) and a demand within one count counts as
-#   reached (`_Loops`). While it rests no steps are made, and the temperatures come in closed
-#   form, from one place, `Heat.at`. `_wake` pays for the time of rest before
-#   anything else changes.
-# - Several steps in one go are the same steps. `run_ahead` repeats `Loops.follow` and
-#   `turn`, `Plant.drive`, `_rub`, `_lead`, `_mean` and `_turn`, the counting of `_step` and
-#   the look of `_update_limit`, over locals and in the same order of operations.
-#   `tests/device/servo/test_run_ahead.py` compares them to the bit: a change of one formula,
-#   or of the order of two additions, must be made in both. Where anything special begins
-#   (friction holds, the demand is cut, the resistance is followed, a bound is left) the run
-#   ends before that step, and single steps go on. Its user is
-#   `device/canopen/ds402/stretch.py`.
-# - No step depends on what was tried. `run_ahead` changes nothing; `follow` takes it over.
+# - Set after stepping. External conditions and demands apply from the instant up to which `step_to`
+#   has run. A setter that is called before `step_to` changes the past.
+# - Derived numbers have one writer. `changed` computes plant load, friction bounds, inertia and
+#   limits from the settings. Heat changes the resistance and `_limit_a` in `_update_limit`. A new
+#   setting needs its property in `ServoSettings` and its line in `changed`.
+# - Resting is exact. A servo rests only when a step leaves position, current, integral and cut
+#   unchanged to the bit. Floating point makes that possible because dry friction stops the shaft at
+#   exactly 0.0 (plant.py) and a demand within one count counts as reached (`_Loops`). While the
+#   servo rests, no steps are made, and `Heat.at` alone computes the temperatures in closed form.
+#   `_wake` accounts for the time of rest before anything else changes.
+# - Several steps in one call are the same steps. `run_ahead` repeats `Loops.follow` and `turn`,
+#   `Plant.drive`, `_rub`, `_lead`, `_mean` and `_turn`, the counting of `_step` and the check of
+#   `_update_limit`, on local variables and in the same order of operations.
+#   `tests/device/servo/test_run_ahead.py` compares them to the bit: if you change one formula, or
+#   the order of two additions, change it in both. Where anything special begins (friction holds,
+#   the demand is cut, the resistance is followed, a bound is left), the run ends before that step,
+#   and single steps follow. `device/canopen/ds402/stretch.py` uses `run_ahead`.
+# - No step depends on an earlier trial. `run_ahead` changes nothing; `follow` applies its result.
 #
-# Numbers: motors, stages and gears stand in parameters.py with their sources; gains are
-# natural frequencies, so they keep their meaning with another motor. 1 ms is the tick of
-# the drives on CAN; 20 ms between two looks at heat is small against the second for which a
-# stage bears its peak current and the 16 s of a winding.
+# Numbers: motors, stages and gears are in parameters.py with their sources. Gains are natural
+# frequencies, so they keep their meaning with another motor. 1 ms is the tick of the drives on CAN.
+# 20 ms between two computations of heat is short compared to the second for which a stage carries
+# its peak current, and to the 16 s of a winding.
 
 # The velocity and position loops of a drive.
 
@@ -61,13 +64,14 @@ from tickrig.device.twin import Part
 class _Loops(Part):
     """A position loop around a velocity loop, in control steps of 1 ms.
 
-    Position: proportional, in whole counts; an error below one count is ignored while the demand is
-    constant. Velocity: proportional and integral. Acceleration, viscous and dry friction are fed
-    forward. While the current demand is cut, the integral does not grow further in that direction.
+    Position: proportional, in whole counts. An error below one count is ignored while the demand is
+        constant. Velocity: proportional and integral. Acceleration, viscous and dry friction are
+        fed forward. While the current demand is cut, the integral does not grow further in the
+        direction of the cut.
 
     Attributes:
         integral_a: share of the integral in the current.
-        cut: direction in which the latest demand was cut: -1, 0, 1.
+        cut: direction in which the latest demand was cut: -1, 1, or 0 if it was not cut.
     """
 
     __slots__ = (
@@ -103,8 +107,8 @@ class _Loops(Part):
         self, position: float, counts: int, velocity: float, acceleration: float, speed: float
     ) -> float:
         """Return the current for a demanded position, A."""
-        # Below one count the encoder cannot tell: without this the integral would push against
-        # friction permanently, and the servo would never rest.
+        # The encoder cannot resolve an error below one count. Without this case the integral would
+        # push against friction permanently, and the servo would never rest.
         error = position - counts
         if velocity == 0.0 and -1.0 < error < 1.0:
             error = 0.0
@@ -120,8 +124,8 @@ class _Loops(Part):
         """
         wanted = velocity * self._rad
         error = wanted - speed
-        # Anti-windup: while the demand is cut, the integral may only come back from that
-        # side.
+        # Anti-windup: while the demand is cut, the integral may only change back, away from the
+        # cut.
         if error * self.cut <= 0.0:
             self.integral_a += self._integral * error
         current = self.integral_a + self._proportional * error + self._viscous * wanted
@@ -140,8 +144,8 @@ class Line(Part):
         position: the present demand, counts.
         velocity: the present demand, counts/s.
         goal: end of the line, counts.
-        left: steps up to the goal.
-        added: velocity that is demanded beside that of the line, counts/s.
+        left: number of steps up to the goal.
+        added: velocity that is demanded in addition to that of the line, counts/s.
         most: largest velocity of the line, counts/s; a run ends before a step that needs more.
     """
 
@@ -159,11 +163,17 @@ class Line(Part):
 
 
 Bounds = tuple[float, float, float, float, int]
-"""Bounds of a run, which ends before a step that would leave them.
+"""Bounds of a run; the run ends before a step that would leave them.
 
-Lowest and highest position, counts; largest distance from the demanded position, counts; velocity,
-counts/s, up to which the motor counts as standing: it may not stand while a higher velocity is
-demanded; highest temperature of the winding, 0.1 degC.
+In this order:
+
+- lowest position, counts;
+- highest position, counts;
+- largest distance from the demanded position, counts;
+- velocity up to which the motor counts as standing, counts/s: the motor may not stand while a
+  higher velocity is demanded;
+- highest temperature of the winding, 0.1 degC.
+
 """
 
 Four = tuple[float, float, float, float]
@@ -174,13 +184,13 @@ class RunAhead(Part):
 
     Attributes:
         steps: number of steps.
-        counts: of the encoder.
-        demand: position, counts, and velocity, counts/s, that are demanded then.
-        motion: position of the motor, counts; its speed, rad/s; current in the winding, A;
-            integral of the velocity loop, A.
+        counts: position that the encoder shows, counts.
+        demand: demanded position, counts, and demanded velocity, counts/s, after these steps.
+        motion: position of the motor, counts; its speed, rad/s; current in the winding, A; integral
+            of the velocity loop, A.
         losses: energy from the power stage since the start, J; heat of the winding, J;
             heat of friction, J; integral of the squared current, A^2 s.
-        heat: of the servo.
+        heat: temperatures and I2t budget of the servo.
     """
 
     __slots__ = ("counts", "demand", "heat", "losses", "motion", "steps")
@@ -210,12 +220,12 @@ class Servo(Readings):
     """A motor with power stage, gear, load, encoders and loops, in steps of 1 ms.
 
     Call `step_to(now_us)` first, then set external conditions and demands: they apply from that
-    instant. Setting the same value again has no effect, so a drive may repeat itself in each tick.
-    While `resting`, nothing moves and time passes at no cost; the temperatures follow in closed
-    form.
+    instant. Setting the same value again has no effect, so a drive may set it in each tick. While
+    the servo is `resting`, nothing moves and no steps are computed; the temperatures follow in
+    closed form.
 
-    Not emulated: see `Plant`, `ThermalModel` and `_Loops`; the velocity is
-    measured without noise, the supply gives and takes any current.
+    Not emulated: see `Plant`, `ThermalModel` and `_Loops`. The velocity is measured without noise;
+    the supply gives and takes any current.
 
     Attributes:
         supply_v: supply of the power stage.
@@ -227,8 +237,8 @@ class Servo(Readings):
         ambient_c: temperature of the air.
         current_limit_a: limit of the drive; the limit of the stage may be lower.
         counts: position of the motor.
-        current_limited: limit or voltage cut the demand in the latest step.
-        resting: nothing changes without a new demand or input.
+        current_limited: whether limit or voltage cut the demand in the latest step.
+        resting: whether nothing changes without a new demand or input.
         now_us: time of the latest control step.
     """
 
@@ -270,7 +280,7 @@ class Servo(Readings):
         Args:
             position: demanded position now, counts; fractions are accepted.
             velocity: demanded velocity now, counts/s.
-            acceleration: its acceleration in the next millisecond, counts/s^2.
+            acceleration: demanded acceleration in the next millisecond, counts/s^2.
         """
         self._want(_Demand.POSITION, (position, velocity, acceleration))
 
@@ -292,10 +302,11 @@ class Servo(Readings):
     def run_ahead(  # noqa: PLR0912, PLR0915 - one loop over locals
         self, line: Line, most_steps: int, bounds: Bounds
     ) -> RunAhead:
-        """Compute control steps without applying them, exactly as single steps do.
+        """Compute control steps without applying them, with exactly the results of single steps.
 
         The run ends before the first step in which friction stops or holds the shaft, the demand is
-        cut, the resistance is followed, or the bounds are left; single steps continue then.
+        cut, the resistance is followed, or the bounds are left. Single steps continue from the end
+        of the run.
 
         Args:
             line: the demands, without acceleration, beginning with the present one.
@@ -464,8 +475,8 @@ class Servo(Readings):
             current, loops.integral_a = value, 0.0
         limit = self._limit_a
         if current > limit:
-            # Cut by the current limit counts as cut in this direction, unless the voltage
-            # cut it too and says otherwise.
+            # A demand that the current limit cuts counts as cut in this direction, unless the
+            # voltage cut it too and in the other direction.
             return plant.drive(limit, self._limit_v) or 1
         if current < -limit:
             return plant.drive(-limit, self._limit_v) or -1
@@ -487,15 +498,15 @@ class Servo(Readings):
         """Enter rest, unless the current will change."""
         self._update_limit()
         current, limit = self._plant.current_a, self._limit_a
-        # A current that the voltage limits is U/R, and R follows the temperature: it will
-        # change.
+        # A current that the voltage limits is U/R, and R follows the temperature. So the current
+        # will change.
         by_voltage = self.current_limited and abs(current) != limit  # follows the resistance
         self.resting = not by_voltage and self._heat.bears(current)
 
     def _wake(self) -> None:
         """Account for the time of rest."""
-        # With the current, air and limits of the time of rest: so before the caller changes
-        # them.
+        # Computed with the current, air temperature and limits of the time of rest, so before the
+        # caller changes them.
         self._heat.rest(self.now_us, self._plant.current_a)
         self.resting = False
         self._update_limit()

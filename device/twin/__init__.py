@@ -1,8 +1,8 @@
 """Twins: independent copies of devices, wires and rigs while they run.
 
-State is data: values, names and bound methods, never closures or lambdas. All copies go through
-pickle, including `copy.deepcopy`: its default would treat bound methods of compiled classes as
-atoms, and such a copy would act on the original.
+A twin's state is data: values, names and bound methods, never closures or lambdas. All copies are
+made with pickle, also those of `copy.deepcopy`. By default `copy.deepcopy` would treat bound
+methods of compiled classes as atoms, and such a copy would act on the original.
 """
 
 from tickrig.device.twin.copyable import Copyable, Immutable, NonCopyable, Part, itself

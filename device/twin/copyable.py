@@ -15,10 +15,11 @@ T = TypeVar("T")
 class Immutable:
     """A description that never changes after creation, such as that of a dictionary.
 
-    Copies within the process share it; a pickle contains it by value.
+    Copies within the process share the description. A pickle contains it by value.
 
     Attributes:
-        shared_by_twins: true; a class of wire/ has this attribute instead of this base.
+        shared_by_twins: always true; classes of wire/ have this attribute instead of this base
+            class.
     """
 
     __slots__ = ()
@@ -52,8 +53,8 @@ class Part:
 class Copyable:
     """A machine that `copy.deepcopy`, `pickle` and `twin` can copy.
 
-    With the same input a twin behaves the same to the byte; other input does not affect the
-    original.
+    With the same input a twin behaves exactly as the original, to the byte. Other input to the twin
+    does not affect the original.
 
     Attributes:
         _new_in_twins: attributes with fixed values in a twin, such as callbacks of outside code.

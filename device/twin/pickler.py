@@ -12,33 +12,32 @@ from typing import Any, Final, NoReturn, TypeVar
 # Theory of operation
 # ===================
 #
-# A twin is made by pickling a machine into memory and loading it again, in the same
-# process. `copy.deepcopy` would be the natural way and cannot be used: it takes the bound
-# methods of compiled classes (mypyc) for atoms, and such a copy goes on acting on the
-# original. Pickle asks each object, so it sees them. Rules:
+# A twin is made by pickling a machine into memory and loading it again, in the same process.
+# `copy.deepcopy` would be the natural way but cannot be used: it treats the bound methods of
+# compiled classes (mypyc) as atoms, and such a copy still acts on the original. Pickle asks each
+# object how to copy it, so it finds these methods. Rules:
 #
-# - State is data. Attributes may be values, names, bound methods and `functools.partial` of
-#   these; a lambda or a closure cannot be pickled, and `twin` raises TypeError.
-# - Three things are shared and not copied: enumerations, classes, and whatever has the
-#   attribute `shared_by_twins` (descriptions that never change). The pickler puts them into
-#   a list and writes `_shared(place)` in their place; the unpickler finds the name
-#   `_shared` and takes the item from the list. So a stream with shared items can only be
-#   loaded by the call that wrote it, and `_shared` itself raises. A real pickle
-#   (`pickle.dumps`) does not come through `_Pickler` and has everything by value.
-# - Listeners and caches begin empty in a twin (listeners.py), attributes named in
-#   `_new_in_twins` begin with what stands there: the callbacks of the original belong to
-#   outside code.
-# - In a `copy.deepcopy` of something larger, `memo` carries over what was copied before and
-#   takes in what is copied here. Pickler and unpickler number their memos alike, which
-#   gives the pairs of original and copy; two twins of one deepcopy then share what their
-#   originals share.
+# - State is data. Attributes may be values, names, bound methods and `functools.partial` of these.
+#   A lambda or a closure cannot be pickled, and `twin` raises TypeError.
+# - Three things are shared and not copied: enumerations, classes, and everything that has the
+#   attribute `shared_by_twins` (descriptions that never change). The pickler appends them to a list
+#   and writes `_shared(place)` in their place. The unpickler finds the name `_shared` and takes the
+#   item from the list. So a stream with shared items can only be loaded by the call that wrote it,
+#   and `_shared` itself raises. A real pickle (`pickle.dumps`) does not use `_Pickler` and contains
+#   everything by value.
+# - Listeners and caches begin empty in a twin (listeners.py), because the callbacks of the original
+#   belong to outside code. Attributes named in `_new_in_twins` begin with the value given there,
+#   for the same reason.
+# - In a `copy.deepcopy` of something larger, `memo` holds the objects that were copied before, and
+#   receives those that are copied here. Pickler and unpickler number their memos alike, which gives
+#   the pairs of original and copy. So two twins of one deepcopy share what their originals share.
 #
-# `state_of` and `restore` are the two halves of one format. They exist because a compiled
-# class keeps its attributes outside `__dict__` and names them in `__mypyc_attrs__`, which
-# pickle does not know; an interpreted one uses `object.__getstate__`. A class that defines
-# one of `__getstate__` and `__setstate__` by itself must define the other, and hold both
-# kinds. Run `tests/device/ test_twin.py` and `test_copies.py` pure and compiled after a
-# change: most faults here show in one of them only.
+# `state_of` and `restore` are the two halves of one format. They exist because a compiled class
+# keeps its attributes outside `__dict__` and names them in `__mypyc_attrs__`, which pickle does not
+# use; an interpreted class uses `object.__getstate__`. A class that defines one of `__getstate__`
+# and `__setstate__` itself must define the other too, and must handle both kinds of attributes.
+# After a change run `tests/device/test_twin.py` and `test_copies.py` both interpreted and compiled:
+# most faults in this module appear in only one of them.
 
 T = TypeVar("T")
 
@@ -53,8 +52,8 @@ def state_of(machine: object, begun: Mapping[str, object] = _NOTHING) -> Any:
         begun: attributes with fixed values in a twin.
 
     Returns:
-        Its attributes by name; if some are not in its `__dict__`, a pair of those in it and the
-        others.
+        Its attributes by name. If some are not in its `__dict__`, a pair: the attributes in
+        `__dict__`, and the others.
     """
     state: Any
     compiled = getattr(type(machine), "__mypyc_attrs__", None)
@@ -86,10 +85,10 @@ def twin(machine: T, memo: dict[int, Any] | None = None) -> T:
 
     Args:
         machine: the machine to copy, with everything it refers to.
-        memo: of an enclosing `copy.deepcopy`: the copies by `id`.
+        memo: the copies by `id`, from an enclosing `copy.deepcopy`.
 
     Raises:
-        TypeError: an object in it is bound to its process, or is a closure or a lambda.
+        TypeError: an object in the machine is bound to its process, or is a closure or a lambda.
     """
     stream = BytesIO()
     pickler = _Pickler(stream, memo or {})
@@ -119,8 +118,8 @@ class _Pickler(pickle.Pickler):
     def reducer_override(self, item: object) -> Any:
         if isinstance(item, (Enum, type)) or getattr(type(item), "shared_by_twins", False):
             self.shared.append(item)
-        # `_shared` is a function and may be in a memo of before; it must go out by its
-        # name, or the unpickler would not recognise it.
+        # `_shared` is a function, and the memo of an earlier copy may contain it. It must be
+        # written by its name, or the unpickler would not recognise it.
         elif id(item) in self._known and item is not _shared:
             self.shared.append(self._known[id(item)])
         else:

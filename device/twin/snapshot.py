@@ -36,27 +36,28 @@ from tickrig.device.twin.copyable import NonCopyable
 # Theory of operation
 # ===================
 #
-# A snapshot walks over everything that machines refer to, once for each object (`_seen`, by
-# id, which also keeps the objects alive so that no id is used twice), and notes for each
-# what puts it back. It makes no copies of objects: the same ones get their old contents
-# again, so references to them stay valid. Kinds of objects, in the order in
-# which they are tried:
+# A snapshot visits everything that machines refer to, once for each object. `_seen` holds the
+# visited objects by id; it also keeps them alive, so that no id is used twice. For each object the
+# snapshot notes a function that restores it. It does not copy objects: the same objects get their
+# old contents again, so references to them stay valid. Kinds of objects, in the order in which they
+# are tried:
 #
-# has `way_back`             asked, not looked into
-# `_NEVER_CHANGES`           not put back, but looked through: a tuple may hold a list
+# has `way_back`             supplies its own function; its contents are not visited
+# `_NEVER_CHANGES`           not restored, but visited: a tuple may hold a list
 # `_is_left`                 neither: numbers, classes, modules, loggers, what twins share
-# functions, cells           what they enclose
-# generators, coroutines     only checked: one that has gone on cannot be wound back
+# functions, cells           the variables that they enclose
+# generators, coroutines     only checked: one that has advanced cannot be restored
 # containers                 contents, then attributes of their subclasses
 # all others                 attributes, in `__dict__` and in slots
 #
-# Anything else that keeps state in C is refused with TypeError (`_is_plain`): a
-# file or a socket would silently not be put back. So a new kind of state needs a line here
-# or a `way_back` of its own, and the error names its class and its owner.
+# Anything else that keeps state in C is refused with TypeError (`_is_plain`), because a file or a
+# socket would otherwise silently not be restored. So a new kind of state needs a line in this table
+# or a `way_back` of its own. The error names the class of the object and its owner.
 #
-# Two details matter. A dictionary is cleared and filled by the methods of `dict` itself,
-# because a subclass may act in its own. An attribute that was not there is deleted again,
-# but only in interpreted classes: compiled ones cannot lose an attribute.
+# Two details matter. A dictionary is cleared and filled by the methods of `dict` itself, because a
+# subclass may override them with effects of its own. An attribute that did not exist at the
+# snapshot is deleted again, but only in interpreted classes: compiled ones cannot lose an
+# attribute.
 
 _PutBack = Callable[[], object]
 """Restores one object."""
@@ -85,9 +86,10 @@ _HEAP_TYPE: Final = 1 << 9
 class MachineSnapshot:
     """The state of machines at one moment; `restore` restores the same objects to it.
 
-    A twin is another machine; a restored machine is the same object, so references to it and to its
-    wire stay valid. A snapshot costs a fraction of a copy. Objects made since are left alone, and
-    no restored object refers to them; so later listeners are removed.
+    A twin is another machine. A restored machine is the same object, so references to it and to its
+    wire stay valid. A snapshot costs a fraction of a copy. Objects made after the snapshot are not
+    changed, and no restored object refers to them. So listeners added after the snapshot are
+    removed.
 
     An object with a method `way_back` supplies its own restore function, and its contents are not
     visited. Not restored: classes, modules, functions except their closures, loggers, locks.
@@ -96,7 +98,8 @@ class MachineSnapshot:
         machines: devices, wires, rigs, hosts, with everything they refer to.
 
     Raises:
-        TypeError: an object in it cannot be restored, such as a file or a port of this machine.
+        TypeError: an object in a machine cannot be restored, such as a file or a port of this
+            computer.
 
     >>> numbers = {"of": [1, 2]}
     >>> snapshot = MachineSnapshot(numbers)
@@ -113,7 +116,7 @@ class MachineSnapshot:
         """Restore the state; may be called repeatedly.
 
         Raises:
-            TypeError: a generator has advanced since, which cannot be undone.
+            TypeError: a generator has advanced since the snapshot, which cannot be undone.
         """
         for put_back in self._put_back:
             put_back()

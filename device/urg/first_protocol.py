@@ -53,11 +53,11 @@ _BIT_RATES: Final = (19_200, 38_400, 57_600, 115_200, 250_000, 500_000, 750_000)
 
 @dataclass(slots=True)
 class Settings:
-    """Bit rate and sensitivity; the sensitivity is reported, without effect on the emulation.
+    """Bit rate and sensitivity; the sensitivity is only reported.
 
     Attributes:
-        rate: bit rate of RS-232C in bit/s; on USB it is reported, without effect.
-        sensitive: whether it measures in the sensitive mode.
+        rate: bit rate of RS-232C in bit/s; on USB the sensor only reports it.
+        sensitive: whether the sensor measures in the sensitive mode; no effect on the emulation.
         first_rate: bit rate after power-up.
     """
 
@@ -127,19 +127,19 @@ class Sensor(Protocol):
         """Switch to SCIP 2.0."""
 
     def measure(self, capture: Capture) -> bytes | None:
-        """Answer with the latest scan, or later with the first one; None if there will be none."""
+        """Answer with the latest scan, or later with the first one; None if no scan will follow."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class Capture(Immutable):
-    """A G that waits for a scan.
+    """A G command that waits for a scan.
 
     Attributes:
-        line: the command as it came.
-        first: step.
-        last: step.
-        cluster: steps for each number.
+        line: the command as received.
+        first: first step to send.
+        last: last step to send.
+        cluster: number of steps for each sent number.
     """
 
     line: bytes
@@ -181,8 +181,7 @@ def _laser(sensor: Sensor, now_us: int, match: re.Match[bytes]) -> bytes:
 
 def _rate(sensor: Sensor, now_us: int, match: re.Match[bytes]) -> bytes:
     code = sensor.settings.set_rate(match[1].decode())
-    # Setting the rate that is set already is no error in SCIP 1.1, where status 0 and E are
-    # all.
+    # Setting the rate that is already set is no error in SCIP 1.1: its only statuses are 0 and E.
     return encode_reply(match[0], SCIP1_OK if code in (status.OK, _RATE_KEPT) else ERROR)
 
 

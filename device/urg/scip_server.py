@@ -18,45 +18,44 @@ from tickrig.wire.instant import NEVER
 # Theory of operation
 # ===================
 #
-# Two clocks and three memories make the behaviour; the rest is texts.
+# Two clocks and three memories make the behaviour; everything else is text.
 #
-# The clocks. `_Rotation` counts whole turns of the mirror from `began_us`, without drift: scans end
-# at multiples of its period from there. `_timer` counts milliseconds from `_zero_us`, modulo 2^24,
-# and stamps each scan with the time of its beginning (decision U2 in the reference page). CR
-# restarts the turn, TM and the laser do not; RS and power-up restart both clocks. `due_us` is the
-# end of the scan that is being measured, `NEVER` while the laser is off: nothing else here happens
-# by itself.
+# The clocks. `_Rotation` counts whole turns of the mirror from `began_us`, without drift. Scans end
+# at multiples of its period from this time. `_timer` counts milliseconds from `_zero_us`, modulo
+# 2^24, and stamps each scan with the time of its beginning (decision U2 in the reference page). CR
+# restarts the turn; TM and the laser do not. RS and power-up restart both clocks. `due_us` is the
+# end of the present scan, or `NEVER` while the laser is off: nothing else in this module happens
+# without input.
 #
-# The memories. `_waiting` is one GD, GS or G that came before the first scan was ready;
-# `_running` is the one MD or MS; `_latest` is the latest scan. Rules:
+# The memories. `_waiting` is one GD, GS or G that came before the first scan was ready. `_running`
+# is the one MD or MS. `_latest` is the latest scan. Rules:
 #
-# - GD and GS need the laser (status 10 without) and answer at once with `_latest`; only
-#   before the first scan they wait. A second one that would wait has status 0B (U5).
-# - MD and MS switch the laser on themselves. Their first scan is the first that begins
-#   after the command (`begins_us`), not the one that the mirror is in the middle of; scan
-#   interval and count work from there. After the last one the laser goes off.
-# - `stop` forgets all three and switches the laser off. QT, TM0, TM2, RS, trouble and the
-#   end of MD end here, so no reply can come from a measurement that was stopped.
+# - GD and GS need the laser (without it, status 10). They answer at once with `_latest`, and wait
+#   only before the first scan. A second command that would wait gets status 0B (U5).
+# - MD and MS switch the laser on themselves. Their first scan is the first one that begins after
+#   the command (`begins_us`), not the scan that is in progress when the command arrives. Scan
+#   interval and count start from that scan. After the last scan the laser goes off.
+# - `stop` clears all three memories and switches the laser off. QT, TM0, TM2, RS, trouble and the
+#   end of MD all call it, so no reply can come from a measurement that was stopped.
 # - A fault (`fail`) answers waiting requests with its status before it drops them.
 #
-# The order in a tick is that of `Urg.tick`: power and inputs, the end of a scan, then
-# commands. So a GD that arrives in the tick in which a scan ends gets that scan.
+# `Urg.tick` sets the order in a tick: power and inputs, the end of a scan, then commands. So a GD
+# that arrives in the tick in which a scan ends gets that scan.
 #
-# A reply to MD is two: `00P` at once, then for each scan the same echo with the scans that
-# remain in the place of their number, and status `99b`:
+# MD has two kinds of reply. `00P` comes at once. Then each scan comes with the same echo, in which
+# the number of scans is replaced by the number of scans that remain, and with status `99b`:
 #
 # MD0044072501000 -> MD0044072501000 00P
 #                ... MD0044072501000 99b, time stamp, blocks     (00 has no end)
 #
-# SCIP 1.1 (first_protocol.py) acts on the same state through the `Sensor` protocol: V, L,
-# G, S and SCIP2.0. In it the laser is on after power-up, and II calls that mode CLASSIC
-# until MD, MS or the laser's end (U12): `_classic`. After `SCIP2.0` everything else stays
-# as it is, so a switch in the middle of a measurement loses nothing; only a power cut leads
-# back.
+# SCIP 1.1 (first_protocol.py) acts on the same state through the `Sensor` protocol: V, L, G, S and
+# SCIP2.0. In SCIP 1.1 the laser is on after power-up, and II calls that mode CLASSIC until MD, MS
+# or the laser's end (U12): `_classic`. `SCIP2.0` changes nothing but the protocol, so a switch in
+# the middle of a measurement loses nothing. Only a power cut returns to SCIP 1.1.
 #
-# Numbers: `SIZES`, characters of parameters, and status codes come from SCIP 2.0; hosts
-# (HokuyoAIST, urg_library, hokuyolx) decide where it is silent, each case with its U
-# number.
+# Numbers: `SIZES`, characters of parameters, and status codes come from SCIP 2.0. Where SCIP 2.0
+# does not define the behaviour, hosts (HokuyoAIST, urg_library, hokuyolx) decide, each case with
+# its U number.
 
 # Reasons to refuse a command (SCIP 2.0, sensor commands and response to invalid commands).
 
@@ -82,7 +81,7 @@ def _refusal(command: scip.Command, *, adjusting: bool) -> str:
 
 
 def _flaw(command: scip.Command) -> str:
-    """Return the status that refuses MD, MS, GD or GS for its parameters, empty if none does."""
+    """Return the status that refuses the parameters of MD, MS, GD or GS; empty if valid."""
     # GD and GS have three fields, MD and MS five; the codes follow the order of the fields.
     for text, code in zip(command.fields, _NOT_A_NUMBER, strict=False):
         if not text.isdecimal():
@@ -104,7 +103,7 @@ class _Rotation:
 
     Attributes:
         speed_rpm: turns per minute.
-        level: of CR, 0..10; each reduces the speed by 1 %.
+        level: parameter of CR, 0..10; each level reduces the speed by 1 %.
         began_us: start of the first scan at this speed.
     """
 
@@ -131,8 +130,8 @@ class _Rotation:
     def whole_end_us(self, now_us: int) -> int:
         """Return the end of the first scan that starts now or later."""
         period_us = self.period_us
-        # Rounded up: the scan that is running at `now_us` started before it, and is not
-        # whole.
+        # Rounded up: the scan that is running at `now_us` started before `now_us`, so it is not a
+        # whole scan.
         return self.began_us + (-(-(now_us - self.began_us) // period_us) + 1) * period_us
 
     def change(self, now_us: int, level: int) -> None:
@@ -151,10 +150,10 @@ class Stream:
     """A command that measures.
 
     Attributes:
-        command: as received, valid.
-        begins_us: earlier scan ends do not count for it.
-        left: remaining scans, 0 if endless.
-        skipped: scans still to be skipped.
+        command: the command as received; it is valid.
+        begins_us: scans that end before this time do not count for the command.
+        left: number of remaining scans, 0 if endless.
+        skipped: number of scans still to be skipped.
     """
 
     command: scip.Command
@@ -186,15 +185,14 @@ class Stream:
 
     def take(self, ended_us: int, view: View) -> bytes:
         """Return the answer for a scan of MD or MS."""
-        # `begins_us` holds the end of the first whole scan, and scans are known by their
+        # `begins_us` holds the end of the first whole scan, because scans are identified by their
         # end.
         if ended_us < self.begins_us:
             return b""
         if self.skipped:
             self.skipped -= 1
             return b""
-        # Interval n: one scan is given, then n are left out; the first one is given at
-        # once.
+        # Interval n: one scan is sent, then n are left out. The first scan is sent at once.
         self.skipped = int(self.command.fields[3])
         self.left -= not self.endless
         return self.reply(view, status.DATA, self.echo)
@@ -219,7 +217,7 @@ _Answer = tuple[str, tuple[bytes, ...]]
 class ScipServer(Part):
     """Executes commands and sends scans (SCIP 2.0, sensor commands).
 
-    Until it is switched, it executes those of SCIP 1.1 (`first_protocol`).
+    Until a host switches to SCIP 2.0, it executes the commands of SCIP 1.1 (`first_protocol`).
 
     Not emulated: DB, the firmware update mode, the statuses 21..49 and 98 of a self-test.
 
@@ -227,11 +225,11 @@ class ScipServer(Part):
         parameters: of the sensor.
 
     Attributes:
-        laser: whether it is on.
+        laser: whether the laser is on.
         settings: bit rate and sensitivity.
-        rotation: of the mirror.
-        trouble: status of the fault, empty if there is none.
-        served: commands that were answered.
+        rotation: rotation of the mirror.
+        trouble: status of the fault, empty without a fault.
+        served: number of commands that were answered.
         scans: number of measured scans.
         due_us: end of the present scan.
     """
@@ -331,7 +329,7 @@ class ScipServer(Part):
         self._switched = True
 
     def measure(self, capture: Stream | Capture) -> bytes | None:
-        """Answer with the latest scan, or later with the first one; None if there will be none."""
+        """Answer with the latest scan, or later with the first one; None if no scan will follow."""
         if not self.laser or self._waiting is not None:
             return None
         if self._latest is not None:

@@ -58,13 +58,14 @@ _TICK_US: Final = 1_000
 class Urg(Copyable):
     """A URG-04LX on USB or RS-232C; a `UartDevice`.
 
-    In each tick: physical inputs, the end of a scan, commands. A scan is taken from the pose of the
-    sensor at its end; the time stamp is that of its start.
+    In each tick it processes physical inputs, the end of a scan, and commands, in this order. A
+    scan is taken from the pose of the sensor at the end of the scan. Its time stamp is the time at
+    its start.
 
-    On RS-232C the reply to SS still has the old bit rate, and everything after it the new one; RS
-    and a power cut restore the first one.
+    On RS-232C the reply to SS still has the old bit rate; everything after the reply has the new
+    one. RS and a power cut restore the first bit rate.
 
-    Not emulated: warming up, current, the LED; see `View` for missing optics and `ScipServer` for
+    Not emulated: warming up, current, the LED. See `View` for missing optics and `ScipServer` for
     missing parts of the protocol.
 
     Args:
@@ -74,7 +75,7 @@ class Urg(Copyable):
     Attributes:
         type_name: name of its device type, for traces.
         inputs: its physical inputs, see `INPUTS`.
-        world: it may be changed; the next scan sees it.
+        world: its surroundings; changes apply from the next scan.
     """
 
     type_name: ClassVar[str] = "urg"
@@ -164,8 +165,8 @@ class Urg(Copyable):
         # The scan first: a command of the same tick finds it as the latest one.
         if server.due_us <= now_us:
             sent += server.end_scan(self.pose, self.surroundings)
-        # SCIP lets a host end a line by LF, CR or both; the empty line between CR and LF is
-        # none.
+        # SCIP lets a host end a line by LF, CR or both. The empty line between CR and LF is not a
+        # command.
         for line in self._lines.push(rx.replace(b"\r", b"\n")):
             if line:
                 sent += server.obey(now_us, line)
@@ -177,8 +178,8 @@ class Urg(Copyable):
         self._server.power_up(now_us)
 
     def _input_set(self) -> None:
-        # Only power and faults act at once. A pose that a rig sets each millisecond must
-        # not make each tick due: it counts when a scan ends.
+        # Only power and faults act at once. A rig may set the pose each millisecond, which must not
+        # make each tick due: the pose counts only when a scan ends.
         self._switched = self._switches != self._obeyed
 
     def _inputs_changed(self, now_us: int) -> bytes:

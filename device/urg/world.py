@@ -38,10 +38,10 @@ class UrgParameters(Immutable):
 
     Attributes:
         serial: its serial number, letters and digits.
-        noise: share of the accuracy of 10 mm below 1 m and 1 % above, 0..1.
-        seed: of the noise.
-        scip: the protocol after power-up. 1.1 is that of the URG-04LX, whose laser is on then;
-            2.0 that of sensors such as the URG-04LX-UG01, whose laser is off.
+        noise: share of the accuracy (10 mm below 1 m, 1 % above), 0..1.
+        seed: seed of the noise.
+        scip: the protocol after power-up: 1.1 as in the URG-04LX, whose laser is then on; 2.0 as in
+            sensors such as the URG-04LX-UG01, whose laser is then off.
         rs232_baud: bit rate of its RS-232C line after power-up, in bit/s; None on USB.
 
     Raises:
@@ -123,8 +123,8 @@ class Post(Immutable):
 
     def distances_m(self, x_m: float, y_m: float, rays: _Rays) -> list[float]:
         """Return the distance along each ray to the post, infinity if it does not meet the post."""
-        # d = (off . ray) is the way to the nearest point of the axis, (off x ray) the
-        # distance there.
+        # d = (off . ray) is the distance along the ray to the point nearest to the axis. (off x
+        # ray) is the distance of this point from the axis.
         off_x, off_y, most = self.x_m - x_m, self.y_m - y_m, self.radius_m**2
         return [
             _first_m(off_x * dx + off_y * dy, sqrt(inside))
@@ -193,8 +193,8 @@ def _off_wall_m(wall: Wall, x_m: float, y_m: float) -> float:
 
 # All beams of a scan at once: each object is computed only for the beams that can meet it.
 #
-# Numbers are those of `World.distances_m` to the bit: the outline of an object tells which beams
-# meet it for certain and which may, and both are computed as there.
+# The numbers equal those of `World.distances_m` to the bit. The outline of an object tells which
+# beams certainly meet it and which may meet it; both are computed as in `World.distances_m`.
 
 _BLUR: Final = 1e-6
 """Distance, relative to its size, below which an object is computed for all beams."""
@@ -207,11 +207,11 @@ class Beams(Part):
     """Beams from a position, evenly spaced to the left.
 
     Args:
-        x_m: of the place.
-        y_m: of the place.
-        rays: their directions, each `tau / turn` after the previous one.
-        first_rad: direction of the first; within 2e6.
-        turn: number of beams in a full turn; there are no more here.
+        x_m: position of the sensor.
+        y_m: position of the sensor.
+        rays: directions of the beams, each `tau / turn` after the previous one.
+        first_rad: direction of the first beam; within 2e6.
+        turn: number of beams in a full turn; `rays` has at most this number.
     """
 
     def __init__(self, x_m: float, y_m: float, rays: _Rays, first_rad: float, turn: int) -> None:
@@ -233,9 +233,9 @@ class Beams(Part):
         off_x, off_y = wall.x1_m - self._x_m, wall.y1_m - self._y_m
         end_x, end_y = off_x + wall_x, off_y + wall_y
         area = off_x * wall_y - off_y * wall_x
-        # Area of the triangle against its sides: near 0 the sensor stands on the line of
-        # the wall, where the angle of the wall's ends says nothing about which beams meet
-        # it.
+        # Compare the area of the triangle with its sides: if it is near 0, the sensor stands on the
+        # line of the wall. Then the angles of the wall's ends do not tell which beams meet the
+        # wall.
         size = hypot(wall_x, wall_y) * (hypot(off_x, off_y) + hypot(end_x, end_y))
         if not abs(area) > _BLUR * size:
             self._measure(wall, (0, len(self._rays)))
@@ -244,9 +244,9 @@ class Beams(Part):
         if area < 0:
             right, left = left, right
         first, last = self._places(right, (left - right) % tau)
-        # One beam of margin at each end: those between are sure to meet the wall, those in
-        # the margin are asked in full. So the numbers are those of `World.distances_m` to
-        # the bit.
+        # One beam of margin at each end: the beams between are sure to meet the wall. The beams in
+        # the margin are computed in full. So the numbers equal those of `World.distances_m` to the
+        # bit.
         sure = ceil(first + 1), floor(last - 1) + 1
         if sure[0] >= sure[1]:
             self._measure_some(wall, (ceil(first - 1), floor(last + 1) + 1))
@@ -274,8 +274,8 @@ class Beams(Part):
 
     def _here(self, span: _Span) -> Iterator[_Span]:
         """Yield the parts of a span within our beams, in whichever turn it was counted."""
-        # A span is counted from the first beam, modulo a turn, and may begin before or end
-        # behind ours.
+        # A span is counted from the first beam, modulo a turn. It may begin before the first of our
+        # beams or end after the last one.
         for turns in (-self._turn, 0, self._turn):
             begin, end = max(span[0] + turns, 0), min(span[1] + turns, len(self._rays))
             if begin < end:
@@ -318,11 +318,11 @@ class View(Immutable):
     objects; beams wider than a line.
 
     Attributes:
-        number: of the scan since power-up.
+        number: number of the scan since power-up.
         time_ms: timer of the sensor when the scan began.
-        pose: of the sensor when the scan ended.
-        world: at that time.
-        kind: limits and steps.
+        pose: pose of the sensor when the scan ended.
+        world: the surroundings when the scan ended.
+        kind: limits and steps of the sensor.
         parameters: noise and seed.
     """
 
@@ -336,13 +336,13 @@ class View(Immutable):
     def distances(self, first: int, last: int, cluster: int) -> tuple[int, ...]:
         """Return a number for each whole `cluster` of steps: the least distance in mm.
 
-        If none has a distance, it is the code of the first. Steps after the last whole cluster have
-        no number (DECISION U11).
+        If no step of a cluster has a distance, the number is the code of its first step. Steps
+        after the last whole cluster have no number (DECISION U11).
         """
         kind, ways_m = self.kind, self._ways_m(range(first, last + 1))
         measurable = kind.first <= first and last <= kind.last
-        # The least of a cluster is the same before and after rounding, as long as no
-        # distance in it is below DMIN: that one would be a code, and codes are no
+        # Rounding before or after taking the least of a cluster gives the same number, if no
+        # distance in the cluster is below DMIN. Such a distance would be a code, and codes are not
         # distances.
         if measurable and cluster > 1:  # round once a cluster: a third of the time of a scan
             least_m = _least_of_each(ways_m, cluster)
