@@ -7,16 +7,15 @@ True
 
 The length of a classic CAN frame on the bus, to the bit.
 
-A node sends the bit stream from start of frame to the end of the CRC with bit
-stuffing: after five equal bits one of the other value is inserted, and it
-counts as the first of the next run (ISO 11898-1, bit stuffing). What follows
-has a fixed form: CRC delimiter, ACK slot, ACK delimiter, seven bits end of
-frame and three bits interframe space.
+A node sends the bit stream from start of frame to the end of the CRC with bit stuffing: after five
+equal bits it inserts one bit of the other value. The inserted bit counts as the first of the next
+run (ISO 11898-1, bit stuffing). The rest of the frame has a fixed form: CRC delimiter, ACK slot,
+ACK delimiter, seven bits end of frame and three bits interframe space.
 
 >>> frame_bits(CanFrame.parse("705#7F")), frame_bits(CanFrame.parse("000#"))
 (58, 53)
 
-CAN FD frames, their candump notation, and how long they are on the bus.
+CAN FD frames, their candump notation, and their length on the bus.
 
 >>> frame = FdFrame.parse("123##1" + "AA" * 9)
 >>> frame.brs, len(frame.data), frame.dlc, str(frame)
@@ -68,7 +67,7 @@ _NOTATION: Final = re.compile(
 
 
 class CanFrame(NamedTuple):
-    """A data or remote frame. It is not validated, for speed; see `checked`.
+    """A data or remote frame. For speed it is not validated; see `checked`.
 
     Attributes:
         can_id: 0x000..0x7FF, extended 0x0000_0000..0x1FFF_FFFF.
@@ -153,56 +152,55 @@ Frames = tuple[CanFrame, ...]
 """The traffic of one tick on a CAN bus."""
 
 
-# How `frame_bits` counts without looking at single bits.
+# How `frame_bits` counts without reading single bits.
 #
-# A frame is, from start of frame to the end of the CRC, bits in which a bit of the other
-# value is stuffed behind five equal ones, and then a fixed tail. How many bits are stuffed
-# depends on all of them. An automaton of eight states (value of the last bit, length of its
-# run 1 to 4) reads the bits; a ninth and a tenth state begin a frame in the middle of a
-# byte, because eleven or 29 bits of identifier do not fill bytes: SOF, identifier and
-# control field are put together so that they end on a byte, and the zeros that fill the
-# front are skipped.
+# From start of frame to the end of the CRC, a frame consists of bits with bit stuffing: a bit of
+# the other value is inserted after five equal ones. A fixed tail follows. The number of stuff bits
+# depends on all bits before the tail. An automaton of eight states reads the bits. Its state is the
+# value of the last bit and the length of its run, 1 to 4. A ninth and a tenth state begin a frame
+# in the middle of a byte, because eleven or 29 bits of identifier do not fill bytes. SOF,
+# identifier and control field are put together so that they end on a byte, and the zeros that fill
+# the front are skipped.
 #
-# `_feed` works one byte out for each state; `_rows` turns that into lists that refer to
-# each other, one set for each number of bits stuffed so far (at most 29). Following a byte
-# is then one index into a list, `reduce(getitem, data, row)` follows all of them in C, and
-# the number stands at the end of the row that is reached. `_head` keeps where a frame
-# stands behind its DLC, since the same identifiers come again and again. The CRC of 15 bits
-# is fed like data, with one more bit that differs from its last one and so never completes
-# a run itself.
+# `_feed` computes the effect of one byte on each state. `_rows` turns the results into lists that
+# refer to each other, one set for each possible number of stuff bits (at most 29). Following a byte
+# is then one index into a list, and `reduce(getitem, data, row)` follows all bytes in C. The last
+# row that it reaches holds the number at its end. `_head` caches the state of a frame after its
+# DLC, because the same identifiers occur repeatedly. The CRC of 15 bits is fed like data, with one
+# additional bit that differs from the last bit of the CRC and so never completes a run itself.
 #
-# Changes here are judged by tests/wire/test_can_bits.py, which counts single bits. `fd_bits`
-# has the same automaton for the data; in its CRC field the stuff bits stand at fixed places.
+# tests/wire/test_can_bits.py, which counts single bits, checks changes to this code. `fd_bits` uses
+# the same automaton for the data. In the CRC field of CAN FD the stuff bits are at fixed places.
 INTERFRAME_BITS: Final = 3
 """Bits of the interframe space (intermission), included in `frame_bits`."""
 
 _CRC_POLYNOMIAL: Final = 0x4599
 """x^15 + x^14 + x^10 + x^8 + x^7 + x^4 + x^3 + 1 (ISO 11898-1)."""
 
-# The generator times x: the CRC of 15 bits stands in the upper bits of 16, and
-# bytes can be fed. Zeros in front of a stream change nothing: the seed is 0.
+# The generator times x: the CRC of 15 bits is in the upper bits of 16, so whole bytes can be fed.
+# Zeros before a stream change nothing, because the seed is 0.
 _crc16 = crcmod.mkCrcFun(1 << 16 | _CRC_POLYNOMIAL << 1, initCrc=0, rev=False, xorOut=0)
 
-# SOF, identifier, RTR IDE r0, DLC, CRC, then CRC delimiter, ACK slot and delimiter and the
-# seven bits of end of frame. 29 bits: 18 more of the identifier, SRR and r1.
+# For 11 bits: SOF, identifier, RTR IDE r0, DLC, CRC, then CRC delimiter, ACK slot and delimiter and
+# the seven bits of end of frame. For 29 bits: additionally 18 bits of the identifier, SRR and r1.
 STANDARD_BITS: Final = 1 + 11 + 3 + 4 + 15 + 10 + INTERFRAME_BITS
 EXTENDED_BITS: Final = STANDARD_BITS + 20
 """Bits of an empty frame without stuff bits."""
 EXTENDED_FLAGS: Final = 0b11  # SRR and IDE, both recessive
 
-# States of the stuffing automaton: value of the latest bit << 2 | length of its
-# run - 1; a run of five is broken at once. Two more states begin a frame: they
-# skip the zeros that fill its first byte up.
+# States of the stuffing automaton: value of the latest bit << 2 | length of its run - 1. A stuff
+# bit ends a run of five at once. Two more states begin a frame: they skip the zeros that fill its
+# first byte.
 START_STANDARD: Final = 8
 START_EXTENDED: Final = 9
 _FILL_BITS: Final = {START_STANDARD: 5, START_EXTENDED: 1}
 _STATES: Final = 10
 
 _MAX_STUFFED: Final = 29
-"""Of the 118 bits from start of frame to the end of the CRC: all but the first of each fifth."""
+"""The most stuff bits for the 118 bits from start of frame to the CRC's end: (118 - 1) // 4."""
 
 _STUFFED_BITS: Final = 256
-"""Position in a row of the number of stuff bits so far; the following rows are before it."""
+"""Position in a row that holds the number of stuff bits; before it are the following rows."""
 
 KEPT_HEADS: Final = 4_096
 
@@ -227,9 +225,9 @@ def frame_bits(frame: CanFrame) -> int:
 
 
 kept_bits: Final = lru_cache(KEPT_HEADS)(frame_bits)
-"""The same, for frames that come again: a bus and what measures its load count each once.
+"""`frame_bits` with a cache, because each bus and each meter of its load counts the same frame.
 
-Their data must be `bytes`: a slave may send a `bytearray`, which has no hash.
+The frame's data must be `bytes`: a slave may send a `bytearray`, which has no hash.
 """
 
 
@@ -253,11 +251,11 @@ def _head(key: int) -> tuple[int, _Row, int]:
 
 @lru_cache(1)
 def _rows() -> list[_Row]:
-    """Build the table of the automaton, so that bytes need no Python step each.
+    """Build the table of the automaton, so that a byte needs no Python step of its own.
 
     Returns:
-        The rows by initial state: by each byte the next row; at `_STUFFED_BITS` the number of bits
-        stuffed so far.
+        The rows by initial state. Each row holds the next row for each byte, and at `_STUFFED_BITS`
+        the number of stuff bits inserted so far.
     """
     steps = [stuffed * _STATES + (state >> 8) for stuffed, state in zip(STUFFED, NEXT, strict=True)]
     rows: list[_Row] = [[] for _ in range(_STATES * (_MAX_STUFFED + 1) + max(steps))]
@@ -354,8 +352,8 @@ class FdFrame(NamedTuple):
         """Read candump's compact notation.
 
         Args:
-            text: `ID##FDATA`: F is one hex digit, 1 BRS and 2 ESI; other flags are ignored. An ID
-                with 8 digits is 29-bit. Data are padded as in `checked`.
+            text: `ID##FDATA`. F is one hex digit: 1 means BRS, 2 means ESI; other flags are
+                ignored. An ID with 8 digits is 29-bit. Data are padded as in `checked`.
 
         Returns:
             The frame.
@@ -380,8 +378,8 @@ class FdFrame(NamedTuple):
         """Check the frame.
 
         Returns:
-            The frame; data of an invalid length are padded with zeros to the next valid one, as a
-            controller does.
+            The frame. Data of an invalid length are padded with zeros to the next valid length, as
+            a controller does.
 
         Raises:
             FieldError: it is not a valid CAN FD frame.
@@ -405,8 +403,8 @@ class FdFrame(NamedTuple):
 class FdBits(NamedTuple):
     """The length of a frame on the bus.
 
-    The rate is assumed to switch after the bit BRS and before the CRC delimiter; in reality it
-    switches at the sample points of these two, which differ from bus to bus.
+    The rate is assumed to switch after the bit BRS and before the CRC delimiter. In reality it
+    switches at the sample points of these two bits, which differ from bus to bus.
 
     Attributes:
         nominal: bits at the nominal bit rate, with the interframe space.
@@ -417,10 +415,10 @@ class FdBits(NamedTuple):
     fast: int
 
 
-# Stuff count with its parity (4), CRC 17 or 21, and a fixed stuff bit before each four bits
-# of these.
+# Stuff count with its parity (4), CRC of 17 or 21 bits, and a fixed stuff bit before each four bits
+# of these fields.
 _CRC_FIELD: Final = {False: 4 + 17 + 6, True: 4 + 21 + 7}
-"""Bits of stuff count, CRC and fixed stuff bits: for up to 16 bytes, and for more."""
+"""Bits of stuff count, CRC and fixed stuff bits; the key is whether the data exceed 16 bytes."""
 
 _TAIL: Final = 1 + 2 + 7 + INTERFRAME_BITS  # CRC delimiter, ACK, end of frame
 _KEPT: Final = 1_024
@@ -429,8 +427,9 @@ _KEPT: Final = 1_024
 def fd_bits(frame: FdFrame) -> FdBits:
     """Return the bits of a frame with stuff bits and interframe space (ISO 11898-1).
 
-    From start of frame to the data bits are stuffed as in classic CAN. The CRC field has stuff bits
-    at fixed places; the first replaces one that the last data bits would need.
+    The bits from start of frame to the end of the data are stuffed as in classic CAN. The CRC field
+    has stuff bits at fixed places. The first of them replaces a stuff bit that the last data bits
+    would need.
     """
     data, length = frame.data, frame.dlc
     nominal, fast, state = _fd_head(frame.can_id, frame.extended, frame.flags, length)
@@ -438,8 +437,8 @@ def fd_bits(frame: FdFrame) -> FdBits:
         place = state << 8 | byte
         fast += STUFFED[place]
         state = NEXT[place] >> 8
-    # The automaton stuffs behind the fifth equal bit of the data; there a fixed stuff bit
-    # stands anyway.
+    # The automaton inserts a stuff bit after the fifth equal bit of the data. At the end of the
+    # data a fixed stuff bit follows anyway.
     fast -= state >> 2 != (data[-1] if data else length) & 1  # the last bit was a stuff bit
     fast += 8 * len(data) + _CRC_FIELD[len(data) > 16]
     return FdBits(nominal, fast) if frame.flags & BRS else FdBits(nominal + fast, 0)
@@ -450,8 +449,8 @@ def _fd_head(can_id: int, extended: bool, flags: int, dlc: int) -> tuple[int, in
     """Return the bits at each rate without data and CRC, and the state before the data."""
     brs, esi = flags & BRS, flags >> 1 & 1
     if extended:
-        # SOF, 11 bits, SRR IDE, 18 bits, RRS FDF r0, BRS; below: SOF, 11 bits, RRS IDE FDF
-        # r0, BRS.
+        # SOF, 11 bits, SRR IDE, 18 bits, RRS FDF r0, BRS. For 11 bits, below: SOF, 11 bits, RRS IDE
+        # FDF r0, BRS.
         stream = f"0{can_id >> 18:011b}11{can_id & 0x3_FFFF:018b}010{brs}"
     else:
         stream = f"0{can_id:011b}0010{brs}"
@@ -642,7 +641,7 @@ class LogLine(NamedTuple):
     """One frame or error frame of a log.
 
     Attributes:
-        at_us: end of the frame.
+        at_us: time of the end of the frame.
         channel: name of the bus, without blanks.
         received: the frame.
     """

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 NEVER: Final = 2**62 - 1
-"""A time in microseconds that never comes: later than any other.
+"""A time in microseconds that is never reached: it is later than any other.
 
-It is the largest int that compiled code stores without an object (5 % faster drives).
+It is the largest int that compiled code stores without an object, which makes drives 5 % faster.
 """

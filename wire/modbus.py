@@ -134,8 +134,8 @@ def encode_request(request: Request) -> bytes:
         first, values = request.write
         if request.function == WRITE_ONE:
             return out + _PAIR.pack(first, *values)
-        # 10h: 01 00 00 04 08, values: first register, number, bytes. 17h: the same behind
-        # 02 00 00 0C.
+        # 10h: 01 00 00 04 08, values: first register, number, bytes. 17h: the same fields after 02
+        # 00 00 0C.
         out += _WRITE_HEAD.pack(first, len(values), 2 * len(values)) + _pack_registers(values)
     return out
 
@@ -167,8 +167,8 @@ def encode_response(request: Request, values: Sequence[int] = ()) -> bytes:
         return out + bytes([2 * len(values)]) + _pack_registers(values)
     assert request.write is not None
     first, written = request.write
-    # 01 06 00 11 00 01 is its own echo; 10h and 17h answer differently: 10h with first
-    # register and number (01 10 01 00 00 04), 17h only with what it read.
+    # The response to 06 repeats the request (01 06 00 11 00 01). 10h answers with first register
+    # and number (01 10 01 00 00 04), 17h only with the values that it read.
     return out + _PAIR.pack(first, written[0] if request.function == WRITE_ONE else len(written))
 
 
@@ -199,7 +199,7 @@ def _write(data: bytes, most: int) -> tuple[int, tuple[int, ...]]:
         raise Refusal(ExceptionCode.ILLEGAL_DATA_VALUE)
     first, count, size = _WRITE_HEAD.unpack_from(data)
     # A wrong byte count is an illegal value (03), whatever the registers are: the standard checks
-    # the numbers of a request before its addresses.
+    # the numbers of a request before it checks the addresses.
     if not size == 2 * count == len(data) - _WRITE_HEAD.size:
         raise Refusal(ExceptionCode.ILLEGAL_DATA_VALUE)
     _checked(first, count, most)

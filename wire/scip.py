@@ -1,6 +1,6 @@
 r"""SCIP of scanning range finders: commands, replies, scans, descriptions; 2.0 and 1.1.
 
-Numbers as characters of 6 bits, and the sum after each line (SCIP 2.0, data encoding).
+Numbers as characters of 6 bits each, and the sum after each line (SCIP 2.0, data encoding).
 
 >>> encode_number(1_234, 2), encode_number(5_432, 3), encode_number(16_000_000, 4)
 (b'CB', b'1Dh', b'm2@0')
@@ -21,7 +21,8 @@ The data of a scan: time stamp, and distances in blocks of 64 characters, each w
 >>> parse_scan((b'm2@0?', b'1DhM'), 3)
 (16000000, (5432,))
 
-SCIP 1.1, in which a URG-04LX starts: no sums, statuses of one character, distances of two.
+SCIP 1.1, the protocol of a URG-04LX after power-up. It has no sums; a status has one character, and
+a distance two.
 
 Sources: HokuyoAIST, urg_nz (gearbox) and urg_library as hosts; two recordings of real sensors
 (`tests/golden/scip_urg_04lx.json`). The document itself is no longer public.
@@ -83,7 +84,7 @@ _ZERO: Final = 0x30
 _CHARACTERS: Final = bytes(range(_ZERO, _ZERO + _MASK + 1))
 
 _BASE64: Final = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/"
-"""Base64 characters of 6 bits, four for three bytes: five times as fast as shifts and masks."""
+"""Base64 characters of 6 bits, four for three bytes: five times as fast as shifts, masks."""
 
 _FROM_BASE64: Final = bytes.maketrans(_BASE64, _CHARACTERS)
 _TO_BASE64: Final = bytes.maketrans(_CHARACTERS, _BASE64)
@@ -100,8 +101,8 @@ def encode_numbers(values: Sequence[int], width: int) -> bytes:
     for value in (min(values, default=0), max(values, default=0)):
         if not 0 <= value < 1 << _BITS * width:
             raise FieldError(f"{value} does not fit into {width} characters of 6 bits")
-    # Four bytes a number; without the top one they are 24 bits, that is four characters of
-    # 6 bits, as base64 has them: `b2a_base64` does in C what shifts would do here.
+    # Each number has four bytes. Without the top byte it has 24 bits, which are four characters of
+    # 6 bits, as in base64. So `b2a_base64` does in C the work of shifts.
     words = bytearray(struct.pack(f">{len(values)}I", *values))
     del words[::_MOST]
     characters = b2a_base64(words, newline=False).translate(_FROM_BASE64)
@@ -112,7 +113,7 @@ def encode_numbers(values: Sequence[int], width: int) -> bytes:
 
 
 def parse_numbers(data: bytes, width: int) -> tuple[int, ...]:
-    """Return the numbers in characters, `width` each, 1 to 4.
+    """Return the numbers encoded in characters; each number has `width` of them, 1 to 4.
 
     Raises:
         FieldError: an invalid character.
@@ -196,8 +197,8 @@ class Command:
 
     Attributes:
         symbol: two letters.
-        parameters: all, one after the other.
-        string: with its semicolon, empty if there is none.
+        parameters: all parameters, one after the other.
+        string: the string with its semicolon, empty without a string.
     """
 
     symbol: str
@@ -251,8 +252,8 @@ def parse_scan(lines: Sequence[bytes], width: int) -> tuple[int, tuple[int, ...]
         FramingError: no time stamp, or an incomplete distance.
         FieldError: an invalid character.
     """
-    # Each line has a sum of its own, and a distance may lie across two blocks of 64
-    # characters: take the sums off first, join, then cut.
+    # Each line has a sum of its own, and a distance may be split between two blocks of 64
+    # characters. So remove the sums first, join the blocks, then cut the distances.
     stamp, *blocks = [without_sum(line) for line in lines] or [b""]
     data = b"".join(blocks)
     if len(stamp) != _TIME_WIDTH:
@@ -294,9 +295,10 @@ class Reply:
     """One reply.
 
     Attributes:
-        echo: the command, with the remaining scans in place of their number.
+        echo: the command, in which the number of scans is replaced by the number of remaining
+            scans.
         status: two characters.
-        lines: after the status, as received, each with its sum.
+        lines: the lines after the status, as received, each with its sum.
     """
 
     echo: bytes
@@ -305,8 +307,7 @@ class Reply:
 
     def encode(self) -> bytes:
         """Return the bytes on the line."""
-        # MD0044072501001 LF 99b LF time stamp, sum LF block, sum LF ... LF LF. The echo has
-        # no sum.
+        # MD0044072501001 LF 99b LF time stamp, sum LF block, sum LF ... LF LF. The echo has no sum.
         return b"\n".join((self.echo, with_sum(self.status.encode()), *self.lines)) + _END
 
     @classmethod
@@ -386,12 +387,12 @@ class Specification:
     """The reply to PP: limits in mm, steps, turns per minute.
 
     Attributes:
-        model: its name.
-        nearest_mm: DMIN.
-        farthest_mm: DMAX.
-        resolution: ARES, steps of a whole turn.
+        model: name of the model.
+        nearest_mm: DMIN, the smallest distance.
+        farthest_mm: DMAX, the largest distance.
+        resolution: ARES, number of steps in a whole turn.
         first: AMIN, the first step that measures.
-        last: AMAX, the last one.
+        last: AMAX, the last step that measures.
         front: AFRT, the step straight ahead.
         speed_rpm: SCAN.
     """

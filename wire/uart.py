@@ -28,8 +28,8 @@ class UartSetting:
 
     Attributes:
         baud: bit rate in bit/s, at least 1.
-        data_bits: of a character, 5 to 8, the lowest first.
-        parity: of the bit after them.
+        data_bits: number of data bits of a character, 5 to 8; the lowest is sent first.
+        parity: parity of the bit after the data bits.
         stop_bits: 1, 1.5 or 2; a receiver checks only the first.
 
     Raises:
@@ -70,12 +70,12 @@ class UartSetting:
         Args:
             characters: number of characters.
         """
-        # Twice as many half bits: 1.5 stop bits stay whole numbers. Rounded once, over all
-        # characters.
+        # Count half bits, so that 1.5 stop bits stay whole numbers. The sum over all characters is
+        # rounded once.
         return int(characters * 2 * self.frame_bits) * PS_PER_S // (2 * self.baud)
 
     def parity_bit(self, value: int) -> int:
-        """Compute the parity bit of a character; 1, the stop bit, if there is none.
+        """Compute the parity bit of a character; without parity it is 1, as the stop bit.
 
         Args:
             value: the character.
@@ -115,10 +115,10 @@ class Character:
 
     Attributes:
         value: the sampled data bits.
-        end_ps: when its first stop bit ends.
+        end_ps: end of the first stop bit.
         framing_error: the line was 0 where a stop bit should have been.
-        parity_error: the parity bit is not that of the value.
-        line_break: the line was 0 from the start bit to the stop bit; a framing error too.
+        parity_error: the parity bit does not match the value.
+        line_break: the line was 0 from the start bit to the stop bit; `framing_error` is set too.
     """
 
     value: int
@@ -132,15 +132,16 @@ class Character:
 class UartReceiver:
     """Samples a line 16 times per bit, and assembles characters.
 
-    A sample of 0 after one of 1 is the edge of a start bit. Half a bit later it must still be 0;
-    then each bit is sampled once, in its middle (National Semiconductor PC16550D has this clock of
-    16 times the baud rate). After a framing error or a break the line has to be 1 again before
-    there can be a start bit; the PC16550D treats the missing stop bit as a start bit.
+    A sample of 0 after a sample of 1 is the edge of a start bit. Half a bit later the line must
+    still be 0. Then each bit is sampled once, in its middle (National Semiconductor PC16550D uses
+    this clock of 16 times the baud rate). After a framing error or a break the line has to be 1
+    again before a new start bit is possible. The PC16550D differs: it treats the missing stop bit
+    as a start bit.
 
     Not emulated: majority votes of several samples, FIFOs and their overrun.
 
     Args:
-        setting: its setting.
+        setting: the UART setting of the receiver.
         now_ps: start of sampling; the line is idle.
     """
 
@@ -163,7 +164,7 @@ class UartReceiver:
         return self._time_of(self._next + left * _OVERSAMPLING)
 
     def push(self, level: int, until_ps: int) -> Iterator[Character]:
-        """Set the level of the line from the end of the previous push on.
+        """Set the level of the line, starting at the end of the previous push.
 
         Args:
             level: 1 or 0.
@@ -190,9 +191,9 @@ class UartReceiver:
         self._next += _OVERSAMPLING
         false_start = len(frame) == 1 and level
         if false_start or len(frame) == self._frame_samples:
-            # Look for an edge from the next sample on, in the middle of the stop bit: a
-            # sender that is a little fast begins its next character before this one has
-            # quite ended.
+            # Look for an edge from the next sample on, in the middle of the stop bit. The next
+            # character of a sender that is slightly fast begins slightly before the end of the stop
+            # bit.
             self._next = taken + 1
             self._sampled, self._idle = None, bool(level)
             if not false_start:
@@ -217,8 +218,9 @@ class UartReceiver:
 
     def _sample_from(self, t_ps: int) -> int:
         """Return the number of the first sample at or after a time."""
-        # From the number of the sample and not step by step: 16 x 115 200 samples a second
-        # are no whole number of picoseconds apart, and rounding errors would add up.
+        # Compute the time from the number of the sample and not step by step. The period of 16 x
+        # 115 200 samples a second is not a whole number of picoseconds, so rounding errors would
+        # add up.
         return -(-t_ps * _OVERSAMPLING * self.setting.baud // PS_PER_S)
 
     def _time_of(self, sample: int) -> int:
@@ -229,7 +231,7 @@ class UartReceiver:
 def sample(
     data: bytes, sender: UartSetting, receiver: UartSetting, start_ps: int = 0
 ) -> tuple[Character, ...]:
-    """Receive with one UART setting what another setting sends back to back.
+    """Receive with one UART setting the bytes that another setting sends back to back.
 
     Args:
         data: the sent bytes.
@@ -238,7 +240,7 @@ def sample(
         start_ps: start of the first start bit.
 
     Returns:
-        The received characters, until the line has been idle for a character.
+        The received characters. Reception ends when the line has been idle for a character.
 
     >>> [hex(got.value) for got in sample(b"OK", UartSetting(115_200), UartSetting(115_200))]
     ['0x4f', '0x4b']

@@ -1,7 +1,7 @@
 r"""Lines of an infra-red ucode reader: `$TYPE,FIELD,...*HHHH`. The protocol is ours.
 
-The source (NEDO report 3.4.43.3 (4), Fig. 123) names the reader and not its lines. HHHH is
-the CRC-16 (XMODEM: 1021h, from 0) of all octets between `$` and `*`.
+The source (NEDO report 3.4.43.3 (4), Fig. 123) names the reader but does not show its lines. HHHH
+is the CRC-16 (XMODEM: 1021h, from 0) of all octets between `$` and `*`.
 
 >>> UcodeLine(LineType.ROUND, (7, 2)).encode()
 b'$UR,7,2*0FF7\n'
@@ -33,11 +33,11 @@ class LineType(Enum):
     """Kind of a line.
 
     Attributes:
-        READER: after power-up, and the answer to ID: version of the protocol, range in mm, cone
-            in degrees, 1 while it listens.
-        UCODE: a received marker: round, ucode, level of the signal in per cent.
+        READER: sent after power-up and in answer to ID: version of the protocol, range in mm, cone
+            in degrees, and 1 while the reader listens.
+        UCODE: a received marker: number of the round, ucode, level of the signal in per cent.
         ROUND: the end of a round: its number, and the number of markers received in it.
-        LIGHT: the end of a round in which too much light drowned all markers: its number.
+        LIGHT: the end of a round in which too much light made all markers unreadable: its number.
         REFUSED: the answer to an invalid command.
     """
 

@@ -262,9 +262,9 @@ class Driver(Part):
         left, right = self.sides
         if left.stalling or right.stalling:
             return 1
-        # Two milliseconds differ from the present one: the one in which the silence becomes long
-        # enough, and the one of the next waiting order. STALL_MS bounds the run, so that a stall is
-        # found in its own millisecond.
+        # The run ends before a millisecond that differs from the present one: the one in which the
+        # silence becomes long enough, or the one of the next waiting order. STALL_MS bounds the
+        # run, so that a stall is found in its own millisecond.
         until_us = min(until_us, last_request_us + self._watch_us - 1)
         if self._waiting:
             until_us = min(until_us, self._waiting[0][0] - 1)

@@ -475,8 +475,8 @@ class Servo(Readings):
             current, loops.integral_a = value, 0.0
         limit = self._limit_a
         if current > limit:
-            # A demand that the current limit cuts counts as cut in this direction, unless the
-            # voltage cut it too and in the other direction.
+            # A demand that the current limit cuts counts as cut in this direction. If the voltage
+            # cut it too, the direction of that cut counts.
             return plant.drive(limit, self._limit_v) or 1
         if current < -limit:
             return plant.drive(-limit, self._limit_v) or -1

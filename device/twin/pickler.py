@@ -25,9 +25,9 @@ from typing import Any, Final, NoReturn, TypeVar
 #   item from the list. So a stream with shared items can only be loaded by the call that wrote it,
 #   and `_shared` itself raises. A real pickle (`pickle.dumps`) does not use `_Pickler` and contains
 #   everything by value.
-# - Listeners and caches begin empty in a twin (listeners.py), because the callbacks of the original
-#   belong to outside code. Attributes named in `_new_in_twins` begin with the value given there,
-#   for the same reason.
+# - Listeners and caches begin empty in a twin (listeners.py). Attributes named in `_new_in_twins`
+#   begin with the value given there. The reason is that the callbacks of the original belong to
+#   outside code.
 # - In a `copy.deepcopy` of something larger, `memo` holds the objects that were copied before, and
 #   receives those that are copied here. Pickler and unpickler number their memos alike, which gives
 #   the pairs of original and copy. So two twins of one deepcopy share what their originals share.

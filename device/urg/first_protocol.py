@@ -127,7 +127,7 @@ class Sensor(Protocol):
         """Switch to SCIP 2.0."""
 
     def measure(self, capture: Capture) -> bytes | None:
-        """Answer with the latest scan, or later with the first one; None if no scan will follow."""
+        """Return the answer with the latest scan; empty if it follows later, None if none will."""
         ...
 
 

@@ -329,7 +329,7 @@ class ScipServer(Part):
         self._switched = True
 
     def measure(self, capture: Stream | Capture) -> bytes | None:
-        """Answer with the latest scan, or later with the first one; None if no scan will follow."""
+        """Return the answer with the latest scan; empty if it follows later, None if none will."""
         if not self.laser or self._waiting is not None:
             return None
         if self._latest is not None:

@@ -233,9 +233,9 @@ class Beams(Part):
         off_x, off_y = wall.x1_m - self._x_m, wall.y1_m - self._y_m
         end_x, end_y = off_x + wall_x, off_y + wall_y
         area = off_x * wall_y - off_y * wall_x
-        # Compare the area of the triangle with its sides: if it is near 0, the sensor stands on the
-        # line of the wall. Then the angles of the wall's ends do not tell which beams meet the
-        # wall.
+        # Compare the area of the triangle of sensor and wall with its sides: if it is near 0, the
+        # sensor stands on the line of the wall. Then the angles of the wall's ends do not tell
+        # which beams meet the wall.
         size = hypot(wall_x, wall_y) * (hypot(off_x, off_y) + hypot(end_x, end_y))
         if not abs(area) > _BLUR * size:
             self._measure(wall, (0, len(self._rays)))

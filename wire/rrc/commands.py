@@ -194,11 +194,12 @@ class Joystick(Command):
         v_exponent: #5, 0..15: output = input ^ (1 + 0.1 * #5).
         w_exponent: #6, 0..15.
         reverse_mode: #7, 0 plain, 1 no backing, 2 gear change, 3 gear change reversed.
-        neutral_pct: #8, neutral radius, 0..100 %; with #7 at 0 or 1 any byte (DECISION R14).
-        switch_deg: #9, threshold between backward and forward gear, 0..90 from straight back;
-            likewise.
-        fade_deg: #10, angle at which the backward gear starts to fade, 0..90 from straight back;
-            likewise.
+        neutral_pct: #8, neutral radius, 0..100 %; if #7 is 0 or 1, any byte is allowed (DECISION
+            R14).
+        switch_deg: #9, threshold between backward and forward gear, 0..90 from straight back; if #7
+            is 0 or 1, any byte is allowed.
+        fade_deg: #10, angle at which the backward gear starts to fade, 0..90 from straight back; if
+            #7 is 0 or 1, any byte is allowed.
     """
 
     name = b"joystick"
@@ -233,7 +234,7 @@ class Joystick(Command):
             raise BadParameters(self.name, "lower dead zone is not below the upper one")
 
     def after(self, former: Joystick) -> Joystick:
-        """Return the settings after this command: #8 to #10 out of range keep the former values.
+        """Return the settings after this command; #8 to #10 out of range keep the former values.
 
         Args:
             former: the settings before (DECISION R14).
@@ -320,8 +321,8 @@ def parse_command(message: bytes) -> Command:
         UnknownCommand: unknown name; names are lower case.
         BadParameters: wrong number of digits, a bad digit, a value out of range.
     """
-    # The name decides first, then the count of characters, then digits, then ranges (R11):
-    # so `limit 6464ffffff` is ER:limit and `Limit6464ffffff` is ER:CommandUnknown.
+    # First the name is checked, then the count of characters, then digits, then ranges (R11). So
+    # `limit 6464ffffff` is ER:limit and `Limit6464ffffff` is ER:CommandUnknown.
     match = _NAME.match(message)
     if match is None:
         raise UnknownCommand(f"{message!r} is not one of {', '.join(n.decode() for n in COMMANDS)}")

@@ -41,9 +41,9 @@ def read_signed(digits: bytes) -> int:
 
 # The CHECK digit of a line.
 #
-# The manual says "the sum from the head of the command to just before CHECK";
-# its nine samples show that the low nibble of the sum of the character codes is
-# meant. Letter case and exchanged characters are not seen by it.
+# The manual says "the sum from the head of the command to just before CHECK". Its nine samples show
+# that it means the low nibble of the sum of the character codes. CHECK does not detect exchanged
+# characters or a different letter case.
 
 
 def check_digit(message: bytes) -> bytes:
@@ -61,8 +61,8 @@ def strip_check(line: bytes) -> bytes:
     Raises:
         ChecksumError: CHECK is missing, wrong or not a hex digit.
     """
-    # The last character is CHECK whatever it is: a line whose CHECK was left out loses its
-    # last digit here, and is refused as a wrong CHECK (vector C02).
+    # The last character is always taken as CHECK. So a line without CHECK loses its last digit here
+    # and is refused because of a wrong CHECK (vector C02).
     message, digit = line[:-1], line[-1:]
     if digit not in _HEX_DIGITS or int(digit, 16) != sum(message) & 0xF:
         raise ChecksumError(f"CHECK {digit!r} of {line!r}, expected {check_digit(message)!r}")
@@ -71,9 +71,9 @@ def strip_check(line: bytes) -> bytes:
 
 # Cost of traffic for the RRC, and how much a host may send (DECISION R27).
 #
-# Costs are in per cent of the RRC's period of 10 ms. Above 100 % it falls behind, and 300 % behind
-# stops VR2. At exactly 100 % nothing drains: a host whose clock is 0.1 % fast stops VR2 after 60 s,
-# so a host takes at most `SAFE_PCT`.
+# Costs are in per cent of the RRC's period of 10 ms. Above 100 % the RRC falls behind; when it is
+# 300 % behind, VR2 stops. At exactly 100 % the backlog never drains: a host whose clock is 0.1 %
+# fast stops VR2 after 60 s. So a host should use at most `SAFE_PCT`.
 
 BASE_PCT: Final = 30
 STATUS_PCT: Final = 20
@@ -107,7 +107,7 @@ def pace_lines_s(*, stable: bool, status: bool, extra_pct: int = 0) -> int:
     """
     left_pct = SAFE_PCT - BASE_PCT - extra_pct - (STATUS_PCT if status else 0)
     line_pct = LINE_FEED_PCT + (0 if stable else REPLY_PCT)
-    # Two bounds: what the work of a period leaves, and the two lines that it takes at most.
-    # With stablemode and without SA the second one is the smaller: 180 lines a second.
+    # Two limits apply: the work that fits into a period, and the two lines that a period takes at
+    # most. With stablemode and without SA the second limit is the smaller one: 180 lines a second.
     most = LINES_A_PERIOD * PERIODS_A_SECOND * SAFE_PCT // PERIOD_PCT
     return max(0, min(most, left_pct * PERIODS_A_SECOND // line_pct))

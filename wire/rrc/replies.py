@@ -117,8 +117,8 @@ class StatusA:
 
     def encode(self) -> bytes:
         """Write the line with CHECK and LF."""
-        # SA:64003200A1000F: two's complement in two digits (FF = -1, 9C = -100), then five
-        # nibbles and CHECK. SA has its CHECK in every mode; EV, OK and ER have none.
+        # SA:64003200A1000F: numbers in two's complement with two digits (FF = -1, 9C = -100), then
+        # five nibbles and CHECK. SA has its CHECK in every mode; EV, OK and ER have no CHECK.
         message = b"SA:%02X%02X%02X%02X%X%X%X%X%X" % (
             *(self.in_v_pct & 0xFF, self.in_w_pct & 0xFF),
             *(self.out_v_pct & 0xFF, self.out_w_pct & 0xFF),

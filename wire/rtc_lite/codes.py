@@ -1,7 +1,7 @@
 """The letters of RTC-Lite: commands, status, states, execution contexts, link faults.
 
-The paper (Suzuki et al., RTComponent-Lite-0.4.0, RSJ 2007) defines two command bytes without
-values. The letters are those of RTno where it has one (DECISION L9).
+The paper (Suzuki et al., RTComponent-Lite-0.4.0, RSJ 2007) defines that a command has two bytes,
+but not their values. If RTno has a letter for a command, this module uses it (DECISION L9).
 """
 
 from __future__ import annotations

@@ -7,15 +7,16 @@ r"""Frames of RTC-Lite: header, Cmnd0, Cmnd1, data, checksum (paper, Fig. 2).
 
 The length of the data of a frame.
 
-There is no length byte: data delimits itself (DECISION L6). A layout computes the minimum length of
-the data from the bytes read so far; the data is complete at that length.
+A frame has no length byte: the data itself determines its length (DECISION L6). A layout computes
+the minimum length of the data from the bytes read so far. The data is complete when it has that
+length.
 
 >>> REQUESTS[LiteCommand.WRITE](b""), REQUESTS[LiteCommand.WRITE](b"\x02\x04in")
 (2, 8)
 >>> REPLIES[LiteCommand.WRITE](b"@"), REPLIES[LiteCommand.ACTIVATE](b"@")
 (1, 2)
 
-Frames out of a byte stream, cut anywhere.
+Decode frames from a byte stream that may be split anywhere.
 
 >>> from tickrig.wire.rtc_lite.frame import REQUESTS
 >>> decoder = LiteDecoder(REQUESTS)
@@ -38,7 +39,7 @@ from tickrig.wire.errors import FieldError
 from tickrig.wire.rtc_lite.codes import FAULT_COMMANDS, LiteCommand, LiteLinkFault, LiteStatus
 
 MAX_DATA_BYTES: Final = 60
-"""Largest size of the data; with header, commands and checksum it fills a buffer of 64 bytes."""
+"""Largest size of the data: with header, commands and checksum it fills a buffer of 64 bytes."""
 
 Layout = Callable[[bytes | bytearray], int]
 """Returns the minimum length of the data from the data so far."""
@@ -173,16 +174,16 @@ _COMMANDS: Final = {command.value: command for command in LiteCommand}
 class LiteDecoder:
     """Reads the frames of one direction (DECISION L6, L7).
 
-    It has no clock. Its owner watches the line and calls `clear` after 100 ms without a byte while
-    a frame has `begun`, and after 20 ms without a byte while it is `lost`.
+    It has no clock. Its owner watches the line and calls `clear` after 100 ms without a byte if a
+    frame has `begun`, or after 20 ms without a byte if the decoder is `lost`.
 
     Args:
         layouts: `REQUESTS` at the device, `REPLIES` at the proxy.
         checksum: algorithm of the checksum.
 
     Attributes:
-        lost: an unknown command or too much data arrived: the start of the next frame is unknown,
-            and all bytes are discarded until `clear`.
+        lost: whether an unknown command or too much data arrived. The start of the next frame is
+            then unknown, and all bytes are discarded until `clear`.
     """
 
     layouts: Mapping[LiteCommand, Layout]
@@ -220,15 +221,14 @@ class LiteDecoder:
         # 0A, Cmnd0, Cmnd1: three bytes are enough to know the layout.
         command = _COMMANDS.get(bytes(frame[1:3]))
         layout = None if command is None else self.layouts.get(command)
-        # Four bytes are the shortest frame, so the checksum that an empty frame would have
-        # is read, too.
+        # The shortest frame has four bytes, so the checksum of an empty frame is read as well.
         if command is None or layout is None:  # taken as having no data (DECISION L7)
             return LiteLinkFault.UNKNOWN if len(frame) == 4 else None
-        # The checksum, once it has come, is in this slice too. Counts stand before what
-        # they count, so it is never taken for one of them.
+        # If the checksum has arrived, it is in this slice too. It is never taken for a count,
+        # because a count comes before the bytes that it counts.
         size = layout(frame[3:])
-        # The counts of a damaged frame may announce up to 512 bytes; waiting for them would
-        # swallow the frames behind it.
+        # The counts of a damaged frame may announce up to 512 bytes. A decoder that waited for
+        # these bytes would swallow the frames that follow.
         if size > MAX_DATA_BYTES:
             return LiteLinkFault.UNKNOWN
         if len(frame) < 4 + size:

@@ -85,7 +85,7 @@ class LiteReply:
 
     Attributes:
         status: a `LiteStatus`, or an unknown number.
-        fields: the bytes after it: state, sequence number, context type.
+        fields: the bytes after the status: state, sequence number, context type.
     """
 
     status: int

@@ -1,8 +1,8 @@
 r"""Packets of RTno, for the bridge mode: header 0x0A 0x0A, letter, length, data, sum.
 
 RTno (Yuki Suga, 2010 to 2014) is the closest relative of RTC-Lite. Its packets have one letter and
-a length; replies have only the status, or only the state. Commands without a letter in RTno cannot
-be sent in bridge mode.
+a length. A reply contains only the status, or only the state. Commands for which RTno has no letter
+cannot be sent in bridge mode.
 
 >>> RtnoDecoder().push(bytes.fromhex("0a 0a 58 00 58"))
 [LiteFrame(command=<LiteCommand.STATE: b'CX'>, data=b'')]
@@ -103,7 +103,7 @@ class RtnoPacketDecoder:
     """Reads packets in either direction from a byte stream.
 
     Attributes:
-        lost: too much data was announced: all bytes are discarded until `clear`.
+        lost: whether too much data was announced; all bytes are then discarded until `clear`.
     """
 
     lost: bool = field(default=False, init=False)
@@ -126,9 +126,9 @@ class RtnoPacketDecoder:
             if self.lost:
                 break
             self._packet.append(code)
-            # Two header bytes: a single 0A that something else follows is noise. A byte
-            # that is no header is dropped with what came before it, so `0A 41 0A 0A` still
-            # finds the packet.
+            # A header is two bytes 0A. A single 0A before any other byte is noise. A byte that is
+            # not part of a header is dropped with the bytes before it, so `0A 41 0A 0A` still finds
+            # the packet.
             if not HEADER.startswith(self._packet[:2]):
                 self._packet.clear()
             elif (found := self._parse()) is not None:
@@ -154,7 +154,7 @@ class RtnoPacketDecoder:
 
 @dataclass(slots=True)
 class RtnoDecoder(RtnoPacketDecoder):
-    """Reads the packets of a proxy as frames; used as `LiteDecoder` is.
+    """Reads the packets of a proxy as frames; it is used in the same way as `LiteDecoder`.
 
     An unknown letter has the same effect as too much data.
     """
@@ -180,11 +180,11 @@ def _frame_of(packet: RtnoPacket) -> LiteFrame | LiteLinkFault:
 
 @dataclass(slots=True)
 class RtnoReplies(RtnoPacketDecoder):
-    r"""Reads the packets of a device as frames; used as `Decoder(REPLIES)` is.
+    r"""Reads the packets of a device as frames; it is used in the same way as `Decoder(REPLIES)`.
 
     RTno omits parts of a frame: the status of a state, the state after a command, the numbers and
-    the type of a profile. They are added if they follow from the rest; the state after a refusal is
-    `?`, which is not a state.
+    the type of a profile. This decoder adds the parts that follow from the rest. The state after a
+    refusal is `?`, which is not a state.
 
     >>> RtnoReplies().push(bytes.fromhex("0a 0a 58 01 49 a2"))
     [LiteFrame(command=<LiteCommand.STATE: b'CX'>, data=b'@I')]
@@ -217,8 +217,8 @@ class RtnoReplies(RtnoPacketDecoder):
         if command in {LiteCommand.STATE, LiteCommand.CONTEXT}:
             return bytes([LiteStatus.OK]) + data
         if command in _PROFILES:
-            # RTno sends no counts with the profile; the P and Q packets before it are
-            # counted instead.
+            # RTno sends no counts with the profile. The decoder counts the P and Q packets before
+            # it instead.
             self._ports[command] = self._ports.get(command, 0) + 1
             return bytes([len(data)]) + data
         if not data or data[0] not in WITH_FIELDS:

@@ -1,7 +1,8 @@
 r"""The data types of ports and their encoding (DECISION L8, L10).
 
-Little-endian; the time of a Timed type is not on the wire. A double has 4 bytes, as on AVR: values
-lose precision. A sequence is the series of its elements; their number follows from the size.
+Values are little-endian. The time of a Timed type is not sent. A double has 4 bytes, as on AVR, so
+values lose precision. A sequence is sent as the series of its elements; their number follows from
+the size.
 
 >>> LONG.encode(-2), LONG.decode(b"\x2a\x00\x00\x00")
 (b'\xfe\xff\xff\xff', 42)
@@ -46,8 +47,8 @@ class LitePortType(Generic[T]):
     """A data type of a port.
 
     Attributes:
-        code: its letter; upper case for a sequence.
-        name: the type of the port at the proxy, such as `TimedLong`.
+        code: letter of the type; upper case for a sequence.
+        name: type of the port at the proxy, such as `TimedLong`.
         size: bytes of a value, or of an element in a sequence.
         format: `struct` format of an element; `_TEXT` for characters.
         initial: the value before the first write.

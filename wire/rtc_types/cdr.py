@@ -9,27 +9,30 @@
 
 # Theory of operation
 #
-# CDR (CORBA 3.0, chapter 15) writes the fields of a struct one after the other. A number stands at
-# a multiple of its size, counted from the first byte. The bytes before it are padding: written as
-# 0 and ignored when read. A sequence is an unsigned long with the number of its elements, then the
-# elements. A string is such a count, the bytes in UTF-8, and a NUL that counts.
+# CDR (CORBA 3.0, chapter 15) writes the fields of a struct one after the other. A number starts at
+# a multiple of its size, counted from the first byte of the encoding. The bytes before it are
+# padding, written as 0 and ignored when read. A sequence is an unsigned long with the number of its
+# elements, then the elements. A string is an unsigned long with its length, the bytes in UTF-8, and
+# a NUL. The length includes the NUL.
 #
 # For each struct and byte order, `_Codec` writes the Python source of an encoder and a decoder at
 # the first use. Both come from one walk through the fields, so that they cannot disagree:
 #
-# - Numbers that follow each other are a *run*: one `struct.Struct`, with its padding as `x`. The
-#   fields of a struct within the struct belong to the run of their neighbours.
-# - A run ends where the position is no longer known: at a string or a sequence, and where a number
-#   needs more alignment than what the length of the last string or sequence left. `_aligned` and
-#   `_phase` hold what is known: the next byte is at `_phase` modulo `_aligned`. At the first byte
-#   that is 0 modulo 8; after a string it is 0 modulo 1: nothing. The code then pads at run time.
-# - Elements that are numbers or structs of numbers, and need no padding among them (`Pose2D`),
-#   are read and written by one call for the sequence or one for each element. Others are a loop.
-# - An enumerator ends its run, because it is checked: of two faults in a message the first one is
-#   reported, and a run that is too short must not hide it.
+# - Consecutive numbers are a *run*: one `struct.Struct`, with its padding as `x`. The fields of a
+#   struct within the struct belong to the run of their neighbours.
+# - A run ends where the position is no longer known. This happens at a string or a sequence. It
+#   also happens where a number needs more alignment than the length of the last string or sequence
+#   guarantees. `_aligned` and `_phase` hold the known part of the position: the next byte is at
+#   `_phase` modulo `_aligned`. The first byte is at 0 modulo 8. After a string the position is 0
+#   modulo 1, so nothing is known and the code pads at run time.
+# - Elements that are numbers or structs of numbers, and need no padding among them (`Pose2D`), are
+#   read and written by one call for the sequence or one for each element. Other elements need a
+#   loop.
+# - An enumerator ends its run, because it is checked. Of two faults in a message the first one is
+#   reported, and the error of a run that is too short must not hide it.
 #
-# The source names fields of classes, constants (`c0`) and variables (`v1`); nothing in it comes
-# from a message.
+# The source contains names of fields and classes, constants (`c0`) and variables (`v1`). Nothing in
+# it comes from a message.
 
 from __future__ import annotations
 
@@ -138,7 +141,7 @@ class _Codec:
             path: the encoder's expression for its value.
 
         Returns:
-            The decoder's expression for its value, of names that are set by then.
+            The decoder's expression for the value; the names in it are set by then.
         """
         if get_origin(hint) is Annotated:
             return self._primitive(get_args(hint)[1], path)
@@ -260,7 +263,7 @@ class _Codec:
         self._take(f"at += {length}")
 
     def _structs(self, hint: Any, path: str, count: str, made: str) -> None:
-        """Generate one run for each struct of numbers: 2 to 4 times as fast as a loop."""
+        """Generate one run for each struct of numbers, 2 to 4 times as fast as a loop."""
         element, end = self._name(), self._name()
         outer, self._making = self._making, []
         value = self._field(hint, element)  # only adds to the run, for its size is fixed

@@ -1,7 +1,7 @@
 """IDL types as Python annotations (OMG IDL to CDR, CORBA 3.0, chapter 15).
 
-A struct is a class whose fields carry these annotations, in the order of the
-IDL file; sequences are tuples, sequences of octets bytes.
+A struct is a class whose fields carry these annotations, in the order of the IDL file. Sequences
+are tuples; sequences of octets are bytes.
 
 >>> class Speeds(Struct):
 ...     left: Double = 0.0
@@ -58,8 +58,9 @@ OctetSeq = Annotated[bytes, Primitive.OCTET_SEQ]
 class _StructType(type):
     """Turns each struct into a value type with slots.
 
-    `dataclass(frozen=True, slots=True)` takes five times as long for a class, which counts where
-    a command loads 140 of them. Here it only enters the fields, for `dataclasses.replace`.
+    `dataclass(frozen=True, slots=True)` takes five times as long for a class. This matters for a
+    command that loads 140 of these classes. This metaclass only enters the fields, for
+    `dataclasses.replace`.
     """
 
     def __new__(mcs, name: str, bases: tuple[type, ...], namespace: dict[str, Any]) -> _StructType:
@@ -93,8 +94,8 @@ def define(source: str, scope: dict[str, Any]) -> None:
     """Define functions from source generated for the fields of a struct.
 
     Args:
-        source: uses only names of fields and of `scope`.
-        scope: globals of the functions; receives them by name.
+        source: the source; it uses only names of fields and of `scope`.
+        scope: globals of the functions; the defined functions are added to it by name.
     """
     exec(source, scope)
 
@@ -105,7 +106,7 @@ class Struct(metaclass=_StructType):
     Values are not checked until they are encoded.
 
     Attributes:
-        idl_module: the IDL module the struct stands in.
+        idl_module: the IDL module that contains the struct.
         __match_args__: names of the fields, in the order of the IDL file.
     """
 
