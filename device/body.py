@@ -87,7 +87,7 @@ class Contact:
     changes with acceleration.
 
     Attributes:
-        radius_m: of the wheel.
+        radius_m: radius of the wheel.
         mass_kg: share of the body's mass that the wheel carries.
         friction: coefficient, None if the wheel never slips.
         speed_m_s: speed of the ground below the wheel.
@@ -101,7 +101,7 @@ class Contact:
     slip_m_s: float = field(default=0.0, init=False)
 
     def roll(self, turn_rad: float, step_s: float) -> float:
-        """Turn the wheel at a steady speed; return the way over the ground in metres."""
+        """Turn the wheel at a steady speed; return the distance over the ground in metres."""
         rim_m_s = turn_rad * self.radius_m / step_s
         speed_m_s = rim_m_s
         if self.friction is not None:
@@ -117,7 +117,7 @@ class Contact:
 
     @property
     def load_nm(self) -> float:
-        """The torque that the ground has on the wheel, positive forward."""
+        """The torque that the ground exerts on the wheel, positive forward."""
         if not self.slip_m_s or self.friction is None:
             return 0.0
         torque_nm = self.friction * self.mass_kg * GRAVITY_M_S2 * self.radius_m
@@ -141,8 +141,8 @@ class BodyParameters(Immutable):
     """Parameters of a body on driven wheels.
 
     Attributes:
-        kind: of `SIDES`.
-        wheel_radius_m: of each wheel.
+        kind: kind of body, a key of `SIDES`.
+        wheel_radius_m: radius of each wheel.
         tread_m: distance between left and right wheels.
         mass_kg: mass on the driven wheels; each carries the same share.
         friction: coefficient between wheels and ground, None if they never slip.
@@ -258,7 +258,7 @@ class OmniParameters(Immutable):
     """Parameters of a body on omni wheels.
 
     Attributes:
-        wheel_radius_m: of each wheel.
+        wheel_radius_m: radius of each wheel.
         base_radius_m: from the middle to each wheel.
         response_s: time constant of the wheels' speed.
         most_rad_s: the highest speed of a wheel.

@@ -41,7 +41,7 @@ class Chance(Part):
         self._state = (self._state + draws * _GOLDEN_GAMMA) & _MASK
 
     def hit(self, threshold: int) -> bool:
-        """Draw once; return True with the probability given to `threshold_of`."""
+        """Draw once; return True with the probability that was given to `threshold_of`."""
         return self.draw() < threshold
 
     def hits(self, threshold: int, draws: int) -> list[int]:

@@ -62,7 +62,7 @@ class DeviceComponent(Copyable):
         return list(own.values())
 
     def on_initialize(self) -> Result:
-        """Initialize: Created becomes Inactive; after an error it stays Created."""
+        """Initialize: Created becomes Inactive; after an error the state stays Created."""
 
     def on_finalize(self) -> Result:
         """Finalize; called once."""
@@ -83,7 +83,7 @@ class DeviceComponent(Copyable):
         """Handle the error, once a period while in Error; CANopen ignores the return value."""
 
     def on_reset(self) -> Result:
-        """Reset: Error becomes Inactive; after an error it stays in Error."""
+        """Reset: Error becomes Inactive; after an error the state stays Error."""
 
 
 C = TypeVar("C", bound=DeviceComponent)

@@ -32,7 +32,7 @@ class Device(Protocol[W]):
         ...
 
     def reset(self) -> None:
-        """Power-on reset: forget all but the configuration and the physical inputs."""
+        """Power-on reset: erase all state except the configuration and the physical inputs."""
 
     def tick(self, now_us: int, rx: W, /) -> W:
         """Advance by one tick.

@@ -177,7 +177,7 @@ class ModbusSlave(Copyable):
 
     @property
     def due_us(self) -> int:
-        """When the frame in progress ends if no more bytes arrive."""
+        """The time at which the present frame ends if no more bytes arrive."""
         return self._last_us + self._silence_us if self._frame else NEVER
 
     def tick(self, now_us: int, rx: bytes) -> bytes:

@@ -219,7 +219,7 @@ def frame_bits(frame: CanFrame) -> int:
     bits, row, crc = _heads.get(key) or _head(key)
     crc = _crc16(data, crc)
     row = reduce(getitem, data, row)
-    # Behind the CRC a bit unlike its last one: it fills the byte up, and is never stuffed.
+    # After the CRC one bit that differs from its last one: it fills the byte, and is never stuffed.
     end: int = row[crc >> 8][crc & 0xFE | ~crc >> 1 & 1][_STUFFED_BITS]
     return bits + end
 

@@ -280,7 +280,7 @@ class Command(IntEnum):
 
 
 class Status(IntFlag):
-    """Status of the driver (0200h); bits 5 and 6 are ours."""
+    """Status of the driver (0200h); bits 5 and 6 are our addition."""
 
     ENABLED = 0x01
     MOVING = 0x02
@@ -292,7 +292,7 @@ class Status(IntFlag):
 
 
 class Fault(IntFlag):
-    """Reason for switching a wheel off (0201h, 0202h); ours, the proposal defines none."""
+    """Reason for switching a wheel off (0201h, 0202h); ours, as the proposal defines no reasons."""
 
     OVER_CURRENT = 0x01
     ENCODER = 0x04
@@ -304,9 +304,9 @@ class Report(NamedTuple):
     """Registers that a master reads each period: 12 from `Address.STATUS` on.
 
     Attributes:
-        status: of the driver.
-        fault_left: of the left wheel.
-        fault_right: of the right wheel.
+        status: status of the driver.
+        fault_left: fault of the left wheel.
+        fault_right: fault of the right wheel.
         sample: milliseconds since power-up, modulo 65536.
         left: position of the left wheel, counts.
         right: position of the right wheel, counts.

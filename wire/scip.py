@@ -75,7 +75,7 @@ STRING_LETTERS: Final = "0H"
 LASER_OFF: Final = "10"
 LASER_TROUBLE: Final = "50"
 MOTOR_TROUBLE: Final = "51"
-"""50..97 are hardware faults; their assignment is ours."""
+"""50..97 are hardware faults; their assignment is our choice."""
 
 
 _BITS: Final = 6
@@ -84,7 +84,7 @@ _ZERO: Final = 0x30
 _CHARACTERS: Final = bytes(range(_ZERO, _ZERO + _MASK + 1))
 
 _BASE64: Final = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/"
-"""Base64 characters of 6 bits, four for three bytes: five times as fast as shifts, masks."""
+"""Base64 characters of 6 bits, four for three bytes: five times as fast as shifts and masks."""
 
 _FROM_BASE64: Final = bytes.maketrans(_BASE64, _CHARACTERS)
 _TO_BASE64: Final = bytes.maketrans(_CHARACTERS, _BASE64)
@@ -119,7 +119,7 @@ def parse_numbers(data: bytes, width: int) -> tuple[int, ...]:
         FieldError: an invalid character.
         FramingError: an incomplete number at the end.
     """
-    # Before base64 sees them: `a2b_base64` skips what it does not know.
+    # Check before base64: `a2b_base64` skips characters that it does not know.
     if strange := data.translate(None, _CHARACTERS):
         raise FieldError(f"character {strange[0]:#04x} is not in 0x30..0x6f")
     if len(data) % width:

@@ -157,7 +157,7 @@ class UartReceiver:
 
     @property
     def due_ps(self) -> int:
-        """When the stop bit of the present character is sampled, `NEVER` without a character."""
+        """The time at which the stop bit is sampled; `NEVER` without a present character."""
         if self._sampled is None:
             return NEVER
         left = self._frame_samples - len(self._sampled) - 1
@@ -224,7 +224,7 @@ class UartReceiver:
         return -(-t_ps * _OVERSAMPLING * self.setting.baud // PS_PER_S)
 
     def _time_of(self, sample: int) -> int:
-        """Return when a sample is taken, in ps, rounded up."""
+        """Return the time at which a sample is taken, in ps, rounded up."""
         return -(-sample * PS_PER_S // (_OVERSAMPLING * self.setting.baud))
 
 

@@ -1,4 +1,4 @@
-r"""Lines of an infra-red ucode reader: `$TYPE,FIELD,...*HHHH`. The protocol is ours.
+r"""Lines of an infra-red ucode reader: `$TYPE,FIELD,...*HHHH`. We define the protocol.
 
 The source (NEDO report 3.4.43.3 (4), Fig. 123) names the reader but does not show its lines. HHHH
 is the CRC-16 (XMODEM: 1021h, from 0) of all octets between `$` and `*`.
@@ -25,7 +25,7 @@ ROUNDS: Final = 1 << 16
 
 MAX_LEVEL: Final = 100
 _UCODE: Final = re.compile(r"[0-9A-Fa-f]{32}", re.ASCII)
-# A field holds none of `$`, `,` and `*`: two lines that a lost LF has joined do not match.
+# A field does not contain `$`, `,` or `*`, so two lines joined by a lost LF do not match.
 _LINE: Final = re.compile(rb"\$([A-Z]{2}(?:,[0-9A-Za-z]*)*)\*([0-9A-F]{4})")
 
 

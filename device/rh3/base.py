@@ -134,7 +134,7 @@ class BaseState(NamedTuple):
     """Observable state of a base; pairs are left and right unless stated otherwise.
 
     Attributes:
-        pose: of the middle of the axle.
+        pose: pose of the middle of the axle.
         speed: m/s forward, rad/s to the left.
         travel: counts of the wheels.
         slip: m/s.
@@ -303,7 +303,7 @@ class Rh3Base(Copyable):
         )
 
     def _catch_up(self, until_us: int) -> bool:
-        """Run the milliseconds up to a time while it moves; return whether all were run."""
+        """Run the milliseconds up to a time while the base moves; return whether all were run."""
         driver = self._driver
         while self._moving and driver.now_us < until_us:
             driver.now_us += _TICK_US
@@ -316,7 +316,7 @@ class Rh3Base(Copyable):
         self._on = self.inputs.changed = True
 
     def _pass_to(self, until_us: int) -> None:
-        """Run the present millisecond, and those after it that are alike."""
+        """Run the present millisecond, and the equal milliseconds after it."""
         driver, ground = self._driver, self.ground
         if self._on:
             lefts, rights = driver.step(self.slave.last_request_us, until_us)

@@ -258,7 +258,7 @@ class Driver(Part):
         return left.coast(shorted=True), right.coast(shorted=True)
 
     def _alike(self, last_request_us: int, until_us: int) -> int:
-        """Return how many milliseconds are alike from the present one on, with a silent master."""
+        """Return the number of equal milliseconds from the present one on, with a silent master."""
         left, right = self.sides
         if left.stalling or right.stalling:
             return 1
@@ -277,7 +277,7 @@ class Driver(Part):
         return (self.now_us - self._start_us) // 1_000 & 0xFFFF
 
     def find_faults(self) -> None:
-        """Check for faults, and switch both wheels off if there is one."""
+        """Check for faults, and switch both wheels off if one is present."""
         for side in self.sides:
             side.find_faults(self._inputs, powered=self._powered)
         self._faulty = any(side.fault for side in self.sides)

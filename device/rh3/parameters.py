@@ -31,7 +31,7 @@ class BaseParameters(Immutable):
             specification.
         radius_right_m: effective radius of the right wheel.
         tread_m: effective distance between the wheels; 0.464 is the calibrated one.
-        mass_kg: of the robot; a choice, the specification gives none.
+        mass_kg: mass of the robot; a choice, because the specification gives no mass.
         friction: coefficient between wheels and ground, None if they never slip.
         response_s: time constant of the speed loop at the default gains without load.
         delay_ms: time from the arrival of a command to its effect.

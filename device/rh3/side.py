@@ -51,7 +51,7 @@ class _Wheel(Part):
         return floor(self.travel)
 
     def held(self, torque: float) -> bool:
-        """Return whether it stands and a torque would not move it."""
+        """Return whether the wheel stands still and a torque would not move it."""
         return not self.speed and (self.jammed or abs(torque - self.load) <= self.friction)
 
     def step(self, torque: float) -> None:
@@ -149,13 +149,13 @@ class _SpeedLoop(Part):
         self.limit = registers["speed_limit"] / 1e3
 
     def take_over(self, speed: float) -> None:
-        """Restart at a speed, so that the motion has no jerk."""
+        """Restart the loop at a speed, so that the motion has no jerk."""
         self.reference, self.torque = speed, 0.0
         self._sum = self._error = self._change = 0.0
 
     @property
     def settled(self) -> bool:
-        """Whether a step towards standstill without counts leaves everything unchanged."""
+        """Whether a step towards standstill, without counts in it, leaves everything unchanged."""
         return not (self.reference or self._error or self._change or self.counted)
 
     def drive(self, wheel: _Wheel, target: float, steps: int) -> list[float]:
@@ -208,7 +208,7 @@ class _SpeedLoop(Part):
 
 
 STALL_MS: Final = 500
-"""How long full torque may leave the wheel unmoved; a choice."""
+"""Time for which full torque may leave the wheel unmoved; a choice."""
 
 _INT32: Final = 2**32
 
@@ -218,7 +218,7 @@ class Side(Part):
 
     Args:
         name: `left` or `right`.
-        backward_bit: of the register `direction`.
+        backward_bit: bit of this side in the register `direction`.
         parameters: of the base.
         registers: of the driver.
 

@@ -291,12 +291,12 @@ class Rrc(Copyable):
         return b"".join(self._sent)
 
     def _boot(self, tick: int) -> None:
-        """Make transition 1 in the previous tick, so that this one ends Initialize."""
+        """Make transition 1 in the previous tick, so that this tick ends Initialize."""
         self.state = RrcState.INITIALIZE
         self._power.enter(self.state, tick - 1)
 
     def _receive(self, rx: bytes) -> int:
-        """Receive bytes; return how many overflows the load account must charge."""
+        """Receive bytes; return the number of overflows that the load account must charge."""
         buffer = self._buffer
         overflows, thrown = buffer.overflows, buffer.thrown_blocks
         buffer.push(rx)
@@ -399,7 +399,7 @@ class Rrc(Copyable):
         return self.config.vehicle and (self.state in POWERED_ON or self._vehicle.moving)
 
     def _roll(self) -> None:
-        """Advance the vehicle, if there is one."""
+        """Advance the vehicle, if it exists."""
         if self.config.vehicle:
             self._vehicle.set_gauge(self.inputs["gauge"])
             running = self.state in POWERED_ON
@@ -437,7 +437,7 @@ class Rrc(Copyable):
         self._sent.append(reply.encode())
 
     def _move(self, move: Move, tick: int) -> bool:
-        """Change the state; return False if there is no such transition."""
+        """Change the state; return False if the transition does not exist."""
         state = NEXT_STATE.get((self.state, move))
         if state is None:
             return False
@@ -463,7 +463,7 @@ class Rrc(Copyable):
         self._drive, self._buzzer = Drive(), Buzzer()
 
     def _next_due(self, tick: int) -> int:
-        """Return the next tick at which something happens without input, `NEVER` if none does."""
+        """Return the next tick that has work without input; `NEVER` without such a tick."""
         settings, running = self._settings, self.state in POWERED_ON
         busy = self._buffer or not self._load.settled or (settings.status and running)
         busy = busy or self._rolls

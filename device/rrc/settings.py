@@ -134,7 +134,7 @@ class RrcConfig(Immutable):
                 raise ValueError(f"{name} is {getattr(self, name)}, at least 1 is needed")
 
 
-# The settings that Initialize wipes: those of commands and buttons.
+# The settings that Initialize wipes: the settings of commands and buttons.
 
 _NO_LIMIT_YET: Final = Limit(0, 0, 0, 0, 0)
 _NO_OUTPUT_YET: Final = Output(0, 0)

@@ -69,12 +69,12 @@ class LiteInPort(LitePort[T]):
     """A port that the proxy writes and the component reads."""
 
     def read(self) -> T:
-        """Return the latest value, which is then no longer new."""
+        """Return the latest value, and mark it as no longer new."""
         self.is_new = False
         return self.value
 
     def accept(self, data: bytes) -> bool:
-        """Store a value from the wire; return False without a change if it is invalid."""
+        """Store a value from the wire; if it is invalid, return False and keep the old value."""
         if not self.fits(data):
             return False
         self.value, self.is_new = self.port_type.decode(data), True
@@ -97,7 +97,7 @@ class LiteOutPort(LitePort[T]):
         return True
 
     def take(self) -> bytes:
-        """Return the value as sent on the wire; it is then no longer new."""
+        """Return the value as sent on the wire, and mark it as no longer new."""
         self.is_new = False
         return self.port_type.encode(self.value)
 
@@ -156,7 +156,7 @@ class LiteComponent(DeviceComponent):
 
 
 def _check_ports(kind: str, ports: Iterable[LitePort[Any]]) -> None:
-    """Raise ValueError if two ports have the same name, or there are too many."""
+    """Raise ValueError if two ports have the same name, or if the ports are too many."""
     for word, wanted in (("in-port", True), ("out-port", False)):
         names = [port.name.decode() for port in ports if _is_in(port) is wanted]
         if len(names) > _MAX_PORTS:

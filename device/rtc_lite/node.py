@@ -196,7 +196,7 @@ def _output_table(component: LiteComponent) -> dict[str, OutputSignal]:
 
 
 def _port_text(component: LiteComponent, name: str) -> float | str:
-    """Return the value of the port `in.NAME` or `out.NAME`; KeyError if there is none."""
+    """Return the value of the port `in.NAME` or `out.NAME`; KeyError if the port does not exist."""
     side, _, port = name.partition(".")
     ports: dict[str, Mapping[bytes, LitePort[Any]]] = {
         "in": component.in_ports,
@@ -206,7 +206,7 @@ def _port_text(component: LiteComponent, name: str) -> float | str:
 
 
 TICK_US: Final = 1_000
-"""Period of the main loop of the device; a choice, the paper gives none."""
+"""Period of the main loop of the device; a choice, because the paper gives no period."""
 
 _TIMED: Final = (LiteState.ACTIVE, LiteState.ERROR)
 """States in which the timer of the device runs."""
@@ -352,7 +352,7 @@ class RtcLiteNode(Copyable):
         return sent
 
     def _boot(self) -> None:
-        """Start with power; RTno initializes itself, RTC-Lite on a command (DECISION L11)."""
+        """Start at power-up; RTno initializes itself, RTC-Lite waits for a command (DECISION L11)."""
         self._on = True
         if self.config.framing is Framing.RTNO:
             self._life.obey(LiteCommand.INITIALIZE)

@@ -173,7 +173,7 @@ class Heat(Part):
         self.winding_dc = round(ambient_c * 10)
 
     def after(self, now_us: int, square_a2s: float) -> Heat:
-        """Return what `pass_time` makes of it."""
+        """Return a copy to which `pass_time` was applied."""
         found = Heat(self._parameters, self.ambient_c)
         found.temperatures, found.winding_dc = self.temperatures, self.winding_dc
         found.since_us = self.since_us
@@ -182,7 +182,7 @@ class Heat(Part):
         return found
 
     def shapes(self, resistance_ohm: float) -> bool:
-        """Return whether a resistance is so far off that the motor must follow the present one."""
+        """Return whether the motor must follow the present resistance, as this one differs much."""
         present = self.resistance_ohm
         return abs(present - resistance_ohm) > _RESISTANCE_STEP * present
 
@@ -395,7 +395,7 @@ class Readings(ServoSettings):
 
     @property
     def spare_mv(self) -> int:
-        """Voltage of the stage above the back-EMF; below 0 a load drives the motor."""
+        """Voltage of the stage minus the back-EMF; if it is below 0, a load drives the motor."""
         stage, motor = self.parameters.stage, self.parameters.motor
         speed_rad_s = 0.0 if self.encoder_unplugged else abs(self._plant.speed_rad_s)
         back_emf_v = motor.torque_constant_nm_a * speed_rad_s

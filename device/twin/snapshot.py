@@ -187,7 +187,7 @@ class _Walk:
             raise TypeError(f"{name} cannot be put back, and {owner} has one")
 
     def _attributes(self, item: Any) -> Iterator[_PutBack]:
-        """Yield the restore function of attributes; a frozen dataclass needs none."""
+        """Yield the restore function of attributes; a frozen dataclass needs no such function."""
         kind, own = type(item), getattr(item, "__dict__", {})
         kept = dict(own)
         slots = [name for name in _slots_of(kind) if name != "__dict__"]

@@ -21,7 +21,7 @@ CONDITION: Final[Mapping[str, str]] = {
     status.LASER_TROUBLE: "Laser trouble.",
     status.MOTOR_TROUBLE: "Motor trouble.",
 }
-"""Texts by status; those of troubles are ours."""
+"""Texts by status; the texts of faults are our choice."""
 
 
 def _first_version(serial: str) -> Mapping[str, str]:
@@ -149,7 +149,7 @@ class Capture(Immutable):
 
     def answer(self, view: View) -> bytes:
         """Return a scan in the requested form."""
-        # Two characters carry 4095 at most (SCIP 1.1), and what is farther reads so.
+        # Two characters carry 4095 at most (SCIP 1.1); larger distances read as 4095.
         numbers = view.distances(self.first, self.last, self.cluster)
         lines = encode_distances([min(number, FARTHEST_MM) for number in numbers])
         return encode_reply(self.line, SCIP1_OK, lines)

@@ -67,7 +67,7 @@ def _refusal(command: scip.Command, *, adjusting: bool) -> str:
     """Return the status for an invalid or untimely command; empty if it is valid."""
     if command.symbol not in scip.SIZES:
         return status.UNKNOWN
-    # The semicolon is part of `string`, the 16 letters of SCIP 2.0 come behind it.
+    # The semicolon is part of `string`; the 16 letters of SCIP 2.0 follow it.
     if len(command.string) > scip.MOST_STRING + 1:
         return status.STRING_TOO_LONG
     if not scip.LETTERS.issuperset(command.string[1:]):
@@ -180,7 +180,7 @@ class Stream:
         return self.reply(view, status.OK, self.command.echo)
 
     def refuse(self, code: str) -> bytes:
-        """Return the answer with the reason why there will be no scan."""
+        """Return the answer with the reason why no scan will follow."""
         return scip.Reply(self.command.echo, code).encode()
 
     def take(self, ended_us: int, view: View) -> bytes:

@@ -162,7 +162,7 @@ class Urg(Copyable):
         if not self._on:
             return b""
         server = self._server
-        # The scan first: a command of the same tick finds it as the latest one.
+        # The scan first: for a command of the same tick it is the latest scan.
         if server.due_us <= now_us:
             sent += server.end_scan(self.pose, self.surroundings)
         # SCIP lets a host end a line by LF, CR or both. The empty line between CR and LF is not a

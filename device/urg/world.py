@@ -178,7 +178,7 @@ def room(width_m: float, depth_m: float) -> World:
 
 
 def _first_m(along_m: float, half_m: float) -> float:
-    """Return where a ray enters a post, or where it leaves it if it starts within."""
+    """Return where a ray enters a post, or where it leaves the post if it starts inside."""
     if along_m >= half_m:
         return along_m - half_m
     return along_m + half_m if along_m >= -half_m else inf
@@ -220,7 +220,7 @@ class Beams(Part):
         self._ways_m = [inf] * len(self._rays)
 
     def cast_m(self, world: World) -> list[float]:
-        """Return the distance of each to the first object, infinity if there is none."""
+        """Return the distance along each beam to the first object, infinity if it meets none."""
         self._ways_m = [inf] * len(self._rays)
         for wall in world.walls:
             self._meet_wall(wall)
@@ -273,7 +273,7 @@ class Beams(Part):
         return first, first + width_rad / tau * self._turn
 
     def _here(self, span: _Span) -> Iterator[_Span]:
-        """Yield the parts of a span within our beams, in whichever turn it was counted."""
+        """Yield the parts of a span within our beams; the span may be counted in any turn."""
         # A span is counted from the first beam, modulo a turn. It may begin before the first of our
         # beams or end after the last one.
         for turns in (-self._turn, 0, self._turn):
@@ -393,7 +393,7 @@ class View(Immutable):
 
 @lru_cache(maxsize=8)
 def _off_rad(kind: Specification, steps: range) -> tuple[float, ...]:
-    """Return the cached directions of steps from straight ahead; each scan needs the same."""
+    """Return the directions of steps from straight ahead; cached, because each scan needs them."""
     return tuple((step - kind.front) * tau / kind.resolution for step in steps)
 
 

@@ -42,10 +42,10 @@ MAX_DATA_BYTES: Final = 60
 """Largest size of the data: with header, commands and checksum it fills a buffer of 64 bytes."""
 
 Layout = Callable[[bytes | bytearray], int]
-"""Returns the minimum length of the data from the data so far."""
+"""Returns the minimum length of the data from the bytes read up to now."""
 
 WITH_FIELDS: Final = (LiteStatus.OK, LiteStatus.ERROR, LiteStatus.WRONG_STATE)
-"""Statuses with fields; after any other status the reply ends."""
+"""Statuses with fields; the reply ends after any other status."""
 
 
 def _fixed(size: int, data: bytes | bytearray) -> int:

@@ -33,7 +33,7 @@ class LitePortData:
     data: bytes
 
     def __post_init__(self) -> None:
-        """Raise FieldError if it does not fit into a frame."""
+        """Raise FieldError if the message does not fit into a frame."""
         size = PORT_COUNTS_BYTES + len(self.name) + len(self.data)
         if size > MAX_DATA_BYTES:
             raise FieldError(f"name and data make {size} data bytes, {MAX_DATA_BYTES} fit")

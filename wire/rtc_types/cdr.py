@@ -403,7 +403,7 @@ def _wchar(data: bytes) -> str:
 
 
 def _utf16(data: bytes) -> str:
-    """Decode UTF-16; big-endian unless its byte order mark says otherwise (GIOP 1.2)."""
+    """Decode UTF-16; big-endian without a byte order mark (GIOP 1.2)."""
     return data.decode("utf-16" if data[:2] in (b"\xfe\xff", b"\xff\xfe") else _UTF16)
 
 
