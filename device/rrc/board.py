@@ -266,7 +266,7 @@ class PowerSequence:
         if pressed:
             return Step(RrcEvent.BY_BUTTON, Move.POWER_BUTTON)
         # In the order of the table: if two faults are detected in one tick, the first of them is
-        # the cause. `>=` is compared with the tick in which the fault was first seen: 10 ticks are
+        # the cause. `>=` counts from the tick in which the fault was first seen: 10 ticks are
         # 100 ms (R25, corrected).
         for name, event in _RUNNING_FAULTS.items():
             if not inputs[name]:

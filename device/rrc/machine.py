@@ -463,7 +463,7 @@ class Rrc(Copyable):
         self._drive, self._buzzer = Drive(), Buzzer()
 
     def _next_due(self, tick: int) -> int:
-        """Return the next tick that has work without input; `NEVER` without such a tick."""
+        """Return the next tick in which anything happens without input; `NEVER` if nothing does."""
         settings, running = self._settings, self.state in POWERED_ON
         busy = self._buffer or not self._load.settled or (settings.status and running)
         busy = busy or self._rolls

@@ -93,7 +93,8 @@ class RrcConfig(Immutable):
         power_on_ticks: from the power button to the result (DECISION R6).
         power_on_timeout_ticks: from the power button to `PowerOnTimeout` (DECISION R6).
         button_off_ticks: from the power button to `PowerOffFinished` (DECISION R6).
-        forced_off_ticks: from a forced stop to `PowerOffFinished` (DECISION R6).
+        forced_off_ticks: from the power button to `PowerOffFinished` after a forced stop
+            (DECISION R6).
         fault_hold_ticks: how long a fault must last to be detected (DECISION R25).
         buffer_bytes: size of the receive buffer (DECISION R27).
         overtime: whether too much work stops VR2 (DECISION R27).

@@ -352,7 +352,7 @@ class RtcLiteNode(Copyable):
         return sent
 
     def _boot(self) -> None:
-        """Start at power-up; RTno initializes itself, RTC-Lite waits for a command (DECISION L11)."""
+        """Start at power-up; RTno initializes itself, RTC-Lite awaits a command (DECISION L11)."""
         self._on = True
         if self.config.framing is Framing.RTNO:
             self._life.obey(LiteCommand.INITIALIZE)

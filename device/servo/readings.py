@@ -90,8 +90,8 @@ class I2t(Part):
     """The I2t protection of a power stage.
 
     A budget of (peak^2 - continuous^2) * time fills with the square of the current above the
-    continuous current, and drains with it below. When the budget is full, only the continuous
-    current is allowed until the budget is empty again.
+    continuous current, and drains when the current is below it. When the budget is full, only the
+    continuous current is allowed until the budget is empty again.
 
     Attributes:
         filled_a2s: used part of the budget.
@@ -182,7 +182,7 @@ class Heat(Part):
         return found
 
     def shapes(self, resistance_ohm: float) -> bool:
-        """Return whether the motor must follow the present resistance, as this one differs much."""
+        """Return whether the present resistance differs so much that the motor must follow it."""
         present = self.resistance_ohm
         return abs(present - resistance_ohm) > _RESISTANCE_STEP * present
 
@@ -352,7 +352,7 @@ class ServoSettings(Copyable):
 class Readings(ServoSettings):
     """Readings of a servo; `Servo` describes its attributes.
 
-    Integers are measurements of the drive; floats are exact values for observers.
+    Integers are measurements of the drive; floats are values for observers.
     """
 
     __slots__ = (

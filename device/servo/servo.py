@@ -64,10 +64,10 @@ from tickrig.device.twin import Part
 class _Loops(Part):
     """A position loop around a velocity loop, in control steps of 1 ms.
 
-    Position: proportional, in whole counts. An error below one count is ignored while the demand is
-        constant. Velocity: proportional and integral. Acceleration, viscous and dry friction are
-        fed forward. While the current demand is cut, the integral does not grow further in the
-        direction of the cut.
+    The position loop is proportional, in whole counts. It ignores an error below one count while
+    the demand is constant. The velocity loop is proportional and integral. Acceleration, viscous
+    and dry friction are fed forward. While the current demand is cut, the integral does not grow
+    further in the direction of the cut.
 
     Attributes:
         integral_a: share of the integral in the current.

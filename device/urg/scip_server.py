@@ -217,7 +217,8 @@ _Answer = tuple[str, tuple[bytes, ...]]
 class ScipServer(Part):
     """Executes commands and sends scans (SCIP 2.0, sensor commands).
 
-    Until a host switches to SCIP 2.0, it executes the commands of SCIP 1.1 (`first_protocol`).
+    Until a host switches to SCIP 2.0, the server executes the commands of SCIP 1.1
+    (`first_protocol`).
 
     Not emulated: DB, the firmware update mode, the statuses 21..49 and 98 of a self-test.
 
