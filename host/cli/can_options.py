@@ -92,7 +92,7 @@ class _BitRate(click.ParamType):  # type: ignore[type-arg] # generic since click
 class BusCommand(HarmlessCommand):
     """A command whose `--timing` and `--bus-kwargs` accept all following words KEY=VALUE.
 
-    Do not use it for a command with such words of its own.
+    Do not use this class for a command whose own arguments have the form KEY=VALUE.
     """
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
@@ -101,7 +101,7 @@ class BusCommand(HarmlessCommand):
 
 
 def spread(args: Sequence[str]) -> list[str]:
-    """Repeat greedy options before each KEY=VALUE behind their first value.
+    """Repeat a greedy option before each KEY=VALUE that follows its first value.
 
     >>> spread(["--bus-kwargs", "a=1", "b=2", "can0", "c=3"])
     ['--bus-kwargs', 'a=1', '--bus-kwargs', 'b=2', 'can0', 'c=3']
@@ -204,13 +204,13 @@ def open_raw(options: BusOptions, instead: str = "") -> tuple[can.BusABC, str, s
 
     Args:
         options: the bus.
-        instead: alternative to a bus, for the message.
+        instead: what can be given instead of a bus, for the message.
 
     Returns:
         The bus, its interface and its channel.
 
     Raises:
-        Refused: no bus is given; SourceFailed: it cannot be opened.
+        Refused: no bus is given; SourceFailed: the bus cannot be opened.
     """
     with loading():
         import can  # noqa: PLC0415 - slow

@@ -26,12 +26,12 @@ def request(socket: Path | str, whom: str, do: str, /, **fields: object) -> Any:
 
     Args:
         socket: the control socket.
-        whom: expected server, for messages: `emulator`, `system`.
+        whom: the expected server, for messages: `emulator` or `system`.
         do: the verb of the request.
-        fields: of the request.
+        fields: the other fields of the request.
 
     Raises:
-        Refused: no answer, or an error.
+        Refused: the server does not answer, or answers with an error.
     """
     with refused_by(socket, whom), ControlClient(socket) as client:
         return client.request(do, **fields)
@@ -39,7 +39,7 @@ def request(socket: Path | str, whom: str, do: str, /, **fields: object) -> Any:
 
 @contextmanager
 def refused_by(socket: Path | str, whom: str) -> Iterator[None]:
-    """Raise Refused in place of what a `ControlClient` raises; arguments as those of `request`."""
+    """Raise Refused in place of errors of a `ControlClient`; see `request` for the arguments."""
     try:
         yield
     except TimeoutError:
@@ -85,7 +85,7 @@ def serving_control(
     Args:
         path: of the socket.
         dispatcher: answers the requests.
-        clock: clock of the run, which serves the socket while it waits.
+        clock: clock of the run; it serves the socket while it waits.
 
     Raises:
         Refused: the socket cannot be made.

@@ -30,11 +30,12 @@ _PORT: Final = 2809
 class Endpoint:
     """Address of an ORB for listening and for peers, or of a name server.
 
-    CORBA has no access control: anyone who reaches the address can do everything that rtshell can.
+    CORBA has no access control. Anyone who can connect to the address can do everything that
+    rtshell can do.
 
     Attributes:
-        host: an address, or a name of one.
-        port: TCP port, 0 for one that is free.
+        host: an IP address or a host name.
+        port: TCP port; 0 selects a free port.
     """
 
     host: str = "127.0.0.1"
@@ -68,7 +69,7 @@ class OpenRtmOptions:
 
 
 def _parse_openrtm(name_server: str, address: str = "", names: str = "") -> OpenRtmOptions:
-    """Read the words of a command line, empty for omitted ones.
+    """Read the words of a command line; the word of an omitted option is empty.
 
     Raises:
         ValueError: an invalid word; the message starts with the name of its option.
@@ -98,13 +99,13 @@ def format_name(pattern: str, values: Mapping[str, str]) -> str:
 
 
 def parse_endpoint(text: str, port: int = _PORT) -> Endpoint:
-    """Read `HOST:PORT`, `HOST` (the port is that given here) or `[ADDRESS]:PORT`.
+    """Read `HOST:PORT`, `HOST` or `[ADDRESS]:PORT`; without a port, use the default port.
 
     >>> parse_endpoint("robot"), parse_endpoint("[::1]:2810")
     (Endpoint(host='robot', port=2809), Endpoint(host='::1', port=2810))
 
     Raises:
-        ValueError: another form.
+        ValueError: the text has another form.
     """
     match = re.fullmatch(r"(?:\[([0-9a-fA-F:.]+)\]|([\w.-]+))(?::(\d{1,5}))?", text, re.ASCII)
     if match is None or int(match[3] or 1) not in range(1, 65_536):
@@ -236,10 +237,10 @@ class Ros2Options:
     """Settings of a system in ROS 2.
 
     Attributes:
-        domain: of DDS, 0..232.
-        interface: of this machine, such as eth0; loopback if empty.
-        table: ports with topics; None for those of the command.
-        topics: text of the table of the command; empty for a topic for each port.
+        domain: the DDS domain, 0..232.
+        interface: network interface of this machine, such as eth0; loopback if empty.
+        table: file with the table of ports and topics; None for the table of the command.
+        topics: text of the table of the command; if empty, each port has a topic.
     """
 
     domain: int = 0

@@ -24,8 +24,8 @@ class ExtensionError(ValueError):
 class ExtensionGroup(Generic[T]):
     """One entry-point group: built-in members and members of other packages.
 
-    Nothing is imported, and no metadata is read, before the first access. Built-in members need no
-    installation; an entry point of the same name does not replace them.
+    No module is imported, and no metadata is read, before the first access. Built-in members need
+    no installation. An entry point with the name of a built-in member does not replace that member.
 
     Args:
         name: of the group, such as `tickrig.devices`.

@@ -44,10 +44,10 @@ def refused_at(option: str) -> Iterator[None]:
 
 @contextmanager
 def failing(*errors: type[Exception]) -> Iterator[None]:
-    """Raise ClickException, which is exit status 1, in place of these errors.
+    """Raise ClickException (exit status 1) in place of these errors.
 
-    It is SourceFailed for an error with `status` 3, which a process that was started ended with.
-    An output error is not changed.
+    For an error whose `status` is 3, raise SourceFailed instead; `status` is the exit status of a
+    process that this command started. An error of standard output is not changed.
     """
     try:
         yield
@@ -66,7 +66,7 @@ def refuse_path(what: str, error: OSError) -> NoReturn:
 
 @contextmanager
 def refusing(what: str = "", wrong: type[ValueError] = ValueError) -> Iterator[None]:
-    """Raise Refused in place of an error of the block, and of an OSError as `refuse_path` does.
+    """Raise Refused in place of an error of the block; for an OSError, as `refuse_path` does.
 
     Args:
         what: the invalid option or argument, which starts the message.
@@ -98,7 +98,10 @@ def say(text: str) -> None:
 
 @contextmanager
 def warnings_shown() -> Iterator[None]:
-    """Show warnings of the library on standard error, one line each; without this it is silent."""
+    """Show warnings of the library on standard error, one line each.
+
+    Without this context manager the library prints no warnings.
+    """
     import logging  # noqa: PLC0415 - slow, and a TAB needs none
 
     logger, handler = logging.getLogger("tickrig"), logging.StreamHandler()
@@ -111,7 +114,7 @@ def warnings_shown() -> Iterator[None]:
 
 
 def show_findings(findings: Iterable[Finding]) -> None:
-    """Print the findings in EDS files; a finding in many sections only once."""
+    """Print the findings in EDS files; print a finding that occurs in many sections only once."""
     from tickrig.wire.canopen.eds.eds_file import finding_lines  # noqa: PLC0415 - a TAB needs none
 
     for line in finding_lines(findings):
@@ -123,7 +126,7 @@ def until_unread() -> Iterator[None]:
     """End the block quietly when standard output is closed, as before `| head`.
 
     Raises:
-        SourceFailed: it cannot be written, for example because the disk is full.
+        SourceFailed: standard output cannot be written, for example because the disk is full.
     """
     try:
         yield

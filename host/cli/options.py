@@ -60,11 +60,11 @@ def add_options(*options: Decorator) -> Decorator:
 
 
 def refuse_idle(why: str, *names: str) -> None:
-    """Refuse options of the present command that were given and would do nothing.
+    """Refuse options that were given to the current command but have no effect.
 
     Args:
-        why: what they do nothing with, as `--jsonl has its own times`.
-        names: of the parameters.
+        why: the reason why they have no effect, such as `--jsonl has its own times`.
+        names: names of the parameters.
     """
     from tickrig.host.cli.messages import Refused  # noqa: PLC0415 - a TAB needs none
 
@@ -76,7 +76,7 @@ def refuse_idle(why: str, *names: str) -> None:
 
 
 class Choice(click.Choice):  # type: ignore[type-arg] # click 8.1 has no type there
-    """One of some words; the message about another word names the nearest."""
+    """One of a list of words; the message about an unknown word suggests the nearest one."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Read a word."""
@@ -91,7 +91,7 @@ class Choice(click.Choice):  # type: ignore[type-arg] # click 8.1 has no type th
 
 
 class NumberRange(click.FloatRange):
-    """Numbers of a range; NaN is refused."""
+    """A number in a range; NaN is refused."""
 
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
@@ -125,7 +125,7 @@ def version_option() -> Callable[[Callable[..., Any]], Callable[..., Any]]:
 
 
 def time_option(option: str, name: str, **attributes: Any) -> Decorator:
-    """Return the option of a time such as `10s`; in microseconds, None if it is not given."""
+    """Return an option for a time such as `10s`; its value is in microseconds, None by default."""
 
     def parsed(context: click.Context, parameter: click.Parameter, text: str | None) -> int | None:
         from tickrig.host.cli.messages import Refused  # noqa: PLC0415 - a TAB needs none
@@ -150,14 +150,15 @@ run_code_option: Final[Decorator] = click.option(
 
 
 def works_in(path: str) -> Decorator:
-    """Return a decorator: the function declares the options of a command, and `path` does its work.
+    """Return a decorator for a function that declares the options of a command.
 
-    Help and completion need only the options, so the module of the work is imported when the
-    command runs. The decorated function has the signature of the work and an empty body.
+    The function at `path` does the work of the command. Help and completion need only the options,
+    so the module of this function is imported only when the command runs. The decorated function
+    has the same signature and an empty body.
 
     Args:
-        path: of the function that does the work, as `MODULE:NAME`. It returns the exit status; None
-            is 0.
+        path: location of the function that does the work, as `MODULE:NAME`. The function returns
+            the exit status; None means 0.
     """
 
     def decorate(described: Callable[..., Any]) -> Callable[..., Any]:
@@ -179,8 +180,8 @@ class LazyCommand(click.Command):
 
     Args:
         name: of the command.
-        path: its place, `MODULE:NAME`.
-        short_help: start of its help.
+        path: location of the command, as `MODULE:NAME`.
+        short_help: first sentence of its help.
     """
 
     def __init__(self, name: str, path: str, short_help: str) -> None:
@@ -192,8 +193,8 @@ class LazyGroup(HarmlessCommand, click.Group):
     """A group whose commands are in separate modules.
 
     Args:
-        commands: path and short help of each by its name, in the order of the list.
-        attributes: those of any group.
+        commands: path and short help of each command, by its name, in the order of the list.
+        attributes: arguments of any click group.
     """
 
     def __init__(self, commands: Mapping[str, tuple[str, str]], **attributes: Any) -> None:

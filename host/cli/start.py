@@ -1,11 +1,12 @@
-"""Begin and end a command: what Ctrl-C, `kill`, a closed terminal and a full disk do to it.
+"""Start and end a command, also by Ctrl-C, `kill`, a closed terminal or a full disk.
 
-All commands start here. Until a command is loaded, a signal ends the process at once. Afterwards
-Ctrl-C, SIGTERM and SIGHUP raise KeyboardInterrupt (`Interrupter`), so that it can clean up.
+All commands start here. While a command is being loaded, a signal ends the process at once.
+Afterwards Ctrl-C, SIGTERM and SIGHUP raise KeyboardInterrupt (`Interrupter`), so that the command
+can clean up.
 
-What files, buses and lines hold may carry characters that a terminal obeys. So whatever a command
-prints passes `_HarmlessStream`, in one place for all of them; what a command itself paints, and
-what programs read, goes through `paint`.
+Data from files, buses and serial lines may contain control characters that a terminal would
+interpret. Therefore all text that a command prints passes `_HarmlessStream`. Two kinds of output
+use `paint` instead: the screens that a command draws itself, and output for programs.
 """
 
 from __future__ import annotations
@@ -52,8 +53,8 @@ def start(name: str, path: str) -> None:
     """Run a command as a console script.
 
     Args:
-        name: what people call it.
-        path: where it is, as `MODULE:NAME`.
+        name: the name that users type.
+        path: the location of the command, as `MODULE:NAME`.
     """
     command: Any = load(path)
     status: Any = 0
@@ -94,8 +95,9 @@ def _status_of(interrupt: KeyboardInterrupt) -> int:
 def _open_closed_streams() -> None:
     """Open the standard streams that the caller has closed, as `>&-` does.
 
-    The next file or socket would get their numbers, and messages would go into it. Standard input
-    is empty then; what is written to the others is dropped, and the exit status stays as it is.
+    Otherwise the next file or socket would get the descriptor of a closed stream, and messages
+    would be written into it. A standard input opened here is empty. Text written to a standard
+    output or standard error opened here is dropped, and the exit status does not change.
     """
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         try:
@@ -118,14 +120,15 @@ _PLAIN: Final = bytes((ord("\n"), *range(0x20, 0x7F)))
 
 
 class _HarmlessStream(io.TextIOWrapper):
-    """Standard output or error; characters that a terminal obeys are written as pictures.
+    """Standard output or error; replaces control characters by visible symbols.
 
     Args:
-        stream: what is written to; both may be used.
-        drops: what a full disk does not take is dropped; otherwise it raises OSError.
+        stream: the stream to write to; it may also be used directly.
+        drops: whether to drop text that does not fit on a full disk; otherwise writing raises
+            OSError.
 
     Attributes:
-        as_is: that stream.
+        as_is: the stream that was passed in.
     """
 
     def __init__(self, stream: TextIO, *, drops: bool = False) -> None:
@@ -157,14 +160,20 @@ class _HarmlessStream(io.TextIOWrapper):
 
 
 def paint(stream: TextIO, text: str) -> None:
-    """Write at once what a command paints itself, or what a program reads: nothing is replaced."""
+    """Write a screen that a command draws, or output for programs.
+
+    The text is written at once, and no characters are replaced.
+    """
     stream = as_is(stream)
     stream.write(text)
     stream.flush()
 
 
 def write_harmless(stream: TextIO, text: str) -> None:
-    """Write text of which every character is known to be harmless; looking at each takes time."""
+    """Write text that is known to have no control characters.
+
+    This is faster, because the characters are not checked.
+    """
     if isinstance(stream, _HarmlessStream):
         io.TextIOWrapper.write(stream, text)
     else:
@@ -179,10 +188,10 @@ def as_is(stream: TextIO) -> TextIO:
 
 @contextmanager
 def standard_streams() -> Iterator[None]:
-    """Have all three while the block runs; what it prints is harmless to the terminal.
+    """Provide all three standard streams during the block; they replace control characters.
 
-    Standard error on a full disk ends nothing: what it does not take is dropped, and the exit
-    status stays as it is.
+    If standard error is a file on a full disk, the command continues. The messages are dropped, and
+    the exit status does not change.
     """
     _open_closed_streams()
     before = sys.stdout, sys.stderr
@@ -205,7 +214,7 @@ def standard_streams() -> Iterator[None]:
 
 
 def raise_of_output(error: Exception) -> None:
-    """Raise an output error again, independent of the printed text.
+    """Raise an error of standard output again, whatever text was printed.
 
     If the reader has closed the pipe, as before `| head`, the command ends without a message.
     """
@@ -241,10 +250,11 @@ def loading() -> Iterator[None]:
 
 
 class Interrupter:
-    """Raises KeyboardInterrupt when a signal comes, but where that would not be lost.
+    """Raises KeyboardInterrupt after a signal, but not in the middle of an import.
 
-    An exception in the middle of an import may be lost in a callback of the importer, or leave
-    half a module: the signal is repeated until the import has ended, for two seconds at most.
+    An exception in the middle of an import may be lost in a callback of the importer, or leave a
+    module half loaded. Therefore the signal is repeated until the import has ended, for two seconds
+    at most.
 
     Attributes:
         pending: number of a signal that is being repeated, 0 if none is.
@@ -254,7 +264,7 @@ class Interrupter:
         self.pending = self._repeats = 0
 
     def received(self, number: int, frame: FrameType | None) -> None:
-        """Take a signal; the argument of the KeyboardInterrupt is its number."""
+        """Handle a signal; the argument of the KeyboardInterrupt is the number of the signal."""
         give_up_terminals()
         if _is_importing(frame) and self._repeats < _MOST_REPEATS:
             self._repeat(number)
@@ -304,8 +314,9 @@ def _is_importing(frame: FrameType | None) -> bool:
 def taking_signals(received: _Handler) -> Iterator[None]:
     """Call `received` at Ctrl-C, SIGTERM and SIGHUP.
 
-    SIGINT is taken although a script has the shell ignore it for what stands before `&`. SIGHUP
-    that is ignored stays ignored, as nohup wants it.
+    SIGINT is handled even if it was ignored at the start, because the shell of a script ignores it
+    for commands before `&`. SIGHUP stays ignored if it was ignored at the start, because nohup
+    requires that.
     """
     numbers = [signal.SIGINT, signal.SIGTERM]
     if sys.platform != "win32" and signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
@@ -319,9 +330,10 @@ def taking_signals(received: _Handler) -> Iterator[None]:
 
 
 def give_up_terminals() -> None:
-    """Print into the void from now on if the terminal is gone, or takes nothing for half a second.
+    """Drop all further output if the terminal is gone, or accepts no data for half a second.
 
-    A stopped terminal would keep a command from its end. A `write` that waits for it goes on.
+    A stopped terminal would prevent a command from ending. A `write` that already waits for the
+    terminal keeps waiting.
     """
     for descriptor in (1, 2):
         if sys.platform != "win32" and _is_stuck(descriptor):
@@ -331,10 +343,10 @@ def give_up_terminals() -> None:
 if sys.platform != "win32":
 
     def _is_stuck(descriptor: int) -> bool:
-        """Return whether it is a terminal that is gone, or takes nothing.
+        """Return whether a stream is a terminal that is gone, or accepts no data.
 
-        One with room for a single byte says that it can be written, and yet CR LF waits: a NUL,
-        which terminals pass over, takes that room.
+        A terminal with room for a single byte reports that it can be written, but writing CR LF
+        would block. A NUL, which terminals ignore, fills that byte.
         """
         try:
             if not stat.S_ISCHR(os.fstat(descriptor).st_mode):

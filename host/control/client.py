@@ -27,7 +27,7 @@ class ControlClient:
         timeout_s: time-out of an answer.
 
     Raises:
-        OSError: no server, or no answer.
+        OSError: no server listens at the path, or the server does not answer.
     """
 
     def __init__(self, path: Path | str, timeout_s: float = TIMEOUT_S) -> None:
@@ -46,7 +46,7 @@ class ControlClient:
         Raises:
             ControlRefused: the emulator refused it.
             OSError: the emulator does not answer, or has closed the connection.
-            ValueError: invalid answer.
+            ValueError: the answer is invalid.
         """
         request = json.dumps({"v": VERSION, "do": do, **fields})
         self._socket.sendall(request.encode() + b"\n")

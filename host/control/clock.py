@@ -41,8 +41,8 @@ class ServingClock(RealClock):
     """The monotonic clock of this machine, which serves requests while it waits.
 
     Attributes:
-        serve: called with the time in microseconds that it may take; at least
-            once for each wait, so that a run that is late can be stopped.
+        serve: called with the time in microseconds that it may take. It is called at least once for
+            each wait, so that a run that is late can be stopped.
     """
 
     serve: Callable[[int], None] | None = None

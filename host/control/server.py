@@ -53,7 +53,7 @@ IDLE_S: Final = 60.0
 """Idle time after which a client makes room for another if all places are taken."""
 
 Answer = Callable[[bytes], bytes]
-"""Answers a line, given without its end; the answer has one."""
+"""Answers a line. The line is passed without its line end; the answer has a line end."""
 
 
 class _Readable(Protocol):
@@ -67,8 +67,8 @@ class _Readable(Protocol):
 class LineServer:
     """Serves a listening socket whenever `serve` is called.
 
-    A round answers at most one line of each client; a client that does not
-    read its answers is not read from either.
+    In each round the server answers at most one line of each client. It stops reading requests of a
+    client that does not read its answers.
 
     Args:
         listener: non-blocking; closed by the server.
@@ -248,12 +248,13 @@ class ControlServer(LineServer):
     """Serves a control socket whenever `serve` is called.
 
     Args:
-        path: path of the socket; that of a killed process is replaced.
+        path: path of the socket; a socket left by a killed process is replaced.
         control: answers the requests.
         clock: monotonic time in seconds.
 
     Raises:
-        FileExistsError: another process listens there, or it is another file.
+        FileExistsError: another process listens at this path, or the path is a file of another
+            kind.
         OSError: the socket cannot be made.
     """
 

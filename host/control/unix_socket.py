@@ -97,7 +97,8 @@ def _check(path: Path) -> None:
 def _publish(listener: socket.socket, path: Path) -> None:
     """Listen first, then create the path, so that every client that sees it can connect.
 
-    By a new name, not by a link: on the file system of User-Mode Linux that is another socket.
+    The socket is renamed, not linked. On the file system of User-Mode Linux a link would be another
+    socket.
     """
     if len(os.fsencode(path)) > _MAX_PATH_BYTES:
         raise OSError(errno.ENAMETOOLONG, "AF_UNIX path too long", str(path))

@@ -1,6 +1,6 @@
 """A CAN link to a real bus, or any other bus of python-can.
 
-Frames as python-can has them.
+Conversion between frames and messages of python-can.
 
 >>> to_frame(to_message(CanFrame.parse("00000605#40"))) == CanFrame.parse("00000605#40")
 True
@@ -90,7 +90,8 @@ def to_frame(message: can.Message) -> CanFrame | None:
 def to_fd_frame(message: can.Message) -> FdFrame | None:
     """Return a CAN FD frame, not validated; None for any other message.
 
-    python-can reads one without data in an ASC log as a remote frame, which CAN FD does not have.
+    In an ASC log, python-can reads a CAN FD frame without data as a remote frame, but CAN FD has no
+    remote frames.
     """
     if not message.is_fd or message.is_error_frame:
         return None
@@ -113,10 +114,12 @@ _DRIFT: Final = 5_000
 class StampClock:
     """Computes the arrival of a frame from the time stamp of the driver.
 
-    The start of the driver's clock is unknown (1970, power-on), and it drifts. A frame is read
-    after its arrival, so the two clocks differ by the smallest difference seen. A frame that was
-    missing at the last poll has arrived since then: so bad time stamps, and a driver's clock that
-    is set, matter only while the host is late.
+    The driver's clock starts at an unknown time (1970, or power-on), and it drifts. A frame is read
+    after its arrival. Therefore the smallest difference seen between reading time and time stamp is
+    taken as the offset of the two clocks.
+
+    A frame that was missing at the last poll has arrived since that poll. Therefore wrong time
+    stamps, and a driver's clock that is set to another time, matter only while the host is late.
 
     >>> clock = StampClock()
     >>> clock.at_us(7.0, 0, 100), clock.at_us(7.3, 100, 900_000)  # stopped for 0.9 s
@@ -163,11 +166,11 @@ net.core.rmem_max."""
 def _receive(recv: Callable[[float], can.Message | None], timeout_s: float) -> can.Message | None:
     """Return the next message of a bus; None after the timeout.
 
-    python-can measures a wait by the wall clock: if that is set back by an hour, the wait is an
-    hour longer. Here it is measured by the monotonic clock.
+    python-can measures a wait by the wall clock. If the wall clock is set back by an hour, the wait
+    is an hour longer. This function uses the monotonic clock.
 
     Args:
-        recv: of the bus. A `recv` that is not python-can's own is called unchanged.
+        recv: method `recv` of the bus. A `recv` that is not python-can's own is called unchanged.
         timeout_s: how long to wait, in seconds; 0 only polls.
     """
     # A bus that has a `recv` of its own waits in its own way: leave it.
@@ -186,7 +189,10 @@ def _receive(recv: Callable[[float], can.Message | None], timeout_s: float) -> c
 
 
 def _enlarge_queue(sock: socket.socket) -> None:
-    """Enlarge the kernel's queue for times when this process is delayed: 300 frames are 40 ms."""
+    """Enlarge the kernel's queue, so that no frame is lost while this process is delayed.
+
+    300 frames take 40 ms.
+    """
     try:
         sock.setsockopt(socket.SOL_SOCKET, _SO_RCVBUFFORCE, _RECEIVE_BYTES)
     except OSError:  # PermissionError, and no such option beside Linux
@@ -194,12 +200,14 @@ def _enlarge_queue(sock: socket.socket) -> None:
 
 
 def prepare_bus(bus: can.BusABC, interface: str) -> None:
-    """Enlarge the queue of a bus, and limit it to its own multicast group.
+    """Enlarge the queue of a bus, and limit the bus to its own multicast group.
 
     python-can binds the socket of `udp_multicast` only to a port. Linux then delivers data on that
     port for any group that any program of this machine has joined (ip(7), IP_MULTICAST_ALL). Other
-    systems have no such option and do not need it. The driver of socketcand also logs the
-    exceptions that it raises, with a traceback; the reader of the bus reports them.
+    systems have no such option and do not need it.
+
+    The driver of socketcand also logs the exceptions that it raises, with a traceback. Those
+    log messages are dropped, because the reader of the bus reports the exceptions.
     """
     let_wait(bus)
     if interface == "socketcand":
@@ -246,22 +254,23 @@ class BusReceiver:
     """Reads a bus of python-can, and continues after exceptions of its driver.
 
     The driver of a serial adapter raises IndexError for a line with a lost byte, and accepts a line
-    with too few data as a frame; others raise their own errors. All of this is counted, and
-    reported for the 1st, the 10th, the 100th fault and so on.
+    with too few data bytes as a frame. Other drivers raise errors of their own. All these faults
+    are counted. The 1st, the 10th, the 100th fault and so on are reported.
 
     Args:
         bus: an open bus without other readers.
         name: its name for messages.
-        ends: an OSError or CanError with one of these codes ends it at once.
-        gone: makes the exception at its end from a text.
+        ends: error codes; an OSError or CanError with one of them ends the reading at once.
+        gone: makes the exception that is raised at the end, from a text.
         raises: errors that are re-raised.
         read: the function that reads it, by default `recv` of the bus.
 
     Attributes:
         faults: number of failed reads and of truncated frames.
         last: the latest fault, empty after a successful read.
-        closed: the reader has closed the bus.
-        on_fault: called with each report, one line; by default it is logged as a warning.
+        closed: whether the reader has closed the bus.
+        on_fault: called with each report, which is one line; by default the report is logged as a
+            warning.
     """
 
     def __init__(  # noqa: PLR0913 - how a bus is read, by keyword
@@ -281,7 +290,7 @@ class BusReceiver:
         self._row, self._since_s = 0, 0.0
 
     def receive(self, timeout_s: float | None) -> can.Message | None:
-        """Return the next message, None after the timeout or if it cannot be read.
+        """Return the next message; None after the timeout, or if the message cannot be read.
 
         Args:
             timeout_s: how long to wait, None without limit.
@@ -386,7 +395,7 @@ def close_bus(bus: can.BusABC) -> None:
 
 _SEND_TIMEOUT_US: Final = 1_000_000
 _AGAIN_S: Final = 0.001
-"""Retry period for a full queue: that of SocketCAN has ten places."""
+"""Retry period for a full queue; the queue of SocketCAN has ten places."""
 _PASSIVE = ControllerFlag.RECEIVE_PASSIVE | ControllerFlag.TRANSMIT_PASSIVE
 
 
@@ -495,8 +504,8 @@ class CanLink:
         Raises:
             LinkClosed: the bus is gone.
 
-        The time is from before the last poll: a process that is stopped after it can detect its
-        delay, and does not count nodes as silent.
+        The returned time was read before the last poll. A process that is stopped after this poll
+        can thus detect its delay, and does not count nodes as silent.
         """
         deadline_us = self.now_us + timeout_us
         received: list[tuple[int, CanFrame]] = []
@@ -534,7 +543,11 @@ def _open(channel: str, interface: str, bit_rate: int | None) -> can.BusABC:
 
 
 def _is_full(error: Exception) -> bool:
-    """Return whether earlier frames are still unsent: no other node, unplugged, bus-off."""
+    """Return whether earlier frames are still unsent.
+
+    Possible reasons: no other node is on the bus, the cable is unplugged, or the controller is
+    bus-off.
+    """
     if isinstance(error, can.CanOperationError):
         return error.error_code in (None, errno.ENOBUFS, errno.EAGAIN)
     return isinstance(error, OSError) and error.errno in (errno.ENOBUFS, errno.EAGAIN)

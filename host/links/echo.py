@@ -18,8 +18,8 @@ ECHO_US: Final = 1_000_000
 class EchoFilter:
     """Separates the echo of sent frames from frames of others.
 
-    An equal frame of another node that arrives first counts as the echo, and the echo as that
-    frame.
+    If an equal frame of another node arrives before the echo, that frame counts as the echo. The
+    echo then counts as the frame of the other node.
     """
 
     def __init__(self) -> None:
@@ -71,7 +71,10 @@ class EchoFreeLink:
         self._link.send(traffic)
 
     def receive(self, timeout_us: int, /) -> Frames:
-        """Return frames of others; empty, possibly early, if there were only echoes."""
+        """Return frames of others.
+
+        If only echoes arrive, return no frames, possibly before the timeout.
+        """
         return tuple(frame for _, frame in self.receive_stamped(timeout_us)[1])
 
     def receive_stamped(self, timeout_us: int, /) -> tuple[int, StampedFrames]:

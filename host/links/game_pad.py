@@ -13,7 +13,7 @@ EV_ABS: Final = 0x03
 ABS_X: Final = 0x00
 ABS_Y: Final = 0x01
 ABS_RX: Final = 0x03
-"""Codes of the kernel's input-event-codes: left stick across and along, right stick across."""
+"""Codes of the kernel's input-event-codes: left stick sideways and forward, right stick sideways."""
 
 _Range = tuple[int, int]
 
@@ -31,7 +31,7 @@ class Axes:
     """Positions of the sticks, and pressed buttons.
 
     Attributes:
-        ranges: least and most value of each axis that the pad has.
+        ranges: lowest and highest value of each axis that the pad has.
         held: codes of the buttons that are held.
     """
 
@@ -50,7 +50,10 @@ class Axes:
 
     @property
     def hand(self) -> StickPosition:
-        """Left stick along is forward, across is turning; right stick across is sideways."""
+        """Return the deflection.
+
+        The left stick gives driving forward and turning; the right stick gives driving sideways.
+        """
         across, along = self._values.get(ABS_X, 0.0), self._values.get(ABS_Y, 0.0)
         return StickPosition(-along + 0.0, -self._values.get(ABS_RX, 0.0) + 0.0, -across + 0.0)
 

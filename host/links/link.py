@@ -21,7 +21,9 @@ TRACEBACK: Final = "Traceback (most recent call last)"
 
 
 def first_line(error: BaseException) -> str:
-    r"""Return the text of an error in one line, without a traceback; its type if it has no text.
+    r"""Return the text of an error in one line, without a traceback.
+
+    If the error has no text, return the name of its type.
 
     >>> first_line(ValueError("bad frame\nTraceback (most recent call last):\n  File x"))
     'bad frame'
@@ -41,7 +43,7 @@ class LinkTimeout(LinkError, TimeoutError):  # noqa: N818 - a timeout, as the bu
 
 
 class LinkClosed(LinkError, ConnectionError):  # noqa: N818 - a state of the link
-    """The line is gone: cable out, port closed, emulator ended."""
+    """The line is gone: the cable is unplugged, the port is closed, or the emulator has ended."""
 
 
 class DeviceRefused(Exception):  # noqa: N818 - what the device did
@@ -68,8 +70,8 @@ W = TypeVar("W")  # traffic: bytes on a line, tuple[CanFrame, ...] on CAN
 class Link(Protocol[W]):
     """The wire of a proxy, with its clock.
 
-    A proxy reads the time from its link, never from the machine: on a rig in virtual time the same
-    proxy waits a minute in a millisecond.
+    A proxy reads the time from its link, never from the clock of the machine. On a rig in virtual
+    time the same proxy waits a minute of virtual time within a millisecond.
     """
 
     @property
@@ -142,8 +144,8 @@ class Closing(ABC):
 class ReopeningLink(Generic[W]):
     """A `Link` that opens a new link after its line was lost.
 
-    A lost line raises LinkClosed once, as in every link. Each later `send` tries to reopen it: a
-    cable may be plugged in again, an emulator restarted.
+    A lost line raises LinkClosed once, as in every link. Each later `send` tries to reopen the
+    line, for example after the cable is plugged in again or the emulator is restarted.
 
     Args:
         open_link: opens the line; called at once.
@@ -162,7 +164,10 @@ class ReopeningLink(Generic[W]):
         return self._link.now_us
 
     def send(self, traffic: W, /) -> None:
-        """Send traffic, on a new link if the line was lost; LinkClosed if it cannot be opened."""
+        """Send traffic, on a new link if the line was lost.
+
+        Raises LinkClosed if the new link cannot be opened.
+        """
         # Only sending opens again: a reader in a loop would try as often as it looks.
         if self._gone and not self._closed:
             self._link, self._gone = self._open_link(), False

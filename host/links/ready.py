@@ -1,4 +1,4 @@
-"""Waits for any number of descriptors: `select` supports only those below 1024.
+"""Waits for any number of descriptors, because `select` supports only descriptors below 1024.
 
 >>> import os
 >>> reader, writer = os.pipe()
@@ -55,11 +55,12 @@ def ready(
 
     Args:
         readers: descriptors, or objects with one.
-        writers: the same.
+        writers: descriptors, or objects with one.
         wait_s: longest wait in s; None without limit.
 
     Returns:
-        Those that can be read, and those that can be written, including broken ones.
+        The descriptors that can be read, and the descriptors that can be written; both lists
+        include broken descriptors.
 
     Raises:
         OSError: a descriptor is closed.
@@ -135,9 +136,10 @@ _T = TypeVar("_T")
 class WaitingQueue(Generic[_T]):
     """A queue for one reading thread and any writing threads.
 
-    `queue.SimpleQueue` waits without end (CPython 3.11) if its timeout has passed before it checks
-    again: after a signal, or if its lock happens to be free. Ctrl-C in the middle of `queue.Queue`
-    and `threading.Event` can leave their lock taken.
+    The queues of Python are not suitable. `queue.SimpleQueue` waits without end (CPython 3.11) if
+    its timeout has passed before it checks again. This happens after a signal, or if its lock
+    happens to be free. Ctrl-C in the middle of a call of `queue.Queue` or `threading.Event` can
+    leave the lock of the object taken.
     """
 
     def __init__(self) -> None:

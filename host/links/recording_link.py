@@ -21,14 +21,15 @@ _WIRE: Final = "wire"
 class RecordingLink(Generic[W]):
     """A `Link` that records its traffic in both directions in a trace, for `tickrig compare`.
 
-    Each line is written at once, so that a kill loses nothing; if writing fails, the recording ends
-    with one warning, and the link continues. Two threads may use it, one of them to send.
+    Each line is written at once, so that no line is lost if the process is killed. If writing
+    fails, the recording ends with one warning, and the link continues. Two threads may use the link
+    at the same time, one of them to send.
 
     Args:
         link: the link, of bytes or frames.
         path: the file; an existing one is replaced.
-        name: name of the device in it; for frames, of the bus.
-        type: device type, such as `rrc`, if known.
+        name: name of the device in the trace; for frames, the name of the bus.
+        type: device type, such as `rrc`; empty if unknown.
 
     Raises:
         OSError: the file cannot be opened.
@@ -115,7 +116,7 @@ class RecordingLink(Generic[W]):
         """Record a manual action on the device.
 
         Args:
-            name: of the physical input, such as `power_button`.
+            name: name of the physical input, such as `power_button`.
             value: its new value.
         """
         self._write(self._link.now_us, Mark.PHYSICAL, text=change_text(name, value))

@@ -30,10 +30,10 @@ def tune(connection: socket.socket) -> None:
     """Send each write at once, and detect a vanished machine after 25 s.
 
     Args:
-        connection: of TCP.
+        connection: a TCP connection.
 
     Raises:
-        OSError: it is closed, or not a TCP connection.
+        OSError: the connection is closed, or is not a TCP connection.
     """
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
@@ -46,10 +46,10 @@ def _give_up_unanswered(connection: socket.socket) -> None:
     """End a connection if the other machine has not acknowledged sent data for 25 s.
 
     Args:
-        connection: of TCP.
+        connection: a TCP connection.
 
     Raises:
-        OSError: it is closed, or not a TCP connection.
+        OSError: the connection is closed, or is not a TCP connection.
     """
     if sys.platform == "linux":
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, _UNANSWERED_MS)
@@ -66,10 +66,13 @@ _WRITE_S: Final = 1.0
 class _Rfc2217Serial(rfc2217.Serial):
     """A serial port of another machine (RFC 2217).
 
-    pyserial negotiates all settings when one is changed, which takes at least 50 ms; it does so
-    even for a time-out, which does not concern the other end. If the other end refuses with a line
-    of text, as ser2net and ours do, it ignores the line. And it discards data received before a
-    connection ended.
+    This class avoids three problems of pyserial:
+
+    - When one setting is changed, pyserial negotiates all settings, which takes at least 50 ms. It
+      does so even for a time-out, which does not concern the other end.
+    - If the other end refuses with a line of text, as ser2net and tickrig do, pyserial ignores the
+      line.
+    - When a connection ends, pyserial discards data received before.
 
     Args and attributes are those of `serial.Serial`; `write_timeout` cannot be set.
     """
@@ -80,7 +83,8 @@ class _Rfc2217Serial(rfc2217.Serial):
         """Open the port.
 
         Raises:
-            SerialException: no server, or one without RFC 2217; the message has its answer.
+            SerialException: no server answers, or the server does not support RFC 2217. The message
+                contains the answer of the server.
         """
         self._agreed = None
         try:
@@ -102,10 +106,10 @@ class _Rfc2217Serial(rfc2217.Serial):
             connection.close()
 
     def read(self, size: int = 1) -> bytes:
-        """Return up to `size` bytes, fewer if the time-out is over or the connection has ended.
+        """Return up to `size` bytes; fewer after the time-out, or if the connection has ended.
 
         Raises:
-            SerialException: it has ended, and all received data were read.
+            SerialException: the connection has ended, and all received data were read.
         """
         if not self.is_open or (queue := self._queue) is None:
             raise PortNotOpenError
@@ -122,7 +126,7 @@ class _Rfc2217Serial(rfc2217.Serial):
         return bytes(received)
 
     def _telnet_read_loop(self) -> None:
-        """Receive data in a thread; invalid telnet data end it like a closed connection."""
+        """Receive data in a thread; end at invalid telnet data as at a closed connection."""
         try:
             with suppress(TypeError, OSError):
                 super()._telnet_read_loop()  # type: ignore[misc] # not in typeshed
@@ -157,8 +161,8 @@ class SerialLink:
         url: a device path or pyserial URL: `/dev/ttyACM0`, `COM3`,
             `socket://host:port`, `rfc2217://host:port`, `loop://`.
         baud: bit rate in bit/s, 8N1.
-        exclusive: whether to lock the port by flock, as pyserial's own tools do; two readers would
-            each get a part of the data.
+        exclusive: whether to lock the port by flock, as pyserial's own tools do. Without the lock,
+            two readers would each get a part of the data.
 
     Raises:
         LinkClosed: the port cannot be opened, or another program uses it.
@@ -232,7 +236,7 @@ class SerialLink:
 
 
 def _open_port(url: str, baud: int, *, exclusive: bool) -> serial.Serial | _Rfc2217Serial:
-    """Open a pyserial URL; for RFC 2217 with our additions."""
+    """Open a pyserial URL; use `_Rfc2217Serial` for RFC 2217."""
     if not url.startswith("rfc2217:"):
         return serial.serial_for_url(
             url, baudrate=baud, timeout=0, write_timeout=1, exclusive=exclusive or None
@@ -293,7 +297,10 @@ if sys.platform != "win32":
         return command if len(command) <= _COMMAND_SHOWN else f"{command[:_COMMAND_SHOWN]}..."
 
     def _remedy(path: str) -> str:
-        """Return how to get access: by the group of the file, if that may read and write."""
+        """Return how to get access to the port.
+
+        The advice is to join the group of the file, if this group may read and write the file.
+        """
         import grp  # noqa: PLC0415 - not on Windows, which has no such files either
 
         try:

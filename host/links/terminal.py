@@ -19,16 +19,16 @@ _CONTROL_CHARACTERS: Final = 6
 def take_keys(descriptor: int) -> Callable[[], None]:
     """Make a terminal return each key at once without echo; reading never blocks.
 
-    Ctrl-Z is disabled, because it would leave the terminal in this mode.
+    Ctrl-Z is disabled, because a program stopped by it would leave the terminal in this mode.
 
     Args:
         descriptor: of the terminal.
 
     Returns:
-        A function that restores the terminal, unless it is gone.
+        A function that restores the terminal; it does nothing if the terminal is gone.
 
     Raises:
-        OSError: it is not a terminal, or the system has no POSIX terminals (Windows).
+        OSError: the descriptor is not a terminal, or the system has no POSIX terminals (Windows).
     """
     if sys.platform == "win32":
         raise OSError(errno.ENOTTY, "keys are read of POSIX terminals alone")
@@ -60,18 +60,19 @@ _LOOK_S: Final = 0.5
 
 
 class TerminalOutput:
-    """Writes to a terminal from its own thread, so that a stuck one blocks nothing else.
+    """Writes to a terminal in its own thread, so that a stuck terminal does not block the program.
 
     A terminal is stuck while its program is stopped, or its connection hangs. Text that does not
     fit into the queue is dropped.
 
     Args:
-        descriptor: of the terminal; a duplicate of it is written to.
-        caught_up: called from that thread when all is written and some text was dropped before.
+        descriptor: descriptor of the terminal; the text is written to a duplicate of it.
+        caught_up: called from that thread when all text is written and some text was dropped
+            before.
         lost: called from that thread when the terminal is gone.
 
     Attributes:
-        gone: the terminal is gone.
+        gone: whether the terminal is gone.
     """
 
     def __init__(
@@ -100,7 +101,7 @@ class TerminalOutput:
             return self._changed.wait_for(lambda: not self.is_behind, within_s)
 
     def write(self, text: str, *, last: bool = False) -> None:
-        """Queue a text; the last ones are never dropped."""
+        """Queue a text; the last texts are never dropped."""
         data = text.encode("utf-8", "replace")
         with self._changed:
             if self.gone:

@@ -1,4 +1,4 @@
-"""A chair behind an RRC: protected, driven while a dead-man key is held, stopped at the end."""
+"""A chair with an RRC: protected, driven while a dead-man key is held, stopped at the end."""
 
 from __future__ import annotations
 
@@ -48,17 +48,17 @@ DEAD_MAN_US: Final = 1_000_000
 STEP_US: Final = 20_000
 _RESEND_US: Final = 100_000
 _SILENT_US: Final = 300_000
-"""Status lines come each 10 ms; after this time without one, the RRC counts as silent."""
+"""Time without a status line after which the RRC counts as silent; status lines come each 10 ms."""
 
 _ASK_US: Final = 1_000_000
-"""VR2 that is off sends no status lines; after so long without one, the RRC is asked."""
+"""Time without a status line after which the RRC is queried: it sends none while VR2 is off."""
 
 _TAKEN_US: Final = 200_000
 """Time after which a status line shows a command."""
 
 _STOP_TRIES: Final = 3
 _MEET_TRIES: Final = 3
-"""How often an RRC is asked that has answered once: a busy machine hands answers on late."""
+"""How often to query an RRC that has answered once: a busy machine delivers answers late."""
 
 _KEPT_BYTES: Final = 4_096
 _SHOWN_BYTES: Final = 40
@@ -71,10 +71,10 @@ _STOPS: Final = frozenset(
 
 
 class ChairStopped(Exception):  # noqa: N818 - what happened
-    """VR2 is off, or it was stopped.
+    """VR2 is off, or was stopped.
 
     Attributes:
-        kind: the event that reported it, None without one.
+        kind: the event that reported this, None if there was no event.
     """
 
     def __init__(self, message: str, kind: RrcEvent | None = None) -> None:
@@ -151,10 +151,10 @@ class _OpeningLink:
 
 
 class Chair(Closing):
-    """An RRC under a guard; the end of a `with` block stops the motors.
+    """An RRC protected by a guard; the end of a `with` block stops the motors.
 
     Args:
-        link: the line, open; it is closed at the end.
+        link: the open line; the chair closes it at the end.
         guard: what protects the chair.
 
     Attributes:
@@ -195,7 +195,7 @@ class Chair(Closing):
             self.client.status()
 
     def _meet(self, opening: _OpeningLink) -> None:
-        """Contact the RRC; a line with an echo does not answer OK:device."""
+        """Contact the RRC and check its answer; a line with an echo does not answer OK:device."""
         failure: Exception | None = None
         for _ in range(_MEET_TRIES):
             try:
@@ -249,7 +249,7 @@ class Chair(Closing):
             client.watchdog(0)
 
     def status(self) -> StatusA | None:
-        """Switch status lines on and return one; None if VR2 is off."""
+        """Switch status lines on and return the next status line; None if VR2 is off."""
         if self._status_since_us is None:
             self._status_since_us = self.client.now_us
             self.client.status()
@@ -302,7 +302,7 @@ class Chair(Closing):
             self.client.speedmode(speed_mode)
 
     def watch(self) -> list[Arrival[Event]]:
-        """Check lines since the last call; return the events that do not end the drive.
+        """Check lines received since the last call; return the events that do not end the drive.
 
         Raises:
             ChairStopped: VR2 was stopped, or deviates from the command.
@@ -350,14 +350,14 @@ class Chair(Closing):
         self._asked_us = self.client.now_us
 
     def stay_silent(self, kind: RrcEvent, most_us: int) -> int | None:
-        """Send nothing until an event arrives, like a hanging program; then resume sending.
+        """Stop sending until an event arrives, like a program that hangs; then resume sending.
 
         Args:
             kind: the event.
             most_us: longest wait.
 
         Returns:
-            The waiting time; None after the time-out.
+            How long the event took; None after the time-out.
         """
         lines, began_us = LineSplitter(), self.client.now_us
         wanted = Event(kind).encode().removesuffix(b"\n")
@@ -371,7 +371,10 @@ class Chair(Closing):
         return None
 
     def stop(self) -> None:
-        """Stop the motors, confirmed by a status line; switch VR2 off without confirmation."""
+        """Stop the motors, and wait for a status line that confirms it.
+
+        Without this confirmation, switch VR2 off.
+        """
         if not self.moved:
             return
         for _ in range(_STOP_TRIES):
@@ -394,7 +397,11 @@ class Chair(Closing):
         self._power_off()
 
     def _stands(self) -> bool:
-        """Wait for a status line whose output is 0; with stablemode a lost line has no reply."""
+        """Wait for a status line whose output is 0.
+
+        With stablemode the RRC does not reply to a lost line, so only a status line confirms the
+        stop.
+        """
         since_us = self.client.now_us
         while self.client.now_us < since_us + _TAKEN_US:
             self.client.run_for(STEP_US)

@@ -1,4 +1,4 @@
-"""The line to one RRC: its pace, the watchdog's renewal, the stop after refusals.
+"""The line to one RRC: pace of sending, renewal of the watchdog, stop after refusals.
 
 Errors besides LinkTimeout and LinkClosed:
 
@@ -108,7 +108,7 @@ class RrcRefused(DeviceRefused):
 class RrcStopped(DeviceRefused):
     """The RRC refused too many times in a row, and the client has stopped sending.
 
-    It ends with EV:Initialized, EV:PowerOffFinished or `RrcClient.resume()`.
+    The client sends again after EV:Initialized, EV:PowerOffFinished or `RrcClient.resume()`.
 
     Attributes:
         code: the last reason.
@@ -128,7 +128,7 @@ _REPLY_US: Final = message.REPLY_PCT * _PCT_US
 _SECOND_US: Final = 1_000_000
 
 _RENEWALS: Final = 3
-"""The watchdog is renewed this many times in its time: one renewal may be lost."""
+"""Number of renewals within the time of the watchdog, so that one renewal may be lost."""
 
 _FORGETTING: Final = (RrcEvent.POWER_OFF_FINISHED, RrcEvent.INITIALIZED)
 """Events after which the RRC has lost its settings (RRC manual, notes)."""
@@ -140,11 +140,11 @@ _log = log_of(__name__)
 class RrcLoad:
     """The load of an RRC with running VR2, from the client's lines of the latest second.
 
-    Lines of others to the same RRC are not included.
+    Lines that other programs send to the same RRC are not included.
 
     Attributes:
-        load_pct: its work in per cent of its time: 30 of its own, plus the cost of the lines.
-        margin_pct: the remainder to 100. The client leaves 10 or more.
+        load_pct: its load in per cent: 30 for its own work, plus the cost of the lines.
+        margin_pct: the remainder to 100; the client leaves 10 or more.
         pace_lines_s: largest number of lines per second without waiting for answers.
     """
 
@@ -156,17 +156,19 @@ class RrcLoad:
 class Channel:
     """Sends commands at the RRC's pace and assigns every received line to its owner.
 
-    The watchdog is renewed by sending `watchdog` again with the same value: the
-    one command that changes nothing, and with stablemode it has no answer. That
-    happens only while the program waits in the client: one that hangs lets the
-    watchdog trip. Every command that is not refused renews it too, so a renewal
-    of its own is due only when nothing else was sent for a third of the time.
+    To renew the watchdog, the channel sends `watchdog` again with the same value. This is the only
+    command that changes no setting. With stablemode the RRC does not answer it. The channel renews
+    the watchdog only while the program waits in the client. If the program hangs, the watchdog
+    trips.
+
+    Every other command that is not refused also renews the watchdog. Therefore the channel sends
+    `watchdog` only if no other command was sent for a third of the time.
 
     Args:
         link: the line.
-        inbox: keeps lines without a waiting request.
-        max_refusals: number of refusals in a row that is too many, 1 or more.
-        on_refusals: the reaction.
+        inbox: keeps the lines that no request waits for.
+        max_refusals: number of refusals in a row after which the channel stops, 1 or more.
+        on_refusals: the reaction to too many refusals.
 
     Attributes:
         matcher: state of the RRC and of the commands sent to it.
@@ -268,9 +270,9 @@ class Channel:
         return data
 
     def _wait_turn(self, command: Command) -> None:
-        """Wait until the RRC has time and each OK has one owner.
+        """Wait until the RRC has time, and until each OK belongs to only one command.
 
-        `poweroff` never waits, and always may be sent.
+        `poweroff` never waits, and may always be sent.
         """
         # It must not wait for pace or doubt: it is the way to stop.
         if isinstance(command, PowerOff):

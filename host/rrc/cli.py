@@ -31,8 +31,8 @@ class RrcCall:
     """Options before the verb.
 
     Attributes:
-        url: of the port; empty if none was given.
-        watchdog_us: of the RRC, 0 is off.
+        url: URL of the port; empty if none was given.
+        watchdog_us: time of the watchdog of the RRC; 0 is off.
         stable: whether stablemode is switched on.
         pad: path of a game pad, None without one.
     """

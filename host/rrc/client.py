@@ -28,32 +28,32 @@ _T = TypeVar("_T")
 
 
 class RrcClient(Closing):
-    """A synchronous client of a Robotic Relay Communicator; nothing runs in the background.
+    """A synchronous client of a Robotic Relay Communicator, without a background thread.
 
-    Time passes only in these calls. While a watchdog is set, each of them renews it in time; a
-    hanging program does not, and the watchdog stops VR2.
+    Time passes only in the calls of this client. While a watchdog is set, each call renews it in
+    time. A program that hangs does not renew the watchdog, and the watchdog stops VR2.
 
-    After `max_refusals` ER lines in a row for one command the client raises
-    RrcStopped and sends only `poweroff`, until the RRC is
-    initialized again or `resume` is called. Values out of range raise
-    `BadParameters` (a ValueError) before anything is sent. Every method that
-    sends a command raises what `command` raises.
+    After `max_refusals` ER lines in a row for one command the client raises RrcStopped. It then
+    sends only `poweroff`, until the RRC is initialized again or `resume` is called.
 
-    It leaves the RRC a tenth of its time: a call may wait 6.25 ms for each line sent before, and
-    3.75 ms for each answer. `load` returns the resulting load of the RRC.
+    Values out of range raise `BadParameters` (a ValueError) before the command is sent. Every
+    method that sends a command raises the same errors as `command`.
 
-    Not checked: that the RRC received the values as they were sent. CHECK does not detect exchanged
-    characters; compare with `statuses` if it matters.
+    The client leaves the RRC a tenth of its time. Therefore a call may wait 6.25 ms for each line
+    sent before, and 3.75 ms for each answer. `load` returns the resulting load of the RRC.
+
+    The client does not check that the RRC received the values as they were sent. CHECK does not
+    detect exchanged characters. If this matters, compare the values with `statuses`.
 
     Args:
-        link: the line, open; the client closes it.
+        link: the open line; the client closes it.
         timeout_us: how long to wait for the answer to a command, us.
-        max_refusals: number of refusals in a row that is too many, 1 or more.
-        on_refusals: the reaction.
+        max_refusals: number of refusals in a row after which the client stops, 1 or more.
+        on_refusals: the reaction to too many refusals.
         on_unknown: called with each line that the manual does not list.
 
     Attributes:
-        unknown: the latest of these lines.
+        unknown: the latest lines that the manual does not list.
 
     Raises:
         ValueError: `max_refusals` is below 1.
@@ -97,10 +97,10 @@ class RrcClient(Closing):
         return client
 
     def start(self) -> None:
-        """Start as the manual's notes advise: dummy command, wait, empty the buffer.
+        """Start as the manual advises: send a dummy command, wait, empty the buffer.
 
-        Afterwards it is known whether an earlier program left stablemode on. Lines received before
-        are dropped, including events.
+        Afterwards the client knows whether an earlier program left stablemode on. Lines received
+        before the start are dropped, including events.
 
         Raises:
             LinkTimeout: no RRC answers.
@@ -169,16 +169,16 @@ class RrcClient(Closing):
 
         Args:
             command: the command.
-            confirm: False to send it without waiting, for a stream; later ERs count. By default all
-                commands are confirmed, except `output` with stablemode on; `stablemode` is always
-                confirmed.
+            confirm: False to send the command without waiting, for a stream of commands; an ER that
+                arrives later counts as a refusal. By default the client waits for all commands
+                except `output` with stablemode on. It always waits for `stablemode`.
 
         Returns:
-            The answer to `device`, `version` or `date`, empty for the others.
+            The answer to `device`, `version` or `date`; empty for other commands.
 
         Raises:
             RrcRefused: the RRC answered ER.
-            LinkTimeout: it did not answer.
+            LinkTimeout: the RRC did not answer.
             RrcStopped: there were too many refusals.
             LinkClosed: the line is gone.
         """
@@ -193,7 +193,7 @@ class RrcClient(Closing):
         """Wait for a time, and receive lines.
 
         Args:
-            duration_us: duration; 0 only reads available lines.
+            duration_us: how long to wait; 0 only reads available lines.
 
         Raises:
             LinkClosed: the line is gone.
@@ -207,10 +207,10 @@ class RrcClient(Closing):
         """Yield events, the oldest one first.
 
         Args:
-            timeout_us: longest wait for each; then the iteration ends.
+            timeout_us: longest wait for each event; then the iteration ends.
 
         Yields:
-            Events, with the time at which they arrived.
+            Each event, with the time at which it arrived.
         """
         return self._drain(self._inbox.events, timeout_us)
 
@@ -218,15 +218,15 @@ class RrcClient(Closing):
         """Yield status lines, the oldest one first.
 
         Args:
-            timeout_us: longest wait for each; then the iteration ends.
+            timeout_us: longest wait for each status line; then the iteration ends.
 
         Yields:
-            Status lines, with the time at which they arrived.
+            Each status line, with the time at which it arrived.
         """
         return self._drain(self._inbox.statuses, timeout_us)
 
     def wait_for(self, kind: RrcEvent, timeout_us: int) -> Arrival[Event]:
-        """Return the first event of a kind; one received before the call counts.
+        """Return the first event of a kind; an event received before the call also counts.
 
         Args:
             kind: the event.
@@ -236,7 +236,7 @@ class RrcClient(Closing):
             The event, with the time at which it arrived.
 
         Raises:
-            LinkTimeout: no such event; the other events are kept.
+            LinkTimeout: no such event arrived; the other events are kept.
         """
         events = self._inbox.events
         until_us = self._link.now_us + timeout_us
@@ -279,8 +279,8 @@ class RrcClient(Closing):
         Args:
             v_pct: translation.
             w_pct: rotation.
-            confirm: whether to wait for its confirmation. By default it waits without stablemode,
-                and streams with it.
+            confirm: whether to wait for the confirmation. By default the client waits with
+                stablemode off, and does not wait with stablemode on.
         """
         self.command(cmd.Output(v_pct, w_pct), confirm=confirm)
 
@@ -301,12 +301,12 @@ class RrcClient(Closing):
 
         Args:
             mode: 1 (slowest) to 5.
-            locked: whether the buttons of the stick that change it are locked.
+            locked: whether to lock the buttons of the stick that change the speed mode.
         """
         self.command(cmd.SpeedMode(mode, int(locked)))
 
     def joystick(self, shape: cmd.Joystick) -> None:
-        """Shape the stick.
+        """Set how the stick responds.
 
         Args:
             shape: the ten parameters of the command, by name.
@@ -316,7 +316,7 @@ class RrcClient(Closing):
     def watchdog(self, time_us: int) -> None:
         """Make the RRC stop VR2 after a time without a command.
 
-        From then on the client renews it in each of its calls.
+        From then on the client renews the watchdog in each of its calls.
 
         Args:
             time_us: 0..2_550_000 us, a multiple of 10_000 us; 0 is off.
@@ -327,7 +327,9 @@ class RrcClient(Closing):
         self.command(cmd.Watchdog(_units(time_us)))
 
     def stablemode(self, *, on: bool = True) -> None:
-        """Switch stablemode: CHECK on each line, appended by the client, and no OK lines.
+        """Switch stablemode on or off.
+
+        With stablemode the client appends CHECK to each line, and the RRC sends no OK lines.
 
         Args:
             on: False to switch it off.
@@ -335,7 +337,7 @@ class RrcClient(Closing):
         self.command(cmd.StableMode(int(on)))
 
     def status(self, *, on: bool = True) -> None:
-        """Switch the stream of status lines, one each 10 ms while VR2 is on.
+        """Switch the stream of status lines on or off: one each 10 ms while VR2 is on.
 
         Args:
             on: False to switch it off.
@@ -350,8 +352,8 @@ class RrcClient(Closing):
         """Sound the buzzer.
 
         Args:
-            times_us: durations of on, off, on, ...: up to ten times of 0..2_550_000 us, multiples
-                of 10_000 us.
+            times_us: durations of on, off, on and so on: up to ten times of 0..2_550_000 us, each a
+                multiple of 10_000 us.
 
         Raises:
             ValueError: a time out of range.
@@ -360,10 +362,10 @@ class RrcClient(Closing):
         self.command(cmd.Beep(times + (0,) * (10 - len(times))))
 
     def drive_by_host(self, v_pct: int, w_pct: int) -> None:
-        """Send `output`, preceded by the slowest speed mode if the stick was driving.
+        """Send `output`; before it, select the slowest speed mode if the stick was driving.
 
-        The manual advises it for every change between limit and output. The
-        first output is confirmed. Select the speed mode again afterwards.
+        The manual advises this for every change between limit and output. The client waits for the
+        confirmation of the first output. Select the speed mode again afterwards.
 
         Args:
             v_pct: translation, -100..100 %, forward positive.
@@ -380,9 +382,9 @@ class RrcClient(Closing):
         product_pct: int = 255,
         radius_pct: int = 255,
     ) -> None:
-        """Send `limit`, preceded by the slowest speed mode if the host was driving.
+        """Send `limit`; before it, select the slowest speed mode if the host was driving.
 
-        Its arguments are those of `limit`: v_pct, w_pct, sum_pct, product_pct, radius_pct.
+        The arguments are the arguments of `limit`: v_pct, w_pct, sum_pct, product_pct, radius_pct.
         """
         self._slow_down_before(cmd.Limit)
         self.limit(v_pct, w_pct, sum_pct, product_pct, radius_pct)
