@@ -1,6 +1,6 @@
-"""What all panels share: the frame, the keys at the foot, lines of text.
+"""Common parts of all panels: the frame, the keys at the foot, lines of text.
 
-Lines of text that are painted one by one: the live tables of all panels.
+The live tables of all panels are lines of text that are painted one by one.
 
 A table of Textual takes eight times as long to paint.
 
@@ -59,7 +59,7 @@ def line_text(line: Line) -> str:
 
 
 def line_width(line: Line) -> int:
-    """Return how many cells it takes; a wide character takes two."""
+    """Return how many cells a text takes; a wide character takes two cells."""
     return sum(cell_len(text) for text, _ in line)
 
 
@@ -75,12 +75,12 @@ _HEIGHT_BITS: Final = 6
 class LineView(ScrollView, can_focus=True):
     """Shows lines; only changed lines are painted again.
 
-    Of many lines, only those around the visible ones are needed.
+    If there are many lines, the view needs only the lines around the visible ones.
 
     Attributes:
-        lines: the lines that it has.
-        begin: the number of the first of them, from 0.
-        follows: whether the last line stays visible: the user has not scrolled up.
+        lines: the lines that the view has.
+        begin: the number of the first of these lines, counted from 0.
+        follows: whether the last line stays visible, because the user has not scrolled up.
     """
 
     DEFAULT_CSS = "LineView { scrollbar-size-horizontal: 0; }"
@@ -121,9 +121,9 @@ class LineView(ScrollView, can_focus=True):
         """Show lines.
 
         Args:
-            lines: those that are there.
-            begin: the number of the first of them.
-            total: how many there are in all; as many as there are here if it is not given.
+            lines: the lines that the view gets.
+            begin: the number of the first of these lines.
+            total: the number of all lines; by default the number of `lines`.
         """
         before, was = self.lines, self.begin
         self.lines, self.begin = list(lines), begin
@@ -150,7 +150,7 @@ class LineView(ScrollView, can_focus=True):
             self.post_message(self.Moved())
 
     def scroll_to(self, x: float | None = None, y: float | None = None, **how: Any) -> None:
-        """Scroll at once: what is animated, the next picture would undo."""
+        """Scroll without animation; the next update of the screen would undo an animation."""
         if y is not None and not how.get("force"):  # the user scrolls; the screen may be moving
             self.follows = y >= self.max_scroll_y
         super().scroll_to(x, y, **{**how, "animate": False})
@@ -178,12 +178,12 @@ class LineView(ScrollView, can_focus=True):
         return strip
 
     def line_at(self, number: int) -> Line:
-        """Return a line by its number; an empty one if it is not there."""
+        """Return a line by its number; an empty line if the view does not have this line."""
         return _at(self.lines, number - self.begin)
 
 
 def rounded_up(total: int) -> int:
-    """Return a height that seldom changes while lines come: to lay out a screen takes long.
+    """Return a height that seldom changes while lines arrive, because a new layout takes long.
 
     >>> rounded_up(50), rounded_up(1_001), rounded_up(100_000)
     (50, 1008, 100352)
@@ -193,7 +193,7 @@ def rounded_up(total: int) -> int:
 
 
 def line_strip(line: Line, base: Style, left: int, width: int) -> Strip:
-    """Return a line as it is painted: from a column on, filled up to a width."""
+    """Return a line as it is painted: from a given column on, padded to a given width."""
     if line_width(line) != len(line_text(line)):
         whole = Strip([Segment(in_cells(text), _style_on(base, style)) for text, style in line])
         return whole.crop(left, left + width).adjust_cell_length(width, base)
@@ -239,7 +239,10 @@ class Key(NamedTuple):
 
 
 def key_rows(keys: Iterable[Key], width: int) -> list[list[Key]]:
-    """Return the keys on lines of a width, a blank between two; none is cut or left out."""
+    """Return the keys on lines of a given width, with a blank between two keys.
+
+    All keys are shown in full.
+    """
     rows: list[list[Key]] = [[]]
     left = width
     for key in keys:
@@ -252,7 +255,7 @@ def key_rows(keys: Iterable[Key], width: int) -> list[list[Key]]:
 
 
 def key_at(row: Iterable[Key], column: int) -> Key | None:
-    """Return the key that stands in a column of a line; None between two and behind them."""
+    """Return the key at a column of a line; None between two keys and after the last key."""
     for key in row:
         if 0 <= column < len(key.text):
             return key
@@ -263,7 +266,7 @@ def key_at(row: Iterable[Key], column: int) -> Key | None:
 class KeyFooter(Widget):
     """Shows each key that is bound here and not hidden; a click presses it.
 
-    Textual's own has one line, and cuts what does not fit.
+    The footer of Textual has one line, and cuts keys that do not fit.
     """
 
     COMPONENT_CLASSES = {"keyfooter--key"}  # noqa: RUF012 - Textual's name, never changed
@@ -333,7 +336,10 @@ _POSIX_DRIVER: Final = "LinuxDriver"
 
 
 class _Harmless(LineFilter):
-    """Lets no text command the terminal: the codes of Textual are not among what it sees."""
+    """Replaces control codes in text for the terminal.
+
+    The codes that Textual itself sends do not pass this filter.
+    """
 
     def apply(self, segments: list[Segment], background: Color) -> list[Segment]:
         """Return pieces of as many characters, all of which are seen."""
@@ -349,10 +355,10 @@ _HARMLESS: Final = _Harmless()
 
 
 class FramedApp(App[None]):
-    """F1 shows and hides help, Escape hides it; q, Ctrl-Q, Ctrl-C and signals end it.
+    """F1 shows and hides help, Escape hides help; q, Ctrl-Q, Ctrl-C and signals end the app.
 
-    Ctrl-Q and Ctrl-C do so from anywhere, also while a question is on the screen. A terminal that
-    is gone ends it too.
+    Ctrl-Q and Ctrl-C work everywhere, also while a question is on the screen. The app also ends if
+    the terminal is gone.
     """
 
     BINDINGS: ClassVar[list[BindingType]] = [
@@ -397,7 +403,7 @@ class FramedApp(App[None]):
         return [*super().get_line_filters(), _HARMLESS]
 
     def notify(self, message: str, **how: Any) -> None:
-        """Show a message; brackets in what files and devices say are no markup."""
+        """Show a message; brackets in texts from files and devices are not markup."""
         super().notify(message, **{**how, "markup": False})
 
     @property
@@ -426,7 +432,7 @@ class FramedApp(App[None]):
 
 
 class _FramedDriver(Driver):
-    """The driver of a terminal that may take nothing, or go; mixed into that of Textual."""
+    """Mix-in for the driver of Textual, for a terminal that accepts no data or disappears."""
 
     _output: TerminalOutput | None = None
     _leaving = False
@@ -457,7 +463,7 @@ class _FramedDriver(Driver):
         super().stop_application_mode()  # type: ignore[safe-super] # of Textual's driver
 
     def close(self) -> None:
-        """End the output; a terminal that does not take it is given up."""
+        """End the output; drop the remaining output if the terminal does not accept it."""
         super().close()
         if self._output is not None and not self._output.close():
             give_up_terminals()

@@ -1,4 +1,4 @@
-"""A SCIP host that waits for nothing: ask, look for scans later."""
+"""A SCIP host that never blocks: it sends a request, and fetches the scans later."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from tickrig.wire.errors import WireError
 
 @dataclass(frozen=True, slots=True)
 class UrgScan:
-    """What a sensor measured in one turn.
+    """The measurements of a sensor in one turn.
 
     Attributes:
-        time_ms: its timer when the turn began, 24 bits.
-        first: step of the first number.
-        cluster: steps for each number.
-        distances_mm: as they came; what is below DMIN is a code, no distance.
+        time_ms: timer of the sensor at the start of the turn, 24 bits.
+        first: step of the first distance.
+        cluster: number of steps for each distance.
+        distances_mm: the distances as received; a value below DMIN is a code, not a distance.
         specification: limits and steps of the sensor.
     """
 
@@ -45,7 +45,7 @@ class UrgScan:
 
 
 _SILENCE_US: Final = 500_000
-"""How long there may be no good scan: five turns; more where scans are left out."""
+"""Longest time without a valid scan: five turns; longer if scans are skipped."""
 
 _ENDLESS: Final = 0
 _LEAVE_ADJUST: Final = "2"
@@ -54,9 +54,9 @@ _LEAVE_ADJUST: Final = "2"
 class UrgClient:
     """Reads the type of the sensor, starts continuous measurement, and receives its scans.
 
-    It first sends SCIP2.0 for a sensor in SCIP 1.1, and TM2 and QT to stop a measurement that an
-    earlier host has started. After the time of five scans without a valid one it starts again. A
-    garbled scan is skipped.
+    The client first sends SCIP2.0, for a sensor in SCIP 1.1. It then sends TM2 and QT to stop a
+    measurement that an earlier host has started. If no valid scan arrives within the time of five
+    scans, the client starts again. A garbled scan is skipped.
 
     Args:
         link: the line.
@@ -64,7 +64,7 @@ class UrgClient:
         interval: scans that are skipped after each one, 0..9.
 
     Attributes:
-        specification: the specification that the sensor sent, None before.
+        specification: the specification that the sensor sent, None before it arrives.
         garbled: number of garbled replies and scans.
         restarts: number of restarts.
     """
@@ -81,11 +81,11 @@ class UrgClient:
         return self._spoilt + self._splitter.garbled
 
     def poll(self) -> list[UrgScan]:
-        """Return the scans that have come.
+        """Return the scans that have arrived.
 
         Raises:
             LinkClosed: the line is gone.
-            DeviceRefused: the sensor has a trouble, or cannot do what was asked.
+            DeviceRefused: the sensor reports a fault, or cannot do what was requested.
         """
         scans, data = [], self._link.receive(0)
         for reply in self._splitter.push(data):

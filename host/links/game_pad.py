@@ -13,7 +13,7 @@ EV_ABS: Final = 0x03
 ABS_X: Final = 0x00
 ABS_Y: Final = 0x01
 ABS_RX: Final = 0x03
-"""Codes of the kernel's input-event-codes: left stick sideways and forward, right stick sideways."""
+"""Codes of the kernel's input-event-codes: left stick sideways, forward; right stick sideways."""
 
 _Range = tuple[int, int]
 

@@ -2,9 +2,10 @@ r"""Received lines of the RRC: split, read, sorted and stored.
 
 Exchanges: one command and the proof that the RRC processed it.
 
-Without stablemode that is `OK:name`. With stablemode there is no OK: a `device`
-query goes behind the command, and as the RRC takes one line after the other,
-its answer proves that the command was processed; an ER before it is the refusal.
+Without stablemode the proof is `OK:name`. With stablemode the RRC sends no OK. Therefore the client
+sends a `device` query after the command. The RRC processes one line after the other, so the answer
+to the query proves that the command was processed. An ER before this answer is the refusal of the
+command.
 
 >>> exchange = Exchange(Watchdog(100), stable=True)
 >>> exchange.lines
@@ -43,7 +44,7 @@ _STATUSES_KEPT: Final = 1_000  # 10 s
 UNKNOWN_KEPT: Final = 100
 
 _ANSWER: Final = re.compile(r"(?![A-Z]{2}:)[ -~]+")
-"""A bare line of text; `XX:...` is a message of newer firmware, not an answer."""
+"""A line of text as an answer; a line `XX:...` is a message of newer firmware, not an answer."""
 
 _T = TypeVar("_T")
 Answer = Ok | Refusal | Text
@@ -67,15 +68,15 @@ class Inbox:
     """Reads lines, stores events and status lines, and returns the others.
 
     Lines that the manual does not list, and SA lines that do not match their CHECK, are kept in
-    `unknown` and reported without an error: newer firmware and noisy lines cause them.
+    `unknown` and reported without an error. Newer firmware and noise on the line cause them.
 
     Args:
-        on_unknown: called with each of them.
+        on_unknown: called with each of these lines.
 
     Attributes:
         events: events not yet read.
         statuses: status lines not yet read.
-        latest_status: the newest one, read or not.
+        latest_status: the newest status line, whether it was read or not.
         unknown: the latest unknown lines.
     """
 

@@ -50,14 +50,16 @@ _STYLES: Final = {"<": "bold cyan", ">": "bold green", "!": "bold red"}
 class ChairPanel(FramedApp):
     """Drives and shows a chair.
 
-    Below 80 x 24 it draws no square for the aim; 60 x 15 is the least.
+    If the terminal is smaller than 80 x 24, the panel draws no square for the stick position. The
+    smallest usable size is 60 x 15.
 
     Args:
-        pilot: what the keys act on.
-        url: what is shown of the port.
+        pilot: the pilot that the keys control.
+        url: the port as shown on the screen.
 
     Attributes:
-        interrupted: Ctrl-C ended it. The terminal sends it as a key, not as a signal.
+        interrupted: whether Ctrl-C ended the panel. The terminal sends Ctrl-C as a key, not as a
+            signal.
     """
 
     ENABLE_COMMAND_PALETTE = False

@@ -34,7 +34,10 @@ class _PadStick(Protocol):
     """A stick with a dead-man button."""
 
     def poll(self, now_us: int, /) -> tuple[int, int]:
-        """Return the values to drive in per cent, 0 without a held button; ChairStopped if gone."""
+        """Return the values to drive in per cent, 0 while no button is held.
+
+        Raises ChairStopped if the pad is gone.
+        """
         ...
 
 
@@ -44,11 +47,11 @@ class PilotView:
 
     Attributes:
         now_us: the time.
-        drives: who drives.
+        drives: who drives the chair.
         aim_pct: values driven while the dead-man key is held.
-        held: whether it is held.
-        speed_mode: the chosen one.
-        most_pct: limit of the stick.
+        held: whether the dead-man key is held.
+        speed_mode: the chosen speed mode.
+        most_pct: the limit of the stick, in per cent.
         status: the latest status line, None while VR2 is off.
         load: load of the RRC by this program.
         lines: events and actions, `(time, mark, text)`.
@@ -69,8 +72,8 @@ class Pilot:
     """Steps a chair in one thread, while another one controls and reads it.
 
     Args:
-        chair: protected.
-        pad: a game pad in place of the keys.
+        chair: the chair, protected by a guard.
+        pad: a game pad that is used instead of the keys.
 
     Attributes:
         view: the present state.

@@ -62,10 +62,10 @@ class StepResult:
 
     Attributes:
         step: its title.
-        sent: the sample, without CHECK; empty if nothing is sent.
-        check: its CHECK; empty in the first round.
-        passed: whether it behaved as in the manual.
-        reason: of a failure.
+        sent: the sample line, without CHECK; empty if the step sends no line.
+        check: the CHECK of this line; empty in the first round.
+        passed: whether the RRC behaved as described in the manual.
+        reason: the reason of a failure.
     """
 
     step: str
@@ -85,7 +85,7 @@ class Procedure:
 
     Args:
         chair: protected by its watchdog, without stablemode.
-        operator: at the chair.
+        operator: the person at the chair.
         report: called with each result.
 
     Attributes:
@@ -131,7 +131,10 @@ class Procedure:
             self._step("VR2 is stopped by force", cmd.PowerOff(), self._power_off)
 
     def _start(self, step: str) -> None:
-        """Have VR2 switched on; Quit if it stays off, as all other steps need it."""
+        """Ask the operator to switch VR2 on.
+
+        Raises Quit if VR2 stays off, because all other steps need it.
+        """
         self._step(step, None, self._power_on)
         if not self.results[-1].passed:
             raise Quit("VR2 is off, and all other steps need it: press its power button, try again")

@@ -38,7 +38,7 @@ from tickrig.wire.rrc.replies import Ok, Refusal, Text
 # Refusals are counted for each command by itself. Who stops, and how, is in channel.py.
 
 _SETTLED_US: Final = 100_000
-"""Time after which an ER would have arrived: 10 periods of the RRC."""
+"""Time after which a missing ER can no longer arrive: 10 periods of the RRC."""
 
 _MOTION: Final = ("output", "limit")
 
@@ -53,17 +53,17 @@ class OnRefusals(Enum):
 class _RefusalCounter:
     """Counts for each command how many times in a row it was refused.
 
-    Each command is counted separately: a `beep` that works in between must not
-    hide that every `output` is refused.
+    Each command is counted separately, so that an accepted `beep` in between does not hide that
+    every `output` is refused.
 
     Args:
-        limit: number in a row that is too many.
+        limit: number of refusals in a row that is too many.
 
     Attributes:
-        stopped: reason of the last refusal once there were too many, else None.
+        stopped: reason of the last refusal after too many refusals, otherwise None.
 
     Raises:
-        ValueError: a limit below 1.
+        ValueError: the limit is below 1.
     """
 
     def __init__(self, limit: int) -> None:
@@ -94,10 +94,10 @@ class _BelievedSettings:
     """Known settings of the RRC that affect the client.
 
     Attributes:
-        stable: stablemode: CHECK on every line, no OK.
-        watchdog_10ms: time of the watchdog, 0 is off.
+        stable: whether stablemode is on: every line has a CHECK, and the RRC sends no OK.
+        watchdog_10ms: time of the watchdog in units of 10 ms, 0 is off.
         locked: whether the controller's speed buttons are locked.
-        drive: the command that chose who drives, None if that is not certain.
+        drive: the command that chose who drives, None if unknown.
     """
 
     stable: bool = False
@@ -106,7 +106,7 @@ class _BelievedSettings:
     drive: type[Limit | Output] | None = None
 
     def sent(self, command: Command) -> None:
-        """Register a command sent without waiting; the driver may have changed."""
+        """Register a command that was sent without waiting; who drives may have changed."""
         if isinstance(command, Limit | Output) and self.drive is not type(command):
             self.drive = None
         else:
@@ -139,10 +139,11 @@ class _Sent(NamedTuple):
 
 
 class _UnconfirmedCommands:
-    """Commands sent without waiting, until a reply or the time settles them.
+    """Commands sent without waiting, each kept until its reply or its time-out.
 
-    Replies come in the order of the commands, so a reply belongs to the oldest command of its name.
-    An ER without a name is assigned to a motion command if there is one, which is the safe choice.
+    Replies arrive in the order of the commands, so a reply belongs to the oldest command of its
+    name. An ER without a name is assigned to a motion command if one is pending, because this is
+    the safe choice.
     """
 
     def __init__(self) -> None:
@@ -151,7 +152,7 @@ class _UnconfirmedCommands:
 
     @property
     def doubt_ends_us(self) -> int:
-        """When all commands sent before a restart will be settled; 0 if they are."""
+        """When the last command sent before a restart times out; 0 if none is pending."""
         in_doubt = self._sent and self._sent[0].at_us <= self._doubted_us
         return self._doubted_us + _SETTLED_US if in_doubt else 0
 
@@ -167,8 +168,9 @@ class _UnconfirmedCommands:
     def carried_out(self, name: str) -> Command | None:
         """Remove the command of an OK; return the newest of its name.
 
-        The newest one counts: it has been or will be executed, unless older ones were lost with the
-        RRC's power and this OK is its own.
+        The newest command counts, because the RRC has executed it or will execute it. The
+        exception: the RRC lost its power together with older commands, and this OK is the reply to
+        the newest command.
         """
         same = [sent for sent in self._sent if sent.name == name]
         if not same:
@@ -187,14 +189,14 @@ class _UnconfirmedCommands:
         return None
 
     def settle(self, now_us: int) -> list[str]:
-        """Remove those without a reply in time; return their names."""
+        """Remove the commands that got no reply in time; return their names."""
         settled = []
         while self._sent and self._sent[0].at_us + _SETTLED_US <= now_us:
             settled.append(self._sent.popleft().name)
         return settled
 
     def take_all(self) -> list[str]:
-        """Remove all; return their names."""
+        """Remove all commands; return their names."""
         names = [sent.name for sent in self._sent]
         self._sent.clear()
         return names
@@ -263,9 +265,10 @@ class ReplyMatcher:
     def _refused_name(self, refusal: Refusal, exchange: Exchange | None) -> str:
         """Return the name of the refused command, empty if unknown.
 
-        Commands are answered in order, so the oldest candidate is assumed. If executed commands
-        have no answer this is unknown, and the awaited command comes first: it is better to report
-        an accepted setting as refused than the other way round.
+        Commands are answered in order, so the oldest candidate is assumed. With stablemode,
+        executed commands have no answer, and the oldest candidate may not be the refused command.
+        Then the awaited command is assumed: it is better to report an accepted setting as refused
+        than the other way round.
         """
         if exchange is not None and exchange.has_barrier and exchange.take(refusal):
             return exchange.name

@@ -49,10 +49,10 @@ _SHOWN_US: Final = 100_000
 
 
 class Ended:
-    """A signal that has come; it interrupts nothing, the loops look at it.
+    """The signal that was received; the loops check it, and no call is interrupted.
 
     Attributes:
-        number: of the first signal, 0 if none came.
+        number: number of the first signal, 0 if no signal was received.
     """
 
     number = 0
@@ -64,15 +64,15 @@ class Ended:
 
 @contextmanager
 def open_chair(ended: Ended, *, stable: bool = True) -> Iterator[Chair]:
-    """Open the port of this call and guard the chair; stop it at the end, then end the command.
+    """Open the port of this call and guard the chair; at the end stop it, and end the command.
 
     Args:
-        ended: takes signals.
+        ended: receives the signals.
         stable: whether stablemode is switched on, unless the call says otherwise.
 
     Raises:
-        click.ClickException: a line says what failed; exit status 1 or 3.
-        KeyboardInterrupt: a signal came, after the chair was stopped.
+        click.ClickException: the command failed; the message is one line; exit status 1 or 3.
+        KeyboardInterrupt: a signal was received; raised after the chair was stopped.
     """
     call = click.get_current_context().find_object(RrcCall)
     assert call is not None
@@ -126,18 +126,21 @@ def status(*, as_json: bool) -> None:
 
 
 class _DriveInput(Protocol):
-    """Who says what to drive.
+    """The source of the values to drive.
 
     Attributes:
-        hint: what to do, for the line of the terminal.
-        leaves: whether the end was asked for.
+        hint: instructions for the user, for the line of the terminal.
+        leaves: whether the user requested the end.
     """
 
     hint: str
     leaves: bool
 
     def poll(self, now_us: int) -> tuple[int, int]:
-        """Return what to drive now, in per cent; ChairStopped if terminal or pad are gone."""
+        """Return the values to drive now, in per cent.
+
+        Raises ChairStopped if the terminal or the pad is gone.
+        """
         ...
 
     def close(self) -> None:
@@ -189,9 +192,9 @@ class _PadHand:
     """Drives by the left stick of a game pad while one of its buttons is held.
 
     Args:
-        path: of the pad.
-        v_pct: most translation.
-        w_pct: most rotation.
+        path: path of the pad.
+        v_pct: largest translation, in per cent.
+        w_pct: largest rotation, in per cent.
     """
 
     hint, leaves = "   a button drives", False
@@ -202,7 +205,7 @@ class _PadHand:
         self.close = self._pad.close
 
     def poll(self, now_us: int) -> tuple[int, int]:
-        """Return what the stick asks for; 0 while no button is held."""
+        """Return the values of the stick; 0 while no button is held."""
         try:
             hand = self._pad.poll(now_us)
         except LinkClosed as error:
@@ -233,12 +236,12 @@ def _drive_input(v_pct: int, w_pct: int, for_us: int | None, *, no_dead_man: boo
 
 
 class _Line:
-    """One line of the terminal that is written again; nothing if standard error is none.
+    """One line of the terminal, written again and again; without a terminal, no output.
 
-    A terminal that takes nothing does not keep the chair waiting.
+    A terminal that accepts no data does not delay the chair.
 
     Attributes:
-        is_live: standard error is a terminal.
+        is_live: whether standard error is a terminal.
     """
 
     def __init__(self) -> None:
@@ -383,7 +386,7 @@ class _TerminalOperator:
     """The person who reads standard error and types answers.
 
     Args:
-        chair: time passes on it, so that its watchdog is renewed.
+        chair: called while the program waits for an answer, so that the watchdog is renewed.
         ended: a signal ends the procedure.
     """
 

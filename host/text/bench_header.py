@@ -50,14 +50,14 @@ class DeviceEntry:
     """Data for rebuilding a device of a bench in a replay.
 
     Attributes:
-        wire: name of its wire.
-        type: a device type, a model, an EDS or DCF file, or `FILE.py:Class`; empty if it was made
-            by a program and cannot be rebuilt.
-        config: its settings.
-        node_id: of a CANopen node.
-        sha256: of the file in its type.
-        files: SHA-256 of the files referenced by this one, by name.
-        stored: its non-volatile memory.
+        wire: name of the wire of the device.
+        type: a device type, a model, an EDS or DCF file, or `FILE.py:Class`; empty if a program
+            made the device, which then cannot be rebuilt.
+        config: settings of the device.
+        node_id: node-ID of a CANopen node.
+        sha256: SHA-256 of the file in `type`.
+        files: SHA-256 of the files that the file in `type` references, by name.
+        stored: content of the non-volatile memory.
     """
 
     wire: str
@@ -74,10 +74,10 @@ class BenchHeader:
     """The first line: the devices of the bench.
 
     Attributes:
-        devices: by name.
-        wires: by name.
-        seed: of all random numbers.
-        place: place of the recording.
+        devices: the devices by name.
+        wires: the wires by name.
+        seed: seed of all random numbers.
+        place: where the recording was made.
 
     Raises:
         ValueError: an invalid name, or an unknown wire.

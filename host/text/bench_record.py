@@ -9,10 +9,14 @@ r"""The text format of bench recordings: version 2 of traces.
     0.512000 left ! bus_state error-passive
     2.000000 .
 
-Times are in seconds; the name says which device, or wire. `>` went to the device, `<` came from it:
-bytes are written by `byte_text.escape`, frames one a line as candump does. `!` was done to the
-device before that tick: an input or an object set, `reset`, or a report of its CAN controller. `~`
-is a fault of a wire that started, or ended (`=0`); `.` says how long the run lasted.
+Each line has a time in seconds, the name of a device or wire, a mark and a text. The marks:
+
+- `>` is traffic to the device, `<` is traffic from the device. Bytes are written by
+  `byte_text.escape`. Frames are written as candump does, one per line.
+- `!` is a change made to the device before that tick: an input or an object was set, `reset`, or a
+  report of its CAN controller.
+- `~` is a fault of a wire that started, or ended (`=0`).
+- `.` is the duration of the run.
 """  # noqa: E501 - a line of the file
 
 from __future__ import annotations
@@ -52,10 +56,10 @@ class BenchRecord(NamedTuple):
 
     Attributes:
         at_us: the tick, or the time at the host's port.
-        name: of the device, for `~` of the wire.
-        mark: kind of the line.
-        traffic: for `>` and `<`.
-        text: for `!` and `~`.
+        name: name of the device; for `~`, the name of the wire.
+        mark: the mark, which is the kind of the line.
+        traffic: the traffic of `>` and `<`.
+        text: the text of `!` and `~`.
         line: number of the line in its file, from 1.
     """
 
@@ -98,7 +102,7 @@ class BenchParser:
     """Reads the lines after a header.
 
     Args:
-        header: with the names and wires.
+        header: the header, which has the names and wires.
     """
 
     def __init__(self, header: BenchHeader) -> None:
@@ -107,7 +111,7 @@ class BenchParser:
         self._known: dict[str, BenchRecord] = {}
 
     def parse(self, lines: Iterable[str]) -> Iterator[BenchRecord]:
-        """Read line by line; time must not run backwards, and nothing follows the end.
+        """Read line by line; times must not decrease, and no line may follow the end.
 
         Raises:
             TraceError: a damaged line.
@@ -132,7 +136,7 @@ class BenchParser:
             before_us, ended = record.at_us, record.mark is Mark.END
 
     def _record(self, line: str, number: int) -> BenchRecord:
-        """Read a line, and keep what it says: lines are often the same but for their time."""
+        """Read a line and cache its content, because many lines differ only in their time."""
         match = _LINE.fullmatch(line)
         if match is None:
             raise ValueError(f"not 'SECONDS NAME MARK TEXT': {line!r:.60}")

@@ -21,7 +21,7 @@ _TOKEN: Final = re.compile(r"\\x[0-9a-fA-F]{2}|\\[nrt\\]|[ -\[\]-~]+")
 
 
 def escape(data: bytes) -> str:
-    """Write bytes as printable ASCII; blanks at both ends are escaped too, to be visible."""
+    """Write bytes as printable ASCII; also escape blanks at both ends, to make them visible."""
     text = "".join(map(_TEXT.__getitem__, data))
     if text.endswith(" "):
         text = text[:-1] + r"\x20"

@@ -15,7 +15,7 @@ Scalar = Key
 
 
 class FilePlace(NamedTuple):
-    """A line of a file; 0 is the file as a whole. The file may have no name."""
+    """A line of a file; line 0 stands for the file as a whole. The file may have no name."""
 
     file: str
     line: int
@@ -48,9 +48,9 @@ class Item:
     """A value of the file.
 
     Attributes:
-        value: of a scalar, or the items of a list, or those of a mapping by key.
-        place: its place.
-        text: a scalar as written, shortened to one line.
+        value: the value of a scalar, the items of a list, or the items of a mapping by key.
+        place: file and line of the item.
+        text: a scalar as written in the file, shortened to one line.
         keys: places of the keys of a mapping.
     """
 
@@ -92,7 +92,10 @@ class Item:
 
 
 def _plain(item: Item, done: dict[int, Any]) -> Any:
-    """Return the values of an item; an anchored value is made once, so no file can explode."""
+    """Return the values of an item.
+
+    An anchored value is made only once, so that nested anchors in a file cannot exhaust the memory.
+    """
     if isinstance(item.value, str | int | float | None):
         return item.value
     if (found := done.get(id(item))) is None:

@@ -1,7 +1,7 @@
 """Self-contained HTML pages from Jinja2 templates (extra `report`).
 
-A template writes a value through `harmless` and escapes it. Only the style sheet and the script of
-the page are marked as safe, and the page allows only their hashes.
+A template passes each value through `harmless` and escapes it. Only the style sheet and the script
+of the page are marked as safe. The page allows only a style sheet and a script with their hashes.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class PageTemplate:
         self._template = environment.get_template(page)
 
     def render(self, **values: Any) -> str:
-        """Return the page of these values; the same values give the same bytes."""
+        """Return the page for these values; equal values always give the same bytes."""
         policy = page_text.content_policy(self._style, self._script)
         return self._template.render(
             style=Markup(self._style), script=Markup(self._script), policy=policy, **values

@@ -26,7 +26,7 @@ def known(names: Iterable[str]) -> str:
 
 
 def near(name: str, names: Iterable[str]) -> str:
-    """Return the probable name, or the known ones.
+    """Return a suggestion of the probable name, or the list of the known names.
 
     >>> near("stik", ["stick", "lamp"]), near("x", ["stick", "lamp"])
     ("did you mean 'stick'?", 'known: stick, lamp')
@@ -41,7 +41,7 @@ def near(name: str, names: Iterable[str]) -> str:
 
 
 def closest(name: str, names: Iterable[str]) -> list[str]:
-    """Return the probable name, if there is one, ignoring case.
+    """Return the probable name, ignoring case; the list is empty if no name is similar.
 
     A name that differs only in its numbers is another name, not a misspelling.
 

@@ -1,8 +1,8 @@
-"""Tables and listings as HTML for Jupyter, in which foreign text is text only.
+"""Tables and listings as HTML for Jupyter, in which markup in foreign text has no effect.
 
-A notebook shows what `_repr_html_` returns inside its own page: there is no style sheet and no
-content security policy of ours. So every text is escaped, invisible characters are spelt out, and
-nothing has a link, a script or an address.
+A notebook inserts the result of `_repr_html_` into its own page, which does not have the style
+sheet and the content security policy of tickrig. Therefore every text is escaped, and invisible
+characters are spelt out. The HTML has no links, scripts or addresses.
 
 >>> listing(["<b>"])[-15:]
 '&lt;b&gt;</pre>'
@@ -23,7 +23,10 @@ _LISTING: Final = ' style="max-height:30em;overflow:auto;font-family:monospace;l
 
 
 def text(value: object) -> str:
-    """Return a value as text that is no markup; a long one is cut, with a count."""
+    """Return a value as escaped text.
+
+    A long text is cut, and the number of omitted characters is added.
+    """
     shown = str(value)
     more = len(shown) - _MOST_CHARACTERS
     if more > 0:
@@ -47,11 +50,11 @@ def table(
     """Return a table; empty if there are no rows.
 
     Args:
-        columns: their titles.
+        columns: the titles of the columns.
         rows: the cells.
-        title: makes a table that folds.
-        opened: a table that folds is unfolded at first.
-        most: number of rows that are shown; a line below counts the others.
+        title: the title of a table that can be folded.
+        opened: whether a table that can be folded is unfolded at first.
+        most: number of rows that are shown; a line below gives the number of the other rows.
     """
     every = iter(rows)
     shown = list(islice(every, most))
@@ -73,7 +76,10 @@ def table(
 
 
 def listing(lines: Sequence[str], most: int = 1_000) -> str:
-    """Return the last lines of a text in a box that scrolls; how many are left out stands above."""
+    """Return the last lines of a text in a box that scrolls.
+
+    A line above the box gives the number of omitted lines.
+    """
     left_out = len(lines) - most
     above = f"… {left_out} earlier lines\n" if left_out > 0 else ""
     return f"<pre{_LISTING}>{above}{chr(10).join(map(text, lines[-most:]))}</pre>"

@@ -71,7 +71,10 @@ def json_text(value: object, *, compact: bool = False, letters: bool = False) ->
 
 
 def content_policy(style: str, script: str = "") -> str:
-    """Return the content security policy of a page: no network, no style or script but its own."""
+    """Return the content security policy of a page.
+
+    The policy allows no network, and only the style and script of the page itself.
+    """
     from base64 import b64encode  # noqa: PLC0415 - each command imports this module
     from hashlib import sha256  # noqa: PLC0415 - it takes 3 ms
 

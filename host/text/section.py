@@ -1,4 +1,4 @@
-"""A table of a user's file while it is read: its fields and their errors.
+"""A table of a user's file while the file is read: the fields of the table and their errors.
 
 A taker converts a value of the file, or raises ValueError with the allowed values.
 
@@ -245,8 +245,8 @@ class Notes:
 
     Attributes:
         document: the document.
-        mistakes: errors so far.
-        names: other names of values in the file; empty for a rig file.
+        mistakes: the errors found until now.
+        names: other names that values have in the file; empty for a rig file.
     """
 
     document: TomlDocument
@@ -259,7 +259,7 @@ class Notes:
         self.mistakes.append(Mistake(line, f"{self.place(keys)}{' '.join(reason.split())}"))
 
     def place(self, keys: TomlPath) -> str:
-        """Return the start of an error message: the keys as in the file."""
+        """Return the start of an error message: the keys as they are written in the file."""
         return f"{self.names.get(keys) or _dotted(keys)}: " if keys else ""
 
     @property
@@ -274,9 +274,9 @@ class Section:
     """A table.
 
     Attributes:
-        notes: of the whole document.
-        keys: its own, from the top.
-        values: what it holds.
+        notes: the errors of the whole document.
+        keys: the keys that lead to this table, from the top.
+        values: the values in the table.
     """
 
     notes: Notes
@@ -323,7 +323,10 @@ class Section:
         self.notes.mistakes.append(Mistake(line, f"{self.notes.place(self.keys)}{reason}"))
 
     def sub(self, key: str) -> Section | None:
-        """Return the table of a key; None if it is missing, or not a table, which is reported."""
+        """Return the table of a key; None if the key is missing.
+
+        If the value is not a table, report the error and return None.
+        """
         value = self.values.get(key)
         if value is None or value is BROKEN:
             return None

@@ -1,8 +1,10 @@
 """Steps of scenarios and sequences: time, action, expectations, repetition.
 
-It is one model with two syntaxes: scenarios are lines with times from the start
-(docs/reference/bench/scenario.md); sequences are TOML or lines, each step after the previous one
-(docs/reference/canmon/canmon-sending.md).
+Scenarios and sequences share this model, but have different syntaxes:
+
+- A scenario consists of lines with times from the start (docs/reference/bench/scenario.md).
+- A sequence is TOML or consists of lines; each step follows the previous one
+  (docs/reference/canmon/canmon-sending.md).
 """
 
 from __future__ import annotations
@@ -38,17 +40,18 @@ class Condition(Generic[_Came]):
 
 @dataclass(frozen=True, kw_only=True)
 class Step(Generic[_What, _Came]):
-    """One step; its parts run in this order, and most steps have only one.
+    """One step; its parts run in the order of the attributes, and most steps have only one part.
 
     Attributes:
-        place: its place.
+        place: place of the step in its file.
         at_us: time in microseconds, after the previous step was due; in a scenario after its start.
-        what: the action; None for nothing.
-        wanted: expectations, in any order; the first match meets one.
-        within_us: time limit for them, from `at_us`.
-        goes_on: continue after a missed expectation; else the steps end.
+        what: the action; None for no action.
+        wanted: expectations, which may be met in any order; the first match meets an expectation.
+        within_us: time limit for the expectations, from `at_us`.
+        goes_on: whether to continue after a missed expectation; otherwise the steps end.
         on_fail: steps that run first after a missed expectation.
-        times: number of repetitions of `steps`, `FOREVER` until stopped; None for none.
+        times: number of repetitions of `steps`; `FOREVER` repeats them until stopped; None for no
+            repetition.
         steps: the repeated steps.
     """
 

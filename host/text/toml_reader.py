@@ -1,7 +1,8 @@
 r"""Read a TOML text to its end despite errors, with the line of each value.
 
-The parser of the standard library stops at the first error and has no line numbers of values. This
-one reads statement by statement, and leaves scalars to that parser.
+The parser of the standard library stops at the first error, and does not give the line numbers of
+values. The reader in this module reads statement by statement, and uses the parser of the standard
+library only for scalars.
 
 >>> document = read_toml("a = 1\n[[step]]\nsend = [\n  {x = 1},\n  {y = },\n]\n[b\n")
 >>> document.values["a"], document.line_of(("step", 0, "send", 0, "x"))
@@ -85,7 +86,7 @@ class _Leaf:
 
 @dataclass(slots=True, eq=False)
 class _Array:
-    """An array; `frozen` unless of tables with headers `[[...]]`."""
+    """An array; `frozen` unless it is an array of tables with headers `[[...]]`."""
 
     line: int
     items: list[_Node] = field(default_factory=list)
@@ -94,7 +95,11 @@ class _Array:
 
 @dataclass(slots=True, eq=False)
 class _Table:
-    """A table; `closed` to a second header and to dotted keys, `frozen` to all."""
+    """A table.
+
+    If it is `closed`, it accepts no second header and no dotted keys. If it is `frozen`, it accepts
+    no additions.
+    """
 
     line: int
     entries: dict[str, _Node] = field(default_factory=dict)
@@ -102,10 +107,10 @@ class _Table:
     frozen: bool = False
 
     def below(self, line: int, key: str) -> _Table:
-        """Return the table on the way to that of a header, the last one of an array.
+        """Return the table of a key on the path of a header; of an array, return the last table.
 
         Raises:
-            _TakenError: there is another value.
+            _TakenError: the key has another value.
         """
         node = self.entries.setdefault(key, _Table(line))
         if isinstance(node, _Array) and not node.frozen:
@@ -230,7 +235,7 @@ def read_toml(text: str) -> TomlDocument:
 
 
 class _WrongError(Exception):
-    """The statement cannot be read further; the error may be at another place."""
+    """The rest of the statement cannot be read; the error may be at another place."""
 
     def __init__(self, at: int, reason: str, place: int | None = None) -> None:
         super().__init__(reason)
@@ -465,7 +470,10 @@ class _Reader:
         return table
 
     def _skip_in_inline(self, *, known: bool) -> bool:
-        """Skip blanks; return whether there was a new line, an error reported once."""
+        """Skip blanks; return whether they contained a new line.
+
+        A new line is an error here; it is reported once.
+        """
         self._skip(_BLANK)
         if not (self._is("\n") or self._is("#")):
             return known

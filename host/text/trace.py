@@ -7,9 +7,12 @@ r"""The text format of a recorded run.
     0.710000 < OK:output\n
     2.000000 .
 
-Time is the device's tick in seconds; `>` went to the device, `<` came from it,
-`!` is a physical input that changed before the tick; `.` is how long the run
-lasted, and the last line. Bytes are written by `byte_text.escape`.
+Each line has the time of the device's tick in seconds, a mark and a text. The marks:
+
+- `>` is traffic to the device, `<` is traffic from the device. Bytes are written by
+  `byte_text.escape`.
+- `!` is a physical input that changed before the tick.
+- `.` is the duration of the run; it is the last line.
 """
 
 from __future__ import annotations
@@ -68,10 +71,10 @@ class Record:
     """One line of a trace.
 
     Attributes:
-        at_us: the tick.
+        at_us: the time of the tick.
         mark: kind of the line.
-        data: traffic, for `>` and `<`.
-        text: for `!`: `NAME=VALUE`, or `reset`.
+        data: the traffic of `>` and `<`.
+        text: the text of `!`: `NAME=VALUE`, or `reset`.
         line: number of the line in its file, from 1.
     """
 
@@ -142,7 +145,7 @@ def parse_record(line: str, number: int) -> Record:
 
 
 def parse_records(lines: Iterable[str]) -> Iterator[Record]:
-    """Read the body line by line; time must not run backwards, and nothing follows the end."""
+    """Read the body line by line; times must not decrease, and no line may follow the end."""
     before = Record(0, Mark.PHYSICAL)
     for number, line in enumerate(lines, 2):
         record = parse_record(line, number)

@@ -28,10 +28,10 @@ def parse_time_us(text: str) -> int:
 
 
 def parse_time_with_unit_us(text: str) -> int:
-    """Read a time in microseconds; except for 0 the unit is required.
+    """Read a time in microseconds; the unit is required, except for 0.
 
     Raises:
-        ValueError: not a time, or without a unit.
+        ValueError: the text is not a time, or has no unit.
 
     >>> parse_time_with_unit_us("1.5s"), parse_time_with_unit_us("0")
     (1500000, 0)

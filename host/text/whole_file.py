@@ -18,11 +18,12 @@ def check_file(path: Path, what: str) -> None:
     """Check before a run whether a file can be written after it.
 
     Args:
-        path: of the file.
+        path: path of the file.
         what: its name in messages, such as `report` or `--html`.
 
     Raises:
-        ValueError: its folder does not exist or is not writable, or it is a folder itself.
+        ValueError: the folder of the file does not exist or is not writable, or the path is a
+            folder.
     """
     if not path.parent.is_dir():
         raise ValueError(f"{what} {path}: no directory {path.parent}")
@@ -39,12 +40,12 @@ def check_not_read(path: Path, what: str, inputs: Iterable[Path]) -> None:
     """Check that a file is not one of those that a run reads.
 
     Args:
-        path: of the file.
+        path: path of the file.
         what: its name in messages, such as `--html`.
-        inputs: paths that are read; others than files are ignored.
+        inputs: paths that the run reads; paths that are not files are ignored.
 
     Raises:
-        ValueError: it is one of them.
+        ValueError: the file is one of the inputs.
     """
     if any(_are_one(path, each) for each in inputs):
         raise ValueError(f"{what} {path}: the run reads this file, it would be overwritten")
@@ -63,10 +64,10 @@ def is_special(path: Path) -> bool:
 
 
 def check_writable(folder: Path) -> None:
-    """Check whether files can be made in a folder, by making one; the folder may be missing.
+    """Check whether files can be made in a folder, by making a file; the folder may be missing.
 
     Raises:
-        OSError: not possible.
+        OSError: no file can be made there.
     """
     while not folder.exists() and folder != folder.parent:
         folder = folder.parent
@@ -79,7 +80,7 @@ def check_writable(folder: Path) -> None:
 
 
 def write_whole(path: Path, content: str | bytes) -> None:
-    """Replace a file when its content is on the disk; write to other paths, such as a pipe.
+    """Replace a file after the new content is on the disk; write directly to a pipe and the like.
 
     Raises:
         OSError: the file cannot be written; its `filename` is `path`, and the file is unchanged.
@@ -91,10 +92,10 @@ def write_whole(path: Path, content: str | bytes) -> None:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Yield the path of a new file, which takes the place of a file when the block is done.
+    """Yield the path of a new file; it replaces the given file at the end of the block.
 
-    It has the same name, in a folder beside that file. Other paths, such as a pipe, are yielded
-    themselves.
+    The new file has the same name, in a new folder next to the given file. If the path is not a
+    regular file, for example a pipe, the path itself is yielded.
 
     Raises:
         OSError: the file cannot be written; its `filename` is `path`, and the file is unchanged. An
@@ -150,14 +151,14 @@ _BINARY: Final[int] = getattr(os, "O_BINARY", 0)
 
 
 class LineFile:
-    """A file of lines, each written at once, so that a kill loses nothing.
+    """A file of lines, each written at once, so that no line is lost if the process is killed.
 
     If writing fails, the recording ends with one warning, and the run continues.
 
     Args:
-        path: the file; one that exists is replaced.
+        path: the file; an existing file is replaced.
         first: its first line.
-        running: what continues without it, for the warning.
+        running: what continues without the recording, for the warning.
 
     Attributes:
         error: reason for the early end of the recording, empty if there was no error.

@@ -59,10 +59,10 @@ def read_yaml(text: str, name: str) -> tuple[Item | None, tuple[FileMistake, ...
 
     Args:
         text: the whole file.
-        name: its name in places.
+        name: name of the file in places.
 
     Returns:
-        The tree, None without one; and the errors.
+        The tree, or None if the text has none; and the errors.
     """
     try:
         root = _composed(text)
@@ -102,7 +102,11 @@ def _in_a_line(reason: str) -> str:
 
 
 class _Tree:
-    """Makes items from nodes; an anchored node is made once, so that files cannot explode."""
+    """Makes items from nodes.
+
+    The item of an anchored node is made only once, so that nested anchors in a file cannot exhaust
+    the memory.
+    """
 
     def __init__(self, name: str) -> None:
         self.wrong: list[FileMistake] = []
@@ -135,7 +139,7 @@ class _Tree:
         return Item(self._scalar(node), place, shorten(str(node.value)))
 
     def _mapping(self, node: yaml.MappingNode, place: FilePlace) -> Item:
-        """Make a mapping: the items of `<<`, then its own; of a duplicate key the last counts."""
+        """Make a mapping: first the items of `<<`, then its own; the last duplicate key counts."""
         fields: dict[Key, Item] = {}
         keys: dict[Key, FilePlace] = {}
         own: list[tuple[yaml.Node, yaml.Node]] = []
@@ -170,7 +174,7 @@ class _Tree:
         return [item for item in items if item.is_mapping]
 
     def _check_number(self, node: yaml.Node) -> None:
-        """Warn of a number that both readers read differently; quotes make it a text."""
+        """Warn about a number that both readers read differently; in quotes it is a text."""
         text = str(node.value)
         if not isinstance(node, yaml.ScalarNode) or node.style is not None:
             return
