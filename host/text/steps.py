@@ -46,7 +46,7 @@ class Step(Generic[_What, _Came]):
         place: place of the step in its file.
         at_us: time in microseconds, after the previous step was due; in a scenario after its start.
         what: the action; None for no action.
-        wanted: expectations, which may be met in any order; the first match meets an expectation.
+        wanted: expectations, in any order; the first match of an expectation meets it.
         within_us: time limit for the expectations, from `at_us`.
         goes_on: whether to continue after a missed expectation; otherwise the steps end.
         on_fail: steps that run first after a missed expectation.

@@ -68,7 +68,7 @@ def check_cob_ids(
 ) -> None:
     """Report CAN-IDs that two nodes send, and CAN-IDs reserved for other services.
 
-    The master sends what the slaves receive; two slaves may receive the same message.
+    The master sends the messages that the slaves receive. Two slaves may receive the same message.
     """
     senders: dict[int, tuple[str, FilePlace, BusSlave | None]] = {}
     if master is not None and master.sync_period_us:

@@ -182,10 +182,10 @@ class BusFile:
     Attributes:
         path: the file.
         options: settings of all nodes.
-        master: None if the file has no such section.
+        master: the master; None if the file has no section for it.
         slaves: the slaves that have an EDS, by name, in the order of dcfgen.
-        findings: all errors and warnings, in the order of the lines; if one is an error, the other
-            attributes hold what could still be read.
+        findings: all errors and warnings, in the order of the lines. If one of them is an error,
+            the other attributes contain only the valid parts of the file.
     """
 
     path: Path
@@ -222,7 +222,7 @@ def is_bus_file(data: bytes) -> bool:
 
 
 def check_of(data: bytes, path: Path) -> str:
-    r"""Return what a YAML file is, and which command checks it; empty if it is of neither kind.
+    r"""Return the kind of a YAML file and the command that checks it; empty for other kinds.
 
     Args:
         data: the file, or its beginning.

@@ -17,7 +17,7 @@ _Extra = Mapping[str, Item]
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """What a master checks at boot-up (1F84h to 1F88h); a value of 0 is not checked.
+    """The values that a master checks at boot-up (1F84h to 1F88h); a value of 0 is not checked.
 
     Attributes:
         device_type: 1000h.
@@ -42,7 +42,7 @@ class BusWrite:
         index: 0x0000..0xFFFF.
         sub_index: 0..255.
         data: the bytes, little endian.
-        place: where the file asks for it.
+        place: the line of the file that requires the write.
     """
 
     index: int
@@ -58,9 +58,9 @@ class BusPdo:
     Attributes:
         number: 1..512.
         transmit: whether the slave sends it.
-        cob_id: with its upper bits; bit 31 set: the PDO is disabled.
-        transmission: type, 0..255.
-        inhibit_time_100us: of a TPDO, in 100 µs.
+        cob_id: the COB-ID with its upper bits; if bit 31 is set, the PDO is disabled.
+        transmission: transmission type, 0..255.
+        inhibit_time_100us: inhibit time of a TPDO, in units of 100 µs.
         event_timer_ms: event timer of a TPDO, deadline of an RPDO.
         sync_start: SYNC start value of a TPDO.
         mapping: the mapped objects; an index below 0020h is a dummy.
@@ -83,10 +83,10 @@ class BusPdo:
 
 @dataclass(frozen=True, slots=True)
 class DriveChannel:
-    """An axis of a drive as ros2_canopen's 402 driver has it; lengths are in the user's units.
+    """An axis of a drive in ros2_canopen's 402 driver; lengths are in the user's units.
 
     Attributes:
-        name: of the joint.
+        name: name of the joint.
         scale_pos_to_dev: device units per unit of position.
         scale_pos_from_dev: units of position per device unit.
         scale_vel_to_dev: device units per unit of speed.
@@ -113,32 +113,33 @@ class BusSlave:
     """A slave of the bus, with what the master expects of it and writes to it.
 
     Attributes:
-        name: of its section.
+        name: name of its section.
         node_id: 1..127.
-        place: of its section.
+        place: place of its section.
         sheet: its EDS or DCF.
-        device: the device that it describes.
+        device: the device that the EDS or DCF describes.
         identity: what the master checks at boot-up.
         writes: concise DCF, in the order in which the master writes it.
         pdos: all PDOs of the dictionary after these writes, RPDOs first.
         master_pdos: the PDOs that enter the master's own dictionary, TPDOs of the slave first.
-        heartbeat_producer_ms: of the slave after the writes, 0 for none.
+        heartbeat_producer_ms: producer heartbeat time of the slave after the writes, 0 for no
+            heartbeat.
         heartbeat_consumer: whether the slave watches the master's heartbeat.
-        heartbeat_multiplier: the master waits this many producer times for a heartbeat.
-        guard_time_ms: 0 for no guarding.
-        life_time_factor: of node guarding.
-        emcy_cob_id: with its upper bits.
-        boot: the master configures and boots it (1F81h, bit 2).
-        mandatory: the master does not start without it (bit 3).
-        reset_communication: the master may reset it at boot-up (bit 4).
+        heartbeat_multiplier: how many producer times the master waits for a heartbeat.
+        guard_time_ms: guard time, 0 for no node guarding.
+        life_time_factor: life time factor of node guarding.
+        emcy_cob_id: COB-ID of EMCY with its upper bits.
+        boot: whether the master configures and boots the slave (1F81h, bit 2).
+        mandatory: whether the master needs the slave to start the network (bit 3).
+        reset_communication: whether the master may reset the slave at boot-up (bit 4).
         retry_factor: number of attempts of node guarding.
-        software_file: firmware, empty for none.
-        software_version: version that the master expects (1F55h), 0 for any.
+        software_file: firmware file, empty if there is none.
+        software_version: software version that the master expects (1F55h), 0 for any.
         restore_configuration: sub-index of 1011h that the master restores before the writes, 0 for
-            none.
+            no restoring.
         boot_timeout_ms: how long ros2_canopen waits for the slave, None for its default.
-        driver: class of ros2_canopen, empty for none.
-        package: of the driver.
+        driver: class of ros2_canopen, empty without a driver.
+        package: package of the driver.
         channels: axes, one for a node without `num_channels`.
         settings: all other keys that the file gives the driver, unchanged.
         extra: the mapping `tickrig:`.
@@ -190,28 +191,28 @@ class BusMaster:
 
     Attributes:
         node_id: 1..127; 255 if the file gives none.
-        place: of its section.
+        place: place of its section.
         baudrate: kbit/s.
-        identity: its own.
-        sync_period_us: 0 for no SYNC.
+        identity: the identity of the master.
+        sync_period_us: period of SYNC, 0 for no SYNC.
         sync_window_us: 1007h.
         sync_overflow: 1019h.
-        heartbeat_producer_ms: 0 for none.
-        heartbeat_consumer: whether it watches the slaves.
-        heartbeat_multiplier: the slaves wait this many producer times for a heartbeat.
+        heartbeat_producer_ms: producer heartbeat time, 0 for no heartbeat.
+        heartbeat_consumer: whether the master watches the heartbeats of the slaves.
+        heartbeat_multiplier: how many producer times the slaves wait for a heartbeat.
         emcy_inhibit_time_100us: 1015h.
         nmt_inhibit_time_100us: 102Ah.
         error_behavior: 1029h by sub-index.
         time_cob_id: 1012h.
-        start: the master enters Operational by itself.
-        start_nodes: the master starts the slaves.
-        start_all_nodes: it starts them with one command.
-        reset_all_nodes: it resets all slaves if it loses a mandatory one.
-        stop_all_nodes: it stops all slaves if it loses a mandatory one.
-        boot_time_ms: how long it waits for the mandatory slaves (1F89h), 0 for no limit.
+        start: whether the master enters Operational by itself.
+        start_nodes: whether the master starts the slaves.
+        start_all_nodes: whether the master starts the slaves with one command.
+        reset_all_nodes: whether the master resets all slaves if it loses a mandatory slave.
+        stop_all_nodes: whether the master stops all slaves if it loses a mandatory slave.
+        boot_time_ms: how long the master waits for the mandatory slaves (1F89h), 0 for no limit.
         boot_timeout_ms: how long ros2_canopen waits for all slaves, None for its default.
-        driver: class of ros2_canopen, empty for none.
-        package: of the driver.
+        driver: class of ros2_canopen, empty without a driver.
+        package: package of the driver.
         extra: the mapping `tickrig:`.
     """
 
@@ -246,9 +247,9 @@ class BusDefaults:
     """Settings of all nodes that do not have their own.
 
     Attributes:
-        dcf_path: folder of the files at run time, as the file gives it.
+        dcf_path: folder of the DCF files at run time, as written in the file.
         heartbeat_multiplier: factor of producer times.
-        retry_factor: of node guarding.
+        retry_factor: number of attempts of node guarding.
         extra: the mapping `tickrig:`.
     """
 

@@ -59,9 +59,9 @@ class _Allowed(NamedTuple):
     said: str
 
     def value_of(self, item: Item) -> int | None:
-        """Return what yaml-cpp makes of a value, None if the driver does not accept it.
+        """Return the value that yaml-cpp reads; None if the driver does not accept this value.
 
-        yaml-cpp ignores quotes. A boolean is 1 or 0.
+        yaml-cpp ignores quotes. A boolean becomes 1 or 0.
         """
         if not self.numbers:
             return _FLAGS.get(item.text.lower())
@@ -94,9 +94,9 @@ def check_keys(
 
     Args:
         section: the section that is checked.
-        known: all keys that it may have.
-        open_to_others: a driver of the user may read other keys; they are reported as such, unless
-            one looks like a misspelling.
+        known: all keys that the section may have.
+        open_to_others: whether a driver of the user may read other keys. They are reported as keys
+            for that driver, except keys that look like a misspelling.
     """
     known = tuple(known)
     for key in section.fields:

@@ -20,11 +20,11 @@ class Layout(NamedTuple):
     """The sections of a file as dcfgen reads them.
 
     Attributes:
-        options: None if the file has none.
-        master: None if the file has none.
-        slaves: by name, in the order of dcfgen.
+        options: the section of options; None if the file has none.
+        master: the section of the master; None if the file has none.
+        slaves: the sections of the slaves by name, in the order of dcfgen.
         hidden: places of keys that begin with a dot, by name, if dcfgen reads the file directly.
-        defaults: what cogen merges into all nodes; None if the file has none.
+        defaults: the section that cogen merges into all nodes; None if the file has none.
     """
 
     options: BusFileSection | None
@@ -37,8 +37,8 @@ class Layout(NamedTuple):
 def read_layout(tree: Item, notes: BusFileNotes) -> Layout:
     """Find the sections of a file.
 
-    A key that begins with a dot is not a node: it holds anchors. As in cogen, `defaults` override
-    the keys of a node, and all keys are sorted.
+    A key that begins with a dot is not a node; its value only defines anchors. As in cogen,
+    `defaults` override the keys of a node, and all keys are sorted.
     """
     top = BusFileSection(notes, "", tree, tree.place)
     ends = _optional(top, OPTIONS), _optional(top, MASTER)

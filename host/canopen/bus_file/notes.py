@@ -34,10 +34,10 @@ class BusFileNotes:
         """Record a finding; a finding that several nodes have in the same line is recorded once.
 
         Args:
-            rule: its name.
+            rule: name of the rule.
             place: the line.
             where: section and keys, as `joint_1.tpdo.1`; empty for the file as a whole.
-            text: what came, and what was allowed.
+            text: the value in the file, and the allowed values.
         """
         found = RuleFinding(RULES[rule], place.file, place.line, shorten(where), text)
         self._found.setdefault((rule, place, text), found)
@@ -70,7 +70,7 @@ class BusFileSection:
         notes: collects the findings.
         name: section and keys, for people.
         item: the mapping; any other value is reported and counts as empty.
-        place: of its key.
+        place: place of its key.
     """
 
     def __init__(self, notes: BusFileNotes, name: str, item: Item, place: FilePlace) -> None:

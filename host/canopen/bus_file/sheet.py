@@ -35,8 +35,8 @@ class Sheet:
     Args:
         path: the file.
         file: its sections.
-        device: what they describe.
-        node_id: that of the node, 0 to use the one of the file.
+        device: the device that the sections describe.
+        node_id: node-ID of the node, 0 to use the node-ID in the file.
     """
 
     def __init__(self, path: Path, file: EdsFile, device: EdsDevice, node_id: int) -> None:
@@ -101,8 +101,8 @@ class Sheets:
     """Finds and reads the EDS and DCF files of a bus.
 
     Args:
-        folder: of the bus.yml.
-        dcf_path: that of the options, for nodes without their own.
+        folder: folder of the bus.yml.
+        dcf_path: the `dcf_path` of the options, for nodes without their own.
     """
 
     def __init__(self, folder: Path, dcf_path: str) -> None:
@@ -111,8 +111,12 @@ class Sheets:
     def find(self, node: BusFileSection) -> Sheet | None:
         """Return the sheet of a node; record a finding and return None if it has none.
 
-        The search goes beside the file, as in dcfgen; then in `dcf_path`; then by the bare file
-        name beside the file and one folder up, because a `dcf_path` may exist only in a container.
+        The file is searched in this order:
+
+        - in the folder of the bus.yml, as in dcfgen
+        - in `dcf_path`
+        - by the bare file name in the folder of the bus.yml and one folder up, because a `dcf_path`
+          may exist only in a container
         """
         name = node.text("dcf")
         if not name:
@@ -213,14 +217,14 @@ class Writes:
         return tuple(self._all)
 
     def add(self, index: int, sub: int, value: int, place: FilePlace, said: str = "") -> None:
-        """Add a write; report and leave out what dcfgen refuses.
+        """Add a write; report and omit a write that dcfgen refuses.
 
         Args:
-            index: of the object.
+            index: index of the object.
             sub: sub-index.
-            value: as the file gives it.
-            place: where the file asks for it.
-            said: the value as written there.
+            value: the value as given by the file.
+            place: the line of the file that requires the write.
+            said: the value as written on that line.
         """
         if (write := self._made(index, sub, value, place, said)) is not None:
             self._all.append(write)

@@ -229,7 +229,7 @@ def read_extra(section: BusFileSection) -> dict[str, Item]:
 
 
 def _read_channels(node: BusFileSection, name: str) -> tuple[DriveChannel, ...]:
-    """Read the axes of a node: their names and scales; without a number there is one axis."""
+    """Read the names and scales of the axes of a node; without a number of axes, read one axis."""
     count = node.whole("num_channels", 1, 1, _MOST_CHANNELS)
     names = node.fields.get("channel_names")
     own = node.sections("channels")

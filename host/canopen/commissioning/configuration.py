@@ -16,16 +16,16 @@ _Address = tuple[int, int]
 Values = dict[_Address, bytes]
 
 _COMMANDS: Final = (0x1003, 0x1010, 0x1011, *range(0x1F50, 0x1F58))
-"""Error history, store, restore, programs: writing them triggers an action."""
+"""Objects whose writing triggers an action: error history, store, restore, programs."""
 _CONFIGURED: Final = 0x1020
-"""Verify configuration: date and time are written last."""
+"""Object "verify configuration": its date and time are written last."""
 _COB_ID: Final = 1
 """Sub-index of the communication parameter of a PDO."""
 _TEXTS: Final = (DataType.VISIBLE_STRING, DataType.UNICODE_STRING)
 
 
 def dcf_values(file: EdsFile, device: EdsDevice, node_id: int) -> Values:
-    """Return what a DCF configures: the ParameterValues of its writable objects.
+    """Return the values that a DCF configures: the ParameterValues of its writable objects.
 
     Args:
         file: the DCF.
@@ -81,7 +81,7 @@ def writes(
     number: Callable[[_Address], int],
     writable: Collection[_Address],
 ) -> list[Write]:
-    """Return what to write, in order; the date of the configuration comes last.
+    """Return the writes in order; the date of the configuration is written last.
 
     Args:
         values: the wanted values of the node.

@@ -27,7 +27,7 @@ from tickrig.wire.canopen.lss import (
 _ANSWER_US: Final = 500_000
 """How long the master waits for the answer to a command."""
 SCAN_US: Final = 20_000
-"""How long it waits for answers to a question of a fastscan: several slaves may answer."""
+"""How long to wait for answers to a question of a fastscan, which several slaves may answer."""
 _SILENCE_US: Final = 200_000
 """Within this time, late answers to a failed fastscan have arrived."""
 _PATIENCE: Final = (1, 2, 4)
@@ -50,10 +50,10 @@ _ERRORS: Final = {
 
 
 class LssFailed(Exception):  # noqa: N818 - what the slave did
-    """A slave refused, did not answer, or several answered where only one may.
+    """A slave refused or did not answer, or several slaves answered a question for one slave.
 
     Attributes:
-        command: the command that failed, None if it was several.
+        command: the command that failed, None if several commands failed.
         code: error code of the slave, 0 if it did not refuse.
     """
 
@@ -71,7 +71,7 @@ class LssMaster:
         scan_us: how long to wait for answers to each of the 133 questions of a fastscan.
 
     Attributes:
-        waiting: whether all slaves are back in state waiting, at the end of `at_work`.
+        waiting: whether all slaves have returned to the state waiting at the end of `at_work`.
     """
 
     def __init__(self, bus: NodeBus, answer_us: int = _ANSWER_US, scan_us: int = SCAN_US) -> None:
@@ -109,7 +109,7 @@ class LssMaster:
         If answers arrive too late for their questions, the scan starts again with twice the time.
 
         Raises:
-            LssFailed: slaves answered in a way that fits no address, each time.
+            LssFailed: in each scan, the answers of the slaves fit no address.
         """
         failed: LssFailed | None = None
         for factor in _PATIENCE:
@@ -143,7 +143,7 @@ class LssMaster:
         return LssAddress(*found)
 
     def address(self) -> LssAddress:
-        """Return the address of the one slave in configuration; raises as `configure_node_id`."""
+        """Return the address of the only slave in configuration; raises as `configure_node_id`."""
         return LssAddress(
             *(
                 number_of(self._command(message(LssCommand(LssCommand.INQUIRE_VENDOR + sub))))
@@ -158,8 +158,8 @@ class LssMaster:
     def count(self) -> int:
         """Return how many slaves in configuration answer; 0 if none supports the question.
 
-        A fastscan finds slaves with the same address as one. Their answers are one frame, and count
-        as one, if they are sent at the same moment.
+        A fastscan finds slaves with the same address as one slave. If these slaves answer at the
+        same moment, their answers are one frame on the bus and count as one answer.
         """
         return len(self._answers_to(message(LssCommand.INQUIRE_NODE_ID)))
 

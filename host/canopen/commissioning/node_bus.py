@@ -28,7 +28,7 @@ _ERROR_CONTROL: Final = range(ERROR_CONTROL_COB_ID + 1, ERROR_CONTROL_COB_ID + 1
 class NodeBus:
     """SDO, NMT and single frames on a bus, from one thread.
 
-    If you end it in the middle of an SDO transfer, for example by Ctrl-C, it aborts the transfer.
+    If you interrupt an SDO transfer, for example by Ctrl-C, the transfer is aborted.
 
     Args:
         link: the bus.
@@ -49,7 +49,7 @@ class NodeBus:
         return self._link.now_us
 
     def send(self, can_id: int, data: bytes) -> None:
-        """Send a data frame; LinkClosed if the bus is gone."""
+        """Send a data frame; raises LinkClosed if the bus is gone."""
         self._link.send((data_frame(can_id, data),))
 
     def listen(self, until_us: int) -> tuple[int, StampedFrames]:
@@ -80,7 +80,7 @@ class NodeBus:
     def await_state(
         self, node_id: int, wanted: tuple[NmtState, ...], within_us: int
     ) -> NmtState | None:
-        """Wait until a node reports one of some states; return the last state that it reported."""
+        """Wait until a node reports one of the given states; return the last reported state."""
         until_us, now_us = self.now_us + within_us, self.now_us
         self.states.pop(node_id, None)
         while self.states.get(node_id) not in wanted and now_us < until_us:
@@ -147,7 +147,7 @@ _IDENTITY: Final = 0x1018
 
 _AT_ONCE: Final = 8
 _GAP_US: Final = 10_000
-"""Nodes queried at once; a pause follows, because a slow bus also carries other traffic."""
+"""Nodes queried at the same time, before a pause for other traffic on a slow bus."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,12 +156,12 @@ class NodeFound:
 
     Attributes:
         node_id: 1..127.
-        device_type: 1000h, None if it did not answer.
-        identity: 1018h:01 to 04, those that it has.
-        name: 1008h, empty if it has none.
-        state: last reported state, None if it reported none.
+        device_type: 1000h, None if the node did not answer.
+        identity: 1018h:01 to 04, without the sub-indices that the node does not have.
+        name: 1008h, empty if the node has none.
+        state: last reported state, None if the node reported none.
         answers: number of answers to one question; 2 means that two nodes share this node-ID.
-        heartbeat_ms: 1017h, None if it has none.
+        heartbeat_ms: 1017h, None if the node has none.
     """
 
     node_id: int

@@ -28,9 +28,9 @@ _OnProgress = Callable[[int], object]
 def download_blocks(index: int, sub: int, data: bytes, on_progress: _OnProgress) -> Script[None]:
     """Write an object in blocks, with CRC if the server supports it.
 
-    A segment lost within a block, and those after it, are sent again. If the last segment of a
-    block or its acknowledgement is lost, CiA 301 defines no way to continue: the transfer times
-    out.
+    If a segment within a block is lost, this segment and the segments after it are sent again. If
+    the last segment of a block or its acknowledgement is lost, the transfer times out, because CiA
+    301 defines no way to continue.
 
     Args:
         index: of the object.
@@ -39,9 +39,9 @@ def download_blocks(index: int, sub: int, data: bytes, on_progress: _OnProgress)
         on_progress: called with the progress.
 
     Raises:
-        SdoAborted: the server refuses, or answers something else; `COMMAND_SPECIFIER` if it does
-            not support block transfer.
-        SdoTimeout: it does not answer.
+        SdoAborted: the server refuses, or sends an unexpected answer; the code is
+            `COMMAND_SPECIFIER` if the server does not support block transfer.
+        SdoTimeout: the server does not answer.
     """
     request = sdo_frame.BlockDownloadInitiateRequest(index, sub, crc=True, size=len(data)).encode()
     first = SdoRequest(request, index, sub)
@@ -94,7 +94,7 @@ def _request(request: SdoRequest, kind: type[Answer]) -> Script[Answer]:
 
 
 def _abort(index: int, sub: int, code: sdo_frame.AbortCode) -> Script[NoReturn]:
-    """End the transfer: the server sent a response that is not allowed here."""
+    """Abort the transfer after a response of the server that is not allowed at this point."""
     yield SdoFrame(Abort(index, sub, code).encode())
     raise SdoAborted(index, sub, code)
 
@@ -136,7 +136,7 @@ _Say = Callable[[str], object]
 
 
 class ProgramFailed(Exception):  # noqa: N818 - what the node did
-    """The node did not do what was requested; the message says what."""
+    """The node did not do what was requested; the message gives the request."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,7 +168,7 @@ class Program:
         bus: the bus.
         node_id: the node.
         number: number of the program, 1..254, which is the sub-index.
-        say: called with each step in words.
+        say: called with a description of each step.
     """
 
     def __init__(self, bus: NodeBus, node_id: int, number: int, say: _Say) -> None:
@@ -184,7 +184,9 @@ class Program:
         )
 
     def command(self, command: int) -> None:
-        """Write program control; a node that stops or starts may reset before it answers.
+        """Write program control.
+
+        A node that stops or starts its program may reset before it answers.
 
         Raises:
             SdoAborted: the node refuses.
@@ -196,7 +198,7 @@ class Program:
                 raise
 
     def stop(self) -> None:
-        """Stop the program unless it is stopped; wait until it is."""
+        """Stop the program unless it is already stopped; wait until it has stopped."""
         if self._read(boot_slave.CONTROL) == boot_slave.STOP:
             self._say("it is already stopped")
             return
@@ -222,8 +224,8 @@ class Program:
         Args:
             data: the program.
             on_progress: called with the progress.
-            tries: number of attempts; a disturbed transfer starts from the beginning, because a
-                client cannot resume it (CiA 301).
+            tries: number of attempts. A disturbed transfer starts from the beginning, because a
+                client cannot resume a transfer (CiA 301).
 
         Returns:
             The number of attempts made.
@@ -249,7 +251,7 @@ class Program:
         return number
 
     def _is_there(self) -> bool:
-        """Return whether the node answers at all; one or two frames may be lost."""
+        """Return whether the node answers any request; up to two frames may be lost."""
         for _ in range(_LOOKS):
             try:
                 self._read(boot_slave.CONTROL)
@@ -272,7 +274,7 @@ class Program:
             on_progress(len(data))
 
     def await_control(self, wanted: int) -> None:
-        """Wait until program control reads this value; a resetting node does not answer."""
+        """Wait until program control has this value; a node does not answer during a reset."""
         until_us = self._bus.now_us + _PATIENCE_US
         while (control := self._optional(boot_slave.CONTROL)) != wanted:
             if self._bus.now_us >= until_us:

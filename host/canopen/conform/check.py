@@ -86,7 +86,8 @@ class Act:
 
     Attributes:
         words: arguments of the stimulus, such as `input`, `6000:01`, `01`.
-        within_ms: if it takes longer, the check is inconclusive; None allows any time.
+        within_ms: time limit of the action; if the action takes longer, the check is inconclusive.
+            None allows any time.
     """
 
     words: tuple[str, ...]
@@ -160,7 +161,7 @@ class RefuseRead(OfObject):
 
 @dataclass(frozen=True, slots=True)
 class Keep(OfObject):
-    """Declare that the check changes an object by other means: it is written back at the end."""
+    """Declare that the check changes an object by other means; it is restored at the end."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -215,9 +216,9 @@ class Step(NamedTuple):
     """One step of a check.
 
     Attributes:
-        action: what is done.
-        given: it prepares: if the node does not do it, the check is inconclusive.
-        at_end: it is always done at the end, and cannot fail the check.
+        action: the action of the step.
+        given: whether the step is a preparation; if it fails, the check is inconclusive.
+        at_end: whether the step is always done at the end; such a step cannot fail the check.
     """
 
     action: Action
@@ -226,10 +227,10 @@ class Step(NamedTuple):
 
 
 class Level(IntEnum):
-    """What a run may do to the node; a level includes those before it."""
+    """What a run may do to the node; each level includes the levels before it."""
 
     READ_ONLY = 0
-    """SDO uploads and listening: no download to any object, not even one to be refused."""
+    """SDO uploads and listening; no downloads, not even a download that the node must refuse."""
     COMMUNICATION = 1
     """Communication objects, refused downloads, NMT, SYNC, PDO, error control; all restored."""
     INTRUSIVE = 2
@@ -254,8 +255,8 @@ class Check:
         group: for example `NMT`.
         title: what a conforming node does.
         source: document, version and clause; `practice` if no clause is certain.
-        level: the lowest level that it needs.
-        needs: features without which it is not applicable; `STIMULUS` is one.
+        level: the lowest level that the check needs.
+        needs: features without which the check is not applicable; `STIMULUS` is one of them.
         choice: why the device may choose the answer; empty if the clause decides.
         steps: what the tester sends, expects, counts and waits for.
     """
@@ -276,8 +277,10 @@ _WILD: Final = re.compile(r"[*?[]")
 """The first character of a pattern part that is not fixed."""
 
 Stimulus = Callable[..., str]
-"""Operates the inputs of the device: takes words such as `input 6000:01 01`, returns the answer.
-Raises ValueError for what it cannot do.
+"""Operates the inputs of the device.
+
+Takes words such as `input 6000:01 01`, and returns the answer. Raises ValueError if it cannot do
+the operation.
 """
 
 
@@ -298,7 +301,8 @@ class ConformancePlan:
             to do them.
         longest_s: after this time no further check starts.
         resolution_us: resolution of the adapter's time stamps.
-        shared_host: the node may be a process of this machine, and late when this one is.
+        shared_host: whether the node may be a process of this machine, which is delayed together
+            with the tester.
     """
 
     level: Level = Level.READ_ONLY
@@ -324,7 +328,7 @@ class ConformancePlan:
         )
 
     def may_choose(self, group: str, place: str = "") -> bool:
-        """Return whether a check of a group may be selected, before it is made.
+        """Return whether a check of a group may be selected; used before the check is made.
 
         Args:
             group: of the check.

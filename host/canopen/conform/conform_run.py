@@ -80,9 +80,10 @@ class _StrayHeartbeat:
         node_id: of the node, 1..127.
 
     Attributes:
-        stamps: when heartbeats came before the run, in bus time.
+        stamps: times at which heartbeats arrived before the run, in bus time.
         finding: the contradiction to 1017h, in words; empty if there is none.
-        unrestored: the message that it is gone after the run; empty if it is not.
+        unrestored: the message that the heartbeat is missing after the run; empty if it is not
+            missing.
     """
 
     def __init__(self, exchange: BusExchange, node_id: int) -> None:
@@ -105,7 +106,10 @@ class _StrayHeartbeat:
             self.finding = f"{self._text()}, but {self._said()}"
 
     def look_again(self) -> None:
-        """Listen after the run: a heartbeat that 1017h does not set cannot be switched on again."""
+        """Listen for the heartbeat after the run.
+
+        A heartbeat that is not set by 1017h cannot be switched on again.
+        """
         each_ms = self._each_ms()
         if not self.finding or not each_ms:
             return
@@ -189,11 +193,11 @@ class ConformRun:
         self._absent = False
 
     def disturb(self, reason: str) -> None:
-        """Make the running check inconclusive if it fails: the adapter lost frames, or similar."""
+        """Make the running check inconclusive if it fails, for example after lost frames."""
         self._exchange.disturb(reason)
 
     def crash(self, reason: str, where: Iterable[str] = ()) -> None:
-        """Make the running check fail: the program of the node raised an error and starts again.
+        """Make the running check fail, because the program of the node crashed and starts again.
 
         Args:
             reason: the error in one line.
@@ -206,8 +210,8 @@ class ConformRun:
     def run(self) -> Report:
         """Test the node and return the report; in any case, restore what was changed.
 
-        Ctrl-C ends the run with a report of the checks so far; a second one, while the node is
-        being restored, leaves the node as it is.
+        Ctrl-C ends the run with a report of the checks that have ended. A second Ctrl-C, while the
+        node is being restored, ends the restoring.
         """
         aborted = ""
         try:
@@ -221,7 +225,7 @@ class ConformRun:
         return self._report(aborted)
 
     def _run(self) -> str:
-        """Run the checks; return why nothing could be judged, empty if something was."""
+        """Run the checks; return why no check could be judged, empty if a check was judged."""
         self._exchange.begin(min(_EXAMINE_US, self._longest_us))
         self._exchange.wait(_LISTEN_MS)
         self._stray.hear()

@@ -73,7 +73,7 @@ from tickrig.host.canopen.conform.subject import Subject
 from tickrig.host.canopen.conform.verdict import CheckOutcome, CheckVerdict, FrameLine, Result
 
 _LSS_ANSWER: Final = "7E4#"
-"""CAN-ID of all LSS slaves: a frame does not tell which one sent it."""
+"""CAN-ID of all LSS slaves; a frame does not show which slave sent it."""
 _HISTORY: Final = (0x1003, 0)
 _PDO_PARAMETERS: Final = (*range(0x1400, 0x1600), *range(0x1800, 0x1A00))
 _EMPTIED: Final = "empty the error history 1003h, which cannot be written back"
@@ -102,7 +102,7 @@ def _is_segment(command: str) -> bool:
 
 
 def _enables(action: Action) -> bool:
-    """Return whether a step sets the COB-ID of a PDO: every device accepts its own."""
+    """Return whether a step sets the COB-ID of a PDO; every device accepts its own COB-ID."""
     index, sub = action.address if isinstance(action, Write) else (0, 0)
     return isinstance(action, Macro) or (index in _PDO_PARAMETERS and sub == 1)
 
@@ -186,7 +186,7 @@ class Judge:
         return bound
 
     def _as_found(self, step: Step) -> Step:
-        """Omit a value that an object had before the run: the tester has written another one."""
+        """Omit the value of an object before the run, if the tester has written another value."""
         action = step.action
         if not isinstance(action, Hold) or action.value is None:
             return step
@@ -196,7 +196,7 @@ class Judge:
         return step._replace(action=replace(action, value=None))
 
     def _unread(self, bound: BoundCheck, subject: Subject) -> str:
-        """Return what a check would write that could not be restored; empty if there is nothing."""
+        """Return why the objects of a check could not be restored; empty if they can be."""
         written = bound.changed & subject.has | bound.written & subject.values
         if self._plan.level is Level.READ_ONLY or not (unread := self._care.unread(written)):
             return ""
@@ -252,7 +252,7 @@ class Judge:
     def _unprepared(
         self, action: Action, error: StepFailed, reason: str
     ) -> tuple[CheckVerdict, str]:
-        """Return the verdict of a check whose question the node prevented.
+        """Return the verdict if the node refused the preparation, or a write of a constant object.
 
         The clause of the check does not cover its preparation.
         CiA 301 allows many objects to be constant, and a device to refuse values that it does not

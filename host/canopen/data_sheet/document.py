@@ -100,10 +100,10 @@ class Document:
 
         Args:
             rule: its name.
-            text: what came, and what was allowed.
-            section: its section; empty for the file as a whole.
-            line: its number, or its keyword; by default the line of the section.
-            edits: the edits that fix it.
+            text: the value in the file, and the allowed values.
+            section: the section; empty for the file as a whole.
+            line: the line number, or the keyword of the line; by default the line of the section.
+            edits: the edits that fix the finding.
         """
         number = line if isinstance(line, int) else self.file.line(section, line)
         kept = () if self.file.is_xml else edits
@@ -128,7 +128,7 @@ class Document:
         return True
 
     def with_value(self, line: EdsLine, value: str) -> Edit:
-        """Return the edit that gives a keyword another value; blanks and comment stay."""
+        """Return the edit that gives a keyword another value; blanks and the comment are kept."""
         text = self.texts[line.number - 1]
         begin = text.index("=") + 1
         at = text.index(line.value, begin) if line.value in text[begin:] else begin
@@ -153,7 +153,7 @@ class Document:
         return any("[" in line.content for line in self._blocks[""] if not line.title)
 
     def lines_of(self, section: str) -> list[EdsLine]:
-        """Return the keywords of a section; of several with this name, those of the first."""
+        """Return the keywords of a section; if several sections have this name, use the first."""
         return [line for line in self._blocks.get(section, ()) if line.is_keyword]
 
     def _read_blocks(self) -> dict[str, list[EdsLine]]:

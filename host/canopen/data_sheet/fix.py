@@ -49,10 +49,10 @@ class _Fixed:
 
 
 def fix(document: Document, *, ascii_only: bool = False) -> _Fixed:
-    """Fix a file until nothing changes; lines without findings keep all bytes.
+    """Fix a file until no fix changes it; all bytes of lines without findings are kept.
 
-    A file that looks truncated stays unchanged: after a fix it would look complete. Other encodings
-    than Unicode become UTF-8.
+    A file that looks truncated is not changed, because it would look complete after a fix. Files in
+    other encodings than Unicode are converted to UTF-8.
 
     Args:
         document: the file.

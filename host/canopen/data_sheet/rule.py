@@ -24,7 +24,7 @@ class _EdsRule(NamedTuple):
 
     Attributes:
         name: as findings show it.
-        severity: of its findings.
+        severity: severity of its findings.
         clause: the document and clause that requires it; `practice` if there is none.
         breaks: the consequence of breaking it.
         fix: what to do.
@@ -88,8 +88,8 @@ class RuleFinding:
         file: name of the file.
         line: its number, 0 for the file as a whole.
         section: empty outside of sections.
-        text: what came, and what was allowed.
-        edits: the edits that fix it; empty if that takes knowledge of the device.
+        text: the value in the file, and the allowed values.
+        edits: the edits that fix the violation; empty if a fix needs knowledge of the device.
     """
 
     rule: _EdsRule

@@ -209,8 +209,8 @@ _WHOLE: Final = ("object", "entry")
 def diff(one: Document, other: Document) -> list[_Change]:
     """Return all differences: device, identity, bit rates, then objects by index.
 
-    The order of sections, the notation of numbers and what does not concern the device (dates, file
-    names, comments) are ignored.
+    The order of sections and the notation of numbers are ignored. Dates, file names and comments
+    are also ignored, because they do not concern the device.
     """
     return [*_device(one, other), *_objects(one, other)]
 

@@ -33,7 +33,7 @@ _ABSENT_OBJECTS: Final = range(0x5FFF, 0x5EFF, -1)
 _COUNTED: Final = (0x1018, 0x1016, 0x1010, 0x1200)
 """Types of which sub-index 0 holds the highest sub-index."""
 _GROWING: Final = (0x1003, *range(0x1200, 0x1C00))
-"""Objects that may have more sub-indices than the EDS describes: errors, COB-IDs, mappings."""
+"""Objects that may have more sub-indices than in the EDS: errors, COB-IDs, mappings."""
 _LAST_SUB: Final = 0xFE
 
 _Place = tuple[int, int]
@@ -45,9 +45,9 @@ class _AbsentPlaces(NamedTuple):
 
     Attributes:
         name: in checks, after `$`.
-        what: description of what the node must have, for messages.
-        certain: CiA 301 allows nothing at this place.
-        likely: no description mentions this place.
+        what: what the node must have, for messages.
+        certain: whether CiA 301 allows no object at this place.
+        likely: whether no description mentions this place.
     """
 
     name: str
@@ -127,16 +127,16 @@ Bound = BoundObject | BoundPdo | BoundPlace
 
 @dataclass(frozen=True, slots=True)
 class Binding:
-    """The objects that the names of `NAMES` stand for, and the reasons for names without one.
+    """The objects that the names of `NAMES` stand for, and the reasons for names without an object.
 
     Attributes:
         device: the objects of the EDS, or those that answered.
         bound: the objects by name.
-        reasons: in words, by name, for names that are not bound.
+        reasons: the reasons in words why names are not bound, by name.
         findings: contradictions between EDS and node, one per line.
         known: whether the objects come from an EDS.
-        entries: the objects by index and sub-index.
-        reader: has read them.
+        entries: the objects, by index and sub-index.
+        reader: the reader that has read the objects.
     """
 
     device: EdsDevice
@@ -171,14 +171,15 @@ def bind(
     allow: Collection[int] = (),
     never: Collection[int] = (),
 ) -> Binding:
-    """Find an object or PDO for each name; only read the node.
+    """Find an object or PDO for each name; the node is only read.
 
-    Objects that checks write later lie in the communication or manufacturer area; without an EDS
-    only in the former, because it is unknown which others may be written.
+    Objects that checks write later are in the communication area or the manufacturer area. Without
+    an EDS these objects are only in the communication area, because it is unknown which other
+    objects may be written.
 
     Args:
-        device: the device of its EDS; None to find out from the node which objects of CiA 301 it
-            has.
+        device: the device of its EDS. If it is None, the node is read to find out which objects of
+            CiA 301 it has.
         upload: reads an object of the node.
         allow: indices of the profile area, 6000h to 9FFFh, that may be written nevertheless.
         never: indices that are never written.
@@ -245,7 +246,7 @@ def _not_free(wanted: WantedObject, fitting: list[EntryDescription]) -> str:
 
 
 def _is_free(search: _Search, entry: EntryDescription) -> bool:
-    """Return whether an object accepts every value of its type: in the profile area few do."""
+    """Return whether an object accepts every value of its type; few profile objects do."""
     if entry.index not in PROFILE_AREA:
         return True
     profile = (search.reader.number(_DEVICE_TYPE, 0) or 0) & 0xFFFF
@@ -270,9 +271,10 @@ def _order(wanted: WantedObject, entry: EntryDescription) -> tuple[bool | int, .
 
 
 def _bind_absent(search: _Search, places: _AbsentPlaces) -> None:
-    """Take a place that must be unused but is not: the checks report it.
+    """Take a place that must be unused but is used; the checks then report it.
 
-    Otherwise take the first unused place, or, if the node has something everywhere, any place.
+    If there is no such place, take the first unused place. If the node has an object at every
+    place, take any place.
     """
     certain = [place for place in places.certain if _may_write(search, place[0])]
     there = [place for place in certain if _has_something(search, place)]

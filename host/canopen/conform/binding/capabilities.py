@@ -53,7 +53,7 @@ _LSS: Final = ("lss", "lssident", "unconfigured")
 _IDENTITY: Final = ((1, "VendorNumber"), (2, "ProductNumber"), (3, "RevisionNumber"))
 _DEVICE_TYPE: Final = 0x1000
 _ON_COMMAND: Final = {"store": 0x1010, "restore": 0x1011}
-"""Optional functions of objects: bit 0 of the first sub-index tells if they are supported."""
+"""Optional functions of objects; bit 0 of the first sub-index is set if they are supported."""
 _STORE: Final = 0x1010
 _AUTONOMOUSLY: Final = 2
 _LSS_ADDRESS: Final = 0x1018
@@ -93,11 +93,11 @@ class EdsClaims(NamedTuple):
 
 
 class NodeDescription(NamedTuple):
-    """What is known about a node before it is queried.
+    """The description of a node before the node is queried.
 
     Attributes:
         device: its objects.
-        claims: what its EDS says besides them.
+        claims: the properties in its EDS besides the objects.
         wrong: errors and warnings of the EDS.
     """
 
@@ -117,8 +117,8 @@ class NodeDescription(NamedTuple):
     ) -> NodeDescription:
         """Return the description that an EDS of these objects gives, without writing the EDS.
 
-        An EDS cannot express "no default": it gives the power-on value of every number, and no
-        value for an empty text.
+        An EDS cannot express "no default". Therefore the description has the power-on value of
+        every number, and no value for an empty text.
         """
         rows = tuple(entries)
         said = [row if row.has_default is bool(row.default) else _as_said(row) for row in rows]
@@ -160,13 +160,13 @@ def find_features(
 ) -> NodeFeatures:
     """Find out the capabilities of a node; only read the node.
 
-    Only the EDS can tell whether the node has LSS: a trial would change the state of all nodes on
-    the bus. Without an EDS the node counts as one without LSS.
+    Only the EDS shows whether the node has LSS, because a trial would change the state of all nodes
+    on the bus. Without an EDS the tester assumes that the node has no LSS.
 
     Args:
         binding: its objects.
         client: tries a block upload.
-        claims: what its EDS says, None without one.
+        claims: the properties in its EDS, None without an EDS.
     """
     reasons = dict(_missing(binding))
     for word, key in _DUMMIES.items():

@@ -148,8 +148,8 @@ def bind_pdos(
 ) -> tuple[dict[str, BoundPdo], dict[str, str]]:
     """Find a PDO of each kind.
 
-    `mapped_rpdo` is an RPDO whose objects may all be written; checks send nothing to the others
-    while they have their original mapping.
+    `mapped_rpdo` is an RPDO whose objects may all be written. Checks send no data to the other
+    RPDOs while these have their original mapping.
 
     Args:
         device: the device of its EDS.

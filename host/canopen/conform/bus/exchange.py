@@ -23,11 +23,13 @@ from tickrig.wire.instant import NEVER
 
 
 class StepFailed(Exception):  # noqa: N818 - what the step did
-    """The node did something else, or nothing; the message says what came and what was allowed.
+    """The node did not react as expected.
+
+    The message gives the received frame and the allowed frames.
 
     Attributes:
         got: the received frame, as candump writes it; empty if there was none.
-        wanted: patterns of the expected frame, of which one must match; empty if no frame was
+        wanted: patterns of the expected frame, one of which must match; empty if no frame was
             expected.
     """
 
@@ -37,11 +39,14 @@ class StepFailed(Exception):  # noqa: N818 - what the step did
 
 
 class NotAllowed(Exception):  # noqa: N818 - what the step is
-    """The level of the run forbids a step; the message says what, and which level allows it."""
+    """The level of the run forbids a step.
+
+    The message gives the step and the level that allows it.
+    """
 
 
 class Disturbed(Exception):  # noqa: N818 - what the check was
-    """A check that cannot be judged; the message says why."""
+    """A check that cannot be judged; the message gives the reason."""
 
 
 # The evidence of a check: the frames on the bus, with their times.
@@ -89,16 +94,16 @@ class Evidence:
 
 MS_US: Final = 1_000
 PERIOD_TOLERANCE: Final = 0.05
-"""Allowed relative error of the mean period: CiA 301 gives none; crystals are far better."""
+"""Allowed relative error of the mean period; CiA 301 gives no limit; crystals are far better."""
 
 
 def _off_period(stamps: Sequence[int], each_ms: int, times: int, resolution_us: int) -> str:
-    """Return what is wrong with the mean period or the number of periods; empty if nothing is.
+    """Return the error in the mean period or the number of periods; empty if both are right.
 
     Args:
         stamps: when frames came, in microseconds; surplus stamps at the end are ignored.
         each_ms: the expected period.
-        times: the expected number of periods; this takes one frame more.
+        times: the expected number of periods, which is one less than the number of frames.
         resolution_us: resolution of the stamps.
 
     >>> _off_period([0, 53_000, 106_000], 50, 2, 0)
@@ -137,7 +142,7 @@ class Presence(Enum):
 # How much of the bus the tester may use, and how much others use.
 
 ASSUMED_BIT_RATE: Final = 125_000
-"""Bit rate if none is given, in bit/s: low, so that the load limit holds on any faster bus."""
+"""Default bit rate in bit/s; it is low, so that the load limit holds on any faster bus."""
 
 _WINDOW_US: Final = 100_000
 """Window over which the load is limited."""
@@ -161,7 +166,7 @@ class _Allowance:
 
     Attributes:
         slowness: factor by which everything may take longer than usual.
-        from_us: nothing may be sent before.
+        from_us: time before which no frame may be sent.
     """
 
     def __init__(self, bit_rate: int, max_load: float) -> None:
@@ -195,7 +200,7 @@ class _ForeignLoad:
 
 
 _SLICE_US: Final = 20_000
-"""The longest single wait: if the host was stopped, a wait that lasts longer shows it."""
+"""The longest single wait; a wait that lasts longer shows that the host was stopped."""
 
 HOST_GAP_US: Final = 10_000
 """How much longer a wait, or the time between two, may last before the host counts as late."""
@@ -203,8 +208,11 @@ HOST_GAP_US: Final = 10_000
 _HELD_US: Final = 20_000
 """A frame sent later than this may change what the node does, so the check is inconclusive."""
 _PAUSE_US: Final = 10_000
-"""Pause after an SDO request that has no answer: a server may accept one frame at a time, and
-CiA 301 does not say how soon it is ready for the next one."""
+"""Pause after an SDO request that has no answer.
+
+A server may accept one frame at a time, and CiA 301 does not specify when it must be ready for the
+next frame.
+"""
 _UNANSWERED: Final = (sdo_frame.ClientCommand.ABORT, sdo_frame.BLOCK_ENDED)
 _TOO_LOW: Final = "your --max-load is too low for this check"
 
@@ -221,37 +229,38 @@ _BEGINNING: Final = (
     sdo_frame.ClientCommand.BLOCK_UPLOAD,
     sdo_frame.ClientCommand.BLOCK_DOWNLOAD,
 )
-"""Requests that name an object; some block segments look like them, which does no harm."""
+"""Requests that name an object; some block segments look like such requests, which does no harm."""
 
 _NAMING: Final = frozenset((*range(0x40, 0x50), 0x60, 0x80, 0xA0, 0xA4, 0xC0, 0xC2, 0xC4, 0xC6))
-"""Commands of answers that name an object; block segments look like them, which does no harm."""
+"""Commands of answers that name an object; block segments may look like them without harm."""
 
 _UNREAD_FRAMES: Final = 2_000
 """Unread frames kept per CAN-ID; if a node floods the bus, the oldest are lost."""
 
 
 class BusExchange:
-    """The bus as a check sees it: frames are text, and stay unread, per CAN-ID, until taken.
+    """The bus as a check sees it: frames are text; each CAN-ID has a queue of unread frames.
 
     Args:
-        link: the bus; checks judge its time stamps.
+        link: the bus; checks use its time stamps.
         node_id: of the node under test, 1..127.
         bit_rate: of the bus in bit/s.
-        max_load: share of it that may be used, above 0 to 1.
+        max_load: share of the bit rate that may be used, above 0 to 1.
         permit: checks each frame before it is sent; raises NotAllowed.
-        resolution_us: of the time stamps; a frame may be late by this time.
-        shared_host: the node may be a process of this machine.
+        resolution_us: resolution of the time stamps; a frame may be late by this time.
+        shared_host: whether the node may be a process of this machine.
 
     Attributes:
-        evidence: of the running check.
+        evidence: the evidence of the running check.
         disturbances: reasons why the running check cannot fail, without duplicates.
         crashes: reasons why the running check fails in any case, without duplicates.
-        boots: boot-up messages of the node so far.
-        others: node-IDs of others that were on the bus so far; 0 for what is of no node.
+        boots: number of boot-up messages of the node since the start of the run.
+        others: node-IDs of other nodes seen on the bus; 0 stands for frames that belong to no node.
         deadline_us: time at which the running check must have ended.
         transfer: the answer of the node to the last SDO request that names an object.
-        played: a node-ID of no other node: the tester simulates it, or assigns it to the node.
-        unanswered: requests that name an object and were not answered, the first one first.
+        played: a node-ID that no other node has. The tester simulates a node with it, or assigns it
+            to the node under test.
+        unanswered: requests that name an object and were not answered, in the order of sending.
     """
 
     def __init__(  # noqa: PLR0913 - a bus, by keyword
@@ -294,12 +303,12 @@ class BusExchange:
         return self._link.now_us
 
     def begin(self, within_us: int, watched: frozenset[str] | None = None) -> None:
-        """Begin a check, or what is done between checks: forget all frames before.
+        """Begin a check, or the work between two checks; drop all earlier frames.
 
         Args:
             within_us: how long it may last.
-            watched: CAN-IDs of which frames are kept, beside those of the node; None between
-                checks, where no evidence is kept.
+            watched: CAN-IDs whose frames are kept, in addition to the CAN-IDs of the node. It is
+                None between checks, when no evidence is kept.
         """
         self.deadline_us = NEVER
         self._listen(self.now_us)
@@ -312,7 +321,7 @@ class BusExchange:
 
     @property
     def presence(self) -> Presence:
-        """How many nodes have answered: two if most objects were answered twice each time."""
+        """Number of nodes that have answered: two if most objects were answered twice each time."""
         if self._is_silent:
             return Presence.NONE
         told = self._answered
@@ -321,7 +330,7 @@ class BusExchange:
         return Presence.TWO if many else Presence.ONE
 
     def end_listening(self) -> None:
-        """From now on the node may send with any CAN-ID: only heartbeats reveal other nodes."""
+        """Allow the node to use any CAN-ID; from now on only heartbeats reveal other nodes."""
         self._others_by = _HEARTBEATS
 
     def remark(self, text: str) -> None:
@@ -335,13 +344,16 @@ class BusExchange:
             self.remark(reason)
 
     def crash(self, reason: str, where: Iterable[str] = ()) -> None:
-        """Make the running check fail: the program of the node crashed and starts again."""
+        """Make the running check fail, because the program of the node crashed and starts again."""
         self.crashes[reason] = None
         for line in (reason, *where):
             self.remark(line)
 
     def send(self, frame: CanFrame) -> None:
-        """Send a frame as soon as the load allows it; NotAllowed if the level does not."""
+        """Send a frame as soon as the load allows it.
+
+        Raises NotAllowed if the level does not allow the frame.
+        """
         self._permit(frame)
         link, is_request = self._link, frame.can_id == self._request
         now_us = link.now_us
@@ -379,7 +391,7 @@ class BusExchange:
             The frame.
 
         Raises:
-            StepFailed: no frame came in time, or another one.
+            StepFailed: no frame arrived in time, or a frame arrived that does not match.
         """
         queue = self._unread[can_id_of(patterns[0])]
         until_us = self.now_us + within_ms * MS_US + self.resolution_us
@@ -398,7 +410,7 @@ class BusExchange:
         return got
 
     def none(self, can_id: str, for_ms: int) -> None:
-        """Wait; StepFailed if a frame with the CAN-ID comes or is unread."""
+        """Wait; raises StepFailed if a frame with the CAN-ID arrives or is unread."""
         until_us = self.now_us + for_ms * MS_US
         self._listen_until(until_us)
         unread = self._unread[can_id]
@@ -406,16 +418,16 @@ class BusExchange:
             raise StepFailed(f"unexpected {unread[0][1]}, want none on {can_id} for {for_ms} ms")
 
     def count(self, pattern: str, for_ms: int, least: int, most: int) -> None:
-        """Wait; StepFailed unless between `least` and `most` matching frames come."""
+        """Wait; raises StepFailed unless `least` to `most` matching frames arrive."""
         got = len(self.collect(pattern, for_ms))
         if not least <= got <= most:
             raise StepFailed(f"{got} x {pattern} in {for_ms} ms, want {least}..{most}")
 
     def period(self, pattern: str, each_ms: int, times: int) -> None:
-        """Wait; StepFailed unless matching frames come with a period of `each_ms`.
+        """Wait; raises StepFailed unless matching frames arrive with a period of `each_ms`.
 
         Args:
-            pattern: of the frames.
+            pattern: pattern of the frames.
             each_ms: their period.
             times: how many periods are measured.
         """
@@ -452,7 +464,7 @@ class BusExchange:
         self._unread.clear()
 
     def excuse(self) -> None:
-        """Do not count the time since the last poll as lateness of the host: a person was asked."""
+        """Do not count the time since the last poll as a delay of the host: a person was asked."""
         self._busy_us = self.now_us
 
     def wait(self, for_ms: int) -> None:

@@ -56,7 +56,7 @@ _DIGITS: Final = 8
 
 
 def unlike(got: str, wanted: Sequence[str]) -> str:
-    """Return in what a frame differs from those that were expected.
+    """Return the difference between a frame and the expected frames.
 
     Args:
         got: a frame as candump writes it.

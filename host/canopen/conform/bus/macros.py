@@ -52,7 +52,7 @@ def follow(  # noqa: PLR0913, PLR0917 - the words of the macro
 
 
 def _rest(sdo: SdoFrames, actual: Address, within_ms: int) -> int:
-    """Wait until the drive stands; return its position."""
+    """Wait until the drive stands still; return its position."""
     before = _position(sdo, actual)
     for _ in range(0, within_ms, _POLL_MS):
         sdo.exchange.wait(_POLL_MS)
@@ -137,7 +137,7 @@ _PDO_MS: Final = 5
 _LATE_MS: Final = 100
 """How long to wait for a TPDO after a SYNC that must bring one."""
 _FEW: Final = 10
-"""SYNCs after which to wait for a TPDO: it is not known which one brings the first."""
+"""Number of SYNCs after which to wait for a TPDO; it is unknown which SYNC triggers the first."""
 
 
 def _download_segmented(sdo: SdoFrames, at: Address, size: str) -> None:
@@ -265,7 +265,10 @@ def _remap(sdo: SdoFrames, pdo: Address, on: str, kind: str, *entries: str) -> N
 
 
 def enable(sdo: SdoFrames, pdo: Address, on: str, *entries: str) -> None:
-    """Enable a PDO; if it has no mapping, map objects first, because it may be refused without."""
+    """Enable a PDO; if it has no mapping, map objects first.
+
+    The node may refuse to enable a PDO without a mapping.
+    """
     head, body, cob_id = pdo[0], pdo[0] + TO_MAPPING, bytes.fromhex(on)
     sdo.write((head, 1), cob_id[:3] + bytes([cob_id[3] | 0x80]))
     if not sdo.read_data((body, 0), 1)[0]:

@@ -35,7 +35,7 @@ def number_of(data: bytes) -> int | None:
 
 
 class SdoClient:
-    """The client of the default SDO server of a node; it does nothing else at the same time.
+    """The client of the default SDO server of a node; it blocks until the transfer ends.
 
     It ignores frames that are not answers of the node.
 
@@ -70,7 +70,7 @@ class SdoClient:
             return self.run(upload(index, sub, size))
 
     def download(self, index: int, sub: int, data: bytes) -> None:
-        """Write an object, as `upload` reads one; raises the same."""
+        """Write an object; raises the same errors as `upload`."""
         try:
             self.run(download(index, sub, data))
         except SdoTimeout:
@@ -84,7 +84,7 @@ class SdoClient:
             return None
 
     def abort(self) -> None:
-        """End a transfer that a check left open; stacks look which object the abort names."""
+        """End a transfer that a check left open; stacks check which object the abort names."""
         at = sdo_frame.index_sub(self._exchange.transfer)
         frame = Abort(*at, sdo_frame.AbortCode.GENERAL).encode()
         self._send(sdo_frame.REQUEST_COB_ID + self._node_id, frame)

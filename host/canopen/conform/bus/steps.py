@@ -43,7 +43,7 @@ class StepPlayer:
         self._sdo = SdoFrames(exchange, node_id)
 
     def play(self, step: check.Step) -> None:
-        """Do one step; StepFailed if the node does not react as it says."""
+        """Do one step; raises StepFailed if the node does not react as the step requires."""
         action, bus = step.action, self._exchange
         match action:
             case check.OfObject():
@@ -155,7 +155,7 @@ def play_of_object(client: Client, action: check.Hold | check.RefuseRewrite) -> 
     """Do a step of an object check.
 
     Raises:
-        StepFailed: the node does not react as the step says.
+        StepFailed: the node does not react as the step requires.
     """
     try:
         if isinstance(action, check.Hold):

@@ -1,6 +1,7 @@
 """Rules over the three lists of objects: each object is in one, numbers start at 1.
 
-A listed object without a description may be lost: it stays in its list, and no count is lowered.
+The description of a listed object may have been lost. Therefore a listed object without a
+description stays in its list, and no count is lowered.
 """
 
 from __future__ import annotations

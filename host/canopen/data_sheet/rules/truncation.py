@@ -13,7 +13,7 @@ from tickrig.wire.canopen.eds.eds_file import shorten
 from tickrig.wire.canopen.eds.eds_value import object_section
 
 _SIGNS: Final = 2
-"""One alone may be a slip: a missing line end, or one object that is only listed."""
+"""A single sign may be a slip: a missing line end, or one object that is only listed."""
 
 
 def truncated(document: Document) -> Iterator[RuleFinding]:
@@ -44,7 +44,7 @@ def _listed_behind(document: Document, last: str) -> list[int]:
 
 
 def _is_short(document: Document, last: str) -> int:
-    """Count what the last section lacks: its entries, those of its object, keywords."""
+    """Count the missing parts of the last section: its entries, entries of its object, keywords."""
     if last in LISTS:
         said = number(document, last, "SupportedObjects") or 0
         return int(said > len(ObjectList(document, last).entries))

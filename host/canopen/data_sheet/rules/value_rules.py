@@ -93,7 +93,7 @@ def _leading_zero(document: Document, line: eds_value.EdsLine, terms: list[str])
 
 
 def _node_id(document: Document, section: str, line: eds_value.EdsLine) -> Iterator[RuleFinding]:
-    """Check what is added to the node-ID; blanks are left to the author."""
+    """Check the number that is added to the node-ID; blanks are not fixed."""
     plain = line.value.replace(" ", "")
     if _NODE_ID.fullmatch(plain) and plain.startswith("$NODEID"):
         return
@@ -230,7 +230,7 @@ def _standard_type(
 
 
 def _bytes(document: Document, finding: Finding, line: eds_value.EdsLine) -> tuple[Edit, ...]:
-    """Write the bytes that are used; the meaning of a text is left to the author."""
+    """Write the bytes that are used; only the author of the file knows the meaning of a text."""
     taken = finding.reason.rpartition(": ")[2].removesuffix(" is taken").replace(" ", "")
     is_plain = eds_value.is_hex_bytes(taken) and eds_value.without_comment(line.value) == line.value
     return (document.with_value(line, taken),) if is_plain else ()
@@ -252,9 +252,10 @@ def _kind(document: Document, finding: Finding, line: eds_value.EdsLine) -> tupl
 
 
 def _comment(document: Document, finding: Finding, line: eds_value.EdsLine) -> tuple[Edit, ...]:
-    """Turn the line into a comment; for a line before the first section, all of these lines.
+    """Turn the line into a comment; if it is before the first section, all lines there.
 
-    Lines that lost their title stay: as comments, their keywords would be lost silently.
+    Lines of a section that lost its title are not changed. As comments, their keywords would be
+    lost without a message.
     """
     lines = [line]
     if not line.section and document.head_is_lost:
@@ -268,7 +269,10 @@ def _comment(document: Document, finding: Finding, line: eds_value.EdsLine) -> t
 
 
 def _doubled_key(document: Document, finding: Finding, line: eds_value.EdsLine) -> tuple[Edit, ...]:
-    """Drop a keyword that repeats the same value; the right one of two values is unknown."""
+    """Drop a keyword that repeats the same value.
+
+    Of two different values, the right one is unknown; both are kept.
+    """
     first = document.keyword(line.section, line.key)
     same = first is not None and first.value == line.value
     return (Edit(line.number),) if same else ()
