@@ -77,10 +77,11 @@ FENCES: Final[tuple[Object, ...]] = (
 
 @dataclass(slots=True)  # not frozen: frozen requests take three times as long to create
 class SdoRequest:
-    """Send an SDO request; gives the response, raises SdoTimeout if there is none.
+    """Send an SDO request; the result is the response; raises SdoTimeout without a response.
 
     Attributes:
-        goes_on: the request continues a transfer of the server; else it starts one.
+        goes_on: whether the request continues a transfer of the server; otherwise it starts a
+            transfer.
     """
 
     request: bytes
@@ -113,11 +114,11 @@ class AwaitState:
 
 @dataclass(frozen=True, slots=True)
 class AwaitReport:
-    """Wait for any heartbeat or node guarding response; gives its state, None if there is none.
+    """Wait for any heartbeat or node guarding response; the result is its state, None without one.
 
     Attributes:
         timeout_us: how long to wait.
-        boot_up: a boot-up counts as well.
+        boot_up: whether a boot-up also counts.
     """
 
     timeout_us: int
@@ -150,7 +151,7 @@ Send = Callable[[int, bytes], None]
 
 
 def nothing(*_: object) -> None:
-    """Do nothing: this host guards no node, or no caller needs the result of a script."""
+    """Do nothing; used if the host guards no node, or if no caller needs the result of a script."""
 
 
 Misnamed = Callable[[Object, bytes], object]
@@ -177,9 +178,9 @@ class QueuedScript(NamedTuple):
 
 
 class Unanswered(list[Object]):
-    """The objects whose questions the server may still answer, the earliest question first.
+    """The objects of the requests that the server may still answer, in the order of the requests.
 
-    A question that was repeated counts once.
+    A repeated request counts once.
     """
 
     def add(self, at: Object) -> None:
@@ -188,16 +189,16 @@ class Unanswered(list[Object]):
             self.append(at)
 
     def hear(self, at: Object) -> None:
-        """Drop the questions before those about the object: the server is past them."""
+        """Drop the requests before those about the object; the server no longer answers them."""
         if at in self:
             del self[: self.index(at)]
 
     def fence(self, at: Object) -> Object:
         """Return an object whose answer shows that no answer about `at` can follow.
 
-        The latest question is preferred, so a node that is gone gets requests for the same fence.
-        If all fences are open, the oldest question is dropped: a server that answers now has left
-        more than 250 questions unanswered.
+        The latest request is preferred, so that a node that is gone gets requests for the same
+        fence. If all fences are open, the oldest request is dropped: a server that answers at this
+        point has left more than 250 requests unanswered.
         """
         last = self[-1]
         if last in FENCES and last != at:
@@ -212,15 +213,15 @@ class Unanswered(list[Object]):
 class Dialogue:
     """The dialogue with one node; it sends, and never blocks.
 
-    It lasts as long as its holder talks to the node: only the dialogue knows which questions the
-    server may still answer.
+    Keep the dialogue as long as you communicate with the node, because only the dialogue knows
+    which requests the server may still answer.
 
     Args:
         node_id: the node.
-        send: takes CAN-ID and data.
-        guard: takes the CAN-ID of a remote frame.
+        send: sends a data frame; takes CAN-ID and data.
+        guard: sends a remote frame; takes the CAN-ID.
         sdo_timeout_us: how long to wait for an SDO response.
-        on_misnamed: called with each answer that ends a question and names another object; None
+        on_misnamed: called with each answer that ends a request and names another object; None
             ignores such answers.
 
     Attributes:
@@ -293,7 +294,7 @@ class Dialogue:
         self._unanswered.add(at)
 
     def receive_sdo(self, now_us: int, data: bytes) -> None:
-        """Process a response; ignore the answer to another question, and copies."""
+        """Process a response; ignore answers to other requests, and copies."""
         self._now_us = now_us
         try:
             answer = sdo.parse_response(data)
@@ -321,7 +322,7 @@ class Dialogue:
             self._keep_misnamed(now_us, named, data)
 
     def _keep_misnamed(self, now_us: int, named: Object | None, data: bytes) -> None:
-        """Keep an answer that names another object; it is used if the right one does not follow."""
+        """Keep an answer that names another object; it is used unless the right one follows."""
         if self._on_misnamed is None or named is None or named in self._unanswered:
             return
         self._misnamed = data
@@ -329,7 +330,7 @@ class Dialogue:
             self.due_us = min(self.due_us, now_us + _MISNAMED_US)
 
     def _end_misnamed(self, step: SdoRequest) -> sdo.Abort | errors.SdoMisnamed:
-        """Return the error for an answer that names another object than the one asked for.
+        """Return the error for an answer that names another object than the request.
 
         An abort ends the only open transfer, no matter which object it names. A value may belong to
         another object.
@@ -349,8 +350,8 @@ class Dialogue:
     ) -> bool:
         """Return whether a response can only be the answer to a step.
 
-        A segment and an abort of 0000h:00 name no object. While other questions are open, they may
-        be answers to those.
+        A segment and an abort of 0000h:00 name no object. While other requests are open, they may
+        be answers to those requests.
         """
         if named is not None and named != _NONE_NAMED:
             mine = named == (step.index, step.sub)
@@ -360,7 +361,7 @@ class Dialogue:
         return mine and (may_repeat or not step.goes_on or data != self._answer)
 
     def _pass_fence(self, step: SdoRequest, fence: sdo.Response) -> None:
-        """Send the request of the script: all earlier questions are settled."""
+        """Send the request of the script after all earlier requests are settled."""
         if isinstance(fence, sdo.UploadInitiateResponse) and fence.data is None:
             self._say(sdo.Abort(fence.index, fence.sub, sdo_frame.AbortCode.GENERAL).encode())
         self._send_request((step.index, step.sub), step.request)
@@ -426,7 +427,7 @@ class Dialogue:
             self._next()
 
     def _take(self, step: Step) -> bool:
-        """Take another step than an SDO request; True if it waits."""
+        """Process a step that is not an SDO request; return True if the step waits."""
         match step:
             case AwaitState() | AwaitReport():
                 self._step, self.due_us = step, self._now_us + step.timeout_us
@@ -443,7 +444,7 @@ class Dialogue:
         return self._step is not None
 
     def _request(self, step: SdoRequest) -> None:
-        """Send the request of a step, or first a fence; or wait before it."""
+        """Send the request of a step; if necessary, send a fence or wait before it."""
         at = step.index, step.sub
         self._step = step
         if not step.goes_on and at in self._unanswered:

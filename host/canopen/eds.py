@@ -51,9 +51,10 @@ def open_eds(path: Path) -> EdsFile:
 
 
 def read_sheet(path: Path) -> tuple[EdsFile, EdsDevice]:
-    """Return the sections of a file and the device they describe; unchanged bytes are parsed once.
+    """Return the sections of a file and the device they describe; equal bytes are parsed only once.
 
-    Both are shared: read them, but do not add findings to the file.
+    The sections and the device are shared between callers. Only read them, and do not add findings
+    to the file.
 
     Raises:
         OSError: the file cannot be read.

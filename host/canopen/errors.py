@@ -15,8 +15,8 @@ class SdoFailed(Exception):  # noqa: N818 - what the transfer did
     """An SDO transfer that failed.
 
     Attributes:
-        index: of the object.
-        sub: of the object.
+        index: index of the object.
+        sub: sub-index of the object.
     """
 
     def __init__(self, message: str, index: int, sub: int) -> None:

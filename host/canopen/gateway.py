@@ -80,7 +80,7 @@ class GatewayError(Exception):
     """A command that is not executed.
 
     Args:
-        code: why.
+        code: error code of the reason.
         text: the reason in words; the text of the code if empty.
     """
 
@@ -306,7 +306,7 @@ _LSS_HELP: Final = """\
 
 
 def carry_out(bus: NodeBus, request: _GatewayRequest) -> str:
-    """Carry out a command of `LSS_VERBS`, and return what is answered.
+    """Carry out a command of `LSS_VERBS`, and return the answer.
 
     Raises:
         GatewayError: the command is not valid, or the slave refuses or does not answer.
@@ -385,7 +385,7 @@ def _scan(lss: LssMaster, request: _GatewayRequest) -> str:
 
 
 def _all_nodes(lss: LssMaster, request: _GatewayRequest) -> str:
-    """Return each slave without a node-ID one; what a slave was given stands in front of OK."""
+    """Assign a node-ID to each slave without one; list the node-IDs before OK."""
     words = _numbers(request, 0, 3)
     if len(words) == 2:
         raise GatewayError(
@@ -472,8 +472,8 @@ class Gateway:
 
     Args:
         bus: the net.
-        net: its number.
-        version: of the gateway, for `info version`.
+        net: number of the net.
+        version: version of the gateway, for `info version`.
     """
 
     def __init__(self, bus: NodeBus, net: int, version: str) -> None:
@@ -491,7 +491,7 @@ class Gateway:
         }
 
     def answer(self, line: str) -> str:
-        """Answer a line, given without its end of line; empty for an empty line and a comment."""
+        """Answer a line without its line end; the answer to an empty line or a comment is empty."""
         try:
             request = parse_request(line)
             return "" if request is None else _numbered(request, self._carry_out(request))
@@ -514,7 +514,7 @@ class Gateway:
         return verb(request)
 
     def _node_of(self, request: _GatewayRequest, least: int) -> int:
-        """Return the node that a command is for; 0 is all of them."""
+        """Return the node that a command addresses; 0 stands for all nodes."""
         *net, node = request.numbers or (-1,)
         self._check_net(net)
         if node == -1:
@@ -591,7 +591,7 @@ class Gateway:
 
 
 def _numbered(request: _GatewayRequest, text: str) -> str:
-    """Return an answer with its number; remarks stand in lines of their own before it."""
+    """Return an answer with its number; remarks are separate lines before the answer."""
     remarks, end, value = text.rpartition("\n") if text.startswith("#") else ("", "", text)
     return f"{remarks}{end}[{request.sequence}] {value}"
 

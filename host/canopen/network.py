@@ -69,13 +69,13 @@ class ErrorControl:
     Args:
         heartbeat_us: consumer heartbeat time, 0 for none.
         guard_us: guard time, 0 for none.
-        life_time_factor: the node is lost after this many requests without an answer.
+        life_time_factor: number of requests without an answer after which the node is lost.
         request: sends a request of node guarding.
 
     Attributes:
         due_us: when to call `tick` next.
         what: `heartbeat` or `guarding`.
-        silence_us: a node that sends nothing for this time is lost.
+        silence_us: time without a frame of the node after which the node is lost.
     """
 
     def __init__(
@@ -93,7 +93,7 @@ class ErrorControl:
         self.due_us = NEVER
 
     def begin(self, now_us: int) -> None:
-        """Begin to guard; supervision of a heartbeat starts with the first one."""
+        """Begin to guard; the supervision of a heartbeat starts with the first heartbeat."""
         if self._guard_us:
             self.due_us, self._unanswered = now_us + self._guard_us, 0
 
@@ -106,7 +106,7 @@ class ErrorControl:
             self._toggle, self._unanswered = toggle, 0
 
     def tick(self, now_us: int) -> bool:
-        """Do what is due; return True if the node is now lost."""
+        """Do the work that is due; return True if the node is now lost."""
         if now_us < self.due_us:
             return False
         if self._heartbeat_us:
@@ -126,14 +126,14 @@ class NodeSession:
 
     Args:
         node_id: the node, 1..127.
-        send: takes CAN-ID and data.
-        guard: takes the CAN-ID of a remote frame.
+        send: sends a data frame; takes CAN-ID and data.
+        guard: sends a remote frame; takes the CAN-ID.
         sdo_timeout_us: how long to wait for an SDO response.
-        on_misnamed: as a `Dialogue` takes it.
+        on_misnamed: see `Dialogue`.
 
     Attributes:
         node_id: as given.
-        dialogue: the scripts that run.
+        dialogue: runs the scripts.
         state: last reported state, None until the first report.
     """
 
@@ -168,8 +168,8 @@ class NodeSession:
         """Run a script to its end, and return its result or raise its error.
 
         Args:
-            script: the script; no other runs at the same time.
-            listen: waits.
+            script: the script; no other script runs at the same time.
+            listen: waits for frames.
 
         Raises:
             LinkClosed: the bus is gone.

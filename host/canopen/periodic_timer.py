@@ -6,7 +6,7 @@ from tickrig.wire.instant import NEVER
 
 
 class PeriodicTimer:
-    """Reports the end of each period; after a pause once, not for each missed period.
+    """Reports the end of each period; after a pause it reports once, not for each missed period.
 
     >>> timer = PeriodicTimer(100)
     >>> timer.start(0)
@@ -17,7 +17,7 @@ class PeriodicTimer:
         period_us: the period, 0 for none.
 
     Attributes:
-        due_us: end of the current period; `NEVER` before the start, and without a period.
+        due_us: end of the current period; `NEVER` before the start, or if the period is 0.
     """
 
     def __init__(self, period_us: int) -> None:
@@ -29,9 +29,9 @@ class PeriodicTimer:
             self.due_us = now_us + self._period_us
 
     def advance(self, now_us: int) -> bool:
-        """Start the next period if one has ended; return whether one has.
+        """Start the next period if the current one has ended; return whether it has ended.
 
-        The next period ends when it would have ended without a pause.
+        The end of the next period is the same as without a pause.
         """
         if now_us < self.due_us:
             return False

@@ -1,8 +1,8 @@
 """SDO transfers as scripts: expedited and segmented (CiA 301, SDO protocols).
 
-The client of the canopen library blocks in its own thread until the answer arrives; this code must
-not block, and runs in virtual time. Therefore tickrig has its own client. Not emulated: block
-transfer, which a server must not require.
+The client of the canopen library blocks in its own thread until the answer arrives. The code here
+must not block, and runs in virtual time. Therefore tickrig has its own client. Block transfer is
+not emulated, because a server must not require it.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ def upload(index: int, sub: int, size: int = 0) -> Script[bytes]:
     Args:
         index: of the object.
         sub: its sub-index.
-        size: of the object in bytes, 0 if unknown; it applies to an expedited answer that does not
-            indicate how many of its four bytes are data (CiA 301, 7.2.4.3.5).
+        size: size of the object in bytes, 0 if unknown. It is used for an expedited answer that
+            does not indicate how many of its four bytes are data (CiA 301, 7.2.4.3.5).
 
     Raises:
-        SdoAborted: the device refuses, or answers something else.
-        SdoTimeout: it does not answer.
+        SdoAborted: the device refuses, or sends an unexpected answer.
+        SdoTimeout: the device does not answer.
     """
     answer = yield SdoRequest(frame_at(ClientCommand.UPLOAD, index, sub), index, sub)
     match answer:
@@ -93,7 +93,7 @@ def _download_segments(index: int, sub: int, data: bytes) -> Script[None]:
 
 
 def _fail(index: int, sub: int, answer: Answer) -> Script[bytes]:
-    """Raise the error of an unexpected answer; abort the transfer unless the device did."""
+    """Raise the error of an unexpected answer; abort the transfer unless the device aborted it."""
     if isinstance(answer, sdo.Abort):
         raise SdoAborted(index, sub, answer.code)
     toggled = isinstance(answer, sdo.Segment | sdo.DownloadSegmentResponse)

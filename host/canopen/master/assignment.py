@@ -22,7 +22,7 @@ class ObjectWrite:
 
 @dataclass(frozen=True, slots=True)
 class SlaveAssignment:
-    """What the master expects of a slave and does for it (CiA 302-2).
+    """What the master expects of a slave and does for the slave (CiA 302-2).
 
     An identity, version, date or time of 0 is not checked.
 
@@ -30,15 +30,15 @@ class SlaveAssignment:
         node_id: 1..127.
         name: its name in messages.
         boots: whether the master boots and starts it (1F81h, bit 2).
-        mandatory: whether the network must not start without it (bit 3).
-        reset_communication: whether the master resets it at the start; otherwise it leaves the
-            slave alone while it is Operational (bit 4).
+        mandatory: whether the network must not start without the slave (bit 3).
+        reset_communication: whether the master resets the slave at the start; otherwise the master
+            does not touch a slave that is Operational (bit 4).
         device_type: 1F84h.
         vendor_id: 1F85h.
         product_code: 1F86h.
         revision: 1F87h.
         serial: 1F88h.
-        software_version: 1F55h; checked unless 0 (bit 5).
+        software_version: 1F55h; checked unless it is 0 (bit 5).
         program: software to download if its version differs (1F58h, bit 6).
         restore_sub: sub-index of 1011h that is written before the configuration (1F8Ah, bit 7).
         configuration_date: 1F26h; the configuration is skipped if date and time equal those in
@@ -47,8 +47,8 @@ class SlaveAssignment:
         writes: 1F22h, in this order.
         heartbeat_us: consumer heartbeat time (1016h), 0 for none.
         guard_us: guard time, 0 for no node guarding (1F81h, bits 16 to 31).
-        life_time_factor: the slave is lost after this many guard requests without an answer (bits 8
-            to 15).
+        life_time_factor: number of guard requests without an answer after which the slave is lost
+            (bits 8 to 15).
     """
 
     node_id: int
@@ -81,8 +81,8 @@ class MasterPlan:
         node_id: its own node-ID.
         starts: whether it enters Operational by itself (bit 2 is 0).
         starts_nodes: whether it starts slaves (bit 3 is 0).
-        starts_all: whether it starts them all at once, after all mandatory ones have booted (bit
-            1).
+        starts_all: whether it starts all slaves at once, after all mandatory slaves have booted
+            (bit 1).
         resets_all: whether the loss of a mandatory slave resets all nodes (bit 4).
         stops_all: whether the loss of a mandatory slave stops all nodes (bit 6).
         boot_time_us: how long it tries to boot a mandatory slave, 0 for no limit (1F89h).

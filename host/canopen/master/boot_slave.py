@@ -1,6 +1,7 @@
 """The boot slave process of CiA 302-2 as a script, in the order of Lely's master.
 
-How the boot-up of a slave ended (CiA 302-2, error status of the boot slave process).
+`BootStatus` is the result of the boot-up of a slave (CiA 302-2, error status of the boot slave
+process).
 
 >>> BootStatus("D").text
 '1018h:01 vendor-ID is another than expected, or cannot be read'
@@ -82,7 +83,7 @@ class BootStatus(Enum):
 
     @property
     def good(self) -> bool:
-        """Whether the slave runs: it has booted, or was Operational before."""
+        """Whether the slave runs, because it has booted or was already Operational."""
         return self in (BootStatus.BOOTED, BootStatus.WAS_OPERATIONAL)
 
 
@@ -161,7 +162,7 @@ class BootTalk:
     def report(
         self, what: str, wait_us: int, status: BootStatus, *, boot_up: bool = True
     ) -> Script[NmtState]:
-        """Wait for a boot-up or a state; end the procedure if it does not come."""
+        """Wait for a boot-up or a state; end the procedure if it does not arrive."""
         state: NmtState | None = yield AwaitReport(wait_us, boot_up)
         if state is None:
             self.record(what, f"none within {wait_us // 1_000} ms", status.text)
@@ -232,7 +233,7 @@ class BootTalk:
         return (yield from download(write.index, write.sub, write.data))
 
     def compare(self, what: str, data: bytes, expected: int, status: BootStatus) -> None:
-        """End the procedure if a number differs from the expected one; 0 is not checked."""
+        """End the procedure if a number differs from the expected one; an expected 0 is not checked."""
         if expected and not _is_value(data, expected):
             self.record(what, _as_hex(data), f"not {expected:08X}h: {status.text}")
             raise BootEnded(status)
@@ -380,8 +381,10 @@ class BootOutcome:
 class SlaveBoot:
     """One boot-up of a slave.
 
-    Not done, as in Lely's master: 1F20h, a DCF as text; the boot-up of a slave that another node
-    configures (1F25h).
+    As in Lely's master, two functions are missing:
+
+    - 1F20h, a DCF as text
+    - the boot-up of a slave that another node configures (1F25h)
 
     Args:
         slave: what the master expects of it.

@@ -48,7 +48,7 @@ class _Named(dict[str, V]):
 
 
 class CanopenMaster(Closing):
-    """A master; time passes only in its calls, which execute the work that is due.
+    """A master; time passes only in its methods, which do the work that is due.
 
     Args:
         link: the bus, such as `bench.link` or a `CanLink`; the master closes it.
@@ -101,7 +101,7 @@ class CanopenMaster(Closing):
             within: time limit in microseconds, or a text such as `"100ms"`.
 
         Raises:
-            BootFailed: some have not; the message says which, and why.
+            BootFailed: some slaves have not booted; the message gives these slaves and the reasons.
         """
         self.wait_until(self._all_booted, within)
         if failed := [slave for slave in self.nmt.slaves.values() if not slave.good]:
@@ -151,8 +151,8 @@ class CanopenMaster(Closing):
     def explain(self, name: str | int) -> str:
         """Return the latest boot-up of a slave and its losses, line by line.
 
-        For the boot-up, the lines give requests, answers and the outcome. Losses and the messages
-        after them are listed in order, before or after the boot-up.
+        For the boot-up, the lines give the requests, the answers and the outcome. Losses, and
+        messages after a loss, are listed in the order of time, before or after the boot-up.
         """
         slave = self.slave(name)
         steps, events = slave.steps, slave.events
@@ -183,7 +183,7 @@ class BootFailed(Exception):  # noqa: N818 - what the network did
     """Some slaves did not boot.
 
     Attributes:
-        slaves: these.
+        slaves: the slaves that did not boot.
     """
 
     def __init__(self, slaves: list[NetworkSlave]) -> None:
@@ -240,9 +240,9 @@ def open_master(
         A master; close it, or use it in a `with` block.
 
     Raises:
-        OSError: the file cannot be read, or software that it names.
+        OSError: the file cannot be read, or a software file that it names cannot be read.
         ImportError: PyYAML is not installed.
-        ValueError: the file has errors; the message has all, each with its line.
+        ValueError: the file has errors; the message lists all errors, each with its line.
         TypeError: a link to a serial line.
     """
     bus = read_bus_file(Path(path))

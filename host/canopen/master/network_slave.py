@@ -29,13 +29,13 @@ class NetworkSlave:
 
     Attributes:
         assignment: as given.
-        session: its session.
+        session: the session of the slave.
         dialogue: dialogue of the session.
         outcome: how its latest boot-up ended, None before that and during one.
         steps: of its latest boot-up, each with its time.
         emergencies: error codes of its EMCYs, the first one first.
         began_us: when its latest boot-up began.
-        lost: how often its error control has failed.
+        lost: number of failures of its error control.
         events: its losses, and its messages afterwards, each with its time.
     """
 
@@ -120,7 +120,7 @@ class NetworkSlave:
             self._control.hear(at_us, frame)
 
     def tick(self, now_us: int) -> bool:
-        """Do what is due; return True if the slave is now lost."""
+        """Do the work that is due; return True if the slave is now lost."""
         self._now_us = now_us
         self.dialogue.tick(now_us)
         if now_us >= self._again_us:
@@ -166,7 +166,10 @@ class NetworkSlave:
         self._booted(self)
 
     def _may_try_again(self) -> bool:
-        """Return whether the boot time of a mandatory slave has not ended; others have no limit."""
+        """Return whether a boot-up may be repeated.
+
+        The boot time of a mandatory slave must not have ended; other slaves have no limit.
+        """
         if not self.assignment.mandatory or not self._boot_time_us:
             return True
         return self._now_us - self.began_us < self._boot_time_us

@@ -54,7 +54,8 @@ class ProcessData:
     def tick(self, now_us: int, *, sync: bool) -> None:
         """Start the periods that are due; `sync` is whether a SYNC was just sent.
 
-        None starts while slaves boot at the start: in ros2_canopen, the drivers wait for them.
+        No period starts while slaves boot at the start, because the drivers of ros2_canopen wait
+        for the slaves.
         """
         if not self._began:
             if any(drive.is_awaited(now_us) for drive in self.drives):
@@ -86,8 +87,9 @@ class NmtMaster:
         plan: as given.
         slaves: by node-ID.
         state: its own NMT state.
-        halted: whether a mandatory slave could not be booted, so that nothing is started any more.
-        strangers: node-IDs that booted and are not slaves: error status A.
+        halted: whether a mandatory slave could not be booted; the master then starts no more
+            slaves.
+        strangers: node-IDs that booted but do not belong to a slave (error status A).
         process_data: receives all other data frames, and works in periods.
         now_us: time of the last `tick`.
     """
@@ -113,7 +115,7 @@ class NmtMaster:
         return min(slaves, self._heartbeat.due_us, self._sync.due_us, self.process_data.due_us)
 
     def tick(self, now_us: int, rx: StampedFrames, /) -> Frames:
-        """Process received frames, do what is due; return the frames to send."""
+        """Process received frames, do the work that is due, and return the frames to send."""
         self.now_us = now_us
         if self.state is nmt.NmtState.INITIALISING:
             self._start_up()
@@ -154,7 +156,7 @@ class NmtMaster:
         self._go_on()
 
     def _reset_slaves(self) -> None:
-        """Reset all communication; one by one if a slave is to be kept alive."""
+        """Reset the communication of all nodes; one by one if a slave must not be reset."""
         slaves = self.plan.slaves
         kept = {slave.node_id for slave in slaves if not slave.reset_communication}
         if not kept:
@@ -229,7 +231,7 @@ class NmtMaster:
             self.command(nmt.NmtCommand.RESET_NODE, slave.assignment.node_id)
 
     def _produce(self) -> bool:
-        """Send due heartbeat and SYNC, after a pause only once; return True after a SYNC."""
+        """Send due heartbeat and SYNC, each once after a pause; return True after a SYNC."""
         if self._heartbeat.advance(self.now_us):
             self.send(nmt.ERROR_CONTROL_COB_ID + self.plan.node_id, bytes((self.state,)))
         if self._sync.advance(self.now_us):

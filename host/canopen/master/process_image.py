@@ -15,17 +15,17 @@ Key = tuple[int, int]
 """Index and sub-index."""
 
 EVENT_DRIVEN: Final = 0xFE
-"""Transmission types from here on: a PDO is sent when one of its objects is written."""
+"""The lowest transmission type with which a PDO is sent when one of its objects is written."""
 
 _SYNC_ACYCLIC: Final = 0
 """Sent with the SYNC after an object was written."""
 
 
 class ProcessImage:
-    """Values by index and sub-index; 0 if never received or written.
+    """Values by index and sub-index; a value is 0 until it is received or written.
 
-    An RPDO of the slave is sent when an object in it is written, or with each n-th SYNC if it is
-    synchronous. Objects not written yet are 0, as in Lely's master.
+    An RPDO of the slave is sent when an object in it is written. A synchronous RPDO is sent with
+    each n-th SYNC. As in Lely's master, objects that have not been written are 0.
 
     Not emulated: inhibit times, event timers and deadlines on the master's side.
 
@@ -65,7 +65,7 @@ class ProcessImage:
         return key in self._seen
 
     def doubt(self, key: Key) -> None:
-        """Mark the value of an object as outdated; it stays."""
+        """Mark the value of an object as outdated; the value is kept."""
         self._seen.discard(key)
 
     def count(self, key: Key) -> int:

@@ -52,7 +52,7 @@ class _Wait:
         return max(0, self._deadline_us - now_us)
 
     def go_on(self, now_us: int) -> None:
-        """Run its next steps; raises what it raises."""
+        """Run the next steps of the operation; raises the errors of the operation."""
         step = self.step
         assert step is not None
         self._take(now_us, None if step.done() else DriveFailed(step.complaint))
@@ -89,7 +89,7 @@ def _wait(
     now_us: Callable[[], int],
     wait_until: Callable[[Callable[[], bool], int], object],
 ) -> None:
-    """Wait until an operation can continue; continue all that can."""
+    """Wait until an operation can continue; continue all operations that can."""
     left_us = min(wait.left_us(now_us()) for wait in waits)
     wait_until(lambda: any(wait.due(now_us()) for wait in waits), left_us)
     for wait in waits:

@@ -34,7 +34,7 @@ _Load = float
 def check_load(bus: BusFile) -> tuple[RuleFinding, ...]:
     """Return a finding if the periods of the drives load the bus too much.
 
-    Frames are counted to the bit, with values of 0.
+    The length of the frames is computed exactly in bits, for data bytes of 0.
     """
     notes, master = BusFileNotes(), bus.master
     if master is not None:

@@ -169,7 +169,7 @@ T = TypeVar("T")
 
 
 class DriveDriver:
-    """Reads and writes an axis in each period; its async operations wait for the results.
+    """Reads and writes an axis in each period; has async operations that wait for their results.
 
     `CanopenMaster.perform` runs them: `master.perform(arm.init())`.
 
@@ -177,13 +177,13 @@ class DriveDriver:
 
     Args:
         settings: settings of the axis.
-        image: the values in PDOs; all others go by SDO.
+        image: the values in PDOs; all other values are transferred by SDO.
         talk: takes SDO scripts for the node.
 
     Attributes:
         name: of the joint.
-        statusword: last one that was read.
-        controlword: last one that was written.
+        statusword: the last statusword that was read.
+        controlword: the last controlword that was written.
         mode: the mode that the drive reports, by number.
         cycles: number of read and write cycles.
         refusals: SDO requests that the drive refused, the oldest first.
@@ -203,9 +203,9 @@ class DriveDriver:
 
     @property
     def state(self) -> DriveState | None:
-        """The state in the statusword; None until one was read since the node booted.
+        """The state in the statusword; None until a statusword was read after the node booted.
 
-        It becomes None when the node is lost, until a statusword comes.
+        The state becomes None when the node is lost, until a statusword arrives.
         """
         return state_of(self.statusword) if self._known else None
 
@@ -278,7 +278,7 @@ class DriveDriver:
         yield from self._write(CONTROLWORD, word)
 
     async def init(self) -> None:
-        """Enable the drive, and home it if its homing method is not 0; then it has no mode.
+        """Enable the drive, and home it if its homing method is not 0; afterwards it has no mode.
 
         Raises:
             DriveFailed: it does not complete in time.
@@ -311,7 +311,7 @@ class DriveDriver:
             self.controlword = word
 
     async def switch_to(self, goal: DriveState | str) -> None:
-        """Lead the drive to a state; to Operation enabled step by step, otherwise directly.
+        """Bring the drive to a state: to Operation enabled step by step, to other states directly.
 
         Args:
             goal: a state, or its name: `Switched on`.
@@ -379,8 +379,8 @@ class DriveDriver:
     async def _catch_up(self) -> None:
         """Wait for statuswords sent after the controlword, whatever the delay of drive and bus.
 
-        A drive that answered an SDO has received the RPDOs before it. A SYNC may still have to
-        apply them, and then a TPDO has to come.
+        A drive that answered an SDO has received the RPDOs sent before. The RPDOs may take effect
+        only with the next SYNC. After that, a TPDO must arrive.
         """
         key, late = self._key(_STATUSWORD), f"{self.name}: no statusword"
         await self._next_cycle()

@@ -116,7 +116,7 @@ class DriveMode:
         """Process the statusword of this period."""
 
     def write(self, write: _Write) -> Script[bool]:
-        """Write the set-point; return whether there is one: without one, the drive is halted."""
+        """Write the set-point; return whether it exists; without one, the drive is halted."""
         yield from ()
         return False
 
@@ -193,7 +193,7 @@ class HomingMode(DriveMode):
 
     Attributes:
         runs: whether homing should run.
-        status: these bits.
+        status: the bits 10, 12 and 13.
     """
 
     MASK: Final = Statusword.TARGET_REACHED | Statusword.MODE_12 | Statusword.MODE_13
