@@ -76,11 +76,11 @@ class KnownState:
         self._silent = 0
 
     def learn(self, addresses: Iterable[Address], held: Mapping[Address, bytes] = _NONE) -> None:
-        """Read objects that are not known yet; those that cannot be read are not restored.
+        """Read objects that are not known yet; objects that cannot be read are not restored.
 
         Args:
-            addresses: of the objects.
-            held: values that were just read; they are not read again.
+            addresses: addresses of the objects.
+            held: values that were just read; these objects are not read again.
         """
         for at in addresses:
             if at in self.original:
@@ -118,7 +118,7 @@ class KnownState:
             self._seen.pop(at, None)
 
     def forget(self) -> None:
-        """Read all objects again: anything may have changed."""
+        """Read all objects again, because any object may have changed."""
         self._seen.clear()
 
     def reset(self) -> None:
@@ -132,12 +132,12 @@ class KnownState:
     def tidy_after(self, resets: Collection[str] = (), written: Collection[Address] = ()) -> None:
         """Bring objects that resets changed into the state in which checks begin.
 
-        The first reset of a kind shows which objects it changes. After later ones, only these and
-        the objects written since are read: reading all of them each time took half the processor
-        time of a run.
+        The first reset of a kind shows which objects it changes. After later resets of this kind,
+        only these objects and the objects written since then are read. Reading all objects each
+        time took half the processor time of a run.
 
         Args:
-            resets: their kinds; empty if it is unknown what happened to the node.
+            resets: kinds of the resets; empty if it is unknown how the node was reset.
             written: objects that may have been written since the last reset.
         """
         touched: Iterable[Address] = self._begin
@@ -158,7 +158,7 @@ class KnownState:
         self._repair(left)
 
     def give_up(self) -> None:
-        """Report the written objects that may have other values: the node is gone."""
+        """Report the written objects that may have other values, because the node is gone."""
         unsure = self.all_written if self._is_reset else self.written
         left = [at for at in self.original if at in unsure]
         for at in left:
@@ -183,7 +183,7 @@ class KnownState:
     def _write_back(
         self, target: Values, addresses: Iterable[Address], moved: Iterable[set[Address]] = ()
     ) -> list[Address]:
-        """Write the values that differ, and add them to sets; return those that still differ."""
+        """Write the values that differ, and add them to sets; return values that still differ."""
         wrong = self._differing(target, addresses)
         for each in moved:
             each.update(wrong)
@@ -213,7 +213,7 @@ class KnownState:
     def _number(self, at: Address, target: Values) -> int | None:
         """Return the value of an object, or the value it should have if it cannot be read.
 
-        None if neither is known: then the object stays unchanged.
+        Returns None if neither value is known; the object is then not changed.
         """
         if at not in target or not is_standard(at, target[at]):
             return None
@@ -221,10 +221,10 @@ class KnownState:
         return number_of(held if held and is_standard(at, held) else target[at])
 
     def _read(self, at: Address) -> bytes | None:
-        """Return what an object holds; None if the node refuses, or does not answer about it.
+        """Return the value of an object; None if the node refuses to read it, or does not answer.
 
-        What was read since the last check is not read again: a full check of the dictionary right
-        behind another was a fifth of the frames of a short run.
+        Objects that were read since the last check are not read again. Two full checks of the
+        dictionary in a row took a fifth of the frames of a short run.
         """
         if self._exchange.boots != self._seen_boots:
             self._seen_boots = self._exchange.boots
@@ -240,7 +240,7 @@ class KnownState:
         return value
 
     def _patiently(self, attempt: Callable[[], T]) -> T | None:
-        """Read an object; None if only this one has no answer, SdoTimeout if the node is gone."""
+        """Read an object; None if only this one has no answer; SdoTimeout if the node is gone."""
         try:
             answer = attempt()
         except SdoTimeout:
@@ -339,7 +339,7 @@ class NodeCare:
         self._errors = self._client.number(*_ERROR_REGISTER) or 0
 
     def begin(self, bound: BoundCheck) -> None:
-        """Record the values that a check may change, unless known; `lost` if that fails."""
+        """Record the values that a check may change, unless known; set `lost` if that fails."""
         if self._level is Level.READ_ONLY:
             return
         self._exchange.begin(_CARE_US)
@@ -386,7 +386,7 @@ class NodeCare:
         self._state.give_up()
 
     def tidy(self, bound: BoundCheck, boots_before: int) -> bool:
-        """Restore the node after a check; return False if that fails: then it is lost."""
+        """Restore the node after a check; return False if that fails; the node is then lost."""
         booted, crashed = self._exchange.boots - boots_before, bool(self._exchange.crashes)
         storing = {f"{index:04X}" for index, _ in bound.changed if index in _STORAGE}
         if storing:
@@ -451,7 +451,7 @@ class NodeCare:
             self._state.tidy_after({_RESET_COMMUNICATION}, written)
 
     def _has_errors(self) -> bool:
-        """Return whether a check left an error behind; earlier errors may have disappeared."""
+        """Return whether a check caused a new error; earlier errors may have disappeared."""
         number = self._client.number(*_ERROR_REGISTER)
         if number is None:
             self._probe()  # is the object absent, or the node gone?

@@ -1,13 +1,14 @@
 """A check with the numbers of one node in place of names.
 
-Steps of a check, one a line, in the notation of docs/reference/canopen/conform.md.
+`parse_step` reads the steps of a check, one step per line, in the notation of
+docs/reference/canopen/conform.md.
 
 >>> parse_step("3..5 x $heartbeat#05 in 400 ms").action
 Count(pattern='$heartbeat#05', for_ms=400, least=3, most=5)
 >>> parse_step("refuse write $ro_u8 00 06010002 06010000").action
 RefuseWrite(at='$ro_u8', data='00', codes=('06010002', '06010000'))
 
-Steps as text: in the notation that `parse_step` reads, and steps of object checks.
+`step_words` returns a step as text in the same notation, also for steps of object checks.
 
 >>> step_words(Step(RefuseWrite((0x1000, 0), "00", ("06010002",))))
 'refuse write 1000:00 00 06010002'
@@ -81,12 +82,12 @@ class _Names(Protocol):
         ...
 
     def address(self, name: str, /) -> Address:
-        """Return index and sub-index of an object; Unbound if there is none."""
+        """Return index and sub-index of an object; raises Unbound if the node has none."""
         ...
 
 
 def _resolve(text: str, names: _Names) -> str:
-    """Replace all names in a text; Unbound if one has nothing."""
+    """Replace all names in a text; raises Unbound if a name has no value."""
     if "$" not in text:
         return text
     return NAME.sub(lambda match: names.text(match[1] or match[2], match[3] or ""), text)
@@ -171,7 +172,7 @@ _FINALLY: Final = "finally "
 """Prefix of a step that is always done at the end; it cannot fail the check."""
 
 _GIVEN: Final = "given "
-"""Prefix of a step that prepares: if the node does not do it, the check is inconclusive."""
+"""Prefix of a preparing step; if the node does not do the step, the check is inconclusive."""
 
 
 def parse_step(line: str) -> Step:
@@ -302,7 +303,7 @@ def _word(word: object) -> str:
 
 
 _MARGIN_US: Final = 2_000_000
-"""Time beyond the sum of all waits: for sending, if the load must be kept low."""
+"""Time in addition to the sum of all waits, for sending at a low bus load."""
 
 _STIMULUS_MS: Final = 60_000
 """How long the operation of an input may take; a person is slow."""
@@ -335,16 +336,16 @@ class BoundCheck:
     """A check for one node.
 
     Attributes:
-        check: as written.
-        steps: with numbers; an object is its index and sub-index.
-        changed: objects that it changes.
+        check: the check as written.
+        steps: the steps with numbers; an object is given by its index and sub-index.
+        changed: objects that the check changes.
         used: objects that the node must have.
-        written: these, and objects whose writing the node must or may refuse.
-        questions: questions to the user before it.
-        can_ids: CAN-IDs of the frames that it judges.
+        written: the changed objects, and objects whose writing the node must or may refuse.
+        questions: questions to the user before the check.
+        can_ids: CAN-IDs of the frames that the check judges.
         within_us: its longest duration.
-        resets: how it may reset the node, which changes all its values: frames without the node-ID,
-            and the first word of each stimulus.
+        resets: how the check may reset the node, which changes all values of the node. These are
+            frames without the node-ID, and the first word of each stimulus.
     """
 
     check: Check
@@ -359,7 +360,7 @@ class BoundCheck:
 
 
 def bind_check(check: Check, names: _Names) -> BoundCheck:
-    """Put numbers in place of names; Unbound if the node has nothing for one."""
+    """Replace names by numbers; raises Unbound if the node has no object or value for a name."""
     steps = tuple(_bind_step(step, names) for step in check.steps)
     actions = [step.action for step in steps]
     request, sync = _resolve("$request", names), _resolve("$sync", names)

@@ -68,7 +68,7 @@ def _profile_checks(device: EdsDevice, node_id: int) -> Iterator[check.Check]:
 
 
 def _wanted(number: int, present: set[int]) -> tuple[tuple[int, ...], str]:
-    """Return the objects that a device type requires; of alternatives, the described one."""
+    """Return the objects that a device type requires; of alternatives, the one in the EDS."""
     match number & _PROFILE_MASK:
         case 401:
             blocks = [objects for bit, objects in _IO_BLOCKS.items() if number >> bit & 1]
@@ -111,7 +111,7 @@ _KEPT: Final = (
     *("06010000", "06010001", "06010002", "06040041", "06040042", "06040043", "06040047"),
     *("06090030", "08000000", "08000021", "08000022"),
 )
-"""Abort codes of this protection: a server need not check the value first."""
+"""Abort codes of this protection; a server need not check the value before it refuses."""
 _RESERVED_SUB: Final = 4
 """Reserved sub-index of a PDO parameter; some files describe it."""
 _SERIAL_NUMBER: Final = (0x1018, 4)
@@ -179,17 +179,19 @@ def object_checks(
 ) -> tuple[check.Check, ...]:
     """Make the checks of all objects, sorted by index and sub-index.
 
-    Undescribed places are read too: in every object the sub-indices between and after the described
-    ones, and FEh and FFh; over all objects together each sub-index up to FFh once; after every row
-    of objects the next index.
+    The checks also read places that the EDS does not describe:
+
+    - in every object, the sub-indices between and after the described ones, and FEh and FFh
+    - over all objects together, each sub-index up to FFh once
+    - after every row of objects, the next index
 
     Args:
         device: the device of the EDS.
         node_id: of the node, 1..127; for defaults with $NODEID.
         allow: indices of the profile area, 6000h to 9FFFh, that may be written.
         never: indices that are never written.
-        may_choose: whether a check of this group whose id continues with this text may be selected;
-            other checks may be omitted, which does not change the rest.
+        may_choose: whether a check of this group whose id continues with this text may be selected.
+            Other checks may be omitted, which does not change the remaining checks.
     """
     maker, checks = _Maker(node_id, allow, never), list[check.Check]()
     entries = sorted(device.entries, key=attrgetter("key"))

@@ -70,7 +70,7 @@ class Permission:
 
         Raises:
             NotAllowed: the level does not allow it.
-            Disturbed: it would change other nodes as well.
+            Disturbed: the frame would also change other nodes.
         """
         is_request = frame.can_id == self._request and not frame.extended
         if self._level is Level.READ_ONLY:

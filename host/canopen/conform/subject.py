@@ -39,7 +39,7 @@ TOLD: Final = {"device type": (0x1000, 0), "vendor": (0x1018, 1), "product": (0x
 
 
 def other_device(device: EdsDevice | None, about: Mapping[str, str]) -> str:
-    """Return how an EDS differs from the node if it is of another device; empty if it fits.
+    """Return how an EDS differs from the node; empty if the EDS describes this device.
 
     Args:
         device: the device of the EDS, None without one; a value of 0 is not compared.
@@ -344,7 +344,7 @@ class Subject:
     def missing(self, bound: BoundCheck) -> str | None:
         """Return why not all objects of a check can be used; None if they can.
 
-        If the node lacks a mandatory object, one check fails, and the others do not use it.
+        If the node lacks a mandatory object, one check fails, and the other checks do not use it.
         """
         for at in sorted(bound.written & self.refused | bound.used):
             judge, where = _MANDATORY.get(at, ""), f"{at[0]:04X}h:{at[1]:02X}"
@@ -378,14 +378,17 @@ class Subject:
         return self.binding.entries
 
     def _where(self, index: int) -> str:
-        """Return which object is missing where: without an EDS, only those of CiA 301 were read."""
+        """Return which object is missing where; without an EDS, only those of CiA 301 were read."""
         if self.binding.known:
             return "the EDS has no"
         asked = _COMMUNICATION <= index < MANUFACTURER
         return "the node has no" if asked else "without an EDS there is no known"
 
     def restorable(self, level: check.Level) -> list[check.Address]:
-        """Return objects that a run may change, be it by a reset: read before, written after."""
+        """Return objects that a run may change, directly or by a reset.
+
+        They are read before the run, and written after it.
+        """
         highest = PROFILE if level is check.Level.INTRUSIVE else MANUFACTURER
         apart = {*PROGRAMS, *STORAGE}
         return [

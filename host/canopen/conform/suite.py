@@ -20,7 +20,7 @@ ORDER: Final = (
     *("UE", "US", "BU", "DE", "DS", "BD", "SG", "NMT", "HB", "NG"),
     *("PC", "PR", "SY", "EM", "IO", "D4", "ST", "LS"),
 )
-"""Groups in the order in which they run: what may disturb most comes last."""
+"""Groups in the order in which they run; the groups that may disturb most run last."""
 
 
 OBJECTS: Final = "OD"
@@ -71,7 +71,7 @@ def _text(name: str) -> str:
 
 
 def parse_group(text: str) -> _Group:
-    """Read a file of checks: parted by empty lines; a line that begins with # is a comment.
+    """Read a file of checks, separated by empty lines; a line that begins with # is a comment.
 
     Raises:
         ValueError: a line is not in the notation; the message names it.

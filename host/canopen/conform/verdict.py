@@ -51,12 +51,13 @@ class CheckOutcome:
 
     Attributes:
         verdict: its verdict.
-        reason: why, in one line: what came and what was allowed; empty if it passed.
+        reason: the reason in one line, with the received and the allowed frames; empty if it
+            passed.
         evidence: the frames on the bus.
         start_us: bus time since the start of the run.
-        end_us: the same for its end.
-        wanted: patterns of the expected frame, of which one must match, if it failed for this
-            reason.
+        end_us: bus time of the end, since the start of the run.
+        wanted: patterns of the expected frame, one of which must match, if the attempt failed
+            because of a frame.
     """
 
     verdict: CheckVerdict
@@ -95,12 +96,13 @@ class Report:
         settings: adapter, bit rate, tolerances, seed, versions and so on, by name, in words.
         findings: of the EDS, and contradictions between it and the node, one per line.
         unrestored: objects that could not be restored, one per line.
-        repairs: writes that restore them, in this order: arguments of `canmon net SOURCE write
-            NODE`.
+        repairs: writes that restore these objects, in this order, as arguments of `canmon net
+            SOURCE write NODE`.
         duration_us: of the run, in bus time.
-        aborted: why it ended before its end; empty if it did not.
-        doubt: why the whole report may say nothing about the node; empty without a doubt.
-        absent: nothing was judged, because no node, or more than one, answers to the node-ID.
+        aborted: why the run ended early; empty if the run was complete.
+        doubt: reason to doubt that the report is about the node; empty without a doubt.
+        absent: whether no check was judged, because no node, or more than one, answers to the
+            node-ID.
     """
 
     source: str

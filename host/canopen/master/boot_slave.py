@@ -233,7 +233,7 @@ class BootTalk:
         return (yield from download(write.index, write.sub, write.data))
 
     def compare(self, what: str, data: bytes, expected: int, status: BootStatus) -> None:
-        """End the procedure if a number differs from the expected one; an expected 0 is not checked."""
+        """End the procedure if a number differs from the expected one; skip an expected 0."""
         if expected and not _is_value(data, expected):
             self.record(what, _as_hex(data), f"not {expected:08X}h: {status.text}")
             raise BootEnded(status)

@@ -1,4 +1,4 @@
-"""Known failures, which separate new ones.
+"""Known failures, to tell new failures from known ones.
 
 A baseline is a text file with the id of one check per line; `#` starts a comment.
 """

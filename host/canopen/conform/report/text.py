@@ -99,7 +99,7 @@ def _never_begun(results: list[Result]) -> list[str]:
 
 
 def _failure(alike: list[Result], show: overview.ShowFrames | None, again: str) -> list[str]:
-    """Return the text of a failure and its like; without frames, without hints too."""
+    """Return the text of a failure and similar failures; hints are given only with frames."""
     result = alike[0]
     clause = f"  {one_line(result.check.source)}"
     reason = [f"  {one_line(result.outcome.reason)}"] if result.outcome.reason else []
