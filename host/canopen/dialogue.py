@@ -6,23 +6,23 @@
 # errors are raised in it. It does not block: a `Dialogue` resumes it when an answer arrives or a
 # time has passed.
 #
-# Late answers. An SDO answer names its object, never its question: after a time-out, an answer
-# that comes late looks like the answer to the next question about the same object. Only the order
-# helps: a server answers one question after the other, and CAN keeps the order of its answers. So
-# an answer that names an object also proves that no answer to an earlier question can follow.
-# `Unanswered` keeps the objects whose questions may still be answered, in their order. Before the
-# dialogue asks about one of them again it reads another object, a fence (1000h, else 1001h and so
-# on), and waits for its answer. Nothing here depends on how late an answer is.
+# Late answers. An SDO answer names its object, but not its request. After a time-out, a late answer
+# looks like the answer to the next request for the same object. Only the order helps: a server
+# answers one request after the other, and CAN keeps the order of its answers. Therefore an answer
+# that names an object also proves that no answer to an earlier request can follow. `Unanswered`
+# keeps the objects whose requests may still be answered, in their order. Before the dialogue sends
+# a request for one of them again, it reads another object, a fence (1000h, otherwise 1001h and so
+# on), and waits for the answer. This works however late an answer is.
 #
-# Duplicate answers. CAN repeats a frame whose sender saw its last bit wrong, and a request
-# that is repeated is answered twice. Such a copy is sent right after its original. So before the
-# dialogue asks again about the object answered last, it waits: as long as that answer took, but at
-# least `LEAST_COPY_US` and at most `MOST_COPY_US`.
+# Duplicate answers. CAN repeats a frame if its sender saw the last bit wrong. A request that is
+# repeated in this way is answered twice. Such a copy is sent right after its original. Therefore
+# the dialogue waits before it sends another request for the object that was answered last. It waits
+# as long as that answer took, but at least `LEAST_COPY_US` and at most `MOST_COPY_US`.
 #
 # Answers that name another object. A dialogue ignores them by default. With `on_misnamed`, an
-# answer about an object that was not asked about ends the question if the right answer does not
-# follow: within `_MISNAMED_US` if no other question is open, else until the time-out. Use it only
-# if no other client uses the server.
+# answer that names another object ends the request if the right answer does not follow. The right
+# answer may follow within `_MISNAMED_US` if no other request is open, otherwise until the time-out.
+# Use `on_misnamed` only if no other client uses the server.
 #
 # What couples to what. `_unanswered` lasts as long as the dialogue, everything else as long as a
 # step:
@@ -34,7 +34,7 @@
 #   due_us       the time-out of the step, or the end of a pause, or of the wait for a copy
 #
 # `_expected` differs from the object of the step only while a fence is open. `clear` ends the
-# scripts and keeps `_unanswered`: the questions stay open, no matter which script asked them.
+# scripts and keeps `_unanswered`: the requests stay open, no matter which script sent them.
 #
 # Where the numbers come from. CiA 301 gives no SDO time-out; 500 ms is our choice. A copy
 # follows its original within the time of the repeated request, so the wait is bounded by the time

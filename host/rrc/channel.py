@@ -34,10 +34,10 @@ from tickrig.wire.rrc.replies import (
 # Theory of operation
 # ===================
 #
-# A channel keeps four things apart that all come over one line of text without numbers:
-# whose answer a line is, how busy the RRC is, whether the watchdog needs a renewal, and
-# whether the RRC refuses so often that it is safer to stop. Nothing runs in the background:
-# all of it happens while the program waits in `_listen`.
+# The lines of the RRC are text without sequence numbers. From them a channel determines
+# four things: whose answer a line is, how busy the RRC is, whether the watchdog needs a
+# renewal, and whether the RRC refuses so often that it is safer to stop. There is no
+# background thread: all work is done while the program waits in `_listen`.
 #
 # - Answers (reply_matcher.py). The RRC answers in the order of the lines, an OK names its
 #   command, an ER often does not. A reply belongs to the oldest command of its name that is
@@ -54,21 +54,21 @@ from tickrig.wire.rrc.replies import (
 # - Watchdog. `_renewed_us` is the latest line that may have renewed it; a third of its time
 #   later `watchdog` is sent again with the same value. An ER sets it to long ago, because a
 #   refused command renews nothing. While a request that changes the protocol is open
-#   (`changes_protocol`) no renewal is sent: nobody could tell in which mode it must be
-#   written.
+#   (`changes_protocol`) no renewal is sent, because the mode in which it must be written
+#   is unknown.
 # - Refusals. Too many in a row of one command set `_alarm`, which `request` or `step`
 #   raises, once, after all bytes of this read are delivered. From then on only `poweroff`
 #   passes. Stopping sends it, too; with `OnRefusals.WATCHDOG` and a watchdog it is left to
 #   trip, because nothing renews it.
 #
-# `_receive` reads until the line is dry before `settle` decides that a command had its
-# time: an ER that waits unread in the buffer of this machine must not be taken for silence.
+# `_receive` reads all available data before `settle` decides that the time of a command is
+# over. Otherwise an ER that is still unread in the buffer of this machine would count as
+# silence.
 #
-# Forgetting is part of it: EV:PowerOffFinished and EV:Initialized mean that the RRC has
-# none of its settings (DECISION R5), so the matcher drops its own copy, stablemode and
-# watchdog among them.
+# EV:PowerOffFinished and EV:Initialized mean that the RRC has lost its settings (DECISION
+# R5). Therefore the matcher drops its own copy of them, including stablemode and watchdog.
 #
-# Simulated and real time are the same here: every time is the link's.
+# All times are times of the link, so simulated and real time need no distinction.
 
 _ONLY_WHILE_ON: Final = (
     "allowed only while VR2 is on, from EV:PowerOnSuccess up to EV:PowerOffWaitBy...;"
