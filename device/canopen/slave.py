@@ -333,6 +333,7 @@ class CanopenSlave(Copyable):
         on_bit_rate: called with the bit rate in bit/s that LSS has switched to.
         sync_handlers: called like `on_sync`, for parts of the slave: RPDOs, TPDOs, then the
             application.
+        watch_handlers: called when a TPDO begins to watch objects, for the application.
         horizon: how far its application may compute ahead. None (no rig) means that it works tick
             by tick.
         model: name of its model for traces; empty if it has none.
@@ -347,7 +348,7 @@ class CanopenSlave(Copyable):
         *("admits", "boots", "configured_id", "dictionary", "due_us", "entered", "horizon"),
         *("model", "node_id", "nonvolatile", "now_us", "on_accepts", "on_bit_rate", "on_state"),
         *("on_sync", "pending_id", "reconfigured_by", "services", "silent_until_us", "state"),
-        *("sync_handlers", "time_of_day"),
+        *("sync_handlers", "time_of_day", "watch_handlers"),
     )
 
     def __init__(
@@ -366,6 +367,7 @@ class CanopenSlave(Copyable):
         self.on_sync: Listeners[Callable[[int], None]] = Listeners()
         self.on_bit_rate: Listeners[Callable[[int], None]] = Listeners()
         self.sync_handlers: list[Callable[[int], None]] = []
+        self.watch_handlers: list[Callable[[], None]] = []
         self.boots: Callable[[], bool] = _boots
         self.admits: Callable[[NmtCommand], bool] = _admits
         self.entered: Callable[[NmtState, NmtState], None] | None = None

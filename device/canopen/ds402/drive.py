@@ -68,7 +68,6 @@ from tickrig.device.canopen.ds402.modes.mode import DriveView, Mode
 from tickrig.device.canopen.ds402.modes.modes import MODES, offered, supported
 from tickrig.device.canopen.ds402.stretch import Stretch
 from tickrig.device.canopen.ds402.trapezoid import RampShape
-from tickrig.device.canopen.pdo.tpdo import PdoProducer
 from tickrig.device.canopen.slave import TICK_US, Application, CanopenSlave
 from tickrig.wire.canopen.datatypes import Value
 from tickrig.wire.canopen.drive import Controlword, DriveState
@@ -221,6 +220,7 @@ class Ds402(Application):
         parameters.watch(settings.CONFIGURATION, self._configuration_written)
         _guard_values(node.dictionary, self.offered)
         node.sync_handlers.append(self._sync)
+        node.watch_handlers.append(self._values_watched)
 
     @property
     def state(self) -> DriveState:
@@ -285,7 +285,6 @@ class Ds402(Application):
         axis = self._axis
         axis.motor.release()
         axis.zero, axis.homed = float(axis.motor.counts), False
-        PdoProducer.of(self.node).on_watched = [self._values_watched]
 
     def without_power(self, now_us: int) -> int:
         """Let the shaft coast; see `Application.without_power`."""

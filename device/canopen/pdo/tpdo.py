@@ -138,7 +138,7 @@ class Tpdo(Part):
         self._watched = [entry for entry in entries if entry.key not in self._producer.quiet]
         for entry in self._watched:
             entry.watch(self.mode.request)
-        for notify in self._producer.on_watched:
+        for notify in self._node.watch_handlers:
             notify()
 
     def _changed(self, entry: Entry) -> None:
@@ -191,19 +191,14 @@ class PdoProducer(Service):
         quiet: keys of entries whose change is not an event, because a profile decides on their
             events. Set it before the node is Operational.
         on_sent: called with the mapped objects of each TPDO that has been sent.
-        on_watched: called when a TPDO begins to watch the mapped objects.
     """
 
-    __slots__ = (
-        *("_counters", "_due_us", "_synchronous", "_timed", "on_sent", "on_watched", "quiet"),
-        "tpdos",
-    )
+    __slots__ = ("_counters", "_due_us", "_synchronous", "_timed", "on_sent", "quiet", "tpdos")
 
     def __init__(self, node: CanopenSlave, slot: int) -> None:
         super().__init__(node, slot)
         self.quiet: set[int] = set()
         self.on_sent: list[Callable[[list[Entry]], None]] = []
-        self.on_watched: list[Callable[[], None]] = []
         self.tpdos = [
             Tpdo(self, index - _TPDO_PARAMETERS[0] + 1)
             for index in node.dictionary.within(_TPDO_PARAMETERS)

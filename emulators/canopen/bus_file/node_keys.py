@@ -99,7 +99,7 @@ JOINT_KEYS: Final[Mapping[str, Field]] = {
     "motor": Field(
         one_of(*PRESETS),
         ", ".join(f"`{name}`" for name in PRESETS),
-        "motor, power stage, encoder and gear to begin with: "
+        "motor, power stage, encoder and gear from which the other keys differ: "
         "[presets](../reference/devices/servo.md#parameters)",
         "`epos-wheel`",
     ),
@@ -116,12 +116,12 @@ JOINT_KEYS: Final[Mapping[str, Field]] = {
         number(0.01, _MOST),
         "0.01..1e6",
         "turns of the motor in a turn of the shaft",
-        "what `velocity` needs, else of the motor",
+        "the ratio that `velocity` needs, else of the motor",
     ),
     "gear_efficiency": Field(
         number(0, 1, above=True),
         "above 0, up to 1",
-        "part of the power of a load that gets through",
+        "fraction of the power of a load that passes the gear",
         "of the motor",
     ),
     "friction_nm": Field(
@@ -131,12 +131,12 @@ JOINT_KEYS: Final[Mapping[str, Field]] = {
         "of the motor",
     ),
     "inertia_kg_m2": Field(
-        number(0, _MOST), "0..1e6", "what always hangs on the shaft", "of the motor"
+        number(0, _MOST), "0..1e6", "inertia that is always attached to the shaft", "of the motor"
     ),
     "effort": Field(
         number(0, _MOST, above=True),
         "above 0",
-        "largest torque of the shaft in Nm, or force in N; the motor is made as large",
+        "largest torque of the shaft in Nm, or force in N; the motor is scaled to it",
         "that of the motor",
     ),
     "velocity": Field(
@@ -146,18 +146,27 @@ JOINT_KEYS: Final[Mapping[str, Field]] = {
         "that of the motor",
     ),
     "lower": Field(
-        number(-_MOST, _MOST), _POSITION, "where it presses the negative limit switch", "no switch"
+        number(-_MOST, _MOST),
+        _POSITION,
+        "position at which the joint presses the negative limit switch",
+        "no switch",
     ),
     "upper": Field(
-        number(-_MOST, _MOST), _POSITION, "where it presses the positive limit switch", "no switch"
+        number(-_MOST, _MOST),
+        _POSITION,
+        "position at which the joint presses the positive limit switch",
+        "no switch",
     ),
     "home_switch": Field(
-        _pair, "`[FROM, TO]`, as above", "between which it presses the home switch", "no switch"
+        _pair,
+        "`[FROM, TO]` in rad, or m with `travel_m`",
+        "range in which the joint presses the home switch",
+        "no switch",
     ),
     "travel_m": Field(
         number(0, _MOST, above=True),
         "above 0",
-        "it is a carriage, and a turn of the shaft moves it so far",
+        "the joint is a carriage, and a turn of the shaft moves it by this distance",
         "the joint turns",
     ),
     "units": Field(
@@ -175,7 +184,7 @@ KEYS: Final[Mapping[str, Field]] = {
         _modes,
         f"`{_ALL}`, a list of {', '.join(f'`{name}`' for name in _NUMBERS)}",
         "modes of operation; objects that they need and the EDS lacks are added",
-        "those of 6502h, and one that `sdo` writes to 6060h",
+        "the modes of 6502h, and the mode that `sdo` writes to 6060h",
     ),
     "profile": Field(
         one_of(*PROFILES),
@@ -187,13 +196,13 @@ KEYS: Final[Mapping[str, Field]] = {
     "configured": Field(
         flag,
         "`true`, `false`",
-        "it begins with all that the master would write to it at boot-up",
+        "if true, the node starts with all values that the master would write to it at boot-up",
         "`false`",
     ),
     "start": Field(
         _settings,
         "a mapping",
-        "physical inputs and objects at the start",
+        "values of physical inputs and objects at the start",
         "as usual",
     ),
 }

@@ -94,20 +94,9 @@ def read_eds_files(eds: EdsOptions) -> eds_folder.EdsFiles:
 
     Files of a folder are chosen when a node sends its identity, and each choice is reported.
     """
-    files = eds_document.read_eds_paths(
+    return eds_document.read_eds_paths(
         eds_document.eds_paths(eds.words), eds.folders, _say_beside_pictures
     )
-    if eds.folders:
-        click.get_current_context().call_on_close(lambda: _report_unused(files))
-    return files
-
-
-def _report_unused(files: eds_folder.EdsFiles) -> None:
-    if not files.consulted:
-        say(
-            f"{files.folder}: no EDS is used, because no node sent vendor and product "
-            "(1018h:01, 1018h:02); name the nodes: --eds NODES=FILE"
-        )
 
 
 def _say_beside_pictures(text: str) -> None:

@@ -59,7 +59,7 @@ def test_words_with_an_equals_sign_are_the_verbs_own(wire: Wire, log: str) -> No
     canmon("send", wire.word, "5.rpdo1", *kwargs, "target=-1", "--eds", f"5={EDS}", "-q")
     canmon("play", log, *kwargs, f"{wire.word}=can1")
     assert wire.all() == ["205#0000FFFFFFFF", "705#05"]
-    drawn = canmon("graph", *kwargs, log, "way=181[0]")
+    drawn = canmon("graph", log, "way=181[0]")
     assert "way 1" in drawn.stdout
 
 

@@ -65,7 +65,7 @@ def test_a_bus_that_is_not_there_ends_with_3() -> None:
 
 def test_a_crash_leaves_the_terminal_as_it_was() -> None:
     program = (
-        "from tickrig.host.canmon.output.listening import Screen\n"
+        "from tickrig.host.canmon.output.listening import _Screen as Screen\n"
         "with Screen() as screen:\n"
         "    screen.paint(['all is well'])\n"
         "    raise ValueError('it is not')\n"

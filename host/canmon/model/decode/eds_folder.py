@@ -209,11 +209,6 @@ class EdsFiles(dict[int, EdsObjects]):
         self._given = frozenset(self)
         self._said: dict[tuple[str, int], tuple[Path | None, str]] = {}
 
-    @property
-    def consulted(self) -> bool:
-        """Whether a node has sent what a file of the folder is chosen by."""
-        return bool(self._said)
-
     def find(self, channel: str, node: int, identity: EdsIdentity) -> EdsObjects | None:
         """Return what the file for a node says; None if none fits, or it is chosen already.
 

@@ -7,7 +7,7 @@ Who a node is, and what its PDOs carry, as far as anybody said it.
 >>> values[0x1A00, 1] = 0x60410010
 >>> eds = EdsObjects({}, {at: value.to_bytes(4, "little") for at, value in values.items()})
 >>> row = NodeStatus("can0", 5, NodeMemory(eds))
->>> identity_words(row)
+>>> told_identity(row)
 'EDS: CiA 402 drive, vendor 0000013Fh, revision 1.2'
 >>> [(pdo.kind, hex(pdo.can_id), pdo.text) for pdo in pdo_contents(row)]
 [('tpdo1', '0x185', 'statusword (eds)')]

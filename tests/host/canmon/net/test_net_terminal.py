@@ -61,7 +61,7 @@ def test_ctrl_c_says_what_was_not_done() -> None:
     child = pexpect.spawn(
         sys.executable, [*BUS, "nmt", "reset-node", "5", "--yes"], encoding="utf-8", timeout=60
     )
-    child.expect_exact("what hangs on it may fall")
+    child.expect_exact("a suspended load may fall")
     child.sendintr()
     child.expect_exact("interrupted")
     child.expect(pexpect.EOF)

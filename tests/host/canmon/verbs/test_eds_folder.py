@@ -85,18 +85,6 @@ def test_the_board_has_the_name_of_the_file(
     assert result.stderr.count("node 5: EDS") == 1
 
 
-@pytest.mark.parametrize("verb", ["dump", "check", "nodes"])
-def test_a_folder_that_is_not_used_is_reported(verb: str, folder: Path, tmp_path: Path) -> None:
-    log = tmp_path / "half.log"
-    frames = (f"({second}.000000) can0 {frame}\n" for second, frame in enumerate(WHO[:2], 1))
-    log.write_text("".join(frames))
-    last = canmon(verb, str(log), "--eds-dir", str(folder)).stderr.splitlines()[-1]
-    assert last == (
-        f"{folder}: no EDS is used, because no node sent vendor and product "
-        "(1018h:01, 1018h:02); name the nodes: --eds NODES=FILE"
-    )
-
-
 def test_where_none_fits_it_is_said_once(folder: Path, log: str) -> None:
     (folder / "drive.eds").unlink()
     said = canmon("dump", log, "--eds-dir", str(folder), "-F", "tpdo1").stderr
