@@ -2,43 +2,53 @@
 
 # Theory of operation.
 #
-# Six modules are one machine: `wire` (what users have), `segment` (what is sent next, and when),
-# `transmission_outcomes` (what it ends in), `arbitration` (whose frame is next), `end` (a node's
-# queue, filter and inbox) and `fault_confinement` (error counters). `faults` says what is armed.
+# Six modules form one machine:
+#   - `wire`: the interface for users;
+#   - `segment`: which frame is sent next, and when;
+#   - `transmission_outcomes`: the outcome of a transmission;
+#   - `arbitration`: which node sends the next frame;
+#   - `end`: the queue, the filter and the inbox of a node;
+#   - `fault_confinement`: the error counters.
+# The module `faults` holds the armed faults.
 #
-# Times on a segment are whole units of which a bit and a microsecond are both multiples; a time
-# stamp is rounded up to the next microsecond. So frames behind each other add up without error.
+# Times on a segment are whole units. A bit and a microsecond are both multiples of the unit. Only
+# time stamps are rounded, up to the next microsecond. So the times of consecutive frames add up
+# without error.
 #
-# A segment has one plan: which frame is on the bus, or goes next, when it starts and ends, and in
-# which method (`_finish`; None is `_deliver`). The plan holds as long as `_stale` is False.
-# `_due_us` is when its end of frame has passed. `advance` ends the plan, reports changed error
-# states, and makes the next one.
-#   - A plan may be withdrawn until its first bit is out: who sends at that very time still takes
-#     part in the arbitration. From then on nothing changes it; a node that leaves breaks it off.
-#   - `CanArbiter.heads` is a heap of the first frames of all queues: priority, then node. Nodes
-#     that send the same identifier win together. `free` is when the bus is free; a node that has to
-#     wait longer (`held`: a delay, a passive node behind its frame) makes the arbiter `slow`.
-#   - `_plan` takes the short way where one frame wins on a bus without faults; `_judge` finds out
-#     what else can happen: sending is impossible, a collision, no acknowledgement, an armed fault.
-#     Chance is drawn once for a frame, however often it is planned (`CanFaults.judge`, `spend`).
-#   - A node alone and error-passive repeats endlessly: `_repeating` stops planning until something
-#     changes (`_recount`).
-#   - A return from bus-off is a plan, too: what ends next may be 128 sequences of recessive bits.
-# `_deliver` is the short way again: without counters, faults and recovery a frame goes straight to
-# the ends that `CanRoutes` knows for its identifier. They have one tuple in common.
+# A segment has one plan. The plan holds the frame that is on the bus or is sent next, its start
+# and end, and the method for its outcome (`_finish`; None means `_deliver`). The plan is valid
+# while `_stale` is False. `_due_us` is the time at which its end of frame has passed. `advance`
+# carries out the plan, reports changed error states, and makes the next plan.
+#   - A plan may be withdrawn until its first bit is sent: a node that sends at that very time still
+#     takes part in the arbitration. After that bit the plan no longer changes, except that a node
+#     that leaves the bus aborts it.
+#   - `CanArbiter.heads` is a heap of the first frames of all queues, by priority, then by node.
+#     Nodes that send the same identifier win together. `free` is the time from which the bus is
+#     free. Some nodes have to wait longer (`held`): after a delay, or as a passive node after its
+#     own frame. Such a node makes the arbiter `slow`.
+#   - `_plan` uses a short path if one frame wins on a bus without faults. `_judge` determines all
+#     other outcomes: sending is impossible, a collision, no acknowledgement, an armed fault.
+#     Random numbers are drawn once for a frame, however often the frame is planned
+#     (`CanFaults.judge`, `spend`).
+#   - A node that is alone and error-passive repeats its frame endlessly. `_repeating` stops the
+#     planning until something changes (`_recount`).
+#   - A return from bus-off is also a plan: its end may be that of 128 sequences of recessive bits.
+# `_deliver` is the short path for the outcome: without counters, faults and recovery a frame goes
+# directly to the ends that `CanRoutes` lists for its identifier. These ends share one tuple.
 #
-# An end that receives its first frame wakes its station and sets `received`; then
-# `advance_until_received` returns, for the rig may have an earlier tick now. A frame that may
-# change what a device listens to (`reconfigured_by`) opens the filter of its end until the next
-# poll.
+# An end that receives its first frame wakes its station and sets `received`. Then
+# `advance_until_received` returns, because the rig may now have an earlier tick. A frame that may
+# change which CAN-IDs a device accepts (`reconfigured_by`) opens the filter of its end until the
+# next poll.
 #
-# A disconnected end is on a segment of its own (`CanWire._apart`): no node acknowledges it there.
+# A disconnected end is on its own segment (`CanWire._apart`). No node acknowledges its frames
+# there.
 #
-# The fields of segment, arbiter, routes and ends are those of the kernel, which
-# `emulators/rig/kernel.py` describes. Where it was built, `_plan`, `advance` and `send` run in C
-# while `_sound` is True and return to the methods here for everything else. What may end soundness
-# sets `_sound` to False: `_recount`, and each plan that does not end in `_deliver`. `_is_sound` is
-# asked before the next plan.
+# Segment, arbiter, routes and ends have the fields of the kernel, see `emulators/rig/kernel.py`.
+# If the kernel was built, `_plan`, `advance` and `send` run in C while `_sound` is True, and call
+# the methods here for everything else. Events that may end the sound state set `_sound` to False:
+# `_recount`, and each plan that does not end in `_deliver`. `_is_sound` is called before the next
+# plan.
 
 from __future__ import annotations
 

@@ -2,26 +2,28 @@
 
 # Theory of operation.
 #
-# Nearly all that goes wrong with a node is something that its frames suffer: an answer is late, a
-# heartbeat missing, a PDO too short. So a fault is a line of `NODE_FAULTS`: which frames it acts
-# on (`_NodeFrames`), and what is sent, or received, instead of one (a function that returns frames,
-# each with how much later it comes). The slave knows nothing of it, as a real one would not.
+# Most faults of a node are visible in its frames: an answer is late, a heartbeat is missing, a PDO
+# is too short. So each fault is an entry of `NODE_FAULTS`. The entry names the frames that the
+# fault acts on (`_NodeFrames`). It also has a function that returns the frames sent or received
+# instead, each with its delay. The slave is not involved, like a real slave with such a fault.
 #
 #   Station -> FaultyNode -> (TracedDevice) -> Node -> slave         port: CanEnd -> CanWire
 #                  |  rx: SYNC, SDO requests are lost or answered here
 #                  |  tx: SDO answers, heartbeats, boot-up, PDOs are changed, late, doubled, lost
 #
-# `NodeFaults` is what an operator arms. Only while a fault is armed, or a late frame waits, a
-# `_FaultyNode` stands between the station and its device (`Station.device`): without faults nothing
-# costs time. A trace records the device itself, so a replay needs no faults.
+# An operator arms faults at `NodeFaults`. A `_FaultyNode` is inserted between the station and its
+# device (`Station.device`) only while a fault is armed or a late frame waits. So a node without
+# faults takes no additional time. A trace records the device itself, so a replay needs no faults.
 #
-# Three kinds act otherwise: those that act `by_itself` send frames, or restart the node, at their
-# times; `bus_off` is done to the CAN controller (`CanWire.force_off`); `NARROWED` are faults of the
-# bus that hit this node's frames alone.
+# Three kinds of faults act in another way:
+#   - Faults that act `by_itself` send frames, or restart the node, at their own times.
+#   - `bus_off` acts on the CAN controller (`CanWire.force_off`).
+#   - `NARROWED` are faults of the bus, limited to the frames of this node.
 #
-# A block transfer has frames that look like any other: `_SdoBlocks` follows it, so that a segment
-# is not taken for a request. Time is that of the ticks, chance that of the bus: a fault is the same
-# in each run, dense or sparse, in forks and after snapshots.
+# Some frames of a block transfer look like other frames. `_SdoBlocks` follows the block transfer,
+# so that a segment is not mistaken for a request. Times are those of the ticks, and random numbers
+# come from the bus. So a fault is the same in each run, dense or sparse, in forks and after
+# snapshots.
 
 from __future__ import annotations
 

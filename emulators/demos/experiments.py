@@ -19,20 +19,21 @@ from tickrig.host.rtc.motion.options.game_pad import GamePad
 # Theory of operation
 # ===================
 #
-# An experiment is a table: where robots stand, who follows whom, how sticks are pushed, and which
-# connectors change when. `ConvoyRun` makes the components of it:
+# An experiment is a table: the first poses of the robots, the leader of each follower, the motions
+# of the sticks, and the changes of connectors with their times. `ConvoyRun` makes the components:
 #
 #     PadA -> JoystickA -> MovingControl0 -> RefHardRh30    a robot that a stick drives
 #     Odometry0 -> Follower1 -> RefHardRh31                 a robot that follows another
 #
-# `JoystickA` and `MovingControl0` speak the interface of the report's phase: RTC::TimedVelocity
+# `JoystickA` and `MovingControl0` use the interface of the report's phase: RTC::TimedVelocity
 # (phase 1, Fig. 90) or IIS::TimedVelocity (phase 2, Fig. 94). Any joystick can be connected to any
 # robot (Fig. 91), and any pose to any follower (Fig. 98).
 #
-# In virtual time the acts change the connectors as `tickrig rtc con` and `dis` do. In real time
-# (`terminal_cli`) the experiment changes none: `tickrig rtc --at` does, or a tool of OpenRTM. The
-# planned path is that of the present connectors in both cases: the path of the robot that is
-# followed, or where the command of the stick leads.
+# In virtual time the acts of the table change the connectors like `tickrig rtc con` and `dis`. In
+# real time (`terminal_cli`) the experiment does not change connectors: `tickrig rtc --at` or a
+# tool of OpenRTM changes them. In both cases the planned path of a robot follows from the present
+# connectors. It is the path of the robot that is followed, or the path that the command of the
+# stick describes.
 
 _SECOND_US: Final = 1_000_000
 _ROW_US: Final = 2 * _SECOND_US

@@ -3,26 +3,27 @@
 # Theory of operation
 # ===================
 #
-# A `FrameFormat` says how a stream of bytes is cut into frames. Both ends of a test use it: a
-# device, which takes `rule.splitter()` and pushes what it receives, and the log of its line
-# (`LineSettings(splitter=rule)`), which calls the rule for each direction and shows the frames
-# in transcripts, failure reports and HTML pages.
+# A `FrameFormat` is a rule that splits a stream of bytes into frames. Both ends of a test use it:
 #
-# Every byte is in exactly one piece. Bytes that are not a frame are a piece as well, because people
-# have to see it, and a device refuses it by its check. So a rule never raises and never loses
-# bytes. Bytes before a header end with that header, not with what came at once: pieces do not
-# depend on how the bytes arrived.
+# - A device calls `rule.splitter()` and pushes the bytes that it receives.
+# - The log of the device's line (`LineSettings(splitter=rule)`) calls the rule for each direction
+#   and shows the frames in transcripts, failure reports and HTML pages.
 #
-# There are four rules. Three know where a frame ends: `by_size`, `by_delimiter`, `by_length`.
-# A silence of `gap` ends an incomplete frame, so a lost byte costs one frame. `by_gap`
-# knows the silence alone: its frame is whole when the silence is over, which is later than its
-# last byte. `due_us` says when; `WireLog` asks it before it takes anything later, so request
-# and answer stand in the order and with the times in which they passed; and it lets the rig
-# stop there (`WireLog.follow`), so that the last frame ends as well.
+# Every byte is in exactly one piece. Bytes that are not a frame are a piece, too: people have to
+# see them, and a device rejects them by its check. So a rule never raises an exception and never
+# loses bytes. A piece of bytes before a header ends at the header. It does not depend on how the
+# bytes were divided when they arrived.
+#
+# There are four rules. `by_size`, `by_delimiter` and `by_length` find the end of a frame in its
+# bytes. With these three a silence of `gap` ends an incomplete frame, so a lost byte costs one
+# frame. `by_gap` uses the silence alone: its frame is complete at the end of the silence, which is
+# later than its last byte. `due_us` returns this time. `WireLog` reads `due_us` before it accepts
+# later traffic, so request and answer appear in the order and with the times in which they passed.
+# It also stops the rig at that time (`WireLog.follow`), so that the last frame ends as well.
 #
 # The log shows text. Without a description a frame is shown in hex. A description is a function
-# of a frame, or an object with such a method `parse` (a Struct of the library construct): it
-# returns the fields by name. A frame that it refuses is shown in hex with the reason.
+# of a frame, or an object with a method `parse` (a Struct of the library construct), that returns
+# the fields by name. If the description rejects a frame, the frame is shown in hex with the reason.
 
 from __future__ import annotations
 

@@ -2,18 +2,22 @@
 
 # Theory of operation.
 #
-# A fault is declared by one entry of a table, `NAME: FaultType(...)`: what it does, which arguments
-# it takes, and what it is made by. Everything else is derived from the entry: `bind_arguments`
-# reads what people write behind `NAME=`, `usage` says how to write it, `describe` and `tickrig ctl
-# SOCKET faults` list it, and the table of docs/reference/bench/faults.md is written of it.
+# A fault is declared by one entry of a table, `NAME: FaultType(...)`. The entry holds the
+# description, the arguments and the factory of the fault. Everything else is derived from it:
+#   - `bind_arguments` reads the text after `NAME=`;
+#   - `usage` returns the notation;
+#   - `describe` and `tickrig ctl SOCKET faults` list the fault;
+#   - the table of docs/reference/bench/faults.md is generated from the entries.
 #
-# People write `NAME[=ARGUMENT[,ARGUMENT]]`. A bare argument is the next one of the declaration, or
-# `KEY=VALUE` names it. Each fault that is `rated` also takes `rate=` (how probable it is that it
-# acts when it could) and `count=` (how often it acts at most); one without arguments of its own
-# takes the rate bare, as `drop=0.01`. Each argument has a default, so the bare name is a fault.
+# Users write `NAME[=ARGUMENT[,ARGUMENT]]`. A bare argument is the next one of the declaration;
+# `KEY=VALUE` names an argument. Each fault that is `rated` also accepts `rate=` (the probability
+# that it acts each time it could) and `count=` (how often it acts at most). A fault without
+# arguments of its own accepts a bare rate, as in `drop=0.01`. Each argument has a default, so the
+# bare name is a valid fault.
 #
-# A `FaultTrigger` decides when a fault acts; it draws by chance, keeps to the count, and counts.
-# A fault asks it each time it could act, and for nothing else, so chance is the same in each run.
+# A `FaultTrigger` decides when a fault acts: it draws a random number, applies the limit, and
+# counts. A fault calls it exactly once each time it could act, so the random numbers are the same
+# in each run.
 
 from __future__ import annotations
 

@@ -2,43 +2,45 @@
 
 # Theory of operation.
 #
-# Time is an int of microseconds that only the rig moves. Three kinds of things happen:
-#   - an action of the event queue, put there by a scenario, a signal, a host that waits;
-#   - an end on a wire: a frame or byte has arrived, and wakes the station that receives it;
+# Time is an int of microseconds that only the rig advances. There are three kinds of events:
+#   - an action of the event queue, added by a scenario, a signal, or a host that waits;
+#   - an end on a wire: a frame or byte has arrived and wakes the station that receives it;
 #   - a tick: at multiples of its period a device polls its port, computes, and sends.
-# Things of one time happen in this order. `run_to`, `run_until` and `step` all keep it, so how a
-# run is cut into calls makes no difference.
+# Events of the same time happen in this order. `run_to`, `run_until` and `step` all keep it, so
+# the division of a run into calls makes no difference.
 #
-# A step of the rig has two phases. First all devices poll and compute, then all send: data sent in
-# a tick are received in a later one, and the order of the stations makes no difference. On a shared
-# wire each station may send at once, because a frame takes time to end. Couplings act after that;
-# what they set counts in the next tick. Watchers come last and see a finished step.
+# A step of the rig has two phases. First all devices poll and compute, then all send. Data sent in
+# a tick are received in a later tick, and the order of the stations makes no difference. On a
+# shared wire each station may send at once, because a frame takes time to end. Couplings act after
+# both phases; the inputs that they set take effect in the next tick. Watchers are called last and
+# see a finished step.
 #
-# Most ticks have no work, and a rig in virtual time jumps over them. Who has work, and when:
-#   - A station on a shared wire (`WirePort`) stands in the `Timetable` at its next tick with work.
-#     It is entered when its port wakes it, after its own tick for `due_us`, and by `_enter_due`
-#     for what changed between steps (an input set, an object written). It stands at one tick;
-#     entries for later ones are ignored.
-#   - All other stations are asked in each step (`_looked_at`), as serial lines say `due_us` alone.
-#   - Wires are asked when something ends next (`_Wires`). An idle wire is not asked: it calls
-#     `on_traffic` when something may end earlier than it said.
-# `_planned_us` is the earliest of tick and action. `_go_on` lets wires run up to just before it,
-# but stops where a station was woken, for that may have entered an earlier tick.
+# Most ticks have no work, and a rig in virtual time jumps over them. Ticks with work are found so:
+#   - A station on a shared wire (`WirePort`) is in the `Timetable` at its next tick with work. It
+#     is entered when its port wakes it, and after its own tick for `due_us`. `_enter_due` enters
+#     it after a change between steps (an input set, an object written). It has one tick; its
+#     entries at later ticks are ignored.
+#   - All other stations are checked in each step (`_looked_at`), because serial lines only offer
+#     `due_us`.
+#   - Wires return the time of their next end (`_Wires`). An idle wire is not queried: it calls
+#     `on_traffic` when something may end earlier than the time it returned.
+# `_planned_us` is the earliest time of a tick or an action. `_go_on` lets wires run up to just
+# before it, but stops when a station was woken, because an earlier tick may have been entered.
 #
-# Several wires run by themselves up to the next tick at which anybody who hears of them could
-# act; only hosts that wait, or observers of two wires, need them in the order of time.
+# Several wires run separately up to the next tick at which any receiver of their traffic could
+# act. Only waiting hosts, or observers of two wires, require the wires in the order of time.
 #
-# A drive may compute its next ticks in one go while it is not observed (`Horizon`). `_foresee` says
-# until when: not with watchers or couplings, and not beyond the next action. `passed_us` has the
-# present time, in case the drive is read all the same.
+# A drive may compute its next ticks in one go while it is not observed (`Horizon`). `_foresee`
+# returns the limit: not with watchers or couplings, and not beyond the next action. `passed_us`
+# has the present time, in case the drive is read before the limit.
 #
-# With the kernel (`kernel.py`), a rig whose stations are all on one bus, in virtual time, without
-# bridges, couplings and `hosts`, is run in C from tick to tick, for a host that waits on that bus
-# too: `run` is the loop of `_go_on`, `_happen` and `_run` over the same fields. It returns False
-# where an action is due or a plug is pulled, and the loop here goes on.
+# With the kernel (`kernel.py`), a rig runs in C from tick to tick under these conditions: all its
+# stations are on one bus, in virtual time, without bridges, couplings and `hosts`. This includes a
+# host that waits on that bus. `run` is the loop of `_go_on`, `_happen` and `_run` over the same
+# fields. It returns False when an action is due or a plug is pulled, and the loop here continues.
 #
-# In real time (`_in_real_time`) the rig wakes at every tick, bridges take in before it and give out
-# after it, and lateness is counted; nothing is skipped.
+# In real time (`_in_real_time`) the rig wakes at every tick. Bridges take in data before the tick
+# and give out data after it. Late ticks are counted, and no tick is skipped.
 
 from __future__ import annotations
 

@@ -56,10 +56,11 @@ def _too_small(size: tuple[int, int], least: tuple[int, int]) -> Text:
 class RrcPanel(FramedApp):
     """Stick, buttons, faults and lamps of an RRC and its VR2.
 
-    A terminal reports no key release: arrows move the stick and leave it there, a button key is a
-    pulse of 100 ms, and capitals hold the speed buttons.
+    A terminal does not report the release of a key. So an arrow key moves the stick and leaves it
+    there, a button key presses the button for 100 ms, and a capital holds a speed button.
 
-    Below 80 x 24 it draws no square for the stick and no frames; 60 x 15 is the least.
+    In a terminal smaller than 80 x 24 the panel has no square for the stick and no frames. The
+    smallest size is 60 x 15.
 
     Args:
         send: sends requests to the emulator, and returns its answers.

@@ -101,7 +101,7 @@ class Observer:
 
     Attributes:
         view: the present view.
-        seen: number of the latest line on the wire; request those after it.
+        seen: number of the latest line on the wire; request the lines after it.
     """
 
     def __init__(self) -> None:

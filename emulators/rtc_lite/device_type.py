@@ -83,7 +83,8 @@ def _find_component(spec: str) -> type[LiteComponent]:
     """Return the component of a name or `FILE.py:Class`.
 
     Raises:
-        ValueError: unknown name, its file cannot be run, or it does not fit into a PIC.
+        ValueError: the name is unknown, the file cannot be run, or the component does not fit into
+            a PIC.
     """
     if spec in COMPONENTS:
         return COMPONENTS[spec]

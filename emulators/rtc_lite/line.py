@@ -33,8 +33,8 @@ from tickrig.wire.rtc_lite.values import LitePortType
 
 # Split the traffic into frames, as shown in the log, transcripts and `expect`.
 #
-# A frame is shown without header and checksum, as `CX`, `CX@I` or
-# `QV\x03\x04out*\x00\x00\x00`; a packet of RTno as `X`, `XI`.
+# A frame is shown without header and checksum, such as `CX`, `CX@I` or
+# `QV\x03\x04out*\x00\x00\x00`. A packet of RTno is shown as `X` or `XI`.
 
 _SHOWN: Final = {
     LiteLinkFault.CHECKSUM: b"(wrong checksum)",
@@ -91,7 +91,7 @@ class MonitoredLink:
     """A `Link[bytes]` that reports each frame on another link.
 
     Args:
-        link: the other one.
+        link: the other link.
         show: called with a line of text, such as `> AE EXECUTE`.
 
     Attributes:
@@ -207,8 +207,9 @@ class RadioSettings:
         latency_us: the shortest time that a packet takes.
         jitter_us: random additional time; packets keep their order.
         gap_us: silence after which a radio sends the collected bytes as one packet.
-        up_us: mean time from one dropout to the next, 0 for no dropouts.
-        dropout_us: mean time of a dropout; both times vary randomly by half.
+        up_us: mean time from one dropout to the next, 0 for no dropouts. It varies randomly by
+            half.
+        dropout_us: mean duration of a dropout; it varies randomly by half.
     """
 
     latency_us: int = 15_000

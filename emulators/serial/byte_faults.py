@@ -3,22 +3,23 @@
 # Theory of operation
 # ===================
 #
-# `BYTE_FAULTS` declares each fault (`FaultType` of rig/faults.py); the class beside it is one
-# direction of it. There are two kinds.
+# `BYTE_FAULTS` declares each fault (`FaultType` of rig/faults.py). The class in the declaration is
+# one direction of the fault. There are two kinds of faults.
 #
-# Plain faults make other bytes of those that pass in a tick: flip, drop, dup, cut, swap, garbage,
-# repeat, truncate, framing, parity. `swap` and `repeat` keep a part for the next one.
+# Plain faults change the bytes that pass in a tick: flip, drop, dup, cut, swap, garbage, repeat,
+# truncate, framing, parity. `swap` and `repeat` keep a part of the bytes for the next tick.
 #
-# Late faults (`_Late`) let bytes go later: delay, jitter, split, break. Each keeps a queue, so
-# nothing overtakes. A part of it has the time before which it does not go, and the silence that
-# the line needs before it, which counts from the last stop bit of the part before: only then is a
-# pause of 3 ms a pause on a line of 9600 bit/s as well. `FaultyPort` says when that is (`sent`).
-# What is late goes in a tick of the device, so times are rounded up to its `tick_us`.
+# Late faults (`_Late`) delay bytes: delay, jitter, split, break. Each keeps a queue, so no byte
+# overtakes another. Each part in the queue has an earliest time, and a silence that the line needs
+# before the part. The silence counts from the last stop bit of the previous part; only then is a
+# pause of 3 ms also a pause on a line of 9600 bit/s. `FaultyPort` reports the time of that stop
+# bit (`sent`). Late bytes are sent in a tick of the device, so their times are rounded up to its
+# `tick_us`.
 #
-# flip, drop, dup and cut act in both directions. The others act on what the device sends, on
-# what it receives, or on both (`way=`), and by the byte, by the line or by the frame (`by=`). A
-# line ends with a line feed. A frame is what the device sends or receives in one tick: an
-# answer, if it sends its answers whole.
+# flip, drop, dup and cut act in both directions. The others act on the bytes that the device
+# sends, on those it receives, or on both (`way=`). They act by the byte, by the line or by the
+# frame (`by=`). A line ends with a line feed. A frame is all bytes that the device sends or
+# receives in one tick: an answer, if the device sends each answer in one piece.
 
 from __future__ import annotations
 

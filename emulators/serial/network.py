@@ -27,33 +27,40 @@ from tickrig.wire.uart import Parity, UartSetting, sample
 # Theory of operation
 # ===================
 #
-# A port has one host at most (`_host`), one that waits (`_next`) and a few that are shown
-# out (`_dismissed`). All sockets are non-blocking. They are looked at in `poll`, once a
-# tick, or in `attend` while the line has no room: no host can hold up the rig, whatever it
-# does.
+# A port has at most one host (`_host`), one host that waits (`_next`), and a few refused hosts
+# whose connections are being closed (`_dismissed`). All sockets are non-blocking. They are
+# processed in `poll`, once a tick, or in `attend` while the line has no room. So no host can block
+# the rig.
 #
-# The second host. Whether the first is still there is known only behind all that it sent,
-# because the end of a connection comes after its data. So the second is accepted and
-# listened to (one of RFC 2217 gives up without negotiation), and a little of what
-# it sends is held. Then `_let_in` decides, in a later tick if need be: the first has ended
-# or is stuck, and the second gets the line, what was held first; or nothing of the first
-# was waiting at the latest look, so that it is at work, and the second is refused.
+# The second host. The end of a connection comes after its data. So the port knows whether the
+# first host is still connected only after it has read all data of that host. Until then it accepts
+# the second host and reads from it, because a host of RFC 2217 gives up without negotiation. It
+# holds a little of the second host's data. Then `_let_in` decides, in a later tick if necessary:
 #
-# Ends. A host that has closed its sending side, as `nc` at the end of its input, is still
-# given what comes for a second. One that is refused reads a line that says why: its
-# connection is closed for sending and read until it is empty, because closing it with
-# unread data resets it, and then the line may be lost (`DismissedHost`).
+# - If the first host has ended or is stuck, the second host gets the line, with its held data
+#   first.
+# - If no data of the first host were waiting at the latest poll, the first host is active, and the
+#   second host is refused.
 #
-# Bounds. Nothing that a host does makes this process grow: whole sends are dropped beyond
-# `buffer_bytes` and counted in `lost`, as on a pty; about two reads are held of a waiting
-# host; a suboption has 256 bytes at most; and a host that negotiates without reading the
-# answers is not read from 8 KiB of them on, because each read may bring forth more
-# (`_may_read`). The buffers of the kernel are small for the same reason: what is in them is
-# beyond the time of the rig.
+# Ends. A host that has closed its sending side, such as `nc` at the end of its input, still
+# receives data for one second. A refused host receives a line with the reason. Its connection is
+# closed for sending and read until it is empty: closing a connection with unread data resets it,
+# and the line may then be lost (`DismissedHost`).
 #
-# The settings of RFC 2217 are answered and remembered. The rate of the line is that of the device,
-# which may change it (`device_uses`). What a host of another setting reads and what the device
-# reads of it is sampled, as at a real port, each piece of a tick by itself; the user is warned
+# Bounds. No host can make this process grow:
+#
+# - Whole sends beyond `buffer_bytes` are dropped and counted in `lost`, as on a pty.
+# - About two reads of a waiting host are held.
+# - A suboption has at most 256 bytes.
+# - If a host negotiates without reading the answers, the port stops reading from it at 8 KiB of
+#   answers, because each read may produce more (`_may_read`).
+#
+# The buffers of the kernel are small for the same reason: their data are outside the time of the
+# rig.
+#
+# The settings of RFC 2217 are answered and stored. The line keeps the rate of the device, which
+# the device may change (`device_uses`). If the host has another setting, the data in both
+# directions are sampled, as at a real port, separately for each tick. The user gets a warning
 # (`HostSetting`).
 
 _SCHEMES: Final = ("rfc2217", "socket")

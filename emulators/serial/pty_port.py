@@ -61,9 +61,9 @@ class _PtyLink:
             lock = os.open(self._note, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
             try:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                # Between `open` and `flock` the owner may have removed the note and another have
-                # made a new one: then this lock is of a file that is no longer reachable. Try
-                # again.
+                # Between `open` and `flock` the owner may have removed the note, and another
+                # emulator may have made a new one. Then this lock is on a file that is no longer
+                # reachable. Try again.
                 if os.path.samestat(os.fstat(lock), self._note.stat()):
                     return lock
             except BlockingIOError:

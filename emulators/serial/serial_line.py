@@ -15,41 +15,41 @@ from tickrig.wire.uart import PS_PER_US, UartSetting
 # Theory of operation
 # ===================
 #
-# A line is two directions, and a direction is a queue of bursts: bytes that leave back to back from
-# `start_us` on. A byte has no event of its own. Everything is computed from the burst on request:
-# byte n has arrived at start + n * frame_bits / baud, rounded up to a whole microsecond. So a
-# megabyte costs as much as a byte, and looking does not change anything.
+# A line is two directions, and a direction is a queue of bursts. A burst is a number of bytes that
+# are sent back to back from `start_us` on. A byte has no event of its own. Its arrival is computed
+# from the burst on request: byte n has arrived at start + n * frame_bits / baud, rounded up to a
+# whole microsecond. So a megabyte costs as much as a byte, and a query does not change anything.
 #
 # Rules:
 #
-# - A burst that begins while the line is busy is joined to the one before, so only the last
-#   burst can still be on its way. One exception: after a change of the setting the next
-#   burst has other times, so it waits behind the one before. `_unsent_bursts` finds both.
-# - A device changes the setting of the whole line (`use_uart`): from the last stop bit that
+# - A burst that begins while the line is busy is joined to the previous burst, so only the last
+#   burst can still be in transit. There is one exception: after a change of the setting the next
+#   burst has other times, so it waits after the previous one. `_unsent_bursts` finds both.
+# - A device changes the setting of the whole line (`use_uart`): after the last stop bit that
 #   it has sent, or at once. Until then bytes of the host keep the old times (`_from_us`).
-# - Times are never added up. A burst that goes on for hours is shortened at its front
-#   (`forget_taken`) by a number of bytes that takes whole microseconds, so no arrival
-#   moves.
-# - Two buffers. What the sender's does not take is lost at `put`, what the receiver's does
-#   not hold is lost at `take`: both are counted in `lost` of the end that would have
-#   received it.
-# - `first_us` and `last_us` are kept up to date by `_note_due` after each change, because a
-#   rig asks for them far more often than bytes come. `poll` before `first_us` returns at
-#   once.
+# - Times are never added up. A burst that lasts for hours is shortened at its front
+#   (`forget_taken`) by a number of bytes whose duration is a whole number of microseconds. So no
+#   arrival changes.
+# - There are two buffers. Bytes that do not fit into the sender's buffer are lost at `put`. Bytes
+#   that do not fit into the receiver's buffer are lost at `take`. Both are counted in `lost` of
+#   the end that would have received them.
+# - `_note_due` updates `first_us` and `last_us` after each change, because a rig reads them far
+#   more often than bytes arrive. `poll` before `first_us` returns at once.
 #
-# The host's bridge looks once a tick and takes what was written as written right after its
-# last look (bridge.py); therefore `arrived` may be asked for a time before the start of a
-# burst.
+# The host's bridge polls once a tick and treats new data as written right after its previous poll
+# (bridge.py). Therefore `arrived` may be called with a time before the start of a burst.
 
 
 @mypyc_attr(allow_interpreted_subclasses=True, serializable=True)
 class SerialLine(Copyable):
     """Two ends joined by two independent directions.
 
-    A byte is delivered when its stop bit has passed. Data sent while the line is busy are queued;
-    data for which a buffer has no room are lost and counted. A device may change the setting
-    (`LineEnd.use_uart`). Characters for a host with another setting are computed at its end
-    (`SerialSide`, `Bridge`). Not emulated: modem control lines.
+    A byte is delivered when its stop bit has passed. Data sent while the line is busy are queued.
+    Data that do not fit into a buffer are lost and counted. A device may change the setting
+    (`LineEnd.use_uart`). If the host has another setting, its end computes the characters that
+    pass (`SerialSide`, `Bridge`).
+
+    Not emulated: modem control lines.
 
     Args:
         baud: bit rate in bit/s.
@@ -114,7 +114,7 @@ class LineEnd(Part):
             now_us: the present time.
 
         Returns:
-            For each byte the start of its start bit in ps, and its value.
+            The start of the start bit in ps and the value of each byte.
         """
         return self._out.withdraw(now_us)
 

@@ -49,16 +49,17 @@ class Board:
     """A board that boots, runs its system, and loses it with its supply; an item of a `Schedule`.
 
     A power cut is not a shutdown: no component is deactivated, no device is notified, and all
-    caches are lost. A new boot makes everything new. The reset button has the same effect.
+    caches are lost. The next boot makes the whole system again. The reset button has the same
+    effect.
 
     Args:
-        limits: of the node.
+        limits: the limits of the node.
         start: makes its system.
-        lines: cut with the supply.
+        lines: the lines that are cut together with the supply.
 
     Attributes:
         inputs: its inputs.
-        manager: its system while it runs, else None.
+        manager: its system while the system runs, else None.
         boots: number of boots.
     """
 

@@ -32,7 +32,7 @@ class NodeLimits:
     Attributes:
         connectors: largest number for all ports together, 1..1000.
         message_octets: largest size of a value as CDR, 16..1048576.
-        tick_us: of its cyclic handlers; periods are multiples of it, 1000..1000000.
+        tick_us: period of its cyclic handlers, 1000..1000000; all periods are multiples of it.
         boot_us: time from power-up until it answers, 0..600000000.
 
     Raises:
@@ -60,20 +60,25 @@ class NodeLimits:
 # Theory of operation
 # ===================
 #
-# The limits hold at four doors, so that it does not matter whether the command line, a
-# control socket or a peer comes: `add` (period of a component), `allows_period` of its
-# contexts (a rate that is set later), `admit` (each new connector) and `passes` (each value
-# that a component writes or that comes from a peer). The last two are called by the ports,
-# which get the manager as their `guard` before their component is known to anybody.
+# The limits are checked in four methods, so it makes no difference whether a request comes from
+# the command line, a control socket or a peer:
 #
-# - A connector between two components of the node is at two ports and counts once. Those of
-#   observers count nowhere: they are on no board.
-# - A refusal is counted under one of `REFUSED`, and the board has an output `refused_NAME`
-#   for each, which goes on over boots. A new reason needs its name there.
-# - Refusals raise for whoever asked. A value that is too long raises for nobody: whoever
-#   writes it is told PORT_ERROR, a peer INVALID_ARGS.
-# - `passes` may be called in the threads of peers, so it has the lock; all else is in the
-#   thread of the manager.
+# - `add`: the period of a component;
+# - `allows_period` of its contexts: a rate that is set later;
+# - `admit`: each new connector;
+# - `passes`: each value that a component writes or that comes from a peer.
+#
+# The ports call `admit` and `passes`. They get the manager as their `guard` before any other
+# object can reach their component.
+#
+# - A connector between two components of the node is at two ports and counts once. Connectors of
+#   observers do not count, because they are on no board.
+# - A refusal is counted under one of `REFUSED`. The board has an output `refused_NAME` for each,
+#   which keeps counting over boots. A new reason needs its name in `REFUSED`.
+# - A refusal raises an exception for the caller. A value that is too long is an exception to this
+#   rule: its writer gets PORT_ERROR, or INVALID_ARGS if the writer is a peer.
+# - `passes` may be called in the threads of peers, so it has the lock. All other methods run in
+#   the thread of the manager.
 
 HOST: Final = "tkernel"
 """Its naming context."""
@@ -94,19 +99,20 @@ _LOG: Final = log_of(__name__)
 class NodeManager(Manager):
     """Runs RT components within the limits of a small board (NEDO report 3.4.43.3 (4)).
 
-    Interfaces are those of OpenRTM 1.0: data are always passed as CDR, never directly (`direct`),
-    and connectors do not have later properties. Requests are served one after the other, as in
-    RtORB: those of peers in the manager's thread, values of peers under one lock. Refusals are
-    counted, and the first one of each reason and port is logged.
+    The interfaces are those of OpenRTM 1.0: data are always passed as CDR, never directly
+    (`direct`), and connectors do not have the properties of later versions. As in RtORB, requests
+    are served one after the other. The manager's thread serves the requests of peers; one lock
+    covers the values that peers write. Refusals are counted, and the first refusal of each reason
+    and port is logged.
 
     Not limited: memory, processor time, threads, and the connectors of observers such as
     `tickrig rtc print`, which are on no board.
 
     Args:
-        limits: of the node.
+        limits: the limits of the node.
 
     Attributes:
-        limits: as above.
+        limits: the limits of the node.
         refused: number of refusals, by `REFUSED`.
     """
 
@@ -242,7 +248,7 @@ class _Closable(Protocol):
 
 
 class BoardLines:
-    """The lines and sources that components of a board open; they can be cut.
+    """The lines and sources that components of a board open. All of them can be cut.
 
     Args:
         open_urg: opens the line of a range finder.
@@ -291,10 +297,10 @@ def add_position_detection(
     """Add, connect and activate reader, settlement and interpretation.
 
     Args:
-        manager: of the node.
-        lines: open their lines.
-        device: line of the reader.
-        service: address of the resolution service; by default that of the component.
+        manager: the manager of the node.
+        lines: opens the lines of the components.
+        device: name of the reader's line.
+        service: address of the resolution service; by default the one that the component has.
     """
     reader = manager.add(InfraredRaysReader(READER, lines.open_reader))
     reader.configuration.set("DeviceFileName", device)

@@ -15,10 +15,10 @@ class Operated:
     `EmulatorControl` answers requests about it.
 
     Args:
-        name: of the object.
-        thing: has inputs and outputs.
-        stop: called on the request to end.
-        status: returns more data for the request `status`.
+        name: name of the object.
+        thing: the object with its inputs and outputs.
+        stop: called when a request ends the run.
+        status: returns additional data for the request `status`.
 
     Attributes:
         operator: executes the actions.

@@ -48,7 +48,7 @@ class ResolutionService:
         base: its own address, such as `http://127.0.0.1:8640`.
 
     Attributes:
-        table: it may be changed.
+        table: ucodes and contents; it may be changed.
         inputs: its faults.
     """
 

@@ -29,7 +29,7 @@ class UcodeTable:
     """Ucodes and contents of a service.
 
     Attributes:
-        ucodes: target of each: a name of `contents`, or an address.
+        ucodes: the target of each ucode: a name of `contents`, or an address.
         contents: JSON texts by name.
     """
 

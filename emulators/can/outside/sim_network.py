@@ -19,12 +19,12 @@ from tickrig.emulators.rig.sim_waits import EPOCH_S, SimCondition, SimQueue, Sim
 from tickrig.host.links.can_link import to_message
 from tickrig.wire.can import STANDARD_MAX, CanFrame
 
-# Run a library's classes on another clock, without touching the library.
+# Run a library's classes on another clock, without changing the library.
 #
-# A function finds `time` among the global names of its module. A copy of the
-# function with other global names is the same code on another clock. `retime`
-# gives one object a class of its own with such copies: other objects of that
-# class, and everything else in the process, stay as they are.
+# A function looks up `time` among the global names of its module. A copy of the function with
+# other global names is the same code on another clock. `retime` gives one object its own class
+# with such copies. Other objects of the original class, and everything else in the process, are
+# unchanged.
 
 _Names = Mapping[str, object]
 """Global names of a module, and their replacements."""

@@ -36,7 +36,7 @@ class HttpService:
         port: on loopback; 0 selects a free one.
 
     Attributes:
-        url: its address.
+        url: address of the server.
 
     Raises:
         OSError: the port is in use.
@@ -52,7 +52,7 @@ class HttpService:
     def follow(self) -> None:
         """Listen unless the fault `unreachable` is active; call it periodically.
 
-        If another program has taken the port, it is reported and tried again.
+        If another program has taken the port, a message is logged and the port is tried again.
         """
         if not self._service.reachable:
             self._hang_up()

@@ -127,7 +127,7 @@ class _NodeRun:
         """Run until it is stopped.
 
         Raises:
-            Refused: the system cannot be on this node, or a socket cannot be made.
+            Refused: the system cannot run on this node, or a socket cannot be opened.
         """
         with warnings_shown(), ExitStack() as stack:
             stack.enter_context(stopped_by_signals(self._runner.stop))
