@@ -51,11 +51,11 @@ def running(module: str, *options: str, linked: bool = True) -> Iterator[Child]:
 
     Args:
         module: the module with the command.
-        options: of the command, besides `--control`.
-        linked: whether it has an option `--link` for a terminal.
+        options: options of the command, except `--control`.
+        linked: whether the command has an option `--link` for a terminal.
 
     Raises:
-        _ChildError: it does not start; the message is its last line of output.
+        _ChildError: the emulator does not start; the message is the last line of its output.
     """
     with tempfile.TemporaryDirectory(prefix="tickrig-") as name:
         link, control, log = (Path(name, part) for part in ("tty", "control", "log"))

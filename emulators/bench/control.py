@@ -62,8 +62,8 @@ class EmulatorControl(RequestDispatcher):
     """Answers requests about one emulator.
 
     Args:
-        emulator: the controlled emulator. It must not be stepped at the same time. Only a
-            `RunningEmulator` has lines to show.
+        emulator: the controlled emulator. No other code may step it while a request is answered.
+            Only a `RunningEmulator` has lines to show.
     """
 
     def __init__(self, emulator: _Controlled) -> None:
@@ -206,7 +206,7 @@ class RequestInbox:
     """Accepts requests from any thread; the emulator's own thread answers them.
 
     Args:
-        control: answers the requests, as those of the control socket.
+        control: answers the requests in the same way as those of the control socket.
     """
 
     def __init__(self, control: EmulatorControl) -> None:
@@ -215,10 +215,10 @@ class RequestInbox:
         self._closed = False
 
     def post(self, requests: Sequence[Object]) -> _Answers:
-        """Submit requests; they are answered together, between two steps.
+        """Submit requests. The emulator answers them together, between two steps.
 
-        The future raises EmulatorEnded if the emulator ends first. It is not cancelled, because an
-        event loop would treat that as the end of the waiting task.
+        The future raises EmulatorEnded if the emulator ends before it answers. The future is not
+        cancelled in this case, because an event loop would then end the task that waits for it.
         """
         answers: _Answers = Future()
         self._posted.put((requests, answers))

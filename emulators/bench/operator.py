@@ -31,7 +31,7 @@ class FaultSpec:
         name: a fault of the wire, or a physical fault of the device.
         arguments: as written; `bind_arguments` of rig/faults.py reads them.
         from_us: start, in the rig's time.
-        to_us: end; `NEVER` if it stays.
+        to_us: end; `NEVER` if the fault stays until it is cleared.
     """
 
     name: str
@@ -110,11 +110,11 @@ class FaultOrder:
 
     Attributes:
         spec: the fault, by its full name.
-        ordered_us: when it was scheduled.
-        for_us: its duration; None for that of `spec`.
-        when: description of the condition; empty if it waits for a time.
-        due_us: its start; None while it waits.
-        to_us: its end; `NEVER` if it stays.
+        ordered_us: when the fault was scheduled.
+        for_us: duration of the fault; None for the duration in `spec`.
+        when: description of the condition; empty if the fault waits for a time.
+        due_us: start of the fault; None while it waits for its condition.
+        to_us: end of the fault; `NEVER` if it stays until it is cleared.
     """
 
     spec: FaultSpec
@@ -172,13 +172,14 @@ class WireFaults(Protocol):
 class AssemblyFaults(Copyable):
     """The faults of several wires, and of the CANopen nodes on them.
 
-    Faults of a single wire have their plain name, else `WIRE/fault`. Faults of a node are
-    `NODE/fault`; those of a single device have their plain name unless the wire has the same.
+    A fault of a wire has the name `WIRE/fault`, or its plain name if there is only one wire. A
+    fault of a node has the name `NODE/fault`. If there is only one device, its faults have their
+    plain names, except those with the name of a fault of the wire.
 
     Args:
-        wires: by name.
-        nodes: by name.
-        alone: the name of the only device, empty if there are several.
+        wires: the wires, by name.
+        nodes: the nodes, by name.
+        alone: the name of the only device; empty if there are several devices.
     """
 
     def __init__(
@@ -295,12 +296,12 @@ def _at(action: Callable[[], None], now_us: int) -> None:
 class Assembly(Copyable):
     """The physical side of several devices.
 
-    Signals of a single device have their plain name, those of several have the device as prefix:
-    `left_drive/shaft_load_nm`.
+    If there is only one device, its signals have their plain names. With several devices a signal
+    has the name of its device as prefix: `left_drive/shaft_load_nm`.
 
     Args:
-        parts: by name, at least one.
-        plain: the device whose signals have their plain names beside those of others.
+        parts: the devices by name, at least one.
+        plain: one of several devices, whose signals have their plain names without a prefix.
     """
 
     def __init__(self, parts: Mapping[str, HasSignals], plain: str | None = None) -> None:
@@ -356,7 +357,7 @@ class _AssemblyInputs(Copyable):
         assembly: the devices.
 
     Attributes:
-        changed: not used: each device has that of its own inputs.
+        changed: not used; each device checks `changed` of its own inputs.
     """
 
     def __init__(self, assembly: Assembly) -> None:
@@ -446,13 +447,13 @@ class _FaultRow(NamedTuple):
     """The status of a fault of a running emulator.
 
     Attributes:
-        name: of the fault.
+        name: name of the fault.
         text: description.
-        arguments: those of the latest arming, or its defaults, by name.
-        on: whether it is active.
-        since_us: start; None if it is off, or was not ordered.
-        acted: how often it has acted since it was last armed; None for a fault of the device, which
-            acts continuously.
+        arguments: the arguments of the latest arming by name, or the defaults of the fault.
+        on: whether the fault is active.
+        since_us: start; None if the fault is off, or was not ordered.
+        acted: how often the fault has acted since it was last armed; None for a fault of the
+            device, which acts continuously.
     """
 
     name: str
@@ -466,8 +467,8 @@ class _FaultRow(NamedTuple):
 class Operator(Copyable):
     """Sets inputs, presses buttons, and starts and clears faults.
 
-    The next tick sees actions done between two ticks; at least one tick sees a press, however
-    short. `now_us` is the earliest time of a tick that sees an action.
+    An action between two ticks takes effect in the next tick, at `now_us` at the earliest. A press
+    lasts for at least one tick, however short it is.
 
     Args:
         inputs: the physical inputs of the device.
@@ -555,7 +556,7 @@ class Operator(Copyable):
     def fault(self, now_us: int, spec: FaultSpec) -> None:
         """Start a fault, now or at its time; ValueError if that is impossible.
 
-        It replaces faults of the same name at overlapping times.
+        The fault replaces faults of the same name at overlapping times.
         """
         spec = replace(spec, name=self.full_name_of(spec.name))
         self.check_fault(spec)

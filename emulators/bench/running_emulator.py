@@ -55,7 +55,7 @@ class RunningEmulator(ABC):
 
     Attributes:
         operator: sets inputs, presses buttons, starts faults.
-        event_queue: actions between ticks, run by the code that advances the rig's time.
+        event_queue: actions between ticks; the code that advances the rig's time runs them.
         log: the latest lines or frames on the wire.
         rig: the rig.
         after_step: called with the time after each step.
@@ -157,9 +157,9 @@ class OutputWatch:
     """Writes outputs when they have changed: `TIME * NAME VALUE`.
 
     Args:
-        device: with the outputs.
+        device: the device with the outputs.
         write: receives the lines.
-        names: of the outputs that are watched from the start.
+        names: names of the outputs that are watched from the start.
     """
 
     def __init__(

@@ -20,10 +20,10 @@ _FIRST_NUMBER: Final = -1
 
 
 def priority(frame: CanFrame) -> int:
-    """Return the arbitration field as a number; the smallest wins, dominant bits being 0.
+    """Return the arbitration field as a number; the frame with the smallest number wins.
 
-    With equal identifiers data frames come before remote frames, and 11-bit before
-    29-bit identifiers (ISO 11898-1, arbitration).
+    Dominant bits are 0 in the number. With equal identifiers a data frame wins over a remote
+    frame, and an 11-bit identifier over a 29-bit identifier (ISO 11898-1, arbitration).
 
     >>> frames = [CanFrame.parse(t) for t in ("101#", "100#", "100#R", "04000000#", "04000000#R")]
     >>> [str(frame) for frame in sorted(frames, key=priority)]
@@ -41,15 +41,15 @@ def dominant(frames: Sequence[CanFrame]) -> CanFrame:
 
 
 class CanArbiter(ArbiterFields):
-    """The first frames of all queues, sorted as the bits on the bus would sort them.
+    """The first frames of all queues, sorted in the order of the arbitration on the bus.
 
     All times are in the units of the segment.
 
     Attributes:
-        heads: a heap of whole numbers, which sort faster than tuples: the priority of the
-            first frame of a queue, and below it the number of the node.
-        free: no frame starts before this.
-        slow: some node has to wait longer than the bus is busy.
+        heads: a heap of whole numbers, which sort faster than tuples. The high bits are the
+            priority of the first frame of a queue, the low bits are the number of the node.
+        free: earliest time at which a frame can start.
+        slow: whether some node has to wait longer than the bus is busy.
     """
 
     __slots__ = ()

@@ -14,9 +14,9 @@ Accepted = frozenset[int] | None
 class Filtering(Protocol):
     """A device that declares the CAN-IDs it accepts.
 
-    A filter may pass more frames than the device needs, never fewer: the device decides frame by
-    frame. After a frame that may change the accepted CAN-IDs, all frames pass until the device has
-    handled it.
+    A filter may pass more frames than the device needs, but never fewer. The device itself checks
+    each frame that passes. After a frame that may change the accepted CAN-IDs, the filter passes
+    all frames until the device has handled that frame.
     """
 
     @property

@@ -22,9 +22,9 @@ from tickrig.wire.can import CanFrame, Frames
 class CanEmulator(RunningEmulator):
     """Devices, their bus, their operator, and a rig that runs them.
 
-    One more end of the bus belongs to the caller; it sends to all devices and to the bus outside,
-    and receives all frames. The bus outside, or an end that only acknowledges, ensures that the
-    caller is never alone.
+    One more end of the bus belongs to the caller. It sends to all devices and to the bus outside,
+    and receives all frames. The caller is never alone on the bus: there is always the bus outside,
+    or an end that only acknowledges frames.
 
     Args:
         name: name of the devices.
@@ -32,7 +32,7 @@ class CanEmulator(RunningEmulator):
         stations: the devices, each on its end of the bus.
         wire: the bus.
         couplings: connections of the devices besides the bus.
-        outside: the host's bus, if it is outside.
+        outside: the host's bus, if the host is outside the rig.
         clock: by default a `VirtualClock`.
         trace: the recording, closed at the end.
         link: name of the bus outside, as text.

@@ -44,14 +44,14 @@ class CanEnd(EndFields):
         number: index among the ends of the bus.
         controller: error counters and error state.
         waiting: number of frames not yet sent.
-        next: the first of them, if any.
-        room: how many more may wait; 0 while the node is bus-off.
-        held: no frame of it starts before this time, in units of the segment.
-        arrived_us: end of the first received frame that waits here, `NEVER` without one.
+        next: the first frame not yet sent, if any.
+        room: how many more frames may wait; 0 while the node is bus-off.
+        held: earliest start of the node's next frame, in units of the segment.
+        arrived_us: end of the first received frame in the inbox, `NEVER` if the inbox is empty.
         lost: frames lost because a queue or inbox was full, or the node was bus-off.
-        unfiltered: whether its filter is disabled until it is polled.
+        unfiltered: whether the filter of this end is disabled until the next poll.
         on_error_state: called with the time and the new state when the error state changes.
-        auto_recovery: whether it leaves bus-off automatically, as with most drivers.
+        auto_recovery: whether the node leaves bus-off automatically, as with most drivers.
     """
 
     __slots__ = ()
@@ -234,7 +234,8 @@ class CanEnd(EndFields):
 class Babbler(CanEnd):
     """A node that always has a frame to send and ignores its error state.
 
-    It is here, for no compiled class derives from one whose fields are those of the kernel.
+    It stands in this module because a class of a compiled module cannot derive from a class with
+    the fields of the kernel.
     """
 
     __slots__ = ()

@@ -22,8 +22,8 @@ _BACK_FROM_PASSIVE: Final = 119
 class ErrorCounters(Part):
     """The two error counters of one node (ISO 11898-1, fault confinement).
 
-    Not emulated: the receiver's further 8 for a dominant bit after its error
-    flag, and the warning limit of 96, which is not a state.
+    Not emulated: the additional 8 that a receiver adds to its error counter after a dominant bit
+    that follows its error flag, and the warning limit of 96, which is not a state.
 
     Attributes:
         tec: transmit error counter.
@@ -95,7 +95,7 @@ class ErrorCounters(Part):
 
 
 class FaultConfinement(Part):
-    """Counts successes and errors of all nodes; a good frame costs nothing on an intact bus.
+    """Counts successes and errors of all nodes; good frames on an intact bus take no time here.
 
     Args:
         ends: all ends of the bus.
@@ -162,10 +162,10 @@ _SEQUENCE_BITS: Final = 11
 
 
 class Recovery(Part):
-    """Counts the recessive sequences for each node that waits to return.
+    """Counts the recessive sequences for each node that waits to return from bus-off.
 
     Args:
-        bit: length of a bit, in the units of all times here.
+        bit: length of a bit; all times in this class are in the same unit.
 
     Attributes:
         active: whether any node waits.

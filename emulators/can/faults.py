@@ -62,8 +62,8 @@ class _ArmedFault(Copyable):
     """An armed fault of a bus, for all nodes or for one.
 
     Attributes:
-        number: of the node whose frames it hits; None for all.
-        hits: whether it hits the planned frame; None until this is drawn.
+        number: number of the node whose frames the fault hits; None for all nodes.
+        hits: whether the fault hits the planned frame; None until a random number is drawn.
     """
 
     __slots__ = ("hits", "number", "tally", "threshold", "verdict")
@@ -84,7 +84,8 @@ class CanFaults(Copyable):
     """The faults of one bus; each fault with a rate draws independently.
 
     One random number is drawn for each frame on the bus, and one each time a node sends, so every
-    run is the same. A fault of one node draws only for its frames.
+    run is the same. A fault of one node draws only for the
+    frames of that node.
 
     Args:
         seed: seed of its random numbers.
@@ -93,7 +94,7 @@ class CanFaults(Copyable):
     Attributes:
         seed: seed of its random numbers; a new one applies to later draws.
         fault_types: the faults that can be armed, by name.
-        active: whether any is armed.
+        active: whether any fault is armed.
         place: a number that determines the position of the inverted bit.
         listeners: called with the time and each frame that no node takes.
     """
@@ -123,9 +124,10 @@ class CanFaults(Copyable):
         """Arm a fault at the present time of the bus; one of the same name is replaced.
 
         Args:
-            name: of the fault.
+            name: name of the fault.
             *arguments: the texts after `NAME=`, split at commas.
-            number: of the end of the only node whose frames it hits, for one of `NARROWED`.
+            number: number of the end of the only node whose frames the fault hits, for a fault of
+                `NARROWED`.
 
         Raises:
             KeyError: no fault has this name.

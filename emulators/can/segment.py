@@ -88,21 +88,21 @@ def _first_difference(frames: Sequence[CanFrame]) -> int:
 class CanSegment(TransmissionOutcomes):
     """A bus in virtual time, advanced by each access.
 
-    Which frame goes next is a plan until its first bit is out: a frame sent at
-    that very time still takes part in the arbitration.
+    The choice of the next frame may change until its first bit is sent: a frame that a node sends
+    at that very time still takes part in the arbitration.
 
     Args:
         bit_rate: bits a second.
         start_us: start time.
         faults: the armed faults.
         observers: called with each frame that ends.
-        on_traffic: called when a frame may end earlier than `due_us` was.
+        on_traffic: called when a frame may end earlier than the previous `due_us`.
 
     Attributes:
         now_us: present time of the bus.
         shorted: whether sending is impossible.
         received: whether a frame has woken a station since `advance_until_received` was called.
-        whole: whether no end of its wire is on another segment.
+        whole: whether all ends of the wire are on this segment.
     """
 
     __slots__ = ()

@@ -47,9 +47,9 @@ class BusyTime(BusyFields):
         """Return the share of the time from `first` to `now`, in 0.1 %.
 
         Args:
-            first: start.
-            now: end.
-            present: the span of the present frame.
+            first: start of the measured time.
+            now: end of the measured time.
+            present: start and end of the present frame.
         """
         spans = (*self._spans, (self._since, self._until), present)
         busy = sum(max(0, min(until, now) - max(since, first)) for since, until in spans)
@@ -69,7 +69,7 @@ class _CanRoutes(RoutesFields):
 
     Attributes:
         ends: all ends, in the order in which they joined.
-        unfiltered: those whose filter is disabled until they are polled.
+        unfiltered: ends whose filter is disabled until their next poll.
     """
 
     __slots__ = ()
@@ -113,7 +113,7 @@ _SUSPEND_BITS: Final = 8  # a passive node's wait after it has sent
 class TransmissionOutcomes(SegmentFields):
     """Outcomes of a transmission on the bus, applied to all nodes.
 
-    Times are in units of which a bit and a microsecond are whole multiples; only time stamps are
+    A bit and a microsecond are whole multiples of the unit of all times. Only time stamps are
     rounded, up to the next microsecond. `CanSegment` plans the transmission and chooses the method
     for its outcome.
 

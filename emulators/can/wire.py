@@ -23,16 +23,17 @@ _BABBLER: Final = -1  # number of the node that the fault `babble` adds
 class CanWire(Copyable):
     r"""A classic CAN bus (ISO 11898-1); each node has a `CanEnd`.
 
-    A frame takes exactly the bits that it has, stuff bits included; it is received and time-stamped
-    after its end of frame. If several wait, the arbitration field decides. Nodes that send the very
-    same frame at the same time send it together; with different contents they collide. An
-    unacknowledged frame, or one broken by a fault, is sent again after the error frame. TEC and REC
-    count as in ISO 11898-1.
+    A frame takes exactly the time of its bits, including stuff bits. It is received and
+    time-stamped after its end of frame. If several frames wait, the arbitration field decides.
+    If nodes send the very same frame at the same time, they send it together. If their frames have
+    the same identifier but different contents, the nodes collide. An unacknowledged frame, or a
+    frame broken by a fault, is sent again after the error frame. TEC and REC count as in
+    ISO 11898-1.
 
-    Not emulated: propagation and bit timing (all see a bit at once), overload frames, errors that
-    only one receiver sees, reception of a node's own frames (a controller does not receive itself),
-    CAN FD. A node that is alone and error-passive repeats its frame endlessly: observers are not
-    called each time, and the bus load does not include it.
+    Not emulated: propagation and bit timing (all nodes see a bit at once), overload frames, errors
+    that only one receiver sees, reception of a node's own frames (a controller does not receive its
+    own frames), CAN FD. A node that is alone and error-passive repeats its frame endlessly.
+    Observers are not called for each repetition, and the bus load does not include the repetitions.
 
     Args:
         bit_rate: 10 000 to 1 000 000 bit/s.
@@ -43,7 +44,7 @@ class CanWire(Copyable):
         bus: the bus of all connected ends.
         faults: the armed faults; `arm` and `clear` act at the present time of the bus.
         observers: called with each frame and each error frame on the bus with its time.
-        on_traffic: called when a frame may end earlier than `due_us` was.
+        on_traffic: called when a frame may end earlier than the previous `due_us`.
 
     >>> wire = CanWire(bit_rate=500_000)
     >>> node, host = wire.end(), wire.end()
@@ -70,7 +71,7 @@ class CanWire(Copyable):
         """Connect one more node.
 
         Args:
-            accepts: CAN-IDs that it receives, 29-bit ones with bit 29 set; None for all.
+            accepts: CAN-IDs that the node receives; 29-bit CAN-IDs have bit 29 set. None for all.
 
         Returns:
             The node's end, its port in a `Station`.
@@ -122,7 +123,7 @@ class CanWire(Copyable):
         """Measure how busy the bus was.
 
         Args:
-            window_us: in the latest time of this length; at most a second is known.
+            window_us: length of the time before now that is measured, at most a second.
 
         Returns:
             The share of bits, in 0.1 %.

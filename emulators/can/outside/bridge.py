@@ -39,8 +39,8 @@ class CanBridge:
     def take_in(self, now_us: int, /) -> None:
         """Send the frames from outside since the last poll on the wire.
 
-        They may have been sent at any time since then, so they count as sent right after that poll:
-        polling costs a host no tick.
+        The frames may have been sent at any time since the last poll. They count as sent right
+        after the last poll, so a host loses no tick by the polling.
         """
         if frames := self._outside.poll(now_us):
             self._end.send(self._looked_us, frames)

@@ -27,13 +27,13 @@ class CanBusPort(NonCopyable):
     """A `Port[Frames]` on a real or virtual bus; it never blocks.
 
     Frames that the adapter does not accept at once are queued, up to `queue_frames`, and sent in
-    order; further frames are dropped and counted.
+    order. Frames that do not fit into the queue are dropped and counted.
 
     Args:
         bus: an open bus, without other readers.
         name: its name for messages.
         queue_frames: size of the queue.
-        gone: makes the exception from a text when the bus can no longer be read.
+        gone: called with a text when the bus can no longer be read; returns the exception to raise.
 
     Attributes:
         lost: frames dropped because the adapter did not accept them.

@@ -30,7 +30,7 @@ class Repeat:
 
     Attributes:
         frames: the frames, effective from the next time on.
-        due_us: when the next one is sent, `NEVER` after `stop`.
+        due_us: when the next frame is sent, `NEVER` after `stop`.
     """
 
     def __init__(self, frames: Frames, period_us: int, due_us: int) -> None:
@@ -94,7 +94,7 @@ class CanHost:
     def repeat(self, frames: Frames, period_us: int) -> Repeat:
         """Send a frame now and one in each period, in turn, until it is stopped.
 
-        They are sent while any code advances the rig's time.
+        The frames are sent whenever any code advances the rig's time.
         """
         if period_us < 1 or not frames:
             raise ValueError(f"{len(frames)} frames each {period_us} us; at least 1 frame and 1 us")
@@ -123,7 +123,7 @@ class CanHost:
         Raises:
             LinkClosed: the link was closed.
             LinkError: a second thread uses it, or a polling loop would never end.
-            LinkTimeout: there is no timeout, and nothing will ever happen.
+            LinkTimeout: there is no timeout, and no event is left that could end the wait.
         """
         if self._closed or self._thread.ident != get_ident() or self._thread.refused:
             self._refuse()

@@ -24,9 +24,9 @@ from tickrig.wire.errors import FieldError
 class _CanChannels:
     """The buses that can presently be opened by name.
 
-    python-can opens a bus by two strings, so the names must be global to the process: in
-    `CHANNELS`, the only global state of this package. `offer` adds an entry for the duration of a
-    `with` block, and nothing is left behind.
+    python-can opens a bus by two strings, so the names must be global to the process. They are
+    kept in `CHANNELS`, the only global state of this package. `offer` adds a name for the duration
+    of a `with` block and removes it at the end.
 
     >>> with CHANNELS.offer("robot", Rig(), CanWire()):
     ...     CHANNELS.names
@@ -62,7 +62,7 @@ class _CanChannels:
         """Connect one more host to a bus.
 
         Args:
-            name: of the bus.
+            name: name of the bus.
             hears_own: whether the host also receives its own frames.
 
         Raises:
@@ -79,16 +79,19 @@ CHANNELS: Final = _CanChannels()
 class TickrigBus(can.BusABC):
     """A host on a rig: `can.Bus(interface="tickrig", channel="name")`.
 
-    `recv` advances the virtual time, by exactly its timeout if nothing arrives; `send` takes no
-    time. Timestamps are the rig's time in seconds. Periodic messages are sent while time passes.
-    Only the thread that opened the rig may use it: a `can.Notifier` would advance the time itself
-    and is refused, so hosts that need one use `SimNetwork`, poll, or run in real time.
+    `recv` advances the virtual time until a message arrives, or by exactly its timeout. `send`
+    takes no time. Timestamps are the rig's time in seconds. Periodic messages are sent while time
+    passes.
+
+    Only the thread that opened the rig may use the bus. A `can.Notifier` is refused, because it
+    would advance the time itself. A host that needs a `can.Notifier` can use `SimNetwork`, poll,
+    or run in real time.
 
     Args:
         channel: a name that `CHANNELS` offers.
         can_filters: as for any bus.
-        receive_own_messages: whether it also receives its own messages after they have been on the
-            bus, with `is_rx` False.
+        receive_own_messages: whether the host also receives its own messages, with `is_rx` False,
+            after they have been on the bus.
         listen_only: must be False.
         options: options of other interfaces (bitrate, ...) are ignored.
 

@@ -33,8 +33,8 @@ _Names = Mapping[str, object]
 def retime(target: object, names: _Names, library: str) -> None:
     """Replace global names in the methods of an object.
 
-    Methods of classes outside the library are unchanged: a subclass that reads the clock itself
-    reads the real one.
+    Methods of classes outside the library are not changed. So a subclass whose own methods read
+    the clock reads the real clock.
 
     Args:
         target: the object; its class must not have slots.
@@ -104,10 +104,12 @@ class SimNetwork(canopen.Network):
     """A `canopen.Network` on a rig: every wait advances the virtual time.
 
     Nodes, SDO clients, PDOs, NMT, EMCY, LSS and p402 are the library's own code, run on the rig's
-    clock: time-outs are exact, and every run is the same. When an object of the library is added to
-    this network, its conditions and queues are replaced, and its methods use the rig's `time`;
-    nothing else is changed. Callbacks run while any code advances the time. Your own classes that
-    call the real `time` are not changed; use `run_for` or `sleep` instead.
+    clock. So time-outs are exact, and every run is the same. When an object of the library is added
+    to this network, its conditions and queues are replaced, and its methods use the rig's `time`.
+    Nothing else is changed.
+
+    Callbacks run while any code advances the time. Your own classes are not changed. If they call
+    the real `time`, call `run_for` or `sleep` instead.
 
     Args:
         rig: the rig.
