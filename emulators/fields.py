@@ -1,9 +1,9 @@
 """Options of a device, declared once for command lines, rig files and traces.
 
-A `DeviceType` has a `DeviceField` for each of its options. The command line is made from them
-(`commands/run_options.py`), a rig file is read with them, and a trace of a device type without
-`configure` may have no other keys. Command lines and rig files refuse a value with the same
-message.
+A `DeviceType` has a `DeviceField` for each of its options. The command line is made from these
+fields (`commands/run_options.py`), and a rig file is read with them. A trace of a device type
+without `configure` may have no other keys. Command lines and rig files refuse a value with the
+same message.
 """
 
 from __future__ import annotations
@@ -34,10 +34,10 @@ class DeviceField(NamedTuple):  # a dataclass takes 2 ms more to import
         choices: allowed texts, empty for any.
         proposals: texts that the shell completes; others are allowed.
         unit: unit of a number, or form of a text, shown in help: `M`, `X,Y,RADIUS`.
-        default: its value if not set.
-        many: whether it can be given several times; its value is then a tuple.
+        default: value if the option is not set.
+        many: whether the option can be given several times; its value is then a tuple.
         help: one sentence.
-        needs: names of the fields of which one has to be set, as without it this one does nothing.
+        needs: names of other fields; this field has an effect only if one of them is set.
     """
 
     name: str
@@ -109,8 +109,8 @@ def read_config(
     Args:
         owner: the device type, for messages.
         fields: its fields.
-        config: values by the names of command lines, without their dashes: `run-s` or `run_s`; a
-            list for a field of several values. Missing options have their default.
+        config: values by the option names of command lines, without leading dashes: `run-s` or
+            `run_s`. A field of several values has a list. Missing options get their default.
 
     Raises:
         ValueError: unknown field, or invalid value; the message starts with the field.
@@ -142,9 +142,9 @@ def check_needed(
     """Raise ValueError if a field is set that does nothing without another one.
 
     Args:
-        fields: of a device.
-        values: by names of fields.
-        given: the names of those that were set; one that has its default is none.
+        fields: fields of a device.
+        values: values by the names of the fields.
+        given: names of the fields that were set; a field with its default is not set.
     """
     known = {field.name: field for field in fields}
     for name, field in known.items():

@@ -102,9 +102,9 @@ class ScenarioParser:
     """Reads and checks scenarios for one device.
 
     Args:
-        device: for the names of inputs and outputs.
-        operator: for what can be done to it.
-        encoders: further verbs that send a line, besides `send`.
+        device: the device; its inputs and outputs are the valid names.
+        operator: the operator of the device; it determines the valid actions.
+        encoders: further verbs that send a line, in addition to `send`.
         senders: the sending verbs of a wire without lines.
     """
 
@@ -255,11 +255,11 @@ class ScenarioPlayer:
         emulator: the emulator; it must not have run yet.
         scenario: the scenario.
         transcript: receives missed expectations and watched outputs.
-        stays: keep the emulator running if the scenario has no `end`.
+        stays: whether to keep the emulator running if the scenario has no `end`.
 
     Attributes:
         met: number of met expectations.
-        missed: number of missed ones.
+        missed: number of missed expectations.
     """
 
     def __init__(

@@ -110,7 +110,7 @@ class DrivenWheel(NamedTuple):
     """A wheel on the shaft of a drive.
 
     Attributes:
-        name: of the wheel.
+        name: name of the wheel.
         node: the drive.
         forward: -1 if it is mounted the other way round.
     """
@@ -121,14 +121,14 @@ class DrivenWheel(NamedTuple):
 
 
 class BodyOnDrives:
-    """Moves a body by the shafts of its drives, and loads the shafts.
+    """Moves a body by the shafts of its drives, and applies the load of the body to the shafts.
 
     Args:
         body: the body.
-        wheels: for each of its wheels the drive.
+        wheels: the wheels of the body with their drives.
 
     Raises:
-        ValueError: a node that has no shaft.
+        ValueError: a node has no shaft.
     """
 
     name = _NAME
@@ -219,7 +219,7 @@ class BodyPlan:
     """A body on drives, as described in a rig file.
 
     Attributes:
-        kind: of `wheeled_body.SIDES`.
+        kind: a name of `wheeled_body.SIDES`.
         drives: device name of each wheel.
         mirrored: wheels whose drive is mounted the other way round.
         parameters: the given arguments of `BodyParameters`.

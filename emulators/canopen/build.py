@@ -58,7 +58,7 @@ def describe_nodes(specs: Iterable[NodeSpec], profile: str = AUTO) -> list[Descr
 
     Args:
         specs: the nodes.
-        profile: of `choices.PROFILES`, for nodes of files without one.
+        profile: a name of `choices.PROFILES`, for nodes of files without a profile.
     """
     cache, found = EdsCache(), dict[str, Described]()
     for spec in specs:
@@ -107,10 +107,10 @@ def describe(cache: EdsCache, device: Path | str, profile: str = AUTO) -> Device
     """Describe the node of a file, a model or a user's class; ValueError for anything else.
 
     Args:
-        cache: of files.
+        cache: cache of files.
         device: its EDS or DCF, the name of a model, `FILE.yml:NODE` of a bus.yml, or
             `FILE.py:Class` of a DeviceRTC.
-        profile: of `choices.PROFILES`, for an EDS or DCF.
+        profile: a name of `choices.PROFILES`, for an EDS or DCF.
     """
     if isinstance(device, str):
         return _bus_node(cache, device) if is_bus_node(device) else describe_device(device)
@@ -122,9 +122,9 @@ def read_bus_file(file: Path, urdf: Path | None, cache: EdsCache, profile: str =
 
     Args:
         file: the bus.yml.
-        urdf: the robot with its joints, None for the one named in the file.
-        cache: of EDS files.
-        profile: of `choices.PROFILES`, for nodes without one.
+        urdf: the robot with its joints, None for the robot named in the file.
+        cache: cache of EDS files.
+        profile: a name of `choices.PROFILES`, for nodes without a profile.
 
     Raises:
         ValueError: all errors, one line each.
@@ -235,7 +235,7 @@ def make_bench(  # noqa: PLR0913 - options, by keyword
 def store_keeper(store: StoreFile) -> Callable[[int], None]:
     """Return a function that writes the file whenever a node has stored something.
 
-    If writing fails there is one warning, and writing is retried.
+    If writing fails, the function logs one warning and retries later.
     """
     failed = False
 

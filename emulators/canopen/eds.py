@@ -71,7 +71,7 @@ def profile_name(application: ServiceMaker) -> str:
 
 
 def _looks_like(dictionary: Dictionary) -> str:
-    """Return the name of the profile that the objects of a dictionary belong to, empty if none.
+    """Return the name of the profile with the objects of a dictionary; empty if there is none.
 
     >>> _looks_like(Dictionary([]))
     ''
@@ -109,12 +109,12 @@ class DeviceDescription:
         file: the EDS or DCF, or the name of the model.
         info: vendor, product, bit rates.
         template: the objects with default values; never given to a slave.
-        node_id: of a DCF or model, None if missing.
-        bit_rate: of a DCF in bit/s, None if missing.
+        node_id: node-ID in a DCF or of a model, None if missing.
+        bit_rate: bit rate in a DCF in bit/s, None if missing.
         application: factory of the application.
-        warnings: deviations of the file from the standard, and values that it leaves open.
-        start: inputs with other than the usual initial values, by name.
-        files: of a node of a bus.yml: its EDS or DCF, and the URDF with its joint.
+        warnings: deviations of the file from the standard, and values that the file leaves open.
+        start: initial values of inputs that differ from the usual ones, by name.
+        files: for a node of a bus.yml: its EDS or DCF, and the URDF with its joint.
     """
 
     file: str
@@ -171,8 +171,8 @@ def read_eds(path: Path, profile: str = AUTO) -> DeviceDescription:
 
     Args:
         path: the file, with any name.
-        profile: profile for defaults that are missing in the file: `auto` for that of the device
-            type, `401`, `402` or `none`.
+        profile: profile for defaults that are missing in the file: `auto` for the profile of the
+            device type, `401`, `402` or `none`.
 
     Returns:
         The description of the device; pass its `make_dictionary()` to `make_slave`.
@@ -187,14 +187,17 @@ def read_eds(path: Path, profile: str = AUTO) -> DeviceDescription:
 def describe(file: EdsFile, profile: str = AUTO) -> DeviceDescription:
     """Describe the device of an EDS or DCF.
 
-    A deviation from the standard with a clear meaning is a warning of the description. Missing
-    defaults: a COB-ID gets that of the pre-defined connection set, a sub-index 0 the number of
-    entries, an object of the device profile its default there, and all others the value nearest to
-    0 within their limits.
+    A deviation from the standard with a clear meaning is a warning of the description. If a default
+    is missing:
+
+    - a COB-ID gets the default of the pre-defined connection set;
+    - a sub-index 0 gets the number of entries;
+    - an object of the device profile gets its default in the profile;
+    - any other object gets the value nearest to 0 within its limits.
 
     Args:
         file: the EDS or DCF.
-        profile: of `choices.PROFILES`.
+        profile: a name of `choices.PROFILES`.
 
     Raises:
         EdsError: the file has errors that would change the device; the message lists all of them.
@@ -227,8 +230,8 @@ def in_profile(
     """Return a device with its profile, which supplies defaults missing in the file.
 
     Args:
-        description: the device by its file only, of `EdsCache.read`.
-        profile: of `choices.PROFILES`.
+        description: the device as described by its file alone, from `EdsCache.read`.
+        profile: a name of `choices.PROFILES`.
         defaults: defaults with priority over those of the profile, by (index, sub-index).
 
     Returns:
@@ -341,7 +344,7 @@ class EdsCache:
     """Reads each EDS or DCF once, and again when the file has changed.
 
     Attributes:
-        others: other results by their source, with the versions of their files.
+        others: other cached results by their source, with the versions of their files.
     """
 
     def __init__(self) -> None:
@@ -349,7 +352,7 @@ class EdsCache:
         self.others: dict[object, tuple[Mapping[Path, Version], object]] = {}
 
     def read(self, path: Path, profile: str | None = AUTO) -> DeviceDescription:
-        """Return the description of a file, see `read_eds`; None as profile for the file only.
+        """Return the description of a file, see `read_eds`; with profile None, of the file alone.
 
         Raises:
             OSError: the file cannot be read.

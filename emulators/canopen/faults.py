@@ -172,9 +172,9 @@ class _ArmedNodeFault(Copyable):
     Attributes:
         fault_type: its declaration.
         arguments: arguments of the arming.
-        trigger: decides when it acts.
+        trigger: decides when the fault acts.
         kept: stored data, by CAN-ID.
-        next_us: its next own action; 0 for at once.
+        next_us: time of the next action that the fault takes by itself; 0 for at once.
     """
 
     __slots__ = ("arguments", "fault_type", "kept", "next_us", "trigger")
@@ -200,14 +200,15 @@ class _NodeFaultType(FaultForm):
     """A fault of a node that can be armed by name.
 
     Attributes:
-        frames: the frames it acts on.
+        frames: the kind of frames that the fault acts on.
         instead: returns the frames sent instead of a frame.
-        matches: returns whether it acts on a frame of that kind.
-        by_itself: action of each `period` (an argument; each tick without it).
-        abort: answers the request itself, with the frame of this function.
+        matches: returns whether the fault acts on a frame of that kind.
+        by_itself: action that the fault takes in each `period` (an argument), or in each tick if
+            it has no such argument.
+        abort: returns the frame with which the fault itself answers the request.
         controller: acts on the CAN controller.
-        silent: the node neither sends nor receives until the held frame has been sent.
-        boots: the second node sends a boot-up first.
+        silent: whether the node neither sends nor receives until the held frame has been sent.
+        boots: whether the second node sends a boot-up first.
     """
 
     frames: _NodeFrames = field(default=_NO_FRAMES, kw_only=True)
@@ -541,12 +542,13 @@ class NodeFaults(Copyable):
 
     Args:
         node: the node.
-        wire: its bus, whose faults are limited to its frames; it also supplies the random numbers.
+        wire: the node's bus. It supplies the random numbers, and its faults are limited to the
+            frames of the node.
 
     Attributes:
-        station: the station of the node, once it has one.
-        listeners: called with the time, the direction, the sent frames and the frames left by
-            faults, if these differ. A twin has no listeners.
+        station: the station of the node, as soon as the node has one.
+        listeners: called if the faults change frames: with the time, the direction, the sent frames
+            and the frames after the faults. A twin has no listeners.
     """
 
     fault_types: Mapping[str, FaultForm] = {

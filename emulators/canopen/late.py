@@ -1,7 +1,8 @@
 """Functions that make CANopen nodes, imported when the first node is made (PEP 562).
 
-A bench of serial devices needs none: without the slaves, EDS files and bus.yml `import Bench`
-takes two thirds of its time. Write `late.describe(...)`; a `from` import would load it at once.
+A bench of serial devices does not need these functions. If slaves, EDS files and bus.yml are not
+imported, `import Bench` takes two thirds of the time. Write `late.describe(...)`; a `from` import
+would load the module at once.
 """
 
 from __future__ import annotations

@@ -48,11 +48,11 @@ NODE_OUTPUTS: Final = (
 class Node(Copyable):
     """A `Device[Frames]` around a slave, with the physical side of its application.
 
-    Without power it neither sends nor receives, and restarts when power returns. Changes from the
-    inside and reports of its CAN controller take effect at the start of its next tick. A bus-off
-    controller starts its recovery at once, as with most drivers.
+    Without power the node neither sends nor receives, and it restarts when power returns. Changes
+    from the inside and reports of its CAN controller take effect at the start of its next tick. A
+    bus-off controller starts its recovery at once, as with most drivers.
 
-    Not emulated: LSS switches the bit rate of the node only; the bus keeps its own.
+    Not emulated: a change of the bit rate of the bus. LSS switches the bit rate of the node only.
 
     Args:
         name: prefix of its signals among those of other nodes.
@@ -65,9 +65,9 @@ class Node(Copyable):
         physical: its physical inputs, by name.
         groups: names of several of these that are set together.
         outputs: its physical outputs, by name.
-        on_set: called with each input or object that was set by name, and its value.
-        on_crash: called with an exception from the slave's program, which then restarts, as after a
-            watchdog; without it the exception is raised here.
+        on_set: called with the name and the value of each input or object that was set by name.
+        on_crash: called with an exception from the slave's program. The program then restarts, as
+            after a watchdog. Without `on_crash` the exception is raised here.
     """
 
     _new_in_twins: ClassVar[Mapping[str, object]] = {"on_set": None, "on_crash": None}
@@ -252,7 +252,7 @@ class _NodePart(Protocol):
     """A node, or a body on nodes: an object with a name and a physical side.
 
     Attributes:
-        name: of the part.
+        name: name of the part.
         physical: its physical inputs, by name.
         groups: names of several of these that are set together.
         outputs: its physical outputs, by name.
@@ -292,8 +292,9 @@ class NodeSide:
 def side_of(nodes: Sequence[Node], bodies: Sequence[_NodePart] = ()) -> Assembly:
     """Return the physical side of all nodes of a bus, and of bodies.
 
-    Signals of a single node have their plain name, `0x6000:1`, `state`; with several nodes the node
-    comes first, `5/0x6000:1`, `5/state`, likewise a body, `body/x_m`, unless it is the only part.
+    If there is only one node, its signals have their plain names: `0x6000:1`, `state`. With several
+    nodes the name of the node is a prefix: `5/0x6000:1`, `5/state`. The name of a body is a prefix
+    as well, as in `body/x_m`, unless the body is the only part.
     """
     plain = nodes[0].name if len(nodes) == 1 else None
     return Assembly({part.name: NodeSide(part) for part in (*nodes, *bodies)}, plain)
@@ -303,7 +304,7 @@ class _NodeInputs:
     """The `Inputs` of a node: its physical side and every object of its dictionary.
 
     Attributes:
-        table: the inputs by name; a variable may be named with its sub-index too.
+        table: the inputs by name; the name of a variable may also include its sub-index.
         groups: names of several inputs that are set together.
     """
 
@@ -375,14 +376,14 @@ _logger = log_of(__name__)
 
 
 class SecondNodeAlarm(PortBefore):
-    """A port that warns, once for each node, of another node outside with its node-ID.
+    """A port that warns, once for each node, if another node outside has the same node-ID.
 
-    It checks boot-ups, heartbeats and answers to guarding. A second node that sends none of these
-    is not detected, nor is one while ours is without power.
+    It checks boot-ups, heartbeats and answers to guarding. A second node that sends no such frame
+    is not detected. A second node is also not detected while the emulated node has no power.
 
     Args:
         port: the port on the bus.
-        nodes: our nodes.
+        nodes: the emulated nodes.
     """
 
     def __init__(self, port: CountingPort, nodes: Sequence[Node]) -> None:

@@ -24,8 +24,8 @@ class NodeSpec:
 
     Attributes:
         device: its EDS or DCF, the name of a model, or `FILE.py:Class` of a DeviceRTC.
-        node_id: 1..127, `UNCONFIGURED`, or None for that of the DCF or model.
-        profile: of `choices.PROFILES`, None for the profile of all nodes.
+        node_id: 1..127, `UNCONFIGURED`, or None for the node-ID of the DCF or model.
+        profile: a name of `choices.PROFILES`, None for the profile of all nodes.
     """
 
     device: Path | str
@@ -36,7 +36,8 @@ class NodeSpec:
 def parse_node(text: str) -> Iterator[NodeSpec]:
     """Read `5=a.eds`, `1-20=a.eds`, `5=epos`, `5=a.py:Class`, `lss=a.eds` or `a.dcf`.
 
-    ValueError for any other text. A name is that of a model, unless there is such a file.
+    ValueError for any other text. A name such as `epos` means the model, unless there is a file of
+    this name.
 
     >>> [spec.node_id for spec in parse_node("5-7=a.eds")]
     [5, 6, 7]

@@ -76,8 +76,8 @@ class ObjectSignal:
     """An object of the dictionary, set from the inside.
 
     Access rights are ignored, except that a constant cannot be changed. The service that owns an
-    object checks a new value and acts on it as if it had come over the bus, so that a heartbeat
-    time set here takes effect. The value changes at the start of the node's next tick.
+    object checks a new value and acts on it like on a value from the bus. So a heartbeat time that
+    is set here takes effect. The value changes at the start of the node's next tick.
 
     Args:
         name: as returned by `object_name`.
@@ -221,7 +221,7 @@ class SwitchSignal:
 
 
 class Emergency:
-    """An error seen by the application: its emergency error code, 0 after its end.
+    """An error seen by the application: the emergency error code, 0 after the end of the error.
 
     Args:
         slave: the slave.

@@ -32,7 +32,7 @@ class StoreFile:
 
     Raises:
         StoreError: the file has another format, or is damaged.
-        OSError: it cannot be read.
+        OSError: the file cannot be read.
     """
 
     def __init__(self, path: Path) -> None:
@@ -52,10 +52,10 @@ class StoreFile:
         return memory
 
     def save(self) -> bool:
-        """Write the file if a node has stored something; return whether it did.
+        """Write the file if a node has stored something; return whether the file was written.
 
         Raises:
-            OSError: it cannot be written; the old file is kept.
+            OSError: the file cannot be written; the old file is kept.
         """
         versions = self._versions()
         if versions == self._written:
@@ -91,7 +91,8 @@ def parse_memory(node: Mapping[str, Any]) -> Nonvolatile:
     """Read the stored data of a node.
 
     Raises:
-        AttributeError, KeyError, TypeError, ValueError: it is not in the format of `memory_values`.
+        AttributeError, KeyError, TypeError, ValueError: the data are not in
+            the format of `memory_values`.
     """
     parameters = {}
     for name, data in node["parameters"].items():

@@ -151,8 +151,8 @@ def verb(
 
     Args:
         show: formats the answer as lines for people.
-        whom: the answering program, for messages.
-        settings: of the command.
+        whom: the program that answers, for messages.
+        settings: settings of the command.
     """
 
     def decorate(fields: Callable[..., Object]) -> click.Command:

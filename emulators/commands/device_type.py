@@ -58,22 +58,24 @@ class DeviceType:
 
     Attributes:
         name: its name in traces and for `tickrig emu`.
-        title: for people.
-        build: makes a device from the configuration in a trace; ValueError if it is invalid.
+        title: title for people.
+        build: makes a device from the configuration in a trace; ValueError if the configuration is
+            invalid.
         text: one sentence for `tickrig emu --help`.
         fields: its options on its command line and in rig files; their values are the
             configuration.
-        options: the same as click options, used before `fields` existed; they become fields.
+        options: the options as click options, used before `fields` existed; they become fields.
         configure: further processing of a command line; see `Configure`.
-        line: baud rate, wire faults, and splitting of the traffic for the log.
+        line: baud rate, wire faults, and the rule that splits the traffic for the log.
         encoders: further verbs of its scenarios that send a line.
         senders: the sending verbs of its scenarios, if the line carries no text.
         is_event: selects the lines that -v shows.
         panel: runs the operator panel until it is closed.
-        talk: returns how to talk to it at a path and a baud rate.
-        config_of: the configuration of a device made by a program, None if the device cannot be
-            rebuilt from one.
-        user_code: `FILE.py:Class` whose errors are reported in one line, if it runs such code.
+        talk: returns the instructions for talking to the device at a path and a baud rate.
+        config_of: returns the configuration of a device made by a program, None if the device
+            cannot be rebuilt from a configuration.
+        user_code: `FILE.py:Class` whose errors are reported in one line, if the device runs such
+            code.
     """
 
     name: str
@@ -100,8 +102,8 @@ class DeviceType:
         """Make the device for a command line or a rig file.
 
         Args:
-            options: the values of its fields.
-            seed: of all random numbers.
+            options: the values of the fields.
+            seed: seed of all random numbers.
 
         Raises:
             ValueError: the device cannot be made.
@@ -176,12 +178,12 @@ def configure(name: str, config: Mapping[str, object], seed: int = 0) -> Configu
     """Make a device from its type and the values of its fields, as in a rig file.
 
     Args:
-        name: of the device type.
-        config: values by the names of command lines, without their dashes; see `read_config`.
-        seed: of its random numbers.
+        name: name of the device type.
+        config: values by the option names of command lines, without dashes; see `read_config`.
+        seed: seed of the device's random numbers.
 
     Raises:
-        ExtensionError: unknown type, or it cannot be loaded.
+        ExtensionError: the type is unknown, or cannot be loaded.
         ValueError: unknown field, or invalid value; the message starts with the field.
 
     >>> configure("rtc-lite", {"node": "lite-a"}).config["node"]
@@ -200,8 +202,8 @@ def build_recorded(header: Header, *, run_code: bool = False) -> Emulated[bytes]
     """Build the device on which a trace was recorded.
 
     Args:
-        header: of the trace.
-        run_code: whether to run a Python file that it names.
+        header: header of the trace.
+        run_code: whether to run a Python file that the trace names.
 
     Raises:
         ValueError: unknown device type, or invalid configuration.
@@ -214,7 +216,7 @@ def build_recorded(header: Header, *, run_code: bool = False) -> Emulated[bytes]
 
 
 def check_no_code(named: Iterable[object], *, run_code: bool) -> None:
-    """Refuse Python files named in a trace: replaying a trace must not run a program unasked.
+    """Refuse Python files named in a trace: a replay runs a program only with `run_code`.
 
     Raises:
         ValueError: the trace names a `FILE.py:Class`, and `run_code` does not allow it.
@@ -228,9 +230,9 @@ def check_config(config: Config, defaults: Config, owner: str, *, typed: bool = 
     """Raise ValueError unless a configuration has only settings of a device.
 
     Args:
-        config: as in a trace.
-        defaults: all settings.
-        owner: start of the message: `an RRC has no setting`.
+        config: the configuration, as in a trace.
+        defaults: all settings with their defaults.
+        owner: start of the message, such as `an RRC has no setting`.
         typed: whether a value must have the type of its default.
     """
     for name, value in config.items():

@@ -1,7 +1,8 @@
 """What of this machine tickrig can use: `tickrig doctor`.
 
-Each check is a probe: it reads files, opens what any user may open, and closes it again. No probe
-needs root. A probe that takes too long is given up; an exception of a probe is its result.
+Each check is a probe. It reads files, opens devices that any user may open, and closes them again.
+No probe needs root. A probe that takes too long is abandoned. If a probe raises an exception, the
+exception is the result of the check.
 """
 
 from __future__ import annotations
@@ -38,9 +39,9 @@ class _CheckState(StrEnum):
     """What a check found.
 
     Attributes:
-        OK: it is there.
-        NOTE: it is there, and there is something to know.
-        MISSING: it is not there.
+        OK: the checked item exists.
+        NOTE: the checked item exists, and there is something to know about it.
+        MISSING: the checked item does not exist.
     """
 
     OK = "ok"
@@ -53,11 +54,11 @@ class _CheckRow:
     """A row of the table.
 
     Attributes:
-        name: of the check, as `--need` takes it.
-        state: what was found.
-        found: what is there, for people.
-        do: what to do about it, empty if nothing.
-        needed: without it tickrig does not work here, or `--need` asks for it.
+        name: name of the check, as `--need` accepts it.
+        state: result of the check.
+        found: description of the result, for people.
+        do: what the user has to do; empty if nothing.
+        needed: whether tickrig does not work here without the item, or `--need` names it.
     """
 
     name: str
@@ -415,10 +416,10 @@ def _rows_of(probe: _Probe) -> list[_CheckRow]:
 
 
 def run_doctor(*, as_json: bool, needs: Sequence[str]) -> int:
-    """Print the table, and return the exit status: 1 if something needed is not there.
+    """Print the table, and return the exit status: 1 if something needed is missing.
 
     Raises:
-        Refused: `needs` names no check.
+        Refused: a name in `needs` is not the name of a check.
     """
     rows = [row for probe in _PROBES for row in _rows_of(probe)]
     names = dict.fromkeys(row.name for row in rows)

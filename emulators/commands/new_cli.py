@@ -105,9 +105,9 @@ def files(name: str, module: str, *, binary: bool = False) -> dict[str, str]:
     """Return the texts of a package by their paths in its folder.
 
     Args:
-        name: what `tickrig emu` shall call the device.
-        module: the same for Python.
-        binary: whether it speaks in frames, not in lines.
+        name: name of the device for `tickrig emu`.
+        module: name of the device's Python module.
+        binary: whether the device exchanges frames instead of lines.
     """
     words = {"name": name, "module": module, "cls": module.title().replace("_", "")}
     kind = {

@@ -22,12 +22,12 @@ _PLOTTER: Final = "matplotlib"
 
 
 def check_plot(path: Path, option: str = "--plot", *others: str) -> None:
-    """Refuse before a run what could not be written after it.
+    """Refuse, before a run, a picture that could not be written after the run.
 
     Args:
-        path: of the picture.
-        option: which names it, for the message.
-        others: further suffixes that the option takes, for the message.
+        path: path of the picture.
+        option: the option with the path, for the message.
+        others: further suffixes that the option accepts, for the message.
     """
     if path.suffix.lower() not in _FORMATS:
         raise Refused(f"{option} {path}: the name ends in {', '.join((*_FORMATS, *others))}")

@@ -65,7 +65,7 @@ class EmulatorRun(ABC, Generic[_OptionsT]):
 
         Raises:
             Refused: the options cannot be carried out.
-            SourceFailed: its CAN bus can no longer be read.
+            SourceFailed: the CAN bus of the run can no longer be read.
         """
         with ExitStack() as stack:
             if self._shows_warnings:

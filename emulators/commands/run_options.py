@@ -62,8 +62,8 @@ def run_options(wire_faults: str, device_faults: _Faults) -> Decorator:
     """Return a decorator that adds the fields of `run.RunOptions`, and --version.
 
     Args:
-        wire_faults: names, separated by commas.
-        device_faults: for shell completion.
+        wire_faults: names of wire faults, separated by commas.
+        device_faults: returns the names of device faults, for shell completion.
     """
 
     def complete(context: click.Context, option: click.Parameter, begun: str) -> list[str]:
@@ -103,9 +103,9 @@ def line_options(wire_faults: str, inputs: str | Callable[[], Iterable[InputSign
     """Return a decorator that adds the options of a device on a serial line, and --version.
 
     Args:
-        wire_faults: names, separated by commas.
-        inputs: returns its physical inputs for shell completion, or the place of a table of them,
-            `MODULE:NAME`.
+        wire_faults: names of wire faults, separated by commas.
+        inputs: returns the physical inputs of the device for shell completion, or is the place of
+            a table of them, `MODULE:NAME`.
     """
 
     def device_faults(context: click.Context) -> list[str]:
@@ -134,11 +134,11 @@ def run_named(name: str, options: Mapping[str, Any]) -> int:
     """Run a device for a command line, and return the exit status.
 
     Args:
-        name: of one of `device_type.DEVICES`.
-        options: its own, and those of `line_options`.
+        name: name of one of `device_type.DEVICES`.
+        options: the options of the device, and those of `line_options`.
 
     Raises:
-        Refused: it cannot be run with these options.
+        Refused: the device cannot be run with these options.
     """
     with loading():
         run_device = load("tickrig.emulators.commands.serial_run:run_device")
@@ -156,14 +156,14 @@ def serial_command(
 ) -> Callable[[Callable[[], None]], click.Command]:
     """Return a decorator that makes the command of a device on a serial line.
 
-    The decorated function has the help as its docstring, and an empty body.
+    The docstring of the decorated function is the help text; its body is empty.
 
     Args:
-        name: of one of `device_type.DEVICES`.
-        fields: of the device.
-        inputs: where the table of its physical inputs is, as `MODULE:NAME`.
-        wire_faults: names, separated by commas.
-        panel: whether it has an operator panel.
+        name: name of one of `device_type.DEVICES`.
+        fields: fields of the device.
+        inputs: place of the table of its physical inputs, as `MODULE:NAME`.
+        wire_faults: names of wire faults, separated by commas.
+        panel: whether the device has an operator panel.
     """
 
     def decorate(described: Callable[[], None]) -> click.Command:

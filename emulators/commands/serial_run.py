@@ -52,7 +52,7 @@ def run_device(device_type: DeviceType, options: Mapping[str, Any]) -> int:
 
     Args:
         device_type: its type.
-        options: all options, its own and those of `line_options`.
+        options: all options: those of the type and those of `line_options`.
 
     Raises:
         Refused: the options cannot be carried out.

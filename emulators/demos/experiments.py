@@ -57,8 +57,8 @@ class _Act(NamedTuple):
     """A change of connectors while all robots move.
 
     Attributes:
-        at_s: when.
-        text: what happens, for people.
+        at_s: time of the change, in s.
+        text: description for people.
         steps: words of `tickrig rtc`; `{pose0}`, `{base0}` are ports of robot 0.
     """
 
@@ -69,18 +69,19 @@ class _Act(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Experiment:
-    """What is tried with several robots.
+    """An experiment with several robots.
 
     Attributes:
-        title: of the picture.
-        robots: names and first poses of those on two wheels; the numbers of ports are theirs.
-        omni: the same of the robot on omni wheels, which has the next number.
-        sticks: how each joystick is pushed, again and again.
+        title: title of the picture.
+        robots: names and first poses of the robots on two wheels, in the order of the numbers in
+            port names.
+        omni: name and first pose of the robot on omni wheels, which has the next number.
+        sticks: motions of each joystick, which are repeated.
         driven: joysticks by the robot that they drive at first.
         followed: leaders by their follower, at first.
-        acts: what changes; the last one ends the experiment.
-        phase: of the common interface between joysticks and robots.
-        controlled: robots that a joystick can be connected to; all in `driven` unless given.
+        acts: the changes; the last one ends the experiment.
+        phase: phase of the common interface between joysticks and robots.
+        controlled: robots that a joystick can be connected to; by default all in `driven`.
     """
 
     title: str
@@ -226,17 +227,17 @@ class _Program:
 
 
 class ConvoyRun:
-    """An experiment: its robots and components, and what has been seen of them.
+    """A run of an experiment: its robots and components, and their recorded motions.
 
     Args:
-        experiment: what is tried.
+        experiment: the experiment.
         echo: receives a line of the table each 2 s.
-        clock: of a run in real time; virtual time without one.
+        clock: clock of a run in real time; without it the run is in virtual time.
 
     Attributes:
         convoy: the robots.
-        tracks: what they have done, in the order of their numbers.
-        marks: when connectors changed.
+        tracks: tracks of the robots, in the order of their numbers.
+        marks: changes of connectors.
     """
 
     def __init__(self, experiment: Experiment, echo: _Echo, clock: RealClock | None = None) -> None:

@@ -38,13 +38,13 @@ _FULL_SCALE_DEG: Final = 180.0
 
 
 class CurveSample(NamedTuple):
-    """One look at both devices.
+    """The state of both devices at one time.
 
     Attributes:
         time_s: seconds since the potentiometer was first turned.
-        volts: at the analogue input of the palette.
-        reference: what the PDO 290h brought last, 6411h:01 of the motor core unit.
-        angle_deg: of the motor's shaft.
+        volts: voltage at the analogue input of the palette.
+        reference: latest value received with the PDO 290h, 6411h:01 of the motor core unit.
+        angle_deg: angle of the motor's shaft.
     """
 
     time_s: float
@@ -78,7 +78,7 @@ _TITLE: Final = "Fig. 120: a potentiometer on node 16 turns the motor of node 32
 
 
 def write_plot(samples: Sequence[CurveSample], path: Path) -> None:
-    """Draw voltage, reference and angle over time into a file, PNG, SVG or HTML.
+    """Draw voltage, reference and angle over time, and write a PNG, SVG or HTML file.
 
     Raises:
         OSError: the file cannot be written.
@@ -129,11 +129,11 @@ class _Write:
 
     Attributes:
         node_id: the server.
-        index: of the object.
-        sub: of the object.
-        value: what to write.
-        size: bytes.
-        text: what for.
+        index: index of the object.
+        sub: sub-index of the object.
+        value: the written value.
+        size: size of the value in bytes.
+        text: purpose of the download, for people.
     """
 
     node_id: int
@@ -178,7 +178,7 @@ def set_up(network: canopen.Network) -> None:
 
     Raises:
         canopen.SdoCommunicationError: a node does not answer.
-        canopen.SdoAbortedError: it refuses.
+        canopen.SdoAbortedError: a node refuses a download.
     """
     nodes = {
         node_id: network.add_node(node_id, canopen.ObjectDictionary())  # type: ignore[no-untyped-call]  # canopen's
@@ -274,10 +274,10 @@ _Fig120Stage = VirtualStage | _BusStage
 def bus_stage(
     arguments: Sequence[str], open_bus: Callable[[], can.BusABC]
 ) -> Iterator[_Fig120Stage]:
-    """Start the emulator on a bus, and a master beside it.
+    """Start the emulator on a bus, and a master on the same bus.
 
     Args:
-        arguments: that name the bus on a command line.
+        arguments: arguments of a command line that select the bus.
         open_bus: opens the same bus.
 
     Raises:
@@ -321,10 +321,10 @@ class _Act:
     """A part of the demonstration.
 
     Attributes:
-        title: what happens.
-        duration_us: how long it takes.
-        volts: what the potentiometer says, by the share of the act that has passed, 0..1.
-        is_step: the shaft arrives within the act.
+        title: description for people.
+        duration_us: duration of the act.
+        volts: returns the voltage of the potentiometer for the elapsed share of the act, 0..1.
+        is_step: whether the shaft arrives within the act.
     """
 
     title: str

@@ -97,7 +97,7 @@ def pty_setup() -> Iterator[_PtySetup]:
 
     Raises:
         RuntimeError: an emulator does not start.
-        LinkClosed: its terminal cannot be opened.
+        LinkClosed: the terminal of an emulator cannot be opened.
     """
     with ExitStack() as stack:
         links, controls, places = dict[str, Link[bytes]](), dict[str, ControlClient](), {}
@@ -133,20 +133,21 @@ _SETTINGS: Final = ProxySettings(rediscover=True)
 
 
 def run_demo(setup: _DemoSetup, echo: _Echo) -> None:
-    """Play it; it takes six seconds of the stage's time.
+    """Run the demonstration; it takes six seconds of the stage's time.
 
     Raises:
-        RuntimeError: something did not come in time.
+        RuntimeError: an expected event did not happen in time.
         RtcRefused: a device does not start up.
     """
     _DemoRun(setup, echo).run()
 
 
 class _DemoRun:
-    """The system on a stage, and what it looks like.
+    """The system on a stage, and its display.
 
-    In real time an answer may come later than its proxy waits. The proxy then goes to Error, or
-    is removed and comes back; `_restore` brings the system to Active from any of these states.
+    In real time an answer may arrive after the time-out of its proxy. The proxy then enters the
+    Error state, or it is removed and added again. `_restore` brings the system to Active from any
+    of these states.
     """
 
     def __init__(self, setup: _DemoSetup, echo: _Echo) -> None:

@@ -106,7 +106,7 @@ def _serve(
     """Run an experiment in real time until Ctrl-C; others change its connectors.
 
     Raises:
-        Refused: an engine or the control socket cannot be.
+        Refused: an engine or the control socket cannot be opened.
     """
     clock = served_cart.CartClock()
     run = experiments.ConvoyRun(experiment, click.echo, clock)

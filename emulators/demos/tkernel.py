@@ -31,13 +31,13 @@ from tickrig.wire.ucode import BAUD, MAX_LEVEL
 
 @dataclass(slots=True)
 class Estimate:
-    """A position on a plane; how it is found is a choice of the demonstration.
+    """An estimated position on a plane; the method is a choice of the demonstration.
 
     Attributes:
-        range_m: of the reader.
-        x_m: where it believes to be.
-        y_m: the same, to the left of x.
-        fixes: how often a place has set it right.
+        range_m: range of the reader.
+        x_m: estimated position, x.
+        y_m: estimated position, y, to the left of x.
+        fixes: how often a place has corrected the estimate.
     """
 
     range_m: float
@@ -101,13 +101,13 @@ class _MountedReader(Mounted):
     """A reader in the middle of the axle.
 
     Args:
-        base: what carries it.
-        markers: what is around.
+        base: the base that carries the reader.
+        markers: the markers in the surroundings.
 
     Attributes:
-        reader: it.
+        reader: the reader.
         line: its line; `b` is the host's end.
-        station: it, on its line.
+        station: the reader on its line.
     """
 
     def __init__(self, base: Rh3Base, markers: tuple[Marker, ...]) -> None:
@@ -122,16 +122,16 @@ class _MountedReader(Mounted):
 
 
 class CorridorStage:
-    """Everything in virtual time.
+    """The cart, the node and the service of the demonstration, all in virtual time.
 
     Args:
         caches: whether entries of the caches outlive an outage.
 
     Attributes:
-        service: of ucodes.
-        board: of the node.
+        service: the service that resolves ucodes.
+        board: the board of the node.
         loop: the cart.
-        estimate: where it believes to be.
+        estimate: the estimated position of the cart.
     """
 
     def __init__(self, *, caches: bool = True) -> None:
@@ -234,13 +234,13 @@ _HEAD: Final = "   time   x true   x odometry   x believed   off     hits stale 
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """What was seen at one time.
+    """The state of the demonstration at one time.
 
     Attributes:
-        time_s: since the beginning.
+        time_s: time since the beginning.
         outage: whether the service was unreachable.
-        error_m: how far off the robot believed to be.
-        odometry_error_m: how far off it would be by its odometry alone.
+        error_m: distance between the estimated and the true position.
+        odometry_error_m: distance between the position by odometry alone and the true position.
     """
 
     time_s: float
@@ -250,14 +250,14 @@ class Moment:
 
 
 def run_demo(stage: CorridorStage, echo: _Echo) -> list[Moment]:
-    """Play it.
+    """Run the demonstration.
 
     Args:
-        stage: at its beginning.
-        echo: takes lines for people.
+        stage: the stage, which has not run yet.
+        echo: receives lines for people.
 
     Returns:
-        What was seen each 100 ms from the first step on.
+        The state each 100 ms, from the first step on.
     """
     moments: list[Moment] = []
     stage.loop.activate("tuned")

@@ -28,9 +28,9 @@ class RobotSample(NamedTuple):
 
     Attributes:
         time_s: since the start.
-        pose: where it is.
-        planned: where it is commanded to be; None without a command.
-        gap_m: distance to the robot that it follows, None if it follows none.
+        pose: pose of the robot.
+        planned: commanded pose; None without a command.
+        gap_m: distance to the robot that it follows; None if it does not follow a robot.
     """
 
     time_s: float
@@ -46,12 +46,13 @@ class RobotSample(NamedTuple):
 
 @dataclass(slots=True)
 class RobotTrack:
-    """What one robot did.
+    """The recorded motion of one robot.
 
     Attributes:
-        name: of the robot.
-        looks: at it, one each `LOOK_US`.
-        corners: of the planned path, if it is known before the run; else `looks` have it.
+        name: name of the robot.
+        looks: samples of the robot, one each `LOOK_US`.
+        corners: corners of the planned path, if the path is known before the run. Otherwise `looks`
+            contain the path.
     """
 
     name: str
@@ -86,12 +87,12 @@ class Mark(NamedTuple):
 
 
 def advanced(pose: Pose, velocity: tuple[float, float, float], step_s: float) -> Pose:
-    """Return where a command takes a robot that obeys at once.
+    """Return the pose after a command, of a robot that follows the command at once.
 
     Args:
-        pose: where it is.
+        pose: pose before the command.
         velocity: forward and to the left in m/s, turning in rad/s.
-        step_s: for how long, s.
+        step_s: duration of the command, s.
 
     >>> advanced(Pose(), (0.5, 0.0, 0.0), 2.0)
     Pose(x=1.0, y=0.0, heading=0.0)
@@ -112,9 +113,9 @@ def draw(tracks: Sequence[RobotTrack], marks: Sequence[Mark], title: str) -> Fig
     """Draw paths, speeds and gaps.
 
     Args:
-        tracks: of the robots.
-        marks: numbered in the picture, and listed below it.
-        title: of the picture.
+        tracks: tracks of the robots.
+        marks: marks that are numbered in the picture and listed below it.
+        title: title of the picture.
     """
     follows = any(look.gap_m is not None for track in tracks for look in track.looks)
     figure = new_figure(12, 7)

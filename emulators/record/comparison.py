@@ -29,10 +29,10 @@ class NumberRule:
 
     Attributes:
         pattern: a shell pattern: `EV:batt*`, `181#*`.
-        least: largest difference; in percent if `share`.
-        share: whether it is a percentage of the recorded number.
-        place: of the field, None for all decimal numbers of the line: characters of a text line
-            (hex digits), or data bytes of a frame, the lowest first.
+        least: largest allowed difference; in percent if `share`.
+        share: whether `least` is a percentage of the recorded number.
+        place: position of the field; None for all decimal numbers of the line. It counts characters
+            of a text line (hex digits), or data bytes of a frame, the lowest first.
     """
 
     pattern: str
@@ -108,8 +108,8 @@ class Tolerance:
         time_us: tolerance of times; the drift of two clocks is added.
         numbers: tolerances of numbers.
         ignored: patterns of lines that are not compared.
-        kinds: patterns of lines that are independent of all others: they may come in another order
-            than recorded.
+        kinds: patterns of lines that are independent of all other lines. Such lines may come in
+            another order than recorded.
     """
 
     time_us: int
@@ -142,8 +142,8 @@ class Said(NamedTuple):
     """A line or frame sent by a device.
 
     Attributes:
-        at_us: its end, since the start of the recording.
-        text: as in a trace.
+        at_us: end of the line or frame, since the start of the recording.
+        text: text of the line or frame, as in a trace.
         line: line number in the trace, 0 without one.
     """
 
@@ -157,7 +157,7 @@ class Pair:
     """A recorded line and the corresponding line of the emulator.
 
     Attributes:
-        kind: kind within which order counts.
+        kind: kind of the line; the order of lines is compared within a kind.
         recorded: None if only the emulator sent it.
         emulated: None if the emulator did not send it.
         difference: description of the difference; empty if equal.

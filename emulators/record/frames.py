@@ -138,7 +138,7 @@ class FrameSplitter(Copyable):
 
     Attributes:
         begun: the bytes of an incomplete frame.
-        last_us: time of the latest of them.
+        last_us: time of the latest of these bytes.
     """
 
     def __init__(self, rule: FrameFormat) -> None:
@@ -234,8 +234,8 @@ def by_gap(gap: str | int) -> FrameFormat:
     """Split at silences of the line.
 
     Args:
-        gap: the silence that ends a frame, such as `"2ms"`, or in us. It must be longer than a byte
-            and than the control period of the device.
+        gap: the silence that ends a frame, such as `"2ms"`, or in us. It must be longer than the
+            time of a byte and longer than the control period of the device.
 
     Returns:
         The rule.
@@ -310,15 +310,15 @@ def by_length(  # noqa: PLR0913 - all but three by keyword
         header: the bytes at the start of each frame; may be empty. Bytes before it are a separate
             piece.
         at: position of the length, in bytes from the start of the frame.
-        extra: bytes of the frame that the length does not count; below 0 if it counts more than
-            the frame.
+        extra: number of bytes of the frame that the length does not count; below 0 if the length
+            counts more bytes than the frame has.
         size: bytes of the length, 1 to 4.
         order: byte order of the length.
         gap: a silence that ends an incomplete frame; None for no limit.
 
     Returns:
-        The rule. If the length gives more than 4096 bytes, or ends before the length field, the
-        first byte is not a frame.
+        The rule. If the frame would have more than 4096 bytes, or would end before the end of its
+        length field, its first byte is treated as a byte outside a frame.
 
     Raises:
         ValueError: invalid position or size, or not a time above 0.
@@ -378,7 +378,7 @@ class _ByLength(Immutable):
 
 
 def hex_text(data: bytes) -> str:
-    """Write bytes in hex, in groups of four; long data are truncated, with their count.
+    """Return bytes in hex, in groups of four; long data are truncated and followed by their count.
 
     >>> hex_text(bytes.fromhex("0103 0452 4801"))
     '01030452 4801'

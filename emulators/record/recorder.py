@@ -24,7 +24,7 @@ from tickrig.wire.uart import UartSetting
 
 
 class TraceFile(NonCopyable):
-    """A trace on its way to a file; each tick is written at once, so a kill loses nothing.
+    """A trace that is written to a file; each tick is written at once, so a kill loses no tick.
 
     If writing fails, the recording ends with one warning, and the run continues.
 
@@ -157,8 +157,9 @@ class DeviceBefore(Generic[W]):
 class TracedDevice(DeviceBefore[W]):
     """A recorded device with the same interface as the device itself.
 
-    Recorded are its traffic, changes of its `inputs`, resets, reports of its CAN controller, and
-    calls of its `on_set`, if it has that, as a node for its objects.
+    It records the device's traffic, changes of its `inputs`, resets, and reports of its CAN
+    controller. If the device has an `on_set`, as a node has for its objects, it also records the
+    calls of `on_set`.
 
     Args:
         device: the device itself.
@@ -245,8 +246,8 @@ class Tick(NamedTuple):
     """The events of a device in a tick, or (mark `~`) of a wire between ticks.
 
     Attributes:
-        at_us: the tick.
-        name: of the device, or the wire.
+        at_us: time of the tick.
+        name: name of the device, or the wire.
         done: actions before the tick, such as `stick=5`.
         received: bytes or frames.
         sent: bytes or frames.
@@ -278,11 +279,13 @@ class Tick(NamedTuple):
 class TraceRecorder(Copyable):
     r"""Records the devices of a bench, in memory or in a file.
 
-    Without a file it keeps the recording for `save`: the latest ticks in memory, earlier ones as
-    text in a temporary file, which is deleted with the recorder. So memory does not grow with the
-    run. A copy of the bench has the recording so far and continues on its own. With a file each
-    tick is written at once, so that a kill loses only the last tick; if writing fails, the
-    recording ends with one warning, and the run continues. Copies are not recorded in this case.
+    Without a file the recorder keeps the recording for `save`. The latest ticks are in memory.
+    Earlier ticks are in a temporary file as text, so memory does not grow with the run. The file is
+    deleted with the recorder. A copy of the bench starts with the present recording and continues
+    it on its own.
+
+    With a file each tick is written at once, so a kill loses only the last tick. If writing fails,
+    the recording ends with one warning, and the run continues. Copies are not recorded.
 
     Args:
         path: the file, which is replaced; None to keep the lines for `save`.
@@ -316,9 +319,9 @@ class TraceRecorder(Copyable):
         """Return a recorded device, to be put on a rig instead of the given one.
 
         Args:
-            name: one of the header.
-            device: the device, recorded from its first tick on, with its `inputs` and with objects
-                of a node that are set from the inside.
+            name: a device name in the header.
+            device: the device. It is recorded from its first tick on, including changes of its
+                `inputs` and of objects of a node that are set from the inside.
 
         Raises:
             KeyError: the header has no such device.
@@ -331,8 +334,8 @@ class TraceRecorder(Copyable):
 
         Args:
             now_us: time of the change.
-            wire: one of the header.
-            text: `cut`, `drop=0.1`; `cut=0` for the end.
+            wire: a wire name in the header.
+            text: the fault, such as `cut` or `drop=0.1`; `cut=0` for the end of the fault.
         """
         self.add(Tick(now_us, wire, (text,), mark=Mark.WIRE))
 
@@ -384,7 +387,7 @@ class TraceRecorder(Copyable):
             now_us: time of the rig.
 
         Raises:
-            ValueError: it already records to a file.
+            ValueError: the recorder already writes to a file.
             OSError: the file cannot be written.
         """
         if self._forgetful:
@@ -422,7 +425,8 @@ class _Ticks(Immutable):
 class _Spool:
     """An append-only temporary file; if none can be written, the text stays in memory.
 
-    Copies within the process share the written part; each copy appends to a file of its own.
+    Copies within the process share the part that is already written. Each copy appends to a file of
+    its own.
     """
 
     shared_by_twins = True
@@ -505,14 +509,14 @@ _logger = log_of(__name__)
 
 
 class CandumpFile:
-    """A log on its way to a file; each line is written at once, so a kill loses nothing.
+    """A log that is written to a file; each line is written at once, so a kill loses no line.
 
     If writing fails, the recording ends with one warning, and the run continues. Use its `hear` as
     observer of a `CanWire`.
 
     Args:
         path: the file; one that exists is replaced.
-        channel: name of the bus in it.
+        channel: name of the bus in the log.
 
     Attributes:
         error: reason for the early end of the recording, empty if there was no error.

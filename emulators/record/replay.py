@@ -30,7 +30,7 @@ class ReplayDifference(Generic[W]):
     """The first tick with another output than recorded.
 
     Attributes:
-        at_us: the tick.
+        at_us: time of the tick.
         recorded: recorded output.
         replayed: output of the replay.
         line: line of the trace, 0 without recorded output.
@@ -59,11 +59,11 @@ def _play(
 ) -> list[tuple[int, W]]:
     """Repeat traffic and changes on a device; return its output with the ticks.
 
-    It does the same as a `Rig` with this one station: only ticks with work are made. Nothing reads
-    the device between two changes, so a drive may compute ahead (`Horizon`).
+    It behaves like a `Rig` with this device as its only station: only ticks with work are run. No
+    code reads the device between two changes, so a drive may compute ahead (`Horizon`).
 
     Args:
-        device: a new one.
+        device: a new device.
         received: the traffic with its times, sorted.
         changes: the actions on it, sorted.
         nothing: empty traffic.
@@ -121,8 +121,8 @@ class RecordedRun:
     Attributes:
         header: the device and its configuration.
         records: the lines in order.
-        ended: whether it contains the duration of the run. Otherwise the writer was killed or its
-            disk was full, and the last tick, which may be incomplete, is left out.
+        ended: whether the trace contains the duration of the run. If not, the writer was killed or
+            its disk was full; the last tick may be incomplete and is left out.
     """
 
     header: trace.Header
@@ -195,8 +195,8 @@ class BenchRecording:
     Attributes:
         header: describes the bench.
         records: the lines in order.
-        ended: whether it contains the duration of the run. Otherwise the writer was killed or its
-            disk was full, and the last tick, which may be incomplete, is left out.
+        ended: whether the trace contains the duration of the run. If not, the writer was killed or
+            its disk was full; the last tick may be incomplete and is left out.
     """
 
     header: bench_header.BenchHeader
@@ -222,16 +222,24 @@ class BenchRecording:
         return self.header.place is bench_header.Place.PORT
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return the lines as a table of pandas, which `pip install 'tickrig[pandas]'` brings.
+        """Return the lines as a DataFrame of pandas (`pip install 'tickrig[pandas]'`).
 
-        The index `time_s` is the time since the beginning in seconds; devices that tick together
-        have the same. Columns: `at_us`, the time in microseconds; `name` of the device or wire;
-        `mark`, as `>` to the device, `<` from it, `!` done to it, `~` a fault of a wire; `text`
-        as in the file; `data`, the bytes; `can_id`; `input` and `value` of what was set. A cell is
-        empty where a line has none.
+        The index `time_s` is the time since the beginning in seconds. Devices that tick together
+        have the same `time_s`. The columns are:
+
+        - `at_us`: the time in microseconds;
+        - `name`: the name of the device or wire;
+        - `mark`: `>` for data to the device, `<` for data from it, `!` for an action on it, `~` for
+          a fault of a wire;
+        - `text`: the text in the file;
+        - `data`: the bytes;
+        - `can_id`: the CAN-ID;
+        - `input` and `value`: the name and the value of an input that was set.
+
+        A cell is empty if the line has no such value.
 
         Raises:
-            ImportError: pandas is not there.
+            ImportError: pandas is not installed.
         """
         try:
             import pandas  # noqa: PLC0415 - an extra, and slow
@@ -303,14 +311,14 @@ def read_trace(path: Path | str) -> BenchRecording:
     """Read a trace of either version.
 
     Args:
-        path: of the file.
+        path: path of the file.
 
     Returns:
-        The recording; one whose writer was killed ends before its last tick.
+        The recording. If its writer was killed, it ends before the last tick.
 
     Raises:
         OSError: the file cannot be read.
-        TraceError: not a trace, or a line of it is damaged. It is a ValueError.
+        TraceError: the file is not a trace, or a line is damaged. TraceError is a ValueError.
     """
     return read_bench_recording(Path(path).read_bytes())
 
@@ -351,12 +359,12 @@ def _as_bench(recording: RecordedRun) -> BenchRecording:
 def replay_device(
     recording: BenchRecording, name: str, device: Device[Any]
 ) -> ReplayDifference[Any] | None:
-    """Replay a device of the bench on a new one; return None if its output is the same.
+    """Replay a device of the bench on a new device; return None if the output is the same.
 
     Args:
         recording: the run.
-        name: of the device in it.
-        device: a new one.
+        name: name of the device in the run.
+        device: a new device.
 
     Raises:
         TraceError: the trace names an input that the device does not have.
@@ -367,7 +375,7 @@ def replay_device(
 
 
 def play_device(recording: BenchRecording, name: str, device: Device[Any]) -> list[tuple[int, Any]]:
-    """Replay a device of the bench on a new one; return its output with the ticks.
+    """Replay a device of the bench on a new device; return its output with the ticks.
 
     Raises:
         TraceError: the trace names an input that the device does not have.

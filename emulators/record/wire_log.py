@@ -55,7 +55,7 @@ class WireLog:
 
     Args:
         keep: number of lines to keep.
-        splitter: factory of the splitters of each direction; by default into lines.
+        splitter: makes the splitter of each direction; by default a splitter into lines.
 
     Attributes:
         listeners: called with each complete line.
@@ -73,11 +73,11 @@ class WireLog:
         self._wake: Callable[[int], None] | None = None
 
     def follow(self, rig: Rig, name: str) -> None:
-        """End frames as soon as a silence ends them, not when the next traffic comes.
+        """End a frame as soon as a silence ends it, without waiting for the next traffic.
 
         Args:
             rig: the rig with the time.
-            name: of the line.
+            name: name of the line.
         """
         logs = self._splitters.values()
         if any(isinstance(each, FrameLog) and each.ends_by_time for each in logs):
@@ -119,7 +119,7 @@ class WireLog:
         """Return the unfinished line or frame of each direction; it has no number.
 
         Args:
-            by_gap: return the frames that silence alone ends instead: each may be whole.
+            by_gap: return instead the frames that end by silence alone; each may be complete.
         """
         return tuple(
             WireLine(0, at_us, mark, data)

@@ -46,17 +46,18 @@ class Mounted:
 class MountedUrg(Mounted):
     """A sensor in front of the axle.
 
-    Not emulated: its own robot in its view, and the outline of other robots, which are round.
+    Not emulated: the sensor's own robot in its view, and the true outline of other robots (they are
+    seen as round).
 
     Args:
         base: the base that carries it.
         world: the surroundings.
-        others: bases that it sees.
+        others: bases that the sensor sees.
 
     Attributes:
         urg: the sensor.
         line: its line; `b` is the host's end.
-        world: it may be changed.
+        world: the surroundings; they may be changed.
     """
 
     def __init__(self, base: Rh3Base, world: World, others: Sequence[Rh3Base] = ()) -> None:
@@ -109,13 +110,13 @@ class ClosedLoop:
     """Carts, their lines and one manager, advanced together.
 
     Args:
-        parameters: one for each base.
-        seed: of random wire faults.
-        dense: run every tick of every base.
-        world: the surroundings; with one, each cart carries a range finder that sees it.
+        parameters: the parameters of each base.
+        seed: seed of random wire faults.
+        dense: whether to run every tick of every base.
+        world: the surroundings. If given, each cart carries a range finder that sees them.
         aboard: makes further loads of the first cart.
-        pace: ratio of its time to real time; None for as fast as possible.
-        clock: the clock for waiting, with a pace.
+        pace: ratio of the loop's time to real time; None for as fast as possible.
+        clock: the clock for waiting, if a pace is given.
 
     Attributes:
         rig: the bases on their lines.
@@ -123,7 +124,7 @@ class ClosedLoop:
         carts: in the order of the parameters.
         cart: the first cart.
         chain: the components of the first cart.
-        range_finders: range finders, in the same order.
+        range_finders: range finders, in the order of the carts.
     """
 
     def __init__(  # noqa: PLR0913 - what a cart may be like

@@ -76,14 +76,14 @@ class OmniCart(RtComponent):
 
 
 class MovingControl(RtComponent):
-    """Commands a base as a joystick asks, and stops it when the joystick is silent.
+    """Commands a base by a joystick, and stops the base when the joystick sends nothing.
 
-    The connector to the joystick may be removed while the stick is pushed; without this component
-    RefHardRh3 would keep the latest velocity.
+    The connector to the joystick may be removed while the stick is pushed. Without this component
+    RefHardRh3 would then keep the latest velocity.
 
     Args:
-        instance_name: of the component.
-        phase: of the common interface: 1 is RTC::TimedVelocity, 2 IIS::TimedVelocity.
+        instance_name: instance name of the component.
+        phase: phase of the common interface: 1 for RTC::TimedVelocity, 2 for IIS::TimedVelocity.
 
     Attributes:
         twist: forward and to the left in m/s, turning in rad/s; None while no command arrives.
@@ -126,10 +126,10 @@ class _Robot:
     """One robot of a convoy, by the names of its ports.
 
     Attributes:
-        position: port of its self-position.
-        velocity: port of its moving command.
-        cart: has the true pose.
-        sideways: whether it can move in any direction.
+        position: port of the robot's self-position.
+        velocity: port of the robot's velocity command.
+        cart: the cart with the true pose.
+        sideways: whether the robot can move in any direction.
     """
 
     position: str
@@ -144,16 +144,19 @@ class _Robot:
 
 
 class Convoy:
-    """Robots in one map frame; the first keeps its planner, the others do what is joined to them.
+    """Robots in one map frame.
+
+    The first robot keeps its planner. The others follow the commands of the ports that are
+    connected to them.
 
     Args:
-        carts: where those on two wheels stand at first.
-        omni: where those on omni wheels stand.
-        clock: of a convoy in real time; virtual time without one.
+        carts: first poses of the robots on two wheels.
+        omni: first poses of the robots on omni wheels.
+        clock: clock of a convoy in real time; without it the convoy is in virtual time.
 
     Attributes:
         loop: carts, their lines and the manager.
-        robots: carts first.
+        robots: all robots; the carts come first.
     """
 
     def __init__(

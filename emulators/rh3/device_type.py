@@ -137,7 +137,7 @@ def read_parameters(options: Mapping[str, Any]) -> BaseParameters:
     """Return a base with the given options and defaults for the others.
 
     Raises:
-        ValueError: invalid options; a message about a parameter names its option.
+        ValueError: an option is invalid. A message about a parameter names its option.
     """
     try:
         return _parameters_of({name: v for name, v in options.items() if v is not None})

@@ -47,13 +47,13 @@ class FaultArgument(Immutable):
     Attributes:
         name: keyword, `delay` of `delay=800ms`.
         text: description for people.
-        default: its default, in the notation of users.
-        unit: `time` for a duration (low and high in us), else the unit of a whole number, which
-            may be written in hex; empty for a plain number.
+        default: default value, in the notation of users.
+        unit: `time` for a duration (low and high in us), or the unit of a whole number, which may
+            be written in hex; empty for a plain number.
         low: smallest value.
         high: largest value.
         choices: allowed words instead of a number, if any.
-        read: reads the word instead, for a special form; raises ValueError.
+        read: reads the text of an argument with a special form; raises ValueError.
     """
 
     name: str
@@ -121,8 +121,9 @@ class FaultForm(Immutable):
 
     Attributes:
         text: description for people.
-        rated: whether it accepts `rate=` and `count=`.
-        arguments: its own arguments, in the order without keywords.
+        rated: whether the fault accepts `rate=` and `count=`.
+        arguments: arguments of the fault itself, in the order in which they are written without
+            keywords.
         usual_rate: the default rate.
     """
 
@@ -145,9 +146,9 @@ class FaultArguments(Immutable):
     """The arguments after the name of a fault, with all defaults.
 
     Attributes:
-        values: by name of the argument, as returned by its `parse`.
-        rate: probability that it acts each time it could.
-        count: how often it acts at most; None for no limit.
+        values: values by name of the argument, as returned by its `parse`.
+        rate: probability that the fault acts each time it could.
+        count: how often the fault acts at most; None for no limit.
     """
 
     values: Mapping[str, Any] = field(default_factory=dict)
@@ -175,8 +176,8 @@ def bind_arguments(name: str, form: FaultForm, words: Sequence[str]) -> FaultArg
     """Read the arguments of a fault.
 
     Args:
-        name: of the fault, for messages.
-        form: its declaration.
+        name: name of the fault, for messages.
+        form: declaration of the fault.
         words: the texts after `NAME=`, split at commas.
 
     Raises:
@@ -261,9 +262,9 @@ class FaultTrigger(Copyable):
     """Decides by random numbers, rate and count when a fault acts.
 
     Args:
-        chance: its random generator; a fault may also draw from it.
-        arguments: with the rate and the count.
-        tally: shared by the triggers of a fault that acts in both directions.
+        chance: random generator of the trigger; the fault may also draw from it.
+        arguments: arguments of the fault, with rate and count.
+        tally: counter shared by the triggers of a fault that acts in both directions.
     """
 
     __slots__ = ("chance", "tally", "threshold")
@@ -326,7 +327,8 @@ class FaultType(FaultForm, Generic[W]):
 
     Attributes:
         make: builds the fault of one direction from its trigger and its arguments.
-        uart_error: the error that a UART sees each time it acts: `framing`, `parity`, `breaks`.
+        uart_error: the error that a UART sees each time the fault acts: `framing`, `parity`,
+            `breaks`.
     """
 
     make: Callable[[FaultTrigger, FaultArguments], Fault[W]]
@@ -336,8 +338,8 @@ class FaultType(FaultForm, Generic[W]):
 class FaultyPort(Copyable, Generic[W]):
     """A port that applies armed faults to its traffic, in the order of arming.
 
-    Each direction has its own random numbers, drawn only for traffic: the other direction and ticks
-    without traffic do not affect them.
+    Each direction has its own random numbers, which are drawn only for traffic. So they do not
+    depend on the other direction or on ticks without traffic.
 
     Args:
         port: the port with the traffic.
@@ -347,8 +349,8 @@ class FaultyPort(Copyable, Generic[W]):
     Attributes:
         seed: seed of its random numbers; a new one applies to faults armed later.
         drawn: whether a random fault was ever armed.
-        listeners: called with the time, the direction, the sent traffic and the traffic left by
-            faults, if these differ. A twin has no listeners.
+        listeners: called if the faults change traffic: with the time, the direction, the sent
+            traffic and the traffic after the faults. A twin has no listeners.
     """
 
     def __init__(
@@ -373,10 +375,10 @@ class FaultyPort(Copyable, Generic[W]):
         bind_arguments(name, self.fault_types[name], arguments)
 
     def arm(self, name: str, *arguments: str) -> None:
-        """Arm a fault; one of the same name is replaced.
+        """Arm a fault; it replaces an armed fault of the same name.
 
         Args:
-            name: of the fault.
+            name: name of the fault.
             *arguments: the texts after `NAME=`, split at commas.
 
         Raises:
@@ -414,8 +416,8 @@ class FaultyPort(Copyable, Generic[W]):
     def clear(self, name: str) -> None:
         """Clear a fault; does nothing if it is not armed.
 
-        What a late fault holds still comes at its time, and nothing overtakes it. What another
-        fault holds is lost.
+        Traffic that a late fault holds still arrives at its time, and no traffic overtakes it.
+        Traffic that another fault holds is lost.
         """
         for faults in (self._to_device, self._from_device):
             fault = faults.get(name)
@@ -473,7 +475,7 @@ class FaultyPort(Copyable, Generic[W]):
                 fault.sent(now_us if sent_us == NEVER else sent_us)
 
     def use_uart(self, now_us: int, setting: UartSetting) -> None:
-        """Change the setting of the device, after the sent traffic that faults still hold.
+        """Change the setting of the device, after the faults have passed on the traffic they hold.
 
         Args:
             now_us: the present time.

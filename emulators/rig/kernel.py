@@ -1,10 +1,12 @@
 """The optional kernel: the fast paths of an intact CAN bus and its stations, in C.
 
 If `_kernel.c` was built, the classes below come from it. They have the fields of `Station`,
-`Timetable`, `CanEnd`, `CanArbiter`, `CanRoutes`, `BusyTime` and `CanSegment`, and a method marked
-with `in_kernel` is replaced by the C function of the same name. There is one state, in these
-fields: the C function calls the Python method for special cases, also in the middle of a run, and
-snapshots, forks and pickles see the same fields with and without the kernel.
+`Timetable`, `CanEnd`, `CanArbiter`, `CanRoutes`, `BusyTime` and `CanSegment`. A method marked with
+`in_kernel` is replaced by the C function of the same name.
+
+There is only one state, in these fields. The C function calls the Python method for special cases,
+also in the middle of a run. Snapshots, forks and pickles contain the same fields with and without
+the kernel.
 """
 
 from __future__ import annotations
@@ -101,10 +103,10 @@ if TYPE_CHECKING or _KERNEL is None:
 
         Args:
             rig: the rig.
-            parts: its timetable, bus, event queue, horizon, watchers, hosts and stations.
+            parts: timetable, bus, event queue, horizon, watchers, hosts and stations of the rig.
             until_us: the time.
-            unseen_us: until this time nothing reads a device.
-            host: an end that waits for traffic; None for none.
+            unseen_us: until this time no code reads a device.
+            host: an end that waits for traffic, None if there is no such end.
         """
         return False
 

@@ -34,11 +34,12 @@ class LineUart(Part):
         setting: the first setting.
 
     Attributes:
-        setting: the setting, with the latest change.
-        since_us: time from which it applies.
-        listeners: called with that time and the new setting; they are copied with the line.
-        error_listeners: called with characters that a fault has spoiled: which way they went, the
-            error that a UART sees (`framing`, `parity`, `breaks`), and how many; copied, too.
+        setting: the setting after the latest change.
+        since_us: time from which this setting applies.
+        listeners: called with `since_us` and the new setting. They are copied with the line.
+        error_listeners: called when a fault has spoiled characters: with their direction, the error
+            that a UART sees (`framing`, `parity`, `breaks`), and their number. They are copied with
+            the line.
     """
 
     def __init__(self, setting: UartSetting) -> None:

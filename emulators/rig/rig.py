@@ -66,11 +66,11 @@ from tickrig.wire.instant import NEVER
 
 
 class Coupling(Protocol):
-    """A body on the wheels of several drives, a belt between two shafts.
+    """A connection of devices, such as a body on several drives, or a belt between two shafts.
 
-    It acts after all devices of a step have computed: it reads their outputs and may set their
-    inputs, which take effect in their next tick. So it does not depend on the order of the devices
-    either.
+    A coupling acts after all devices of a step have computed. It reads their outputs and may set
+    their inputs, which take effect in the next tick. So a coupling does not depend on the order of
+    the devices.
     """
 
     @property
@@ -96,11 +96,11 @@ _arrived_us = attrgetter("arrived_us")
 class _Wires(Part):
     """Wires that are advanced together, each separately as long as this has no visible effect.
 
-    A transmission that ends on one wire may let a station send on another, but not before its next
-    tick. Until then each wire is advanced alone; in order of time, frame by frame, if hosts wait or
-    several wires have observers.
+    A transmission that ends on one wire may cause a station to send on another wire, but not before
+    the next tick of the station. Until this tick each wire is advanced alone. If hosts wait, or if
+    several wires have observers, the wires are advanced in order of time, frame by frame instead.
 
-    A wire without traffic stays behind until `advance`.
+    A wire without traffic is not advanced until `advance` is called.
 
     Args:
         periods: the control periods in us; ticks are at their multiples.
@@ -220,18 +220,18 @@ _U = TypeVar("_U")
 class Rig(Copyable):
     """Stations that share a clock.
 
-    A step has two phases, like registers on one clock line: first every port is polled and every
-    device computes, then everything is sent. So the order of the stations has no effect.
+    A step has two phases, like registers on one clock line. First every port is polled and every
+    device computes, then all data are sent. So the order of the stations has no effect.
 
-    In virtual time the rig jumps over ticks at which no device is due and nothing arrives;
-    `dense=True` visits them all, with the same result. In real time it wakes at every tick and runs
-    those with work. Stations on a shared wire stand in a timetable and cost nothing until they have
-    work; the others are checked in every step.
+    In virtual time the rig jumps over ticks at which no device is due and nothing arrives.
+    `dense=True` runs all ticks, with the same result. In real time the rig wakes at every tick and
+    runs the ticks with work. Stations on a shared wire are in a timetable and take no time until
+    they have work. All other stations are checked in every step.
 
-    Actions of the event_queue run whenever the time is advanced: after all events before their
-    time, and before the tick of their time.
+    Actions of the event_queue run whenever the time is advanced. An action runs after all events
+    with an earlier time, and before the tick at its own time.
 
-    A rig can be copied while it runs, with its devices, wires and faults: `fork`.
+    `fork` copies a running rig with its devices, wires and faults.
 
     Args:
         stations: the devices, each on its port.
@@ -244,11 +244,11 @@ class Rig(Copyable):
     Attributes:
         event_queue: actions between ticks.
         stations: the devices, each on its port.
-        acting_us: the time of the running action of the event_queue, else None.
+        acting_us: the time of the running action of the event_queue; None if no action runs.
         now_us: time since the start of the rig.
         worst_late_us: largest delay of a step.
         late_ticks: number of steps that started more than `_LATE_US` late.
-        hosts: ends where each arrival is a separate step; a watcher handles it.
+        hosts: ends at which each arrival is a separate step; a watcher handles the arrival.
         watchers: called with the time after each step, in the order of registration.
     """
 
@@ -334,20 +334,20 @@ class Rig(Copyable):
     def fork(self, *parts: Any) -> Any:
         """Return a twin of the rig: an independent copy that continues from here.
 
-        With the same input it behaves the same to the byte. It has the devices, wires, faults,
-        couplings and events of this one, runs in virtual time, and has no connection to the
-        outside: no bridge, recorder or observer.
+        With the same input the twin behaves the same to the byte. It has the devices, wires,
+        faults, couplings and events of this rig. It runs in virtual time and has no connection to
+        the outside: no bridge, recorder or observer.
 
         Args:
-            parts: objects of the rig that are also needed of the twin, such as the host's end of a
+            parts: objects of the rig whose copies are returned too, such as the host's end of a
                 line.
 
         Returns:
             The twin; with `parts` a tuple of the twin and of its parts.
 
         Raises:
-            TypeError: an object in it cannot be copied, such as a pty port; the message names it
-                and the reason.
+            TypeError: an object of the rig cannot be copied, such as a pty port. The message names
+                the object and the reason.
 
         >>> from tickrig.device.rrc.machine import Rrc
         >>> from tickrig.emulators.serial.serial_line import SerialLine
@@ -363,14 +363,14 @@ class Rig(Copyable):
     def snapshot(self, *parts: object) -> MachineSnapshot:
         """Return a snapshot that restores the present state of the rig any number of times.
 
-        It restores the same rig, so references to ends of its wires stay valid; it costs a
-        twentieth of a `fork`.
+        The snapshot restores this rig itself, so references to ends of its wires stay valid. It
+        takes a twentieth of the time of a `fork`.
 
         Args:
-            parts: objects to restore with it, such as a host.
+            parts: objects to restore with the rig, such as a host.
 
         Raises:
-            TypeError: an object in it cannot be restored, such as a pty port.
+            TypeError: an object of the rig cannot be restored, such as a pty port.
 
         >>> from tickrig.device.rrc.machine import Rrc
         >>> from tickrig.emulators.serial.serial_line import SerialLine
@@ -423,8 +423,8 @@ class Rig(Copyable):
         Args:
             t_us: the time, since the start of the rig.
             host: the host to watch, if given.
-            unseen_us: how long after that time devices are probably not read and inputs not set
-                between ticks; doing so is allowed, but slower.
+            unseen_us: how long after `t_us` the caller will probably not read devices or set inputs
+                between ticks. Doing so is allowed, but slower.
         """
         self._until_us = t_us + unseen_us if host is None else 0
         if self._short and run(self, self._short, t_us, self._until_us, host):
@@ -596,7 +596,8 @@ class Rig(Copyable):
         """Return the largest delay of a step since a time, counting those beyond `_LATE_US`.
 
         Args:
-            t_us: the time; if more than `LATE_KEPT` steps were late since then, all count.
+            t_us: the time. If more than `LATE_KEPT` steps were late since then, all late steps
+                count.
         """
         if len(self._late) == LATE_KEPT and self._late[0][0] > t_us:
             return self.worst_late_us

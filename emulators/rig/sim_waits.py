@@ -28,13 +28,14 @@ _T = TypeVar("_T")
 
 
 class OneThread(Copyable):
-    """The thread in which hosts advance the virtual time: two threads would make runs differ.
+    """The thread in which hosts advance the virtual time.
 
-    It is the thread that makes this object; for a twin, the thread that makes the twin.
+    If two threads advanced the time, runs would differ. The thread is the one that makes this
+    object; for a twin, it is the thread that makes the twin.
 
     Attributes:
-        ident: of the thread.
-        refused: the text, once a second thread has tried it.
+        ident: identifier of the thread.
+        refused: text of the refusal, as soon as a second thread has tried to advance the time.
     """
 
     def __init__(self) -> None:
@@ -46,10 +47,10 @@ class OneThread(Copyable):
         self.ident = get_ident()
 
     def refusal(self, name: str, instead: str) -> str:
-        """Return why use is impossible, permanently after a second thread has tried it; else "".
+        """Return why use is refused, permanently after a second thread has tried it; else "".
 
         Args:
-            name: the used object: a port, a bus.
+            name: the object in use, such as a port or a bus.
             instead: alternative for hosts with a second thread.
         """
         if get_ident() != self.ident and not self.refused:

@@ -19,7 +19,7 @@ from tickrig.wire.uart import UartSetting
 class WirePort(Protocol[W]):
     """A `Port` that reports arrived traffic, so that it need not be polled.
 
-    It is not derived from `Port`, because a compiled base has additional names.
+    `WirePort` is not derived from `Port`, because a compiled base class has additional names.
     """
 
     @property
@@ -115,8 +115,9 @@ class Timetable(TimetableFields):
 
     Attributes:
         first_us: the soonest tick with work, `NEVER` if there is none.
-        open_us: no tick is entered before this.
-        in_step: 1 while a step of the rig is running, else 0; here for the kernel (2 % of an SDO).
+        open_us: earliest time at which a tick can be entered.
+        in_step: 1 while a step of the rig is running, else 0. It is a field of this class for the
+            kernel, which saves 2 % of an SDO.
     """
 
     __slots__ = ()

@@ -18,12 +18,12 @@ _LOOK_US: Final = 500_000
 
 
 class HostSetting:
-    """Reports, once each, host settings with which the device does not understand the host.
+    """Reports host settings that differ from the device's setting, once for each setting.
 
     Args:
-        read: returns the present setting, such as `9600 8N1`.
-        wanted: the device's; empty if any host is understood.
-        notify: called with a different setting.
+        read: returns the present setting of the host, such as `9600 8N1`.
+        wanted: setting of the device; empty if the device understands any host.
+        notify: called with a setting of the host that differs.
 
     Attributes:
         differing: the present setting, if it differs from the device's.
@@ -39,14 +39,14 @@ class HostSetting:
         """Compare with another setting after the device has changed its own.
 
         Args:
-            wanted: the device's; empty if any host is understood.
+            wanted: setting of the device; empty if the device understands any host.
         """
         if wanted != self._wanted:
             self._wanted, self._next_us = wanted, 0
             self._notified.clear()
 
     def look(self, now_us: int, *, at_once: bool = False) -> None:
-        """Check whether it differs: twice a second, or at once.
+        """Check whether the host's setting differs: twice a second, or at once.
 
         Args:
             now_us: the present time.
@@ -65,16 +65,16 @@ class HostSetting:
 class Bridge:
     """A bridge between the far end of a line and the outside: a pty, a socket, a real port.
 
-    The line keeps its baud rate: data written at once from outside arrive at the device byte by
-    byte, and data that do not fit into the line's buffer stay in the outside's buffer until they
-    do.
+    The line keeps its baud rate: data written in one piece from outside arrive at the device byte
+    by byte. Data that do not fit into the line's buffer stay in the buffer of the outside port
+    until they fit.
 
     Args:
         end: the host's end of the line.
         outside: the host's port.
         attend: called with the time instead of a poll, while the line has no room for earlier data.
-        changed: called with the setting of the device, at first and when it has changed; None if
-            hosts of any setting understand it.
+        changed: called with the setting of the device, at the start and after each change. The
+            setting is None if hosts of any setting understand the device.
     """
 
     def __init__(
@@ -98,8 +98,8 @@ class Bridge:
     def take_in(self, now_us: int) -> None:
         """Send the data written outside since the last poll on the line.
 
-        They may have been written at any time since then, so they count as written right after that
-        poll: polling costs a host no tick.
+        The data may have been written at any time since the last poll. They count as written right
+        after the last poll, so a host loses no tick by the polling.
         """
         if self._pending:
             self._attend(now_us)
@@ -209,7 +209,7 @@ class HostEnd:
 class Tap(Copyable, Generic[W]):
     """A port with listeners: polled data go to the device, sent data come from it.
 
-    It may be the device's end of a wire, or the port of the host. A twin has no listeners.
+    The port may be the device's end of a wire, or the port of the host. A twin has no listeners.
 
     Args:
         port: the port.

@@ -60,8 +60,8 @@ class ByteFault:
     """A fault that hits bits, bytes, lines or frames at random.
 
     Attributes:
-        trigger: decides which ones it hits.
-        arguments: of the fault.
+        trigger: decides which of them the fault hits.
+        arguments: arguments of the fault.
     """
 
     trigger: FaultTrigger

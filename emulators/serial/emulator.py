@@ -53,7 +53,8 @@ class LineSettings:
         faults: the wire faults that can be armed.
         splitter: makes the splitter of one direction for the log; by default into lines.
         wire: makes the line for a baud rate.
-        uart: whether the device has a UART; a device behind USB understands a host of any setting.
+        uart: whether the device has a UART. A device on USB has none and understands a host of any
+            setting.
     """
 
     baud: int = 115_200
@@ -78,7 +79,7 @@ class Emulator(RunningEmulator):
 
     Attributes:
         line: the line itself.
-        host_end: the caller's end of it, also for a `SimLink`; its traffic is logged.
+        host_end: the caller's end of the line, also for a `SimLink`; its traffic is logged.
     """
 
     def __init__(  # noqa: PLR0913 - options, by keyword
@@ -145,8 +146,8 @@ class Emulator(RunningEmulator):
 class SerialHub(NonCopyable):
     """Ports on one line: each receives everything that the device sends, and each may send.
 
-    Data of several hosts at the same time arrive mixed, in pieces of one poll; hosts do not receive
-    each other's data.
+    If several hosts send at the same time, their data arrive mixed, in pieces of one poll. Hosts do
+    not receive each other's data.
 
     Args:
         ports: the ports, a pty and network ports.

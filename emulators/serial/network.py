@@ -124,8 +124,8 @@ _DISCARDED_BYTES: Final = 65_536
 class DismissedHost:
     """A refused host, which has a second to read the reason.
 
-    A connection that is closed while its host still sends is reset, and some systems then drop data
-    that the host had not read yet. So received data are read and dropped.
+    If a connection is closed while its host still sends, the connection is reset. Some systems then
+    drop data that the host has not read yet. So data from a refused host are read and dropped.
 
     Args:
         connection: to the host.
@@ -173,9 +173,9 @@ STUCK_US: Final = 30_000_000
 class HostConnection:
     """A host on a plain connection; nothing here blocks.
 
-    Unread data are kept up to `buffer_bytes`; then whole sends are dropped and counted, as on a
-    pty. A host that has stopped sending but may still read, such as `nc` at the end of its input,
-    gets the data of one more second.
+    Data that the host has not read are kept, up to `buffer_bytes`. Beyond that, whole sends are
+    dropped and counted, as on a pty. A host that has stopped sending but may still read, such as
+    `nc` at the end of its input, gets the data of one more second.
 
     Args:
         connection: to the host.
@@ -183,10 +183,10 @@ class HostConnection:
 
     Attributes:
         connection: to the host.
-        over: the connection is closed.
-        mistake: reason to drop the host, if it sent invalid data.
-        is_idle: no data of it were waiting at the latest poll.
-        lost: bytes dropped because it did not read.
+        over: whether the connection is closed.
+        mistake: reason to drop the host, if the host sent invalid data.
+        is_idle: whether no data of the host were waiting at the latest poll.
+        lost: bytes dropped because the host did not read.
     """
 
     def __init__(self, connection: socket.socket, buffer_bytes: int) -> None:
@@ -374,9 +374,11 @@ class _SafePortManager(PortManager):
 class Rfc2217Connection(HostConnection):
     """A host that may set the port, as on a serial server; pyserial's `rfc2217://` is one.
 
-    Its settings are answered and stored; the device has its own setting. Its DTR, RTS and break
-    have no effect; CTS, DSR, CD and RI are off. A host with invalid telnet data is dropped. Not
-    emulated: FLOWCONTROL-SUSPEND, and purging data that are already on the line.
+    The host's settings are answered and stored; the device keeps its own setting. DTR, RTS and
+    break of the host have no effect. CTS, DSR, CD and RI are off. A host that sends invalid telnet
+    data is dropped.
+
+    Not emulated: FLOWCONTROL-SUSPEND, and purging data that are already on the line.
 
     Args:
         connection: to the host.
@@ -449,11 +451,12 @@ _log = logging.getLogger(__name__)
 class NetworkPort(NonCopyable):
     """A `Port[bytes]` for hosts over TCP; hosts may come and go, one at a time.
 
-    A second host is refused with a line of text, unless the present one has stopped sending, or has
-    not read for 30 s. This is known only after all its data: until they are on the line, one more
-    host is accepted, and a little of its data is held. Without a host, data of the device are lost,
-    as on an open line. Nothing here blocks, and buffers are bounded. There is no password: a port
-    that other machines can reach causes a warning.
+    A second host is refused with a line of text, unless the present host has stopped sending, or
+    has not read for 30 s. The port can decide this only after all data of the present host are on
+    the line. Until then it accepts one more host and holds a little of its data.
+
+    Without a host, data of the device are lost, as on an open line. No call blocks, and all buffers
+    are bounded. There is no password: the port logs a warning if other machines can reach it.
 
     Args:
         url: address to listen at.
@@ -461,13 +464,13 @@ class NetworkPort(NonCopyable):
 
     Attributes:
         url: URL for hosts on this machine, for pyserial, with its port.
-        address: the address that it listens at.
-        port: its TCP port.
+        address: the address at which the port listens.
+        port: TCP port number.
         spoken: whether a host ever sent data.
 
     Raises:
-        OSError: the port is in use, or the host is not an address of this machine; the URL is its
-            `filename`.
+        OSError: the port is in use, or the host is not an address of this machine. The `filename`
+            of the exception is the URL.
     """
 
     why_not_copied = "it is a TCP port of this machine"
@@ -502,7 +505,7 @@ class NetworkPort(NonCopyable):
         """Set the port like the device, and report hosts that change it; see `HostSetting`.
 
         Args:
-            baud: the device's rate in bit/s, with 8N1; above 4 Mbit/s it is not checked.
+            baud: the device's bit rate in bit/s, with 8N1. A rate above 4 Mbit/s is not checked.
             notify: called with a different setting, such as `9600 8N1`.
         """
         self._uart = UartSetting(baud)
@@ -510,10 +513,10 @@ class NetworkPort(NonCopyable):
             self._setting = HostSetting(self._shown_setting, str(self._uart), notify)
 
     def device_uses(self, setting: UartSetting) -> None:
-        """Let a host with another setting read what its UART would sample, and the device likewise.
+        """Sample the data between the device and a host with another setting, as UARTs would do.
 
         Args:
-            setting: the device's; above 4 Mbit/s a host of any setting is understood.
+            setting: setting of the device. Above 4 Mbit/s a host of any setting is understood.
         """
         self._uart, self._samples = setting, setting.baud <= _MAX_BAUD
         if self._setting is not None:
@@ -535,9 +538,9 @@ class NetworkPort(NonCopyable):
         return data
 
     def attend(self, now_us: int, /) -> None:
-        """Let hosts come and go, and send them buffered data, without reading.
+        """Accept and close connections, and send buffered data to hosts, without reading.
 
-        It is called between polls while the line has no room for earlier data.
+        The bridge calls it instead of a poll while the line has no room for earlier data.
         """
         if self._host is not None:
             self._host.flush(now_us)

@@ -25,9 +25,9 @@ from tickrig.wire.uart import UartSetting
 class _PtyLink:
     """A symbolic link to a terminal, with a note that shows whether its emulator runs.
 
-    Beside `NAME` is the file `.NAME.emulator`, locked while the link is in use: it names the
-    process and the terminal. So the link of a killed emulator is recognised even if its terminal
-    now belongs to another program.
+    The note is a file `.NAME.emulator` in the folder of the link `NAME`. It names the process and
+    the terminal, and is locked while the link is in use. So the link of a killed emulator is
+    recognised even if its terminal now belongs to another program.
 
     Args:
         path: path of the link.
@@ -117,8 +117,8 @@ _BAUDS: Final = {
 def _setting_of(terminal: int) -> str:
     """Return rate, bits, parity and stop bits, as `115200 8N1`.
 
-    Linux keeps the bit rate, the stop bits and whether parity is odd. A pseudo-terminal always
-    has 8 bits, and even parity looks like none.
+    Linux keeps the bit rate, the stop bits, and odd parity. A pseudo-terminal always has 8 bits,
+    and even parity looks like no parity.
     """
     _, _, flags, _, _, speed, _ = termios.tcgetattr(terminal)
     bits = {termios.CS5: 5, termios.CS6: 6, termios.CS7: 7}.get(flags & termios.CSIZE, 8)
@@ -141,7 +141,8 @@ class _PtyVisits(NonCopyable):
         path: the host's side.
 
     Attributes:
-        wakes: the descriptor to wait on. Without inotify, which only Linux has, it is `master`.
+        wakes: the descriptor to wait on. Without inotify, which exists only on Linux, it is
+            `master`.
     """
 
     why_not_copied = "it is a pty of this machine"
@@ -178,13 +179,14 @@ class _PtyVisits(NonCopyable):
 class PtyPort(NonCopyable):
     """A `Port[bytes]` whose other side any serial program can open.
 
-    The emulator keeps the other side open too, so hosts may come and go. Unread data are kept, up
-    to `buffer_bytes` here and some 4 KiB in the kernel; then whole sends are dropped and counted.
+    The emulator keeps the other side open too, so hosts may come and go. Data that no host has read
+    are kept, up to `buffer_bytes` here and about 4 KiB in the kernel. Beyond that, whole sends are
+    dropped and counted.
 
-    A second host that opens the terminal is not refused: the kernel does not show this side who has
-    it open, and TIOCEXCL would exclude the first host as well, but not one of root. Data of the
-    device then go to the host that reads first. Hosts that lock it, as with pyserial's
-    `exclusive=True`, exclude each other.
+    A second host that opens the terminal is not refused, because the kernel does not show this side
+    which hosts have opened the terminal. TIOCEXCL would exclude the first host as well, but not a
+    host that runs as root. With two hosts, data of the device go to the host that reads first.
+    Hosts that lock the terminal, as with pyserial's `exclusive=True`, exclude each other.
 
     Args:
         link: path of a symbolic link to the terminal, see `_PtyLink`; None for no link. The link of
@@ -236,7 +238,7 @@ class PtyPort(NonCopyable):
         """Set the port like the device, and report hosts that change it; see `HostSetting`.
 
         Args:
-            baud: the device's rate in bit/s, with 8N1; a rate without a termios name is not
+            baud: the device's bit rate in bit/s, with 8N1. A rate without a termios name is not
                 checked.
             notify: called with a different setting, such as `9600 8N1`.
         """
@@ -252,7 +254,7 @@ class PtyPort(NonCopyable):
         """Compare hosts with the present setting of the device; a pty passes all bytes unchanged.
 
         Args:
-            setting: the device's; a pty shows 8 data bits, and even parity as none.
+            setting: setting of the device. A pty shows 8 data bits, and even parity as no parity.
         """
         if self._setting is not None:
             parity = "O" if setting.parity == "O" else "N"
@@ -299,9 +301,10 @@ class PtyPort(NonCopyable):
     def _look(self, now_us: int, *, at_once: bool) -> None:
         """Check the setting of the host, and allow the next host to set it again.
 
-        A pseudo-terminal drops even parity and 7 bits. glibc reports EINVAL if nothing is left of
-        what a host asked for, so the second host of such a setting fails. Hosts set CLOCAL, which
-        means nothing here: as it is cleared, their requests always change something.
+        A pseudo-terminal drops even parity and 7 bits. If a request of a host then changes nothing,
+        glibc reports EINVAL, so the second host with such a setting would fail. Therefore CLOCAL is
+        cleared here. It has no effect on a pseudo-terminal, but hosts set it, so their requests
+        always change something.
         """
         if self._setting is not None:
             self._setting.look(now_us, at_once=at_once)

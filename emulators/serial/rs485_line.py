@@ -17,9 +17,9 @@ class _Burst:
 
     Attributes:
         sender: the sender.
-        start_us: its start.
-        end_us: its end.
-        data: as it arrives.
+        start_us: start of the burst.
+        end_us: end of the burst.
+        data: the bytes as they arrive.
     """
 
     __slots__ = ("data", "end_us", "sender", "start_us")
@@ -31,12 +31,12 @@ class _Burst:
 class Rs485Line(Copyable):
     """Several ends on one pair of wires.
 
-    All other ends receive a byte when its stop bit has passed. If two ends send at once, both are
-    garbled: every byte that overlaps one of another end arrives as the bits that both have set, and
-    is counted. Data that an end sends while it is still sending are queued.
+    All other ends receive a byte when its stop bit has passed. If two ends send at once, the data
+    of both are garbled. Every byte that overlaps a byte of another end arrives with the bits that
+    are set in both, and is counted. Data that an end sends while it is still sending are queued.
 
     Not emulated: the turn-round of the transceivers, a change of the bit rate, framing and parity
-    errors, echo of own bytes unless requested.
+    errors. Echo of own bytes is emulated only if requested.
 
     Args:
         baud: bit rate in bit/s.
@@ -44,8 +44,8 @@ class Rs485Line(Copyable):
         buffer_bytes: size of each receiver's buffer and sender's queue.
         ends: number of stations.
         echo: whether each end also receives its own bytes.
-        bursts: whether a receiver gets bytes sent back to back together at their end, as one that
-            waits for an idle line; else it gets each byte.
+        bursts: whether a receiver gets bytes that are sent back to back together at their end, like
+            a receiver that waits for an idle line. If False, it gets each byte separately.
 
     Attributes:
         ends: the stations' ends.
@@ -90,7 +90,7 @@ class Rs485Line(Copyable):
         return self.ends[1]
 
     def put(self, sender: Rs485End, now_us: int, start_us: int, data: bytes) -> int:
-        """Send bytes on the wires back to back; called by an end.
+        """Send bytes on the wires back to back; an end calls this.
 
         Args:
             sender: the end.
@@ -99,7 +99,7 @@ class Rs485Line(Copyable):
             data: the bytes.
 
         Returns:
-            When the last has passed, in us.
+            Time when the last byte has passed, in us.
         """
         # A burst is cut at whole microseconds once, at its end; single bytes are worked out
         # from its start.
@@ -120,11 +120,11 @@ class Rs485Line(Copyable):
         """Remove the bytes of which no bit is on the wires yet.
 
         Args:
-            sender: their sender.
+            sender: sender of the bytes.
             now_us: the present time.
 
         Returns:
-            When the byte in transit has passed, in us.
+            Time when the byte in transit has passed, in us.
         """
         end_us = now_us
         for burst in self._air:

@@ -46,9 +46,9 @@ class _BusNode:
     """A slave.
 
     Attributes:
-        name: of its section.
+        name: name of its section.
         node_id: 1..127.
-        line: of its section.
+        line: line of its section.
         description: its description, with its initial inputs.
         about: what it moves, for people; empty if nothing.
     """
@@ -73,10 +73,10 @@ class _NodeMaker:
 
     Args:
         bus: the file.
-        robot: its joints, None if there is no description of them.
-        cache: of EDS files.
+        robot: the joints of the robot, None if there is no description of them.
+        cache: cache of EDS files.
         mistakes: collects errors.
-        profile: of `choices.PROFILES`, for nodes without one.
+        profile: a name of `choices.PROFILES`, for nodes without a profile.
 
     Attributes:
         remarks: warnings.
@@ -327,9 +327,9 @@ def read_bus(
 
     Args:
         path: the bus.yml.
-        urdf: the robot with the joints; by default that of `options: tickrig:`.
-        cache: of EDS files and slaves.
-        profile: of `choices.PROFILES`, for nodes without one.
+        urdf: the robot with the joints; by default the robot named in `options: tickrig:`.
+        cache: cache of EDS files and slaves.
+        profile: a name of `choices.PROFILES`, for nodes without a profile.
 
     Raises:
         OSError: the bus.yml or the URDF cannot be read.
@@ -348,7 +348,7 @@ def read_bus(
 
 
 def check_nodes(bus: BusFile) -> tuple[RuleFinding, ...]:
-    """Return errors and warnings besides those of the file: in `tickrig:`, the robot, ...
+    """Return errors and warnings that are not those of the file: in `tickrig:`, the robot, ...
 
     Args:
         bus: the file; without slaves there is nothing to check.

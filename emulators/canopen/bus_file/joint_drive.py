@@ -52,15 +52,15 @@ class JointDrive:
     Attributes:
         motor: name of `servo.presets.PRESETS`.
         gear_ratio: turns of the motor per turn of the shaft.
-        gear_efficiency: share of the power of an external torque that it transmits.
+        gear_efficiency: share of the power of an external torque that the gear transmits.
         friction_nm: dry friction at the shaft.
         inertia_kg_m2: permanent inertia on the shaft; the loops are tuned to it.
         supply_v: supply of the power stage.
         encoder_counts: quadrature counts per turn of the motor.
-        max_torque: of the shaft for one second, in Nm; in N for a carriage.
-        max_velocity: of the shaft, in rad/s; in m/s for a carriage. lower, upper: positions of the
-            limit switches, in rad; in m as above.
-        home: range in which the home switch is pressed, in rad; in m as above.
+        max_torque: largest torque of the shaft for one second, in Nm; in N for a carriage.
+        max_velocity: largest velocity of the shaft, in rad/s; in m/s for a carriage. lower, upper:
+            positions of the limit switches, in rad; in m for a carriage.
+        home: range in which the home switch is pressed, in rad; in m for a carriage.
         travel_m: travel of a carriage per turn of the shaft; None if the joint turns.
         units: position units per radian or metre.
     """
@@ -287,9 +287,9 @@ def complete(
     """Return the dictionary of a drive, with missing values filled in and missing objects added.
 
     Args:
-        dictionary: of its EDS.
-        modes: its modes of operation.
-        added: objects that its EDS lacks.
+        dictionary: the dictionary of the drive's EDS.
+        modes: modes of operation of the drive.
+        added: objects that the EDS lacks.
         defaults: values for objects of the profile without a value in the EDS.
     """
     given, own = dictionary.description, epos.dictionary().description
@@ -345,7 +345,7 @@ def _with_default(
 ) -> EntryDescription:
     """Return an entry with the default of a drive if it has no value; see `_NEVER_ZERO`.
 
-    It is limited to the type and the limits of the object in the EDS.
+    The default is limited to the type and the limits of the object in the EDS.
     """
     value = defaults.get((entry.index, entry.sub))
     open_zero = entry.index in _NEVER_ZERO and not any(entry.default)

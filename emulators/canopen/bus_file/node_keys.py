@@ -47,10 +47,10 @@ class NodeKeys:
     """The settings of a node under `tickrig:`.
 
     Attributes:
-        joint: of `JointDrive`, by name.
-        modes: numbers of its modes of operation; None for those in its files.
-        profile: of `choices.PROFILES`, None for `auto`.
-        configured: whether it starts with the values that its master writes to it.
+        joint: attributes of `JointDrive`, by name.
+        modes: numbers of the node's modes of operation; None for the modes in its files.
+        profile: a name of `choices.PROFILES`, None for `auto`.
+        configured: whether the node starts with the values that its master writes to it.
         start: initial inputs, by name.
         places: position of each key and each input.
     """
@@ -219,10 +219,10 @@ _ARGUMENTS: Final = {
 def read_keys(
     layers: tuple[Mapping[str, Item], ...], where: str, mistakes: list[FileMistake]
 ) -> NodeKeys:
-    """Read the mappings `tickrig:` of a node; of several with a key the first is used.
+    """Read the mappings `tickrig:` of a node; if several have a key, the first one is used.
 
     Args:
-        layers: that of the node, then those of all nodes.
+        layers: the mapping of the node, then the mappings of all nodes.
         where: name of the node, for mistakes.
         mistakes: collects errors.
     """

@@ -1,6 +1,6 @@
 """The joints of a URDF that `<ros2_control>` puts on a CANopen bus: limits and reduction.
 
-Only elements and attributes are read: a document type, and so entities, are refused.
+Only elements and attributes are read. A document type is refused, and with it all entities.
 
 >>> robot = '''<robot name="arm">
 ... <joint name="elbow" type="revolute"><limit lower="-1" upper="1" velocity="2"/></joint>
@@ -45,15 +45,15 @@ class UrdfJoint:
     """A joint that a device of the bus moves.
 
     Attributes:
-        name: of the joint.
-        place: place of it in `<ros2_control>`.
-        device_name: of the node in bus.yml, empty if missing.
-        node_id: of the node, None if missing.
+        name: name of the joint.
+        place: place of the joint in `<ros2_control>`.
+        device_name: name of the node in bus.yml, empty if missing.
+        node_id: node-ID of the node, None if missing.
         kind: `revolute`, `continuous` or `prismatic`.
-        lower: in rad, or m; None if unlimited.
-        upper: the same.
-        velocity: largest one in rad/s, or m/s; None if missing.
-        effort: largest one in Nm, or N; None if missing.
+        lower: lower limit of the position in rad, or m; None if unlimited.
+        upper: upper limit of the position in rad, or m; None if unlimited.
+        velocity: largest velocity in rad/s, or m/s; None if missing.
+        effort: largest effort in Nm, or N; None if missing.
         reduction: turns, or rad per m, of the actuator per turn, or m, of the joint; None if
             missing.
     """
@@ -75,8 +75,8 @@ class Urdf:
     """The content of a file.
 
     Attributes:
-        name: of the file.
-        joints: those that devices of a bus move, in the order of the file.
+        name: name of the file.
+        joints: the joints that devices of a bus move, in the order of the file.
     """
 
     name: str

@@ -37,14 +37,14 @@ class MotionOptions:
         set_id: configuration set.
         device: a serial port, None for an emulated base in virtual time.
         baud: its bit rate.
-        any_device: whether to drive it without checking what it is.
+        any_device: whether to drive the device without a check of its type.
         pace: ratio of virtual time to real time, None for as fast as possible.
         conf: Odometry.conf.
         show_map: draw the track while it runs.
         base: parameters of the emulated base.
         plot: file for a picture.
         clock: the clock for waiting, in real time and with a pace.
-        room_m: width and depth of a room around the origin; with one, an emulated base carries a
+        room_m: width and depth of a room around the origin. If given, an emulated base carries a
             range finder.
     """
 

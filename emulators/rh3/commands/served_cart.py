@@ -39,7 +39,7 @@ class CartClock(ServingClock):
 
     Attributes:
         late_ticks: number of waits that started more than `LATE_US` late.
-        worst_late_us: largest delay of them.
+        worst_late_us: largest delay of these waits.
     """
 
     late_ticks = 0
@@ -104,8 +104,8 @@ class CartControl(SystemControl):
     """Answers requests about a cart: those of a system, and the commands of PositionInput.
 
     Args:
-        connection: the cart; it must not be advanced at the same time.
-        cart: advances it.
+        connection: the cart. It must not be advanced while a request is answered.
+        cart: advances the cart.
     """
 
     def __init__(self, connection: BaseConnection, cart: ServedCart) -> None:
@@ -158,7 +158,7 @@ def _pose(value: object, least: int) -> Pose:
 
 
 def serve_cart(options: MotionOptions, engines: EngineOptions, control: Path | None = None) -> None:
-    """Run a cart until Ctrl-C, or until a peer ends it; then its components are deactivated.
+    """Run a cart until Ctrl-C, or until a peer ends it; then deactivate its components.
 
     Lines typed on standard input are commands of PositionInput. When standard input ends and
     no other program can reach the cart, the run ends after the last command.

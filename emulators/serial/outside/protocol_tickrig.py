@@ -10,13 +10,13 @@ from tickrig.emulators.serial.outside.sim_serial import SimSerial
 class Serial(SimSerial):
     """The port of a URL, made by `serial.serial_for_url`.
 
-    Its name is looked up when it is opened. As with any pyserial port, the default setting is 9600
-    8N1, whatever the device uses. `?mismatch=errors` or `?mismatch=refuse` selects the effect of a
-    different setting; without it the code that offers the name has chosen.
+    The name in the URL is looked up when the port is opened. As with any pyserial port, the default
+    setting is 9600 8N1, whatever the device uses. `?mismatch=errors` or `?mismatch=refuse` selects
+    the effect of a different setting. Without it, the code that offers the name selects the effect.
 
     Args:
-        port: the URL, opened at once; None to open it later.
-        options: those of `serial.Serial`.
+        port: the URL, opened at once; None to open the port later.
+        options: options of `serial.Serial`.
     """
 
     def __init__(self, port: str | None = None, *args: Any, **options: Any) -> None:

@@ -26,9 +26,9 @@ def register_handler() -> None:
 class _SerialPorts:
     """The lines that can presently be opened by name.
 
-    pyserial opens a port by a string, so the names must be global to the process: in
-    `SERIAL_PORTS`, the only global state of this package. `offer` adds an entry for the duration of
-    a `with` block.
+    pyserial opens a port by a string, so the names must be global to the process. They are kept in
+    `SERIAL_PORTS`, the only global state of this package. `offer` adds a name for the duration of a
+    `with` block.
     """
 
     def __init__(self) -> None:
@@ -44,7 +44,7 @@ class _SerialPorts:
         """Allow a line to be opened as `tickrig://NAME`, for the duration of a `with` block.
 
         Args:
-            name: as in a URL: without `?`, `#` and spaces; pyserial keeps its case.
+            name: the name, valid in a URL: without `?`, `#` and spaces. pyserial keeps its case.
             side: the host's side of the line.
 
         Yields:

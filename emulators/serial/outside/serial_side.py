@@ -62,9 +62,9 @@ class UartErrors:
 class ModemLines(Copyable):
     """Modem lines of a host: DTR and RTS, which it sets, and CTS, DSR, RI and CD, which it reads.
 
-    No device here has such lines: its host reads the same as from a USB adapter with open pins (the
-    inputs of FT232R, CP2102 and CH340 are pulled up, which is off). If your device has such lines,
-    set the values for the host.
+    No device of tickrig has such lines. The host reads the same values as from a USB adapter with
+    open pins: off, because the inputs of FT232R, CP2102 and CH340 are pulled up. If your device has
+    such lines, set the values for the host.
 
     Attributes:
         dtr: Data Terminal Ready, set by the host; off while its port is closed.
@@ -98,9 +98,9 @@ class ModemLines(Copyable):
 class HostReceiver(Copyable):
     """Receives bytes of a device from a line, sampled by a UART with the host's setting.
 
-    With another setting than the device's, a character is available when the device's byte in which
-    it ends has passed. A character with an error is delivered like any other and counted, as Linux
-    and Windows do for pyserial.
+    If the host's setting differs from the device's, a character may end within a byte of the
+    device. It is available when that byte has passed. A character with an error is delivered like
+    any other character and counted, as Linux and Windows do for pyserial.
 
     Args:
         end: the host's end of the line.
@@ -121,7 +121,7 @@ class HostReceiver(Copyable):
         self._received: deque[Character] = deque()
 
     def follow(self, device: UartSetting, now_us: int) -> None:
-        """Let the device send with another setting from now on; the host's is unchanged.
+        """Change the setting with which the device sends; the host's setting is unchanged.
 
         Args:
             device: the new setting.
@@ -136,10 +136,10 @@ class HostReceiver(Copyable):
         self._device = device
 
     def use(self, setting: UartSetting, now_us: int) -> None:
-        """Receive at a setting from now on; a partly received character is lost.
+        """Receive with a setting from now on; a partly received character is lost.
 
         Args:
-            setting: the host's.
+            setting: the host's setting.
             now_us: the present time; all earlier characters have been read.
         """
         same, self._setting = setting == self._device, setting
@@ -218,23 +218,23 @@ _HELD_BYTES: Final = 4_096
 class HostTransmitter(Copyable):
     """Sends bytes of a host to a device, which samples them at its own setting.
 
-    Bytes with the device's setting are sent unchanged. All others, and breaks, are sampled: the
-    device receives each character at the expected end of its stop bit, with the sampled value,
-    wrong or not, as most UARTs deliver it; a break is a byte of 0. Errors are counted, but not
-    reported to the device.
+    Bytes with the device's setting are sent unchanged. All other bytes, and breaks, are sampled.
+    The device receives each sampled character at the expected end of its stop bit. The character
+    has the sampled value, wrong or not, as most UARTs deliver it. A break is a byte of 0. Errors
+    are counted, but not reported to the device.
 
     Args:
-        event_queue: of the rig: characters arrive between its ticks.
+        event_queue: event queue of the rig; characters arrive between the rig's ticks.
         end: the host's end of the line.
         device: the device's setting.
-        lines: with the CTS that it may have to wait for.
-        garbled: called with the time when bytes are sent that the device samples otherwise.
+        lines: modem lines with the CTS that the transmitter may have to wait for.
+        garbled: called with the time when bytes are sent that the device samples differently.
 
     Attributes:
-        setting: the host's, for what is sent from now on.
+        setting: the host's setting for bytes that are sent from now on.
         waits_for_cts: whether sending waits while CTS is off.
         suspended: whether sending waits until the host resumes its output.
-        held: the bytes that wait for either.
+        held: the bytes that wait for CTS or for the host.
         errors: number of characters that the device received with an error.
     """
 
@@ -284,7 +284,7 @@ class HostTransmitter(Copyable):
         self._free_ps = self._begun_ps
 
     def send(self, now_us: int, data: bytes) -> int:
-        """Send bytes after those that are being sent.
+        """Send bytes after the bytes that are being sent.
 
         Args:
             now_us: the present time.
@@ -303,7 +303,7 @@ class HostTransmitter(Copyable):
         return len(data)
 
     def follow(self, device: UartSetting, now_us: int) -> None:
-        """Let the device receive with another setting from now on.
+        """Change the setting with which the device receives.
 
         The device loses a partly received character. Bytes in transit are sampled.
 
@@ -430,7 +430,7 @@ _LOOKING: Final = "read with a timeout, or let time.sleep be that of the rig"
 
 
 class HostWaits(Copyable):
-    """Steps a rig while a host waits, in the thread that made it and in no other.
+    """Steps a rig while a host waits, only in the thread that made this object.
 
     Args:
         rig: the rig.
@@ -453,7 +453,7 @@ class HostWaits(Copyable):
             raise SerialException(refusal)
 
     def deadline_us(self, timeout_s: float | None) -> int:
-        """Return the end of a timeout that starts now; without one, the time for `give_up`.
+        """Return the end of a timeout that starts now; without a timeout, the time for `give_up`.
 
         Args:
             timeout_s: the timeout in seconds, None if there is none.
@@ -503,24 +503,24 @@ Mismatch = Literal["errors", "refuse"]
 class SerialSide(Copyable):
     """The host's side of a serial line: the adapter that a program opens as a port.
 
-    Its hosts must run in the thread that makes it: no other thread can advance the time.
+    The hosts must run in the thread that makes this object. No other thread can advance the time.
 
     Args:
         rig: the rig that advances while a host waits.
         end: the host's end of the line, such as `line.b` or `emulator.host_end`.
-        device: the device's setting, by default 115200 8N1; None if it has no UART, as behind USB,
-            and understands a host of any setting.
+        device: the device's setting, by default 115200 8N1. None if the device has no UART (as on
+            USB) and understands a host of any setting.
         mismatch: `"errors"` if a host with another setting sends and receives wrong characters, as
             with real UARTs; `"refuse"` to raise at once.
 
     Attributes:
-        setting: the host's.
+        setting: the host's setting.
         modem_lines: modem lines of the host.
         receiver: the receiver of the host; its `errors` are those of the host's UART.
         transmitter: the transmitter of the host; its `errors` are those of the device's UART.
         waits: the waits of the host.
         in_use: whether a port is open here.
-        listeners: called with the time and a text, when bytes pass between two settings.
+        listeners: called with the time and a text when bytes pass between different settings.
     """
 
     def __init__(

@@ -43,8 +43,8 @@ class _SimPort(SerialBase):
     """Base of `SimSerial` without the transfer of bytes.
 
     Attributes:
-        side: the host's side of the line, once it is known.
-        mismatch: effect of a different setting; None for that of `side`.
+        side: the host's side of the line, as soon as it is known.
+        mismatch: effect of a different setting; None for the `mismatch` of `side`.
     """
 
     side: SerialSide | None = None
@@ -65,11 +65,11 @@ class _SimPort(SerialBase):
         return twin(self, memo)
 
     def open(self) -> None:
-        """Open the port: DTR and RTS go on, and earlier input is discarded.
+        """Open the port, set DTR and RTS on, and discard earlier input.
 
         Raises:
-            SerialException: it is already open, another port is open on the line, or its setting is
-                refused.
+            SerialException: the port is already open, another port is open on the line, or the
+                setting is refused.
         """
         if self.is_open:
             raise SerialException("Port is already open.")
@@ -215,23 +215,27 @@ _ROOM_BYTES: Final = 256
 class SimSerial(_SimPort):
     """A `serial.Serial` whose device is on a rig.
 
-    Calls, settings and exceptions are pyserial's. Calls that wait advance the rig's time: `read`
-    until a byte and its stop bit have arrived, or by exactly its timeout; `write` until the line's
-    buffer has accepted all; `flush`, a break and `send_break`. Other calls take no time.
+    Calls, settings and exceptions are pyserial's. Calls that wait advance the rig's time:
 
-    If systems differ it behaves as on Linux, where pyserial ignores `inter_byte_timeout`. Not
-    emulated: XON and XOFF, DSR and DTR as flow control, RS485 modes (the emulated line turns round
-    automatically); they can be set, without effect. With `rtscts` nothing is sent before CTS is on;
-    data accepted while it was on are still sent.
+    - `read` until a byte and its stop bit have arrived, or by exactly its timeout;
+    - `write` until the line's buffer has accepted all bytes;
+    - `flush`, a break and `send_break`.
+
+    Other calls take no time. If operating systems differ, the port behaves as on Linux, where
+    pyserial ignores `inter_byte_timeout`. With `rtscts` no bytes are sent before CTS is on; data
+    accepted while CTS was on are still sent.
+
+    Not emulated: XON and XOFF, DSR and DTR as flow control, RS485 modes (the emulated line turns
+    round automatically). These settings can be set, without effect.
 
     Args:
         side: the host's side of the line.
-        options: those of `serial.Serial`: `timeout`, `baudrate`, ... Baud rate and frame default to
-            the device's.
+        options: options of `serial.Serial`: `timeout`, `baudrate`, ... Baud rate and frame default
+            to the device's.
 
     Attributes:
-        side: the same.
-        mismatch: effect of a different setting; None for that of `side`.
+        side: the host's side of the line.
+        mismatch: effect of a different setting; None for the `mismatch` of `side`.
 
     Raises:
         SerialException: another port is open on the line, or the setting is refused.
@@ -255,7 +259,7 @@ class SimSerial(_SimPort):
         self.open()
 
     def open(self) -> None:
-        """Open the port: on its own line, or on that of a `tickrig://` URL.
+        """Open the port, on its own line or on the line of a `tickrig://` URL.
 
         Raises:
             SerialException: no rig offers the name; see `_SimPort.open`.
@@ -297,8 +301,8 @@ class SimSerial(_SimPort):
             That many bytes, or fewer after the timeout or `cancel_read`.
 
         Raises:
-            SerialException: the port is closed; nothing arrived for an hour, and there is no
-                timeout.
+            SerialException: the port is closed, or there is no timeout and no byte arrived for an
+                hour.
         """
         side = self._side()
         if 0 < size <= len(self._input) and not self._read_cancelled:
@@ -419,8 +423,8 @@ class SimSerial(_SimPort):
             `cancel_write`.
 
         Raises:
-            SerialTimeoutException: the timeout has expired; some bytes may have been accepted.
-            SerialException: the port is closed; there was no room for an hour.
+            SerialTimeoutException: the timeout has expired. Some bytes may have been accepted.
+            SerialException: the port is closed, or there was no room for an hour.
             TypeError: the data is text.
         """
         side = self._side()
