@@ -1,4 +1,7 @@
-"""Fuzzing of devices: bytes become what a host and the world do, from the same snapshot."""
+"""Fuzzing of devices: random bytes select what a host sends and which inputs change.
+
+Each run starts from the same snapshot.
+"""
 
 from __future__ import annotations
 
@@ -24,15 +27,15 @@ Word = bytes | str
 
 
 def check_words(name: str, words: object, on_can: bool) -> None:
-    """Look whether words are a list of what a device of this wire hears.
+    """Check that words are a list of what a device on this wire can receive.
 
     Args:
-        name: what they are called.
-        words: as a user has given them.
+        name: what messages call the words.
+        words: the value that the user passed.
         on_can: whether the device is on a CAN bus.
 
     Raises:
-        ValueError: they are not.
+        ValueError: they are not such a list.
     """
     if isinstance(words, str | bytes) or not isinstance(words, list | tuple):
         example = "'705#7F'" if on_can else "b'ON\\\\n'"
@@ -51,20 +54,21 @@ _SENDS: Final = 160
 _SPOILS: Final = 200
 _NOISES: Final = 224
 _SETS: Final = 252
-"""The first byte of an act: a word below the first, a spoilt one below the second, noise, an
-input; a reset from the last on."""
+"""Limits of the first byte of an act. A byte below the first limit sends a word; below the second,
+a corrupted word; then noise; then an input change. From the last limit on, the act is a reset."""
 
 _MOST_NOISE: Final = 24
 _MOST_ACTS: Final = 40
 
 
 class FuzzAct(NamedTuple):
-    """One thing that is done.
+    """One action of a fuzzing run.
 
     Attributes:
         verb: `send`, `set` or `reset`.
-        what: bytes or a frame; the name of an input and its value; None.
-        wait_us: how long nothing is done afterwards.
+        what: for `send`, bytes or a frame; for `set`, the name of an input and its value; for
+            `reset`, None.
+        wait_us: pause after the action.
     """
 
     verb: str
@@ -85,12 +89,14 @@ class FuzzAct(NamedTuple):
 
 
 class _InputReader:
-    """Reads bytes as acts, any bytes: what fuzzers change in them is small in the acts too.
+    """Decodes any bytes into acts.
+
+    A small change that a fuzzer makes to the bytes changes the acts only a little.
 
     Args:
         words: what the device understands: bytes, or frames.
-        inputs: what the world can do to it.
-        tick_us: its period.
+        inputs: the inputs of the device that may change.
+        tick_us: period of the device.
         on_can: whether words are frames.
     """
 
@@ -106,7 +112,7 @@ class _InputReader:
         self._waits = (0, tick_us // 2, tick_us, tick_us, 2 * tick_us, 5 * tick_us, 20_000, 100_000)
 
     def acts(self, data: bytes) -> Iterator[FuzzAct]:
-        """Yield the acts; what is left over at the end means nothing."""
+        """Yield the acts; incomplete data at the end are ignored."""
         rest = iter(data)
         try:
             for _ in range(_MOST_ACTS):
@@ -165,7 +171,7 @@ def _spoilt_bytes(word: bytes, rest: Iterator[int]) -> bytes:
 # A device that bytes of chance are thrown at, each time from the same snapshot.
 
 _LOOKS: Final = 60
-"""So often a device that shall answer is asked, at ever longer intervals: 92 s in all."""
+"""How often the device is asked for an answer, at increasing intervals: 92 s in total."""
 
 _LOOK_US: Final = 10_000
 
@@ -175,26 +181,30 @@ class SilentDeviceError(AssertionError):
 
 
 class DeviceFuzz:
-    r"""A device on its wire, a host that sends what bytes mean, and the world that acts on it.
+    r"""A device on its wire, with a host and inputs that random bytes control.
 
-    Called with bytes, it puts the device back to what it was at the start, does what they mean,
-    puts all inputs back, and asks the device until it answers. So each call is a run by itself,
-    for a fuzzer or for bytes of chance.
+    A call takes bytes. It restores the device to its state at the start and executes the acts that
+    the bytes encode. Then it restores all inputs and sends the request until the device answers.
+    Each call is therefore independent of earlier ones, whether the bytes come from a fuzzer or from
+    a random generator.
 
     Args:
-        device: its type, or the name of one; or what makes the device.
-        words: what it understands, whole lines or frames (`605#40...`); they are sent as they
-            are, spoilt, and in any order, with noise between.
-        start: what it hears first, 10 ms each, so that it is at work.
-        request: what is sent after each throw until the device answers, word after word; the first
-            begins with LF where a line of noise has to be ended. Nothing is asked if empty.
-        answer: what is in the bytes that come then; of a frame its beginning.
-        wire: makes what it is on; that of its type, `CanWire` for a slave, unless given.
-        warm_us: how long it runs before `start`, in microseconds.
+        device: its type or the name of the type, or a callable that makes the device.
+        words: what the device understands, as whole lines or frames (`605#40...`). They are sent
+            unchanged or corrupted, in any order, with noise between them.
+        start: traffic that the device receives first, one item each 10 ms, to bring it into
+            operation.
+        request: sent after each run until the device answers, one word after the other. The first
+            word begins with LF if it has to end a line of noise. If empty, no answer is expected.
+        answer: text that the bytes of the answer contain; for a frame, the beginning of the frame.
+        wire: makes the wire of the device; by default the wire of its type, or `CanWire` for a
+            slave.
+        warm_us: how long the device runs before `start`, in microseconds.
 
     Raises:
-        ValueError: words are no list of bytes or frames, or an answer is wanted to nothing.
-        SilentDeviceError: when called: it does not answer.
+        ValueError: words are not a list of bytes or frames, or there is an answer without a
+            request.
+        SilentDeviceError: raised by a call: the device does not answer.
 
     >>> fuzz = DeviceFuzz("rrc", [b"hello\n"], request=[b"\ndevice\n"], answer=b"RRC\n")
     >>> fuzz(bytes(range(200)))
@@ -235,7 +245,7 @@ class DeviceFuzz:
         self._snapshot = self.rig.snapshot(self._end)
 
     def __call__(self, data: bytes) -> None:
-        """Do what bytes mean; raise what the device raises, or that it is silent.
+        """Execute the acts that bytes encode; raise the exception of the device.
 
         Raises:
             SilentDeviceError: it does not answer.
@@ -277,7 +287,7 @@ class DeviceFuzz:
             check_words("answer", [answer], self._on_can)
 
     def acts(self, data: bytes) -> list[FuzzAct]:
-        """Return what bytes mean.
+        """Return the acts that bytes encode.
 
         Args:
             data: any bytes.
@@ -356,7 +366,7 @@ def _ends(wire: ByteLine | CanWire) -> tuple[Any, Any]:
 
 
 def _inputs_of(device: Any) -> Any:
-    """Return what the world does to a device; None if it does nothing."""
+    """Return the inputs of a device that fuzzing may change; None if there are none."""
     if isinstance(device, CanopenSlave):
         return Application.of(device).inputs
     return getattr(device, "inputs", None)

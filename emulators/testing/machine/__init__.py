@@ -1,1 +1,1 @@
-"""Searches for what a host does wrong: calls, faults and hands in any order."""
+"""Searches for errors of a host: calls, faults and input changes in any order."""

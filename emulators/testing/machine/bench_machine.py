@@ -1,4 +1,4 @@
-"""What a user writes for a search: a bench, a host, its rules, and what must always be so."""
+"""What a user writes for a search: a bench, a host, its rules, and its invariants."""
 
 from __future__ import annotations
 
@@ -30,19 +30,19 @@ class WorldInput(NamedTuple):
 
 
 class World:
-    """The faults and inputs of a bench, as far as they may happen.
+    """The faults and inputs that a search may use on a bench.
 
     Args:
         bench: the bench, in virtual time.
-        faults: names of faults that may come, with arguments if wanted; all unless given.
-        inputs: names of inputs that may change; all but the objects of nodes unless given.
+        faults: names of the faults that may occur, with arguments if wanted; by default all.
+        inputs: names of the inputs that may change; by default all except the objects of nodes.
 
     Attributes:
         faults: those that may come, by name and arguments.
         inputs: those that may change.
 
     Raises:
-        ValueError: there is no such fault or input.
+        ValueError: unknown fault or input.
     """
 
     def __init__(
@@ -65,7 +65,7 @@ class World:
         self._before: Mapping[str, Setting] = {}
 
     def begin(self) -> None:
-        """Note what inputs are now: `calm` puts them back to it."""
+        """Store the present values of the inputs; `calm` restores these values."""
         self._before = {name: self._bench.get(name) for name in self._watched}
 
     def calm(self) -> None:
@@ -78,10 +78,10 @@ class World:
 
 
 def _bare(name: str, known: Mapping[str, Any]) -> str:
-    """Return the name of a fault that is written with arguments of its own.
+    """Return the name of a fault that is written with its own arguments.
 
     Raises:
-        ValueError: arguments that it does not take.
+        ValueError: the fault does not accept these arguments.
     """
     bare, has_words, words = name.partition("=")
     form = known.get(bare)
@@ -121,11 +121,11 @@ _INVARIANT: Final = "_tickrig_invariant"
 
 
 def host_rule(**arguments: object) -> Callable[[F], F]:
-    """Make a method of a `BenchMachine` something that may happen.
+    """Make a method of a `BenchMachine` a rule: an action that a search may execute.
 
     Args:
-        arguments: of the method, each with what it may be: a list, a tuple or a `range` of plain
-            values, or a strategy of Hypothesis that draws some.
+        arguments: of the method, each with its possible values: a list, a tuple or a `range` of
+            plain values, or a strategy of Hypothesis.
     """
 
     def mark(method: F) -> F:
@@ -136,9 +136,9 @@ def host_rule(**arguments: object) -> Callable[[F], F]:
 
 
 def invariant() -> Callable[[F], F]:
-    """Make a method of a `BenchMachine` what must always be so: it is called after each tick.
+    """Make a method of a `BenchMachine` an invariant, which is checked after each tick.
 
-    It only looks, and raises AssertionError where something is not so.
+    The method must have no side effects. It raises AssertionError if the invariant is violated.
     """
 
     def mark(method: F) -> F:
@@ -151,22 +151,22 @@ def invariant() -> Callable[[F], F]:
 class BenchMachine:
     r"""A bench and your host, for random orders of calls, faults and inputs.
 
-    Derive from it: make the bench, connect the host, and write a `host_rule` for each operation of
-    the host. `check_host` searches; `replay_host` repeats what it found. Each run begins with the
-    same bench, prepared by `warm_up`, and with a host of its own.
+    Derive a class from it: make the bench, connect the host, and write a `host_rule` for each
+    operation of the host. `check_host` searches for errors; `replay_host` repeats an error that was
+    found. Each run begins with the same bench, prepared by `warm_up`, and with a new host.
 
     Attributes:
         bench: the bench, in virtual time.
-        world: what may happen to the bench besides the host's calls.
-        faults: names of possible temporary faults; by default all of the bench. A fault with
-            arguments may be written with them: `"sdo_slow=2s"`.
+        world: the faults and inputs that may change in addition to the host's calls.
+        faults: names of possible temporary faults; by default all of the bench. A name may have
+            arguments: `"sdo_slow=2s"`.
         inputs: names of the inputs and buttons that may change; by default all of the bench.
         traffic: what other participants may send: frames in candump's notation, or bytes in hex to
-            a device; with several wires, prefixed by a device: `drive/705#00`.
-        fault_for: how long faults stay, such as `("100ms", "300ms")`.
-        patience: bench time that one call may take: a host that waits without end is a finding. A
-            smaller value makes a search faster, because each such call takes this time.
-        longest: bench time that a whole run may take.
+            a device. With several wires, each has the name of a device as prefix: `drive/705#00`.
+        fault_for: shortest and longest duration of a fault, such as `("100ms", "300ms")`.
+        patience: longest bench time of one call. A longer call is a finding: the host waits without
+            end. A smaller value makes a search faster, because each such call takes this time.
+        longest: longest bench time of a whole run.
         patched: whether `time.sleep` and `time.monotonic` of hosts use the bench's time.
 
     >>> class Chair(BenchMachine):
@@ -198,13 +198,13 @@ class BenchMachine:
         raise NotImplementedError(f"{type(self).__name__} makes no bench: write make_bench")
 
     def warm_up(self) -> None:
-        """Bring the bench to where each run begins; called once."""
+        """Bring the bench into the state in which each run begins; called once."""
 
     def connect(self) -> None:
-        """Connect the host, at the beginning of each run; what it raises is a finding."""
+        """Connect the host at the beginning of each run; an exception raised here is a finding."""
 
     def end(self) -> None:
-        """Judge at the end of each run; `calm` ends all faults first, if that is wanted."""
+        """Check the result at the end of each run; call `calm` first if all faults should end."""
 
     def disconnect(self) -> None:
         """Close what the host has open, after each run, whatever came of it."""

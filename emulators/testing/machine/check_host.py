@@ -31,21 +31,21 @@ def check_host(
     max_steps: int = 12,
     seed: int | None = None,
 ) -> None:
-    """Search for an order of calls, faults and hands in which a host does something wrong.
+    """Search for a sequence of calls, faults and input changes that shows an error of a host.
 
-    What is found is made as short as can be. The exception has a note with the scenario of it and
-    the command that replays it, without Hypothesis.
+    The search shortens the sequence that it finds as much as possible. The exception has a note
+    with the scenario and with the command that replays it without Hypothesis.
 
     Args:
         machine: the bench, the host and its rules.
-        max_examples: how many runs, if nothing is found.
-        max_steps: how many steps a run has at most.
-        seed: of what is drawn: the same search again, whatever was found before; None for
-            another one each time, which begins with what was found before.
+        max_examples: number of runs, if no error is found.
+        max_steps: largest number of steps in a run.
+        seed: of the random choices. The same seed repeats the same search, independent of earlier
+            findings. With None each search is different, and begins with earlier findings.
 
     Raises:
-        ModuleNotFoundError: Hypothesis is not there.
-        Exception: what the host, a rule or an invariant raised in the shortest run found.
+        ModuleNotFoundError: Hypothesis is not installed.
+        Exception: the exception of the host, a rule or an invariant in the shortest failing run.
     """
     with HostRuns(machine) as runs:
         search = search_of(runs, max_examples=max_examples, max_steps=max_steps, seed=seed)
@@ -64,7 +64,7 @@ def search_of(runs: HostRuns, *, max_examples: int, max_steps: int, seed: int | 
     """Return the test of Hypothesis that draws steps and runs them.
 
     Raises:
-        ModuleNotFoundError: Hypothesis is not there.
+        ModuleNotFoundError: Hypothesis is not installed.
     """
     try:
         import hypothesis  # noqa: PLC0415 - an extra
@@ -90,16 +90,16 @@ def search_of(runs: HostRuns, *, max_examples: int, max_steps: int, seed: int | 
 
 
 def replay_host(machine: type[BenchMachine], scenario: Path | str) -> None:
-    """Do again what a search found; nothing is drawn, and Hypothesis is not asked.
+    """Repeat a failure that a search found; no random choices, and Hypothesis is not needed.
 
     Args:
         machine: the bench, the host and its rules.
-        scenario: a file with the scenario; or its text, of several lines.
+        scenario: a file with the scenario, or its text of several lines.
 
     Raises:
         OSError: the file cannot be read.
-        ValueError: it is no scenario of this machine; the text says where.
-        Exception: what the host, a rule or an invariant raised.
+        ValueError: it is not a scenario of this machine; the message names the place.
+        Exception: the exception of the host, a rule or an invariant.
     """
     text, name = str(scenario), "scenario"
     if "\n" not in text:
@@ -115,12 +115,12 @@ def replay_host(machine: type[BenchMachine], scenario: Path | str) -> None:
 
 
 def note_of(runs: HostRuns, failure: HostFailure, *, repeats: bool = True) -> str:
-    """Write a failure as a scenario, how it is replayed, and what passed last.
+    """Return a failure as text: the scenario, the command that replays it, and the last traffic.
 
     Args:
-        runs: those of the machine.
-        failure: what was wrong.
-        repeats: it was wrong again when the run was repeated.
+        runs: the runs of the machine.
+        failure: the failure.
+        repeats: whether the run failed again when it was repeated.
     """
     place, steps = _place(type(runs.machine)), failure.steps
     return "\n".join(

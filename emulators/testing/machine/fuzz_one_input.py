@@ -1,4 +1,4 @@
-"""The door for fuzzers that are guided by coverage: bytes in, an exception for what is wrong."""
+"""Entry point for coverage-guided fuzzers: it takes bytes, and raises an exception for an error."""
 
 from __future__ import annotations
 
@@ -15,20 +15,24 @@ from tickrig.emulators.testing.machine.host_runs import HostRuns
 def fuzz_one_input(
     what: type[BenchMachine] | Any, *, max_steps: int = 12, **options: Any
 ) -> Callable[[bytes], None]:
-    r"""Return what a fuzzer such as Atheris calls with bytes, each time from one snapshot.
+    r"""Return a function that a fuzzer such as Atheris calls with bytes.
+
+    Each call starts from the same snapshot.
 
     Args:
-        what: a `BenchMachine`, whose bench stays open: bytes choose its steps, by Hypothesis. Or
-            a device, as `DeviceFuzz` takes it: bytes are what it hears.
-        max_steps: how many steps a run of the machine has at most.
+        what: a `BenchMachine` or a device. For a `BenchMachine`, Hypothesis chooses its steps from
+            the bytes; its bench stays open. For a device, as in `DeviceFuzz`, the bytes are what it
+            receives.
+        max_steps: largest number of steps in a run of the machine.
         options: of `DeviceFuzz`.
 
     Returns:
-        The function. It raises what the device, the host or the machine raises; the exception
-        has a note with what was done. As fuzzers show no notes, standard error has it too.
+        The function. It raises the exception of the device, the host or the machine, with a note
+        that lists the steps. The note is also printed on standard error, because fuzzers do not
+        show notes.
 
     Raises:
-        ModuleNotFoundError: of a machine: Hypothesis is not there.
+        ModuleNotFoundError: `what` is a machine, and Hypothesis is not installed.
 
     >>> one_input = fuzz_one_input("rrc", words=[b"device"], request=[b"\ndevice\n"], answer=b"RRC")
     >>> one_input(b"any bytes")

@@ -42,16 +42,16 @@ _LINE: Final = re.compile(r"\+(\S+)\s+(\w+)(?:\s+(.*))?")
 
 @dataclass(frozen=True, slots=True, repr=False)
 class HostStep:
-    """Something that is done after a while.
+    """A step of a run: a pause, then an action.
 
     Attributes:
-        wait_us: how long nothing is done before it.
-        verb: `call` of a rule, `set`, `press`, `fault`, `send`, `wait` for nothing more, or
-            `seed` of the chance in faults that begin from then on.
-        what: the rule, or what stands behind the verb in a scenario: `stick_v_pct 50`,
-            `drop=0.1`, `705#00` or bytes in hex, with the device before them where there are
-            several wires: `drive/705#00`.
-        for_us: how long a button is pressed, or a fault stays.
+        wait_us: pause before the action.
+        verb: `call` of a rule, `set`, `press`, `fault`, `send`, `wait` for a pause only, or `seed`
+            of the random numbers of faults that begin after this step.
+        what: the rule, or the text that follows the verb in a scenario: `stick_v_pct 50`,
+            `drop=0.1`, `705#00`, or bytes in hex. With several wires the device is in front:
+            `drive/705#00`.
+        for_us: how long a button is pressed, or how long a fault stays.
         arguments: of the rule.
     """
 
@@ -62,7 +62,7 @@ class HostStep:
     arguments: Mapping[str, Any] = field(default_factory=dict)
 
     def __repr__(self) -> str:
-        """Write it as `__str__` does: what a search shows is to be read."""
+        """Return the same text as `__str__`, so that the output of a search is readable."""
         return f"<{self}>"
 
     def _repr_pretty_(self, printer: Any, cycle: bool) -> None:
@@ -83,7 +83,7 @@ class HostStep:
         return f"+{_time(self.wait_us)} {self.verb} {what}".rstrip() + lasting
 
     def do(self, bench: Bench) -> None:
-        """Let the time pass, and do it to a bench; a `call` is of a machine alone.
+        """Wait, then execute the step on a bench; a `call` needs a machine instead.
 
         Args:
             bench: the bench.
@@ -95,7 +95,7 @@ class HostStep:
         self.act(bench)
 
     def act(self, bench: Bench) -> None:
-        """Do it to a bench at once; raises ValueError as `do` does."""
+        """Execute the step on a bench at once; raise ValueError as `do` does."""
         if self.verb == "set":
             name, *words = self.what.split()
             bench.set(name, *map(parse_setting, words))
@@ -121,10 +121,10 @@ def parse_steps(
     Args:
         text: the whole file.
         file: its name, for messages.
-        rules: those of the machine: an argument may be any value that its rule lists.
+        rules: of the machine; an argument may be any value that its rule lists.
 
     Raises:
-        ValueError: `FILE:LINE: what came, what is allowed`.
+        ValueError: `FILE:LINE: found text, what is allowed`.
     """
     steps = []
     for number, content in content_lines(text):
@@ -152,7 +152,7 @@ def _parse(content: str, rules: Mapping[str, Mapping[str, object]]) -> HostStep:
 
 
 def _parse_call(text: str, rules: Mapping[str, Mapping[str, object]]) -> tuple[str, dict[str, Any]]:
-    """Read `name(argument=literal, ...)`; nothing is evaluated but literals."""
+    """Read `name(argument=literal, ...)`; only literals are evaluated."""
     try:
         call = ast.parse(text, mode="eval").body if len(text) <= _LONGEST else None
     except (SyntaxError, ValueError, MemoryError, RecursionError):
@@ -199,10 +199,10 @@ def check_written(rule: str, name: str, value: object, listed: object = None) ->
     """Raise TypeError unless a scenario can hold an argument.
 
     Args:
-        rule: whose argument it is.
+        rule: the rule with this argument.
         name: of the argument.
         value: the argument.
-        listed: the values that the rule lists, if it does.
+        listed: the values that the rule lists; None if it lists none.
     """
     try:
         node = ast.parse(_literal(value), mode="eval").body
@@ -236,19 +236,19 @@ _NO_FAILURES: Final = ("KeyboardInterrupt", "Skipped", "Exit", "UnsatisfiedAssum
 
 
 class HostHangsError(AssertionError):
-    """A host does not come back: a call, or a whole run, takes longer than the machine says."""
+    """A host does not return: a call, or a whole run, takes longer than the machine allows."""
 
 
 @dataclass(frozen=True, slots=True)
 class HostFailure:
-    """What was wrong in a run.
+    """A failure of a run.
 
     Attributes:
-        error: what was raised.
-        violated: what raised it: `invariant it_is_slow`, `rule drive`, `connect`, `end`.
-        at_us: when, in the time of the bench.
-        steps: what was done until then.
-        passed: what passed last.
+        error: the exception.
+        violated: what raised it, such as `invariant it_is_slow`, `rule drive`, `connect`, `end`.
+        at_us: time of the failure on the bench.
+        steps: the steps before the failure.
+        passed: the last traffic before the failure.
     """
 
     error: BaseException
@@ -271,7 +271,7 @@ class HostFailure:
 
 @contextmanager
 def _seeded() -> Iterator[None]:
-    """Seed the chance of hosts: what a search draws, a replay draws too."""
+    """Seed the random numbers of hosts, so that a replay draws the same numbers as the search."""
     modules = [random, sys.modules.get("numpy.random")]
     chances: list[Any] = [module for module in modules if module is not None]
     before = [chance.getstate() if chance is random else chance.get_state() for chance in chances]
@@ -285,17 +285,17 @@ def _seeded() -> Iterator[None]:
 
 
 class HostRuns:
-    """Runs of one machine; a `with` block, in which the bench is open.
+    """Runs of one machine; a context manager that keeps the bench open.
 
     Args:
         kind: the machine.
 
     Attributes:
         machine: the machine.
-        failure: what was wrong in the last run that failed; None if none has failed.
+        failure: the failure of the last run that failed; None if no run has failed.
 
     Raises:
-        ValueError: a fault or input of it is not on its bench.
+        ValueError: a fault or input of the machine is not on its bench.
         NotOnThisBench: its bench is not in virtual time.
     """
 
@@ -343,11 +343,11 @@ class HostRuns:
         self._stack.close()
 
     def run(self, steps: Sequence[HostStep]) -> None:
-        """Run the steps from the snapshot on; raise the error of the host.
+        """Run the steps from the snapshot; raise the exception of the host.
 
         Raises:
             HostHangsError: the host waits without end.
-            Exception: the error of the machine, or of the host in it.
+            Exception: the exception of the machine, or of the host in it.
         """
         # All runs begin at one snapshot with the same objects, so hosts that hold a device need no
         # update.
@@ -377,10 +377,10 @@ class HostRuns:
             self.machine.disconnect()
 
     def shorten(self, failure: HostFailure) -> HostFailure | None:
-        """Leave out the steps without which a run fails in the same way.
+        """Remove the steps that are not needed for a run to fail in the same way.
 
         Returns:
-            A failure of which no step can be left out; None if the run does not fail again.
+            A failure without unnecessary steps; None if the run does not fail again.
         """
         failed = self._again(failure, failure.steps)
         shorter = failed
@@ -411,7 +411,7 @@ class HostRuns:
         return None
 
     def _settle(self) -> None:
-        """Let the devices act on what was asked last: a run is judged after that."""
+        """Give the devices time to react to the last request, before the run is checked."""
         bench = self.machine.bench
         bench.run_for(bench._mode.act(lambda rig: rig.settling_us))
 
@@ -442,7 +442,8 @@ class HostRuns:
     def _judged(self, act: Any, *args: Any, **arguments: Any) -> None:
         """Run an operation of the host; raise a violation even if the host has caught it.
 
-        Endless waiting is one error regardless of the place: so a search shortens a single error.
+        Endless waiting counts as one error, wherever the host waits. A search therefore shortens a
+        single error.
         """
         self._back_us = self.machine.bench.now_us + us_of(self.machine.patience)
         hangs = ""
@@ -467,7 +468,7 @@ class HostRuns:
         return ""
 
     def _watch(self, now_us: int) -> None:
-        """Look after each step of the rig; the first that is broken counts."""
+        """Check the invariants after each step of the rig; the first violation counts."""
         if hangs := self._hangs(now_us):
             # Raised in the rig, amid the host's call; and kept, because a host may swallow
             # it.
@@ -493,7 +494,7 @@ class HostRuns:
 
 
 def _shorter(steps: Sequence[HostStep]) -> Iterator[list[HostStep]]:
-    """Give what a run could be without one of its steps: at first without its time as well."""
+    """Yield shorter runs, each without one of the steps; first also without its waiting time."""
     for at, step in enumerate(steps):
         before, after = list(steps[:at]), list(steps[at + 1 :])
         yield before + after

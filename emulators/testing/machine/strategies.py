@@ -47,35 +47,35 @@ _WAITS_US: Final = (0, 0, 0, 1_000, 10_000, 50_000, 100_000, 300_000, 1_000_000,
 
 
 def timing() -> st.SearchStrategy[int]:
-    """Draw how long nothing is done before a step, in microseconds: mostly nothing, up to 3 s."""
+    """Draw the pause before a step, in microseconds: mostly 0, at most 3 s."""
     return st.sampled_from(_WAITS_US)
 
 
 def faults(
     bench: Bench, names: Sequence[str] | None = None, for_: Sequence[str] = ("100ms", "1s")
 ) -> st.SearchStrategy[HostStep]:
-    """Draw faults that come for a while; `step.do(bench)` lets one come.
+    """Draw temporary faults; `step.do(bench)` starts one.
 
     Args:
-        bench: where.
-        names: of faults of it; all unless given.
-        for_: how long they stay.
+        bench: the bench with the faults.
+        names: of faults of this bench; by default all.
+        for_: duration of the faults.
 
     Raises:
-        ValueError: there is no such fault.
+        ValueError: unknown fault.
     """
     return _faults(World(bench, names, ()), for_)
 
 
 def operator(bench: Bench, names: Sequence[str] | None = None) -> st.SearchStrategy[HostStep]:
-    """Draw what hands do: buttons are pressed, levels set; `step.do(bench)` does it.
+    """Draw manual actions: pressed buttons, changed levels; `step.do(bench)` executes one.
 
     Args:
-        bench: where.
-        names: of inputs and buttons of it; all but the objects of nodes unless given.
+        bench: the bench with the inputs.
+        names: of inputs and buttons of this bench; by default all except the objects of nodes.
 
     Raises:
-        ValueError: there is no such input.
+        ValueError: unknown input.
     """
     return _operator(World(bench, (), names))
 
@@ -84,7 +84,7 @@ def traffic(words: Sequence[str]) -> st.SearchStrategy[HostStep]:
     """Draw what other participants send; `step.do(bench)` sends it.
 
     Args:
-        words: frames in candump's notation, or bytes in hex, as `HostStep.what` has them.
+        words: frames in candump's notation, or bytes in hex, as in `HostStep.what`.
     """
     return st.builds(HostStep, timing(), st.just("send"), st.sampled_from(words))
 
@@ -176,7 +176,7 @@ def steps(machine: BenchMachine, most: int) -> st.SearchStrategy[list[HostStep]]
 
 
 def _with_seed(world: World, drawn: list[HostStep], seed: int) -> list[HostStep]:
-    """Return a run whose faults by chance are others; those of seed 0 are the bench's own."""
+    """Return a run with other random faults; with seed 0 the bench uses its own random numbers."""
     # Faults without a rate draw too, such as `jitter` and `garbage`.
     rated = {name.partition("=")[0] for name, form in world.faults.items() if form.rated}
     noisy = any(step.verb == "fault" and step.what.partition("=")[0] in rated for step in drawn)
@@ -192,7 +192,10 @@ def _strategy(what: object) -> st.SearchStrategy[Any]:
 
 
 def _values(item: WorldInput) -> st.SearchStrategy[float]:
-    """Draw whole values of a level, its ends and zero more often; its ends if none is whole."""
+    """Draw integers in the range of a level, more often its limits and 0.
+
+    If the range contains no integer, only its limits are drawn.
+    """
     low, high = ceil(item.low), floor(item.high)
     if low > high:
         return st.sampled_from((item.low, item.high))

@@ -1,3 +1,3 @@
-"""What tests a device of anybody, over any session; what is done to it is drawn by Hypothesis."""
+"""Tests of any device in any session; Hypothesis draws the traffic and the inputs."""
 
 from tickrig.emulators.testing.properties import strategies as strategies

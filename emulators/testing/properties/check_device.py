@@ -36,7 +36,7 @@ _VERBS: Final = ("send", "set", "reset")
 
 
 def _check_start(start: Session, device: Any, nothing: Any) -> None:
-    """Check that each act of `start` can be done.
+    """Check that each act of `start` can be executed.
 
     Args:
         start: the acts.
@@ -44,7 +44,7 @@ def _check_start(start: Session, device: Any, nothing: Any) -> None:
         nothing: empty traffic.
 
     Raises:
-        ValueError: one cannot; the message says which, and why.
+        ValueError: an act cannot be executed; the message has the act and the reason.
     """
     for number, act in enumerate(start):
         try:
@@ -96,16 +96,17 @@ def _search(
     names: tuple[str, ...],
     max_examples: int,
 ) -> None:
-    """Draw sessions until a check raises, then shorter ones.
+    """Draw sessions until a check raises, then search for shorter ones.
 
     Args:
         check: takes sessions by name.
-        drawn: the sessions.
-        names: what they are called.
-        max_examples: how many of each, if nothing is found.
+        drawn: the strategies of the sessions.
+        names: the names of the sessions.
+        max_examples: number of sessions of each name, if no check raises.
 
     Raises:
-        Exception: what the check raised of the shortest found, with a note of what was met.
+        Exception: the exception of the check for the shortest session, with a note of what
+            occurred.
     """
     found: dict[str, Exception] = {}
     met: dict[str, dict[str, Session]] = {}
@@ -147,7 +148,7 @@ def _search(
 def _shortest(
     check: Callable[..., None], sessions: Mapping[str, Session], error: Exception
 ) -> Exception:
-    """Leave out acts without which a check raises the same; return what it raises then."""
+    """Remove acts without which a check raises the same error; return the exception of the rest."""
     shortest, needed = error, dict(sessions)
     for name in sessions:
 
@@ -186,38 +187,39 @@ def check_device(  # noqa: PLR0913 - by name
     remembers: bool = False,
     pauses: bool = True,
 ) -> None:
-    r"""Test a type of device with any session: bytes or frames, inputs, resets, pauses.
+    r"""Test a type of device in any session: bytes or frames, inputs, resets, pauses.
 
-    - It has the attributes of a device, and returns values of the right types; `tick` clears
-      `inputs.changed`.
-    - No traffic and no input makes it raise.
-    - A new device with the same traffic behaves the same, also from its trace on a line.
-    - Ticks at which it is not due change nothing (dense = sparse), up to a day later.
-    - A host that writes in pieces gets the same answers as one that writes at once. A word of
-      `strategies.chunks` that arrives in two ticks is answered like one that arrives in one.
+    - The device has the attributes of a device, and returns values of the right types. `tick`
+      clears `inputs.changed`.
+    - It does not raise an exception for any traffic or input.
+    - A new device with the same traffic behaves identically. On a line, a device replayed from the
+      trace does, too.
+    - Ticks at which the device is not due change nothing (dense = sparse), up to a day later.
+    - A host that writes in pieces gets the same answers as a host that writes at once. A word of
+      `strategies.chunks` that arrives in two ticks is answered like a word that arrives in one.
     - A reset device equals a new one with the same inputs.
-    - A copy, by `copy.deepcopy`, by pickle and with its rig, behaves like the original; changes to
-      it do not change the original. A device that a snapshot restores continues from there.
+    - A copy behaves like the original, whether made by `copy.deepcopy`, by pickle or with its rig.
+      Changes to the copy do not change the original. A device that a snapshot restores continues
+      from that state.
 
     Args:
-        device_type: the factory of the device: its `DeviceType` or the name of one, a class or
-            function.
-        traffic: what a host sends at once, `strategies.chunks(...)` or `strategies.frames(...)`;
-            noise unless given.
+        device_type: the factory of the device: a `DeviceType` or its name, a class or a function.
+        traffic: what a host sends at once, `strategies.chunks(...)` or `strategies.frames(...)`; by
+            default noise.
         wire: factory of its wire, such as `CanWire`; by default that of its type, or a serial line.
-        start: acts before each session that start the device, one after the other: `(5_000, "send",
+        start: acts that start the device, executed in order before each session: `(5_000, "send",
             b"ON\n")` sends after 5 ms, `(0, "set", ("jam", 1))` sets an input, `(0, "reset", None)`
             resets.
-        max_examples: how many sessions for each of the tests.
+        max_examples: number of sessions for each test.
         remembers: whether a reset keeps more than configuration and inputs: stored parameters, or
             the position of an axis.
-        pauses: whether pauses within a word do not matter; not if a pause ends a frame, as in
+        pauses: whether pauses within a word have no effect; False if a pause ends a frame, as in
             Modbus RTU.
 
     Raises:
-        AssertionError: one of these does not hold; the message says when and what, a note has the
-            shortest session found.
-        ValueError: an act of `start` cannot be done, or there is no type with this name.
+        AssertionError: one of these properties does not hold. The message has the time and the
+            difference; a note has the shortest session found.
+        ValueError: an act of `start` cannot be executed, or no type has this name.
 
     >>> check_device("rrc", traffic=strategies.chunks([b"hello\n", b"device\n"]), max_examples=2)
     """

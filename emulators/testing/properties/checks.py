@@ -49,7 +49,7 @@ from tickrig.host.text.trace import Header
 # Words that come with a pause in them: a line means the same, whenever its second half comes.
 
 _WORDS_WITH_PAUSES: Final = 2
-"""So many words of a session are tried; there are many sessions."""
+"""Number of words tried in each session; there are many sessions."""
 
 _Answer = tuple[bytes, list[Any]]
 """What is sent, and the outputs then."""
@@ -59,18 +59,18 @@ _TICKS: Final = 20
 
 
 def _check_pauses(played: device_bench.DeviceBench, session: Session) -> None:
-    """Let words come in two ticks, each half in its own.
+    """Check words that arrive in two ticks, a part in each.
 
-    The word counts when its end is there, so it must be answered as if all of it came with the
-    end. What is before the first byte that is as the last one is its beginning: a word of several
-    lines is cut in the first.
+    A word counts when its end arrives. The answer must therefore be the same as for a whole word
+    that arrives together with its end. The first part ends at the latest before the first byte that
+    equals the last byte of the word: a word of several lines is divided within its first line.
 
     Args:
         played: a bench with a device at work.
-        session: what was done to it.
+        session: the acts already executed.
 
     Raises:
-        AssertionError: it is answered otherwise.
+        AssertionError: the answer differs.
     """
     words = list(dict.fromkeys(what for _, _, what in session if isinstance(what, Word)))
     for word in words[:_WORDS_WITH_PAUSES]:
@@ -116,7 +116,8 @@ def _message(word: Word, at: int, wanted: _Answer, got: _Answer) -> str:
 _DAY_US: Final = 86_400_000_000
 
 _AHEAD_US: Final = (0, 10_000, 100_000, 1_000_000, 10_000_000, 60_000_000, 600_000_000)
-"""So long after now a tick is tried; and a last one, just before it is due, or after a day."""
+"""Delays after which a tick is tried. A last tick is tried just before the device is due, or after
+a day."""
 
 _MOST_WORDS: Final = 3
 """So many of the words of a session are said after it."""
@@ -125,18 +126,19 @@ _MOST_INPUTS: Final = 8
 """So many inputs are tried at the end of a session."""
 
 _SETTLES: Final = 50
-"""Ticks in which a device comes to rest after an input has changed; else it is not checked."""
+"""Number of ticks for a device to become idle after an input has changed; if it does not, this
+check is omitted."""
 
 
 def _check_due_us(bench: Callable[..., device_bench.DeviceBench], session: Session) -> None:
     """Tick copies of a device before it is due, at the end of each wait of a session.
 
-    Timers of hours are found so, without ticks of hours. At the end of the session it is also
-    done after a change of each input, alone.
+    This finds errors in timers of hours without running ticks for hours. At the end of the session
+    the check is repeated after a change of each input alone.
 
     Args:
-        bench: makes one.
-        session: what is done.
+        bench: makes a bench.
+        session: the acts.
 
     Raises:
         AssertionError: such a tick changes something.
@@ -162,7 +164,7 @@ def _some_inputs(device: Any, number: int) -> list[InputSignal]:
 
 
 def _changed_input(played: device_bench.DeviceBench, item: InputSignal) -> tuple[Any, int]:
-    """Change an input of a copy, and let it come to rest.
+    """Change an input of a copy, and wait until the copy is idle.
 
     Returns:
         The copy, and the time.
@@ -276,12 +278,12 @@ _KEEPS: Final = "reset keeps something (if it is to: check_device(remembers=True
 
 
 class DeviceChecks:
-    """The checks of one type of device.
+    """The checks of one device type.
 
     Args:
-        bench: makes a bench with one.
-        remembers: a reset leaves more than configuration and inputs.
-        pauses: what a host sends means the same with pauses in it.
+        bench: makes a bench with one device.
+        remembers: a reset keeps more than configuration and inputs.
+        pauses: pauses within the host's traffic have no effect.
     """
 
     def __init__(self, bench: _Benches, remembers: bool, pauses: bool) -> None:

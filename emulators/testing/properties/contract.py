@@ -18,7 +18,7 @@ _SIGNALS: Final = {
     "inputs": "an InputBank, InputBank(()) if there are none",
     "outputs": "a dict of OutputSignal by name, {} if there are none",
 }
-"""What one on a line has too; of a node they are those of its application."""
+"""Further attributes of a device on a serial line; a node has them in its application."""
 
 
 def must(holds: bool, text: str) -> None:
@@ -58,15 +58,15 @@ def _check_due(device: Any) -> None:
 
 
 def check_acts(device: Any, acts: list[Act], nothing: Any) -> None:
-    """Do acts to a device that is on no wire, and look at the types of all that it returns.
+    """Execute acts on a device without a wire, and check the types of all that it returns.
 
     Args:
-        device: a fresh one.
-        acts: what is done.
-        nothing: traffic without anything in it.
+        device: a new device.
+        acts: the acts to execute.
+        nothing: empty traffic.
 
     Raises:
-        AssertionError: something is of another type, or `inputs.changed` stays set.
+        AssertionError: a value has a wrong type, or `inputs.changed` stays set.
     """
     now_us = device.tick_us
     for wait_us, verb, what in acts:

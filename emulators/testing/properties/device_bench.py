@@ -23,20 +23,20 @@ _AFTERWARDS_US: Final = 2_000_000
 """How long a session is watched when nothing more is done."""
 
 Observation = tuple[Any, ...]
-"""What was seen: the time, what was received, and the outputs."""
+"""An observation: the time, the received traffic, and the outputs."""
 
 
 @dataclass
 class DeviceBench:
-    """A device on its wire, a host at the other end, and all that can be seen of them.
+    """A device on its wire, with a host at the other end; it records all that can be observed.
 
     Attributes:
         make: makes the device.
         wire: makes the wire.
-        start: what is done first.
-        dense: the rig runs every tick.
-        pieces: the host writes byte by byte, frame by frame.
-        trace: records the device.
+        start: the acts before the session.
+        dense: whether the rig runs every tick.
+        pieces: whether the host writes byte by byte, or frame by frame.
+        trace: whether to record the device.
     """
 
     make: Callable[[], Any]
@@ -102,10 +102,10 @@ def outputs_of(device: Any) -> list[Any]:
 
 
 def drive(device: Any, now_us: int, session: Session, nothing: Any) -> list[Observation]:
-    """Play a session to a device that is on no wire.
+    """Play a session to a device without a wire.
 
     Returns:
-        What it sends and what is seen, with times since `now_us`.
+        What it sends and its observations, with times relative to `now_us`.
     """
     log, begin_us = [], now_us
     for wait_us, verb, what in [*session, (_AFTERWARDS_US, "send", nothing)]:
@@ -140,7 +140,7 @@ class TicksDifferError(AssertionError):
 
 
 def in_ms(time_us: int) -> str:
-    """Write a time for people.
+    """Return a time as readable text.
 
     >>> in_ms(2_000), in_ms(86_400_000_000)
     ('2.000 ms', '86400.000000 s')
@@ -149,7 +149,7 @@ def in_ms(time_us: int) -> str:
 
 
 def due_text(due_us: int) -> str:
-    """Write what `due_us` says.
+    """Return the text of a value of `due_us`.
 
     >>> due_text(NEVER), due_text(2_000)
     ('NEVER', '2000')
@@ -160,14 +160,14 @@ def due_text(due_us: int) -> str:
 def difference(
     device: Any, one: Sequence[Observation], other: Sequence[Observation], first: str, second: str
 ) -> str:
-    """Return in what two runs differ first; empty if they do not.
+    """Return the first difference between two runs; empty if they are equal.
 
     Args:
-        device: whose outputs are seen.
-        one: what was seen in one run.
-        other: what was seen in the other one.
-        first: which run is the one, behind its value.
-        second: which is the other.
+        device: the device with the outputs.
+        one: observations of one run.
+        other: observations of the other run.
+        first: description of the first run, written after its value.
+        second: description of the other run.
     """
     names = [_SENDS, *getattr(device, "outputs", ())]
     for (at_us, *seen), (_, *others) in zip(one, other, strict=True):
@@ -189,7 +189,7 @@ def _message(at_us: int, name: str, one: tuple[Any, str], other: tuple[Any, str]
 
 
 def shorten(value: Any) -> str:
-    """Write a value, in the middle of a line.
+    """Return a value as text for the middle of a line.
 
     >>> shorten((2_000, b"ok")), shorten(None)
     ("b'ok' at 2.000 ms", 'nothing')
@@ -203,12 +203,12 @@ def shorten(value: Any) -> str:
 
 
 def explain_ticks(bench: Callable[..., DeviceBench], start: Session, session: Session) -> str:
-    """Return at which tick dense and sparse ticks differ first, in what, and what was due.
+    """Return where dense and sparse ticks first differ: the tick, the difference, and what was due.
 
     Args:
-        bench: makes one.
-        start: what is done before the session.
-        session: one in which they differ.
+        bench: makes a bench.
+        start: the acts before the session.
+        session: a session in which they differ.
     """
     sparse, dense = bench(start=()), bench(start=(), dense=True)
     for act in sparse.with_end([*start, *session]):
@@ -232,11 +232,11 @@ _T = TypeVar("_T")
 
 
 def shortened(acts: Sequence[_T], fails: Callable[[list[_T]], bool]) -> list[_T]:
-    """Leave out each act without which the same goes wrong, until all that are left are needed.
+    """Remove every act that is not needed for the same failure.
 
     Args:
-        acts: with all of them it does.
-        fails: returns whether it does so with fewer.
+        acts: acts that fail together.
+        fails: returns whether a shorter list of acts fails in the same way.
 
     >>> shortened([1, 2, 3, 4], lambda fewer: 2 in fewer and 4 in fewer)
     [2, 4]
