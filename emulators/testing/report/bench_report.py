@@ -1,6 +1,6 @@
-"""What a test run was, as values: what a report is made of.
+"""The content of a report as values.
 
-Fewer samples of a signal, without losing a spike.
+`thinned` reduces the samples of a signal without losing a spike.
 
 >>> thinned([(0, 0), (1, 1), (2, 9), (3, 1), (4, 0), (5, 0), (6, -7), (7, 0)], 6)
 [(0, 0), (2, 9), (4, 0), (5, 0), (6, -7), (7, 0)]
@@ -19,18 +19,19 @@ from typing import ClassVar, Final, NamedTuple
 from tickrig._version import __version__
 
 Value = int | float | str | None
-"""A sample: a number, a word such as a state, None where nothing is known."""
+"""A sample: a number, a word such as a state, or None if the value is unknown."""
 
 
 class Outcome(StrEnum):
-    """How a test ended, in the order in which people want to see them.
+    """How a test ended, in the order in which the report lists tests.
 
     Attributes:
-        FAILED: the device, or the host, does not do what was expected.
-        ERROR: the test itself is wrong, or its fixtures are.
-        BLOCKED: the bench could not judge: too slow, a port gone, an operator who said no.
-        PASSED: all was as expected.
-        SKIPPED: not run, such as on a bench that cannot do what is needed.
+        FAILED: the device or the host did not behave as expected.
+        ERROR: the test itself or its fixtures are wrong.
+        BLOCKED: no verdict is possible: real time was not kept, a port is gone, or an operator
+            refused.
+        PASSED: everything was as expected.
+        SKIPPED: not run, for example because the bench does not support what the test needs.
     """
 
     FAILED = "failed"
@@ -42,12 +43,12 @@ class Outcome(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class RunEnvironment:
-    """Where and how tests ran; all workers of a parallel run give the same.
+    """Where and how tests ran; equal for all workers of a parallel run.
 
     Attributes:
-        date: when it began, as text.
+        date: start of the run, as text.
         mode: `virtual`, `real` or `hardware`.
-        seed: of all randomness, None if there is none.
+        seed: of all random numbers; None if there is no seed.
         rig_file: name of the rig file, empty if there is none.
         rig_text: its content.
         tickrig: version of tickrig.
@@ -76,11 +77,11 @@ class RunEnvironment:
 
 @dataclass(frozen=True, slots=True)
 class Requirement:
-    """What has to be shown by tests.
+    """A requirement that tests must show.
 
     Attributes:
-        name: as the marker `req` has it, such as `SAF-12`.
-        text: what it demands, for people.
+        name: as in the marker `req`, such as `SAF-12`.
+        text: the requirement as readable text.
     """
 
     name: str
@@ -89,15 +90,15 @@ class Requirement:
 
 @dataclass(frozen=True, slots=True)
 class PlannedFault:
-    """A fault that a test requested, or that came without a request.
+    """A fault that a test requested, or that occurred without a request.
 
     Attributes:
-        name: as it was requested, with device and rate: `left_drive/flip=0.01`.
-        from_us: when it began; None if its trigger never came.
-        to_us: when it ended; None if it stayed.
-        when: its trigger, such as `the 3rd OK:output`, or a time that never came; empty if it came
-            by time.
-        ordered_us: when it was requested; None if unknown, as for a manual one.
+        name: as in the request, with device and rate: `left_drive/flip=0.01`.
+        from_us: when the fault began; None if its trigger did not occur.
+        to_us: when the fault ended; None if it stayed.
+        when: its trigger, such as `the 3rd OK:output`, or a time that was not reached; empty if it
+            began at its time.
+        ordered_us: when the fault was requested; None if unknown, as for a manual fault.
     """
 
     name: str
@@ -108,14 +109,14 @@ class PlannedFault:
 
 
 class JournalLine(NamedTuple):
-    """Something that happened: a line or decoded frame on a wire, an action, a changed output.
+    """An event: a line or decoded frame on a wire, an action, or a changed output.
 
     Attributes:
         at_us: when, in the time of the bench.
-        source: device or wire, empty where there is one only.
-        mark: as transcripts have it: `>` to the device, `<` from it, `!` an action, `*` an
-            output, `?` an expectation that was missed.
-        text: what, for people; bytes are escaped as in traces.
+        source: device or wire; empty if there is only one.
+        mark: as in transcripts: `>` to the device, `<` from it, `!` an action, `*` an output, `?` a
+            missed expectation.
+        text: the event as readable text; bytes are escaped as in traces.
     """
 
     at_us: int
@@ -129,10 +130,10 @@ class SignalSeries:
     """The samples of a signal.
 
     Attributes:
-        name: of the signal, with its device where there are several: `left_drive/state`.
-        unit: of numbers, empty for plain ones.
-        points: time in the time of the bench, value; times do not run backwards.
-        steps: a value holds until the next one. Words always do.
+        name: of the signal, with its device if there are several: `left_drive/state`.
+        unit: of numbers; empty if they have none.
+        points: pairs of time and value, in the time of the bench; times do not decrease.
+        steps: whether a value holds until the next one; words always do.
     """
 
     name: str
@@ -141,7 +142,7 @@ class SignalSeries:
     steps: bool = True
 
     def __post_init__(self) -> None:
-        """Take booleans as 0 and 1, NaN as unknown; ValueError if times run backwards."""
+        """Convert booleans to 0 and 1, NaN to None; ValueError if times decrease."""
         times = [at_us for at_us, _ in self.points]
         if times != sorted(times):  # it costs a tenth of comparing pair by pair
             before_us, at_us = next(pair for pair in pairwise(times) if pair[1] < pair[0])
@@ -160,28 +161,28 @@ def _plain(value: Value) -> Value:
 
 @dataclass(frozen=True, slots=True)
 class TestRecord:
-    """One test, once.
+    """One run of one test.
 
     Attributes:
-        nodeid: as pytest writes it: `tests/test_stop.py::test_it_stops[fast]`.
+        nodeid: as in pytest: `tests/test_stop.py::test_it_stops[fast]`.
         outcome: how it ended.
         run: number of its environment in the report, from 0.
         mode: `virtual`, `real` or `hardware`; empty if it had no bench.
-        virtual_us: how much time passed on the bench, None without one.
-        wall_us: how long it took.
-        seed: of what was left to chance, None if nothing was.
-        requirements: names of what it shows.
+        virtual_us: time that passed on the bench; None without a bench.
+        wall_us: duration of the test.
+        seed: of random numbers; None if none were used.
+        requirements: names of the requirements that the test shows.
         markers: its other markers.
-        expected: what was waited for or checked last, in a line: the statement that failed.
-        reason: why it failed, is blocked or was skipped, in a line.
-        longrepr: what pytest tells about a failure.
-        command: what repeats it, for a shell.
-        faults: what was ordered.
-        journal: the last that happened, in the order of time.
-        journal_left_out: how many earlier lines are not in `journal`.
-        series: physical values.
-        trace: of the bench, as `tickrig replay` reads it; empty if none was kept.
-        artefacts: names of files that were kept.
+        expected: the statement that failed, in one line: the last wait or check.
+        reason: why it failed, is blocked or was skipped, in one line.
+        longrepr: pytest's text of the failure.
+        command: shell command that repeats the test.
+        faults: requested faults.
+        journal: the last events, in order of time.
+        journal_left_out: number of earlier events that are not in `journal`.
+        series: recorded signals.
+        trace: of the bench, for `tickrig replay`; empty if none was kept.
+        artefacts: names of kept files.
     """
 
     __test__: ClassVar[bool] = False  # pytest: no test class
@@ -213,8 +214,8 @@ class BenchReport:
 
     Attributes:
         title: title of the page.
-        runs: where and how, without duplicates.
-        tests: in the order in which they are shown.
+        runs: where and how the tests ran, without duplicates.
+        tests: in the order of the report.
         requirements: all requirements, including those that no test names; empty if there is no
             list.
     """
@@ -232,13 +233,14 @@ class BenchReport:
 
 
 def merge_reports(reports: Sequence[BenchReport], title: str = "") -> BenchReport:
-    """Return one report of several, such as of the workers of a run, or of runs in three modes.
+    """Return one report of several: workers of a run, or runs in three modes.
 
-    Equal runs become one, and so do requirements; tests stand in the order in which they come.
+    Equal runs are merged into one, and so are equal requirements. Tests keep the order of the
+    reports.
 
     Args:
-        reports: at least one, else the report is empty.
-        title: of the page; that of the first unless given.
+        reports: the reports to merge; without any, the result is empty.
+        title: of the page; by default the title of the first report.
     """
     runs = tuple(dict.fromkeys(run for report in reports for run in report.runs))
     tests = tuple(
@@ -266,11 +268,11 @@ _GROUP: Final = 4
 def thinned(points: Sequence[Point], most: int) -> list[Point]:
     """Return at most `most` samples: the first, the last, and the extremes of every four.
 
-    Of four that include words, the first and the last stay; this is repeated while there are too
-    many samples.
+    If one of the four is a word, only the first and the last are kept. The step is repeated while
+    there are too many samples.
 
     Args:
-        points: in the order of time.
+        points: samples in order of time.
         most: largest number of samples, at least 4.
     """
     if len(points) <= most:

@@ -1,6 +1,6 @@
-r"""What a report says of all tests together: counts, requirements, the slowest.
+r"""Summary of all tests of a report: counts, requirements, the slowest tests.
 
-Read what has to be shown by tests: a text file with a requirement a line.
+Requirements are read from a text file with one requirement per line.
 
 >>> parse_requirements("# Wheelchair\nSAF-12  A pulled bus stops the chair\n", "req.txt")
 (Requirement(name='SAF-12', text='A pulled bus stops the chair'),)
@@ -34,13 +34,13 @@ _NO_ANCHOR: Final = re.compile(r"[\W_]+")
 
 @dataclass(frozen=True, slots=True)
 class ReportedTest:
-    """A test in its place on the page.
+    """A test and its place on the page.
 
     Attributes:
         record: the test.
-        anchor: where it is, the same in each report of these tests.
-        file: what its name begins with.
-        name: the rest of it.
+        anchor: link target on the page, equal in each report of these tests.
+        file: the part of the node ID before the name.
+        name: the rest of the node ID.
     """
 
     record: TestRecord
@@ -50,12 +50,12 @@ class ReportedTest:
 
 
 class OverallVerdict(StrEnum):
-    """What tests say about a requirement.
+    """Verdict of all tests of a requirement.
 
     Attributes:
-        FAILED: a test failed, or could not be run to its end.
-        NOT_SHOWN: none failed, and none passed.
-        SHOWN: at least one passed, and none failed.
+        FAILED: at least one test failed or could not be completed.
+        NOT_SHOWN: no test failed, and no test passed.
+        SHOWN: at least one test passed, and no test failed.
     """
 
     FAILED = "failed"
@@ -69,8 +69,8 @@ class _RequirementRow:
 
     Attributes:
         name: of the requirement.
-        text: what it demands.
-        tests: those that name it.
+        text: the requirement as readable text.
+        tests: the tests that name the requirement.
         listed: whether it is in the list of requirements, or there is no list.
     """
 
@@ -86,7 +86,7 @@ class _RequirementRow:
 
     @property
     def verdict(self) -> OverallVerdict:
-        """What its tests say; a blocked one says nothing."""
+        """Verdict of all its tests; blocked tests are not counted."""
         outcomes = {test.record.outcome for test in self.tests}
         if outcomes & {Outcome.FAILED, Outcome.ERROR}:
             return OverallVerdict.FAILED
@@ -109,7 +109,7 @@ def reported(tests: Iterable[TestRecord]) -> tuple[ReportedTest, ...]:
 
 
 def by_file(tests: Sequence[ReportedTest]) -> list[tuple[str, list[ReportedTest]]]:
-    """Return the tests of each file, as they first come; those of equal names stand together."""
+    """Return the tests grouped by file, in order of first appearance; equal names stay together."""
     files: dict[str, int] = {}
     names: dict[str, int] = {}
     for number, test in enumerate(tests):
@@ -161,7 +161,7 @@ def read_requirements(path: Path) -> tuple[Requirement, ...]:
 
     Raises:
         OSError: it cannot be read.
-        ValueError: all that is wrong with it, a line each.
+        ValueError: all errors in the file, one per line.
     """
     try:
         return parse_requirements(path.read_text("utf-8"), str(path))
@@ -173,12 +173,12 @@ def parse_requirements(text: str, file: str) -> tuple[Requirement, ...]:
     """Return the requirements of a text.
 
     Args:
-        text: in each line the name, as the marker `req` has it, and after blanks what it demands;
-            a line that begins with `#` is a comment.
-        file: where it stands, for people.
+        text: a requirement per line: the name, as in the marker `req`, then blanks, then its text.
+            A line that begins with `#` is a comment.
+        file: name of the file, for messages.
 
     Raises:
-        ValueError: a name stands twice, or there is none at all.
+        ValueError: a name occurs twice, or there are no requirements.
     """
     found: dict[str, Requirement] = {}
     lines: dict[str, int] = {}

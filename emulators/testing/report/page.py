@@ -20,7 +20,7 @@ from tickrig.host.text.values import counted
 # Which parts of which tests have room on a page: a browser has to open it in a few seconds.
 
 _PAGE_BYTES: Final = 16_000_000
-"""For what tests bring; what stands around it comes on top."""
+"""Space for the data of tests, in bytes; the rest of the page is additional."""
 
 _JOURNAL_LINES: Final = 200
 _LINE_CHARACTERS: Final = 2_000
@@ -42,15 +42,15 @@ class _PagePart(Enum):
 
 @dataclass(slots=True)
 class _PageRoom:
-    """Gives room to what matters most: of each part, first that of failed tests.
+    """Divides the space on the page: in each kind of part, failed tests come first.
 
     Args:
         tests: all tests.
-        timelines: theirs.
-        room_bytes: how much there is.
+        timelines: the time lines of these tests.
+        room_bytes: the available space.
 
     Attributes:
-        admitted: number of the test and part, of all that have room.
+        admitted: number of the test and part, for each part that fits.
     """
 
     tests: Sequence[bench_report.TestRecord]
@@ -107,17 +107,17 @@ _MOST_OPEN: Final = 12
 
 @dataclass(frozen=True, slots=True)
 class _TestOnPage:
-    """A test with the parts of it that have room on the page.
+    """A test with those of its parts that fit on the page.
 
     Attributes:
         place: the test, its anchor and name.
-        timeline: its time line, None if there is none, or no room.
-        longrepr: the text of pytest.
+        timeline: its time line; None if there is none, or if it does not fit.
+        longrepr: pytest's text of the failure.
         journal: its last lines.
         journal_left_out: number of earlier lines.
         trace: its trace.
-        left_out: what is not on the page, in words.
-        opened: whether it is unfolded when the page opens.
+        left_out: the parts that are not on the page, in words.
+        opened: whether the test is expanded when the page opens.
     """
 
     place: overview.ReportedTest
@@ -134,8 +134,8 @@ def html_page(report: bench_report.BenchReport, room_bytes: int = _PAGE_BYTES) -
     """Return the page.
 
     Args:
-        report: what is shown.
-        room_bytes: how much tests may bring to the page; what has no room is named on it.
+        report: the report to show.
+        room_bytes: space for the data of tests; the page lists the data that do not fit.
     """
     places = overview.reported(report.tests)
     unwell = [place for place in places if place.record.outcome in overview.UNWELL]
@@ -153,7 +153,7 @@ def html_page(report: bench_report.BenchReport, room_bytes: int = _PAGE_BYTES) -
 
 @cache
 def _template(page: str = "page.html") -> PageTemplate:
-    """Return a template; it is compiled once."""
+    """Return a template; each template is compiled once."""
     return PageTemplate(__package__, {"Outcome": bench_report.Outcome}, script="page.js", page=page)
 
 
@@ -166,7 +166,7 @@ _PATH_POINTS: Final = 4_000
 
 @dataclass(frozen=True, slots=True)
 class PagePath:
-    """A path: one signal over another.
+    """A path: one signal drawn over another.
 
     Attributes:
         x: name and unit.
@@ -180,7 +180,7 @@ class PagePath:
 
     @property
     def texts(self) -> list[str]:
-        """What is drawn: each name with its least and greatest value and its unit."""
+        """Labels of both axes: name, least and greatest value, unit."""
         return [
             f"{name} {min(column):.6g} to {max(column):.6g} {unit}".rstrip()
             for (name, unit), column in zip((self.x, self.y), self._columns, strict=True)
@@ -192,7 +192,7 @@ class PagePath:
 
     @property
     def drawn(self) -> tuple[float, float, str]:
-        """Width and height of the picture, and its path; one scale if both have one unit."""
+        """Width and height of the picture, and its path; equal units have one scale."""
         (left, right), (low, high) = (widened(min(c), max(c)) for c in self._columns)
         x_scale, y_scale = _PATH_SIZE / (right - left), _PATH_SIZE / (high - low)
         if self.x[1] == self.y[1]:
@@ -213,10 +213,10 @@ def run_page(
     """Return the page of one run.
 
     Args:
-        record: what happened; `nodeid` is the title, `reason` how it went.
-        run: where and how it ran.
+        record: the run; `nodeid` is the title, `reason` the result.
+        run: where and how the run was executed.
         wires: name, place, rate and devices of each wire.
-        paths: signals that are drawn over each other.
+        paths: pairs of signals, one drawn over the other.
     """
     (place,) = overview.reported([record])
     (shown,) = _on_page([place], _PAGE_BYTES)

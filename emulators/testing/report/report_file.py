@@ -1,6 +1,6 @@
-"""Reports in files: the page, and the JSON that it can be made of later.
+"""Reports in files: the page, and the JSON from which the page can be made later.
 
-Reports as JSON: what workers hand over, and what several runs are merged from.
+Workers pass their reports as JSON, and reports of several runs are merged from JSON.
 
 >>> from tickrig.emulators.testing.report.bench_report import Outcome, TestRecord
 >>> data = to_data(TestRecord("test_a.py::test_a", Outcome.PASSED, virtual_us=1_000))
@@ -33,7 +33,7 @@ else:
 _VERSION_KEY: Final = "tickrig-report"
 
 _MOST: Final = 2**63 - 1
-"""Of whole numbers: of times in microseconds 292,000 years."""
+"""Limit of integers: as times in microseconds, 292,000 years."""
 
 _MOST_SHARED: Final = 50_000
 """So many values of a column are remembered before the memory of them is emptied."""
@@ -53,7 +53,7 @@ _NAMES: Final[Mapping[type, str]] = {
 
 
 class ReportError(ValueError):
-    """JSON that is no report of this version; the text says where and what."""
+    """JSON that is not a report of this version; the message has the place and the error."""
 
 
 def to_data(value: Any) -> Any:  # what a value holds is open
@@ -62,14 +62,14 @@ def to_data(value: Any) -> Any:  # what a value holds is open
 
 
 def from_data(kind: type[_T], data: object) -> _T:
-    """Make a value of a report out of what `to_data` gave.
+    """Return the report value from the result of `to_data`.
 
     Args:
         kind: `BenchReport`, `TestRecord`, ...
         data: dicts, lists, texts and numbers.
 
     Raises:
-        ReportError: a key or value that it cannot have.
+        ReportError: an invalid key or value.
     """
     hint: Any = kind
     value: _T = _reader(hint)(data)
@@ -77,7 +77,7 @@ def from_data(kind: type[_T], data: object) -> _T:
 
 
 _VERSION: Final = 1
-"""Of the JSON form; it changes when a field changes its meaning or goes."""
+"""Version of the JSON form; it changes when a field is removed or gets another meaning."""
 
 
 def to_json(report: BenchReport) -> str:
@@ -94,7 +94,7 @@ def from_json(text: str) -> BenchReport:
     """Read a report.
 
     Raises:
-        ReportError: no JSON, no report, a report of another version, or a wrong value.
+        ReportError: not JSON, not a report, a report of another version, or an invalid value.
     """
     return _read(StringIO(text))
 
@@ -120,7 +120,7 @@ _PIECE: Final = 1 << 20
 
 
 class _Scanner:
-    """Reads values and punctuation of JSON, of which only a piece is in memory.
+    """Reads values and punctuation of JSON; only a part of the file is in memory.
 
     Args:
         file: the JSON, without blanks between values.
@@ -160,7 +160,7 @@ class _Scanner:
                 return found
 
     def _read_on(self) -> bool:
-        """Read a piece more, as much as is there already at least; False at the end."""
+        """Read more of the file, at least as much as is in memory; return False at the end."""
         self._text, self._at = self._text[self._at :], 0
         more = self._file.read(max(_PIECE, len(self._text)))
         self._text += more
@@ -168,12 +168,12 @@ class _Scanner:
 
 
 def _written_by_us(json_: _Scanner) -> BenchReport | None:
-    """Read a report test by test, so that the JSON of each is gone before that of the next.
+    """Read a report test by test; the JSON of a test is released before the next one is read.
 
-    It saves half of the time and three quarters of the memory.
+    This takes half of the time and a quarter of the memory of reading the report at once.
 
     Returns:
-        The report; None where it is not as `to_json` writes it.
+        The report; None if its form differs from the output of `to_json`.
     """
     data, read, tests = dict[str, Any](), _reader(TestRecord), list[TestRecord]()
     opening = "{"
@@ -246,15 +246,15 @@ def _allowed(kinds: tuple[type, ...]) -> frozenset[type]:
 
 
 def _rows_reader(hint: Any, each: _Reader) -> _Reader:
-    """Return what reads many tuples of plain values: a column of all of them at a time.
+    """Return a function that reads many tuples of plain values, column by column.
 
-    It takes a tenth of the time of reading value by value. Values that come again, in this list
-    or in one of the next, are kept once: times and samples of tests are alike, and without it
-    ten thousand tests take twice the memory.
+    It takes a tenth of the time of reading value by value. Equal values in this list or a later one
+    are stored once, because times and samples of tests are similar. Without this, ten thousand
+    tests take twice the memory.
 
     Args:
         hint: the type of a tuple.
-        each: reads one, and says what is wrong in it.
+        each: reads a single tuple, and explains an error in it.
     """
     allowed = [_allowed(get_args(member) or (member,)) for member in _members(hint)]
     make: Any = tuple if get_origin(hint) is tuple else partial(tuple.__new__, hint)
@@ -374,11 +374,11 @@ _JSON: Final = ".json"
 
 
 def check_report(path: Path) -> None:
-    """See before a run whether its report could be written after it.
+    """Check before a run that its report can be written after it.
 
     Raises:
-        ValueError: Jinja2 is not there, the folder is not, or nothing can be written to it; or
-            the name is that of a folder, or of a kind of file that no report is.
+        ValueError: Jinja2 or the folder is missing; the folder is not writable; or the name is that
+            of a folder, or has a suffix that reports do not have.
     """
     if path.suffix.lower() not in (*_PAGES, _JSON) and not is_special(path):
         raise ValueError(f"report {path}: it is a page, as report.html, or JSON, as report.json")
@@ -388,13 +388,13 @@ def check_report(path: Path) -> None:
 
 
 def write_report(report: BenchReport, path: Path) -> None:
-    """Write the page of a report; JSON, as `write_run`, if the name ends in `.json`.
+    """Write the page of a report; if the name ends in `.json`, write JSON as `write_run` does.
 
-    A file of this name is replaced when the new one is whole, else it stays as it is.
+    An existing file of this name is replaced only after the new one is complete.
 
     Raises:
         OSError: the file cannot be written; its `filename` is `path`.
-        ImportError: Jinja2 (extra `report`) is not there.
+        ImportError: Jinja2 is not installed (extra `report`).
     """
     if path.suffix.lower() == _JSON:
         write_run(report, path)
@@ -403,7 +403,7 @@ def write_report(report: BenchReport, path: Path) -> None:
 
 
 def write_run(report: BenchReport, path: Path) -> None:
-    """Write a report as JSON, whole or not at all.
+    """Write a report as JSON atomically.
 
     Raises:
         OSError: the file cannot be written; its `filename` is `path`.
@@ -416,7 +416,7 @@ def read_run(path: Path) -> BenchReport:
 
     Raises:
         OSError: the file cannot be read.
-        ValueError: it is no report; the text says where and what.
+        ValueError: not a report; the message has the place and the error.
     """
     try:
         with path.open(encoding="utf-8") as file:

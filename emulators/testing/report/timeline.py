@@ -1,4 +1,4 @@
-"""What happened in a test on one axis of time: faults, actions, physical values."""
+"""Events of a test on one time axis: faults, actions, physical values."""
 
 from __future__ import annotations
 
@@ -21,35 +21,35 @@ _WIDE: Final = 25
 
 
 class TimeAxis(NamedTuple):
-    """The span of time that is shown.
+    """The displayed span of time.
 
     Attributes:
         from_us: its beginning,
-        to_us: its end, later.
+        to_us: its end, later than the beginning.
     """
 
     from_us: int
     to_us: int
 
     def part(self, at_us: int) -> float:
-        """Return where a time is, in per cent from the left; what is outside is at the edge."""
+        """Return the place of a time, in per cent from the left; times outside are at the edge."""
         part = (at_us - self.from_us) * 100 / (self.to_us - self.from_us)
         return round(min(max(part, 0), 100), 2)
 
     @property
     def ticks(self) -> list[tuple[float, str]]:
-        """Round times: where, and what is written there, in seconds."""
+        """Round times: the place of each, and its label in seconds."""
         marks = ticks(self.from_us / 1e6, self.to_us / 1e6, 5)
         return [(self.part(round(second * 1e6)), text) for second, text in marks]
 
 
 class TimeSpan(NamedTuple):
-    """Something that lasted.
+    """An event with a duration.
 
     Attributes:
-        left: where it begins, in per cent.
+        left: its beginning, in per cent.
         width: in per cent.
-        text: what it was.
+        text: description of the event.
     """
 
     left: float
@@ -58,7 +58,7 @@ class TimeSpan(NamedTuple):
 
     @property
     def place(self) -> str:
-        """Where its text has room: `inside`, `behind` or `before`."""
+        """Place with room for its text: `inside`, `behind` or `before`."""
         if self.width >= _WIDE:
             return "inside"
         return "behind" if self.left + self.width <= 100 - _WIDE else "before"
@@ -69,7 +69,7 @@ class TimeSpan(NamedTuple):
 _WIDTH: Final = 1000
 _HEIGHT: Final = 100
 _MOST_POINTS: Final = 800
-"""Of a curve; more cannot be seen."""
+"""Number of points of a curve; more are not visible."""
 _MOST_WORDS: Final = 200
 _WORD_CHARACTERS: Final = 80
 CURVE_PX: Final = 64
@@ -85,13 +85,13 @@ class Lane:
     Attributes:
         name: of the signal.
         unit: of its numbers.
-        path: its curve, empty for words.
-        words: its values, if they are words, or its only number.
+        path: its curve; empty for words.
+        words: its values if they are words, or its only number.
         low: its least number,
         high: its greatest one.
         scale: the numbers at the lower and the upper edge of the field.
-        zero: how far from the top zero is, in per cent; None if it is at an edge or outside.
-        rows: what a table tells: first, least, greatest and last value, number of samples.
+        zero: distance of zero from the top, in per cent; None if zero is at an edge or outside.
+        rows: values for a table: first, least, greatest and last value, number of samples.
     """
 
     name: str
@@ -111,7 +111,7 @@ class Lane:
 
     @property
     def height(self) -> int:
-        """How high its picture is, in pixels; switches need little."""
+        """Height of its picture in pixels; switches need little."""
         return SWITCH_PX if self.scale == _SWITCH else CURVE_PX
 
 
@@ -187,7 +187,7 @@ def _path(
 
 
 def _height(value: float, scale: tuple[float, float]) -> float:
-    """Return how far a value is from the top; halves, for their difference is never infinite."""
+    """Return the distance of a value from the top; halved values avoid an infinite difference."""
     low, high = scale
     return (high / 2 - value / 2) / (high / 2 - low / 2) * _HEIGHT
 
@@ -201,12 +201,12 @@ _MISS: Final = "?"
 
 
 class _TimelineEvent(NamedTuple):
-    """Something at a moment.
+    """An event without a duration.
 
     Attributes:
-        left: where, in per cent.
-        text: what it was.
-        missed: it was an expectation that was missed.
+        left: its place, in per cent.
+        text: description of the event.
+        missed: whether it is a missed expectation.
     """
 
     left: float
@@ -216,14 +216,14 @@ class _TimelineEvent(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Timeline:
-    """Everything of a test that has a time.
+    """Everything in a test that has a time.
 
     Attributes:
-        axis: the span of time.
-        faults: those that came.
-        events: actions, and expectations that were missed.
+        axis: the displayed span of time.
+        faults: the faults that occurred.
+        events: actions, and missed expectations.
         lanes: the signals.
-        left_out: what is not drawn, for people.
+        left_out: description of what is not drawn.
     """
 
     axis: TimeAxis

@@ -70,12 +70,12 @@ class _SignalScope:
         self.signals, self.devices = signals, devices
 
     def find(self, name: str, owner: str) -> str | _DeviceSignal | None:
-        """Return what a name means: the name of a signal, something of a device, or None.
+        """Return the object behind a name: the name of a signal, a signal of a device, or None.
 
         Args:
-            name: as a formula has it: a signal's, one of the owner's device, `DEVICE.NAME`,
-                or in quotes `DEVICE/NAME`.
-            owner: the signal that the formula is of.
+            name: as in a formula: of a signal, of an input or output of the owner's device,
+                `DEVICE.NAME`, or in quotes `DEVICE/NAME`.
+            owner: the signal with the formula.
         """
         own, slash, _ = owner.partition(SLASH)
         full = name if SLASH in name else name.replace(".", SLASH, 1)
@@ -103,7 +103,7 @@ class _SignalScope:
                     yield found
 
     def ordered(self) -> list[str]:
-        """Return all signals, each behind those that it needs; ValueError if there is none."""
+        """Return all signals, each after those that it needs; ValueError if that is impossible."""
         order: dict[str, None] = {}
         for key in self.signals:
             self._enter(key, (), order)
@@ -123,13 +123,13 @@ class _SignalScope:
 
 
 class _Order(ValueError):  # noqa: N818 - reported as a mistake
-    """Why there is no order: the reason, and the signal."""
+    """An error in the order of signals: the reason, and the signal."""
 
 
 def check_signals(
     signals: Mapping[str, SignalSpec], devices: Mapping[str, HasSignals]
 ) -> list[SignalMistake]:
-    """Find what is wrong with signals on a bench: unknown names, values out of range, circles.
+    """Check the signals of a bench: unknown names, values out of range, circular references.
 
     Args:
         signals: by name; `DEVICE/INPUT` drives that input, any other name is for formulas.
@@ -241,15 +241,15 @@ def _check_target(scope: _SignalScope, key: str) -> Iterator[SignalMistake]:
 
 
 class _RunningSignal(Copyable):
-    """A signal that runs.
+    """A signal while the bench runs.
 
     Args:
-        spec: what it is.
+        spec: its specification.
 
     Attributes:
-        setting: its value; nan where there is none.
-        due_us: the earliest time at which it may have another by itself.
-        terms: what the names of its formula mean.
+        setting: its value; nan if it has none.
+        due_us: the earliest time of another value, if no other signal changes.
+        terms: the object behind each name in its formula.
     """
 
     __slots__ = ("due_us", "setting", "spec", "terms")
@@ -266,7 +266,7 @@ class _RunningSignal(Copyable):
 
     @abstractmethod
     def update(self, now_us: int) -> None:
-        """Take the value of now; all that it is computed of has done so before."""
+        """Take the present value; the signals in its formula have been updated before."""
 
     def evaluate(self, formula: Formula, now_us: int) -> float:
         """Return the value of its formula."""
@@ -320,7 +320,7 @@ class _FormulaNode(_RunningSignal):
 
 
 class _FilterNode(_RunningSignal):
-    """A signal with a memory: it moves each `every_us`, as what moves it was before."""
+    """A signal with a memory: it moves each `every_us`, from the previous value of its formula."""
 
     __slots__ = ("_gain", "_input", "_moves", "_state", "filter")
 
@@ -363,12 +363,12 @@ class _FilterNode(_RunningSignal):
 
 
 def _node_of(name: str, spec: SignalSpec, seed: int) -> _RunningSignal:
-    """Return a signal that runs.
+    """Return a signal for a running bench.
 
     Args:
-        name: of the signal: noise of another name is independent.
-        spec: what it is.
-        seed: of its noise, unless it has one of its own.
+        name: of the signal; signals with different names have independent noise.
+        spec: its specification.
+        seed: of its noise, if the specification has none.
     """
     source = spec.source
     if isinstance(source, Formula):
@@ -386,26 +386,27 @@ _NO_DEVICE_US: Final = 1_000_000
 
 
 class SignalDriver(Copyable):
-    """Sets inputs of devices to the values of their signals, when these change.
+    """Sets inputs of devices to the values of their signals when these change.
 
-    At a time an input has the value that its signal had at the last tick up to then; a device
-    sees it at its next tick, as it sees what a body does. Where an input takes whole numbers
-    it has the nearest one, and it stays in its range. A value that is no number, as 0/0, leaves
-    an input as it is. What is set by hand holds until the signal changes, or for good after
-    `release`.
+    An input gets the value that its signal had at the last tick up to now. A device sees the value
+    at its next tick, as it sees the changes made by a body. An input for whole numbers gets the
+    nearest whole number. Values are limited to the range of the input. A value that is not a
+    number, such as 0/0, leaves the input unchanged. A value set by hand holds until the signal
+    changes, or permanently after `release`.
 
     Args:
         signals: by name; `DEVICE/INPUT` drives that input, any other name is for formulas.
         devices: by name.
-        seed: of noise that has none of its own.
+        seed: of noise without a seed of its own.
 
     Raises:
-        ValueError: what `check_signals` finds.
+        ValueError: the mistakes found by `check_signals`.
 
     Attributes:
-        tick_us: it acts at multiples of this, at which every tick of a device is.
-        due_us: when a signal changes next by itself.
-        problems: what a signal could not do, by its name, the first time that it happened.
+        tick_us: the signals act at multiples of this period; every tick of a device is at such a
+            multiple.
+        due_us: time of the next change of a signal.
+        problems: by the name of the signal, what the signal could not do when that first happened.
     """
 
     def __init__(
@@ -468,7 +469,7 @@ class SignalDriver(Copyable):
         return tuple(self._nodes)
 
     def release(self, name: str) -> None:
-        """Let an input be driven by hand from now on; one that no signal drives is no error."""
+        """Let an input be driven by hand from now on; no effect if no signal drives it."""
         self._targets.pop(name, None)
 
 
@@ -482,7 +483,7 @@ class _Target(Copyable):
         self._value: Setting | None = None
 
     def take(self, value: Setting) -> str:
-        """Set the input to a value, if it is another; return why it stays as it is."""
+        """Set the input to a value if it differs; return the reason if it stays unchanged."""
         if not isinstance(value, str):
             value = min(max(value, self._item.low), self._item.high)
             if not isfinite(value):

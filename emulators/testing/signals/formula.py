@@ -62,10 +62,10 @@ class Formula(Immutable):
     """A formula.
 
     Attributes:
-        text: as it was written.
-        term: what it says.
+        text: the formula as written.
+        term: the parsed formula.
         names: the signals in it, in order, without `t`.
-        timed: whether `t` is in it.
+        timed: whether it contains `t`.
     """
 
     text: str
@@ -74,7 +74,7 @@ class Formula(Immutable):
     timed: bool
 
     def value(self, values: Mapping[str, float]) -> float:
-        """Return its value; as floats of IEEE 754 have it where it has none (`nan`, `inf`).
+        """Return its value; `nan` or `inf` as in IEEE 754 if it has no finite value.
 
         Args:
             values: of its names, and of `t` in seconds.
@@ -137,7 +137,7 @@ _FUNCTIONS: Final[dict[str, tuple[Callable[..., float], int, int]]] = {
     "not": (lambda x: float(not x), 1, 1),
     "if": (lambda condition, x, y: x if condition else y, 3, 3),
 }
-"""What can be computed; how many numbers it takes at least and at most."""
+"""The functions, with the least and the greatest number of their arguments."""
 
 
 _LONGEST: Final = 2_000
@@ -170,7 +170,7 @@ def parse_formula(text: str) -> Formula:
     """Read a formula.
 
     Raises:
-        ValueError: it is none, it is too long, or something in it is not known here.
+        ValueError: not a formula, too long, or with an unknown name or function.
     """
     if len(text) > _LONGEST:
         raise ValueError(f"a formula of {len(text)} characters; at most {_LONGEST} are taken")

@@ -69,10 +69,11 @@ class RampSource(Immutable):
     """A straight line from one value to another.
 
     Attributes:
-        first: the value at 0,
-        last: and at the end.
-        over_us: how long it takes.
-        repeat: whether it jumps back and begins again, as a saw-tooth; else it stays.
+        first: the value at time 0.
+        last: the value at the end.
+        over_us: duration of the change.
+        repeat: whether it starts again at the first value, as a saw-tooth; if not, it stays at the
+            last value.
     """
 
     first: float
@@ -108,16 +109,16 @@ SHAPES: Final[dict[str, Callable[[float], float]]] = {
 
 @dataclass(frozen=True, slots=True)
 class Wave(Immutable):
-    """A value that goes to and fro between two.
+    """A periodic value between two limits.
 
     Attributes:
-        shape: `sine` begins in the middle and goes to the second; `triangle` and `square`
-            begin at the first.
-        first: one end,
-        second: the other.
-        period_us: how long one to and fro takes.
-        phase_us: by how much of a period it is ahead.
-        duty: which part of a period a square has the second value.
+        shape: `sine` begins in the middle and moves to the second limit; `triangle` and `square`
+            begin at the first limit.
+        first: the first limit.
+        second: the second limit.
+        period_us: duration of a period.
+        phase_us: time by which the wave is ahead.
+        duty: part of a period in which a square has the second value.
     """
 
     shape: str
@@ -154,7 +155,7 @@ class Wave(Immutable):
 
 @dataclass(frozen=True, slots=True)
 class Noise(Immutable):
-    """Random values, drawn again each `every_us`: the value of a time is always the same.
+    """Random values, drawn each `every_us`; the value at a given time is always the same.
 
     Attributes:
         first: the mean of gaussian noise; the smallest value of uniform noise.
@@ -195,13 +196,15 @@ class Noise(Immutable):
 
 @dataclass(frozen=True, slots=True)
 class ValueTable(Immutable):
-    """Values at times: the first holds before its time, the last behind its own.
+    """Values at times.
+
+    The first value also holds before its time, the last one also after its time.
 
     Attributes:
-        times_us: when, none earlier than the one before it; two at one time are a jump.
-        values: as many.
-        linear: a straight line from one to the next; else each holds until the next.
-        repeat: whether it begins again at the time of the last.
+        times_us: times in ascending order; two equal times are a jump.
+        values: the value at each time.
+        linear: whether to interpolate linearly; if not, each value holds until the next time.
+        repeat: whether the table starts again from 0 at its last time.
     """
 
     times_us: tuple[int, ...]
@@ -249,12 +252,12 @@ _SETTLED: Final = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class Lag(Immutable):
-    """A value that follows another: after `tau` it has gone 63 % of the way (first order).
+    """A value that follows another: it covers 63 % of the distance in `tau_us` (first order).
 
     Attributes:
-        formula: what it follows.
+        formula: the value that it follows.
         tau_us: its time constant.
-        start: where it begins; None where the other begins.
+        start: its first value; None for the first value of the formula.
     """
 
     formula: Formula
@@ -274,11 +277,11 @@ class Lag(Immutable):
 
 @dataclass(frozen=True, slots=True)
 class Integral(Immutable):
-    """The sum of another value over time, in its unit times seconds.
+    """The integral of another value over time, in its unit times seconds.
 
     Attributes:
-        formula: what is summed up.
-        start: where it begins.
+        formula: the value to integrate.
+        start: its first value.
     """
 
     formula: Formula
@@ -298,12 +301,12 @@ class SignalSpec(Immutable):
     """A signal.
 
     Attributes:
-        source: where its values come from.
-        from_us: when a source of time begins; it stands still until then.
-        every_us: how long a value is held; 0 takes a new one at each tick of the rig.
-        low: the least value,
-        high: and the greatest.
-        step: values are multiples of this; 0 leaves them as they are.
+        source: the source of its values.
+        from_us: start time of a source that depends on time; before it, the source stands still.
+        every_us: how long a value is held; with 0 there is a new value at each tick of the rig.
+        low: the least value.
+        high: the greatest value.
+        step: values are rounded to multiples of this; 0 means no rounding.
     """
 
     source: SignalSource | Formula | Lag | Integral
@@ -323,7 +326,7 @@ class SignalSpec(Immutable):
 
 
 def _rounded(value: float, step: float) -> float:
-    """Return the nearest multiple, as it is written: 0.3, not 0.30000000000000004."""
+    """Return the nearest multiple as a short decimal: 0.3, not 0.30000000000000004."""
     whole = round(1 / step)
     if whole and 1 / whole == step:
         return round(value * whole) / whole
@@ -337,11 +340,11 @@ Keys = tuple[str | int, ...]
 
 
 class SignalMistake(NamedTuple):
-    """One mistake.
+    """A mistake in a signal.
 
     Attributes:
-        keys: where it is.
-        reason: what came, and what was allowed.
+        keys: its place in the file.
+        reason: what was found, and what is allowed.
 
     >>> print(SignalMistake(("signal", "load", "over"), "it is missing"))
     signal.load.over: it is missing
@@ -412,14 +415,14 @@ def spread(value: object) -> float | tuple[float, float]:
 
 
 def time(value: object) -> int:
-    """Take a time from 0 on; return microseconds."""
+    """Convert a time of at least 0 to microseconds."""
     if not isinstance(value, str):
         raise ValueError(f'it takes a time with its unit, as "1.5s" or "20ms", not {value!r:.60}')
     return parse_time_us(value)
 
 
 def some_time(value: object) -> int:
-    """Take a time that is not too short; return microseconds."""
+    """Convert a time to microseconds; ValueError if it is too short."""
     if (found := time(value)) < _LEAST_US:
         raise ValueError(f'it takes a time from "{_LEAST_US}us" on, not {value!r:.60}')
     return found

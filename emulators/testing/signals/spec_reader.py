@@ -30,7 +30,7 @@ _Fields = Mapping[str, Any]
 """The values of a table's keys, each as its reader has left it."""
 
 _Reader = Callable[[object], object]
-"""Takes what TOML gives, and returns a field; ValueError with what was allowed."""
+"""Converts a TOML value to a field; ValueError with what is allowed."""
 
 _COMMON: Final[Mapping[str, _Reader]] = {
     "every": sources.some_time,
@@ -43,13 +43,13 @@ _FROM: Final[Mapping[str, _Reader]] = {"from": sources.time, **_COMMON}
 
 @dataclass(frozen=True, slots=True)
 class _Form:
-    """A table that a signal can be.
+    """A form of a signal as a table.
 
     Attributes:
-        keys: those that it can have, the one that names it first.
-        build: makes the source of its fields; ValueError if they do not fit each other.
-        needed: those that it must have.
-        every_us: how long a value is held unless `every` says so.
+        keys: possible keys; the first one identifies the form.
+        build: makes the source from its fields; ValueError if they do not match.
+        needed: required keys.
+        every_us: how long a value is held, if there is no key `every`.
     """
 
     keys: Mapping[str, _Reader]
@@ -134,14 +134,14 @@ FORMS: Final[Mapping[str, _Form]] = {
 def read_signal_spec(
     value: object, keys: sources.Keys = (), folder: Path | None = None
 ) -> sources.SignalSpec | list[sources.SignalMistake]:
-    """Read what TOML gives for a value that may change by itself.
+    """Read the TOML value of a signal.
 
-    Whether the signals that a formula names are there is judged by `check_signals`.
+    `check_signals` checks whether the signals named in a formula exist.
 
     Args:
         value: a number, true or false, a text, or a table (docs/reference/bench/signals.md).
-        keys: where it stands, for mistakes.
-        folder: where files of tables are looked for; unless given, the working directory.
+        keys: place of the value in the file, for mistakes.
+        folder: folder of the files of tables; by default the working directory.
 
     Returns:
         The signal, or all mistakes in it.
@@ -187,7 +187,7 @@ def _read(
 def _read_fields(
     name: str, table: _Fields, keys: sources.Keys, fields: dict[str, Any]
 ) -> Iterator[sources.SignalMistake]:
-    """Enter the fields; yield the mistakes in them."""
+    """Store the fields; yield the mistakes in them."""
     known = FORMS[name].keys
     for key, value in table.items():
         if key not in known:
@@ -201,7 +201,7 @@ def _read_fields(
 
 
 def _limits(fields: _Fields) -> dict[str, float]:
-    """Return the limits and the quantisation; ValueError if nothing is between the limits."""
+    """Return the limits and the quantisation; ValueError if no value is between the limits."""
     named = {"min": "low", "max": "high", "step": "step"}
     limits = {named[key]: float(fields[key]) for key in named if key in fields}
     if limits.get("low", -inf) > limits.get("high", inf):

@@ -39,20 +39,21 @@ _MOST: Final = 1_000_000
 """So many values may be in a file."""
 
 _UNITS: Final = {"_us": 1, "_ms": 1_000, "_s": 1_000_000}
-"""Ends of the name of a column with times, and their unit in microseconds; seconds otherwise."""
+"""Endings of the name of a column with times, and their unit in microseconds; other columns are in
+seconds."""
 
 _TRACE: Final = ".trace"
 
 
 def _seconds_us(value: float, unit_us: int) -> int:
-    """Return a time of 0 or later in microseconds; ValueError if it is none."""
+    """Convert a time of at least 0 to microseconds; ValueError if it is not a time."""
     if not 0 <= value * unit_us < 1e18:
         raise ValueError(f"{value:g} is no time from 0 on")
     return round(value * unit_us)
 
 
 def _usual_interpolation(path: Path) -> str:
-    """Return how a file is read between its points: a trace says when an input changed."""
+    """Return the default interpolation of a file; values of a trace hold until the next change."""
     return "hold" if path.suffix == _TRACE else "linear"
 
 
@@ -60,11 +61,11 @@ def read_points(path: Path, column: str | None) -> _Points:
     """Read a column of a file.
 
     Args:
-        path: a CSV file, a trace, or a CAN log; its suffix tells which.
-        column: a column of the CSV file, an input of the trace, bits of a frame.
+        path: a CSV file, a trace, or a CAN log; the suffix selects the format.
+        column: a column of the CSV file, an input of the trace, or bits of a frame.
 
     Raises:
-        ValueError: the file cannot be read, or it has no such column, or no value in it.
+        ValueError: the file cannot be read, has no such column, or has no value in this column.
     """
     try:
         points = _READERS.get(path.suffix.lower(), _read_log)(path, column)
@@ -80,7 +81,7 @@ def read_points(path: Path, column: str | None) -> _Points:
 
 
 def _read_trace(path: Path, column: str | None) -> _Points:
-    """Return the changes of an input in a trace; it has no value before the first of them."""
+    """Return the changes of an input in a trace; the input has no value before the first change."""
     if column is None:
         raise ValueError("column is missing: the name of an input")
     records = read_bench_recording(path.read_bytes()).records
@@ -166,7 +167,7 @@ def _point(line: int, row: list[str], place: int, unit_us: int) -> tuple[int, fl
 
 
 def _place(head: list[str], column: str | None) -> int:
-    """Return which column it is; there may be no need to name it."""
+    """Return the index of the column; a name is not always needed."""
     if column is None and len(head) == 2:
         return 1
     if column in head[1:]:
@@ -189,22 +190,22 @@ _READERS: Final[Mapping[str, Callable[[Path, str | None], _Points]]] = {
     ".csv": _read_csv,
     _TRACE: _read_trace,
 }
-"""What reads a file, by its suffix; CAN logs have many."""
+"""Readers of files by suffix; CAN logs have several suffixes."""
 
 
 _INTERPOLATIONS: Final = ("linear", "hold")
 
 
 def read_table(folder: Path, fields: Mapping[str, Any]) -> ValueTable:
-    """Return the table that fields of a signal describe.
+    """Return the table from the fields of a signal.
 
     Args:
-        folder: where files are looked for.
-        fields: `table`, which is a list of points or the name of a file, and perhaps
-            `column`, `interpolation`, `repeat`.
+        folder: folder of the files.
+        fields: `table`, which is a list of points or the name of a file; optional are `column`,
+            `interpolation` and `repeat`.
 
     Raises:
-        ValueError: something in it is wrong; for a file with its name, and the line.
+        ValueError: an invalid field; for a file, the message has its name and the line.
     """
     given, column = fields["table"], fields.get("column")
     way = fields.get("interpolation")
@@ -241,7 +242,7 @@ def _inline(given: object) -> _Points:
 
 
 def _point_us(value: object) -> int:
-    """Return the time of a point: text, or a number of seconds."""
+    """Return the time of a point, which is a text or a number of seconds."""
     if isinstance(value, str):
         return parse_time_us(value)
     return _seconds_us(number(value), 1_000_000)
