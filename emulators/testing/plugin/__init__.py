@@ -1,1 +1,1 @@
-"""The plug-in of pytest: fixtures, markers, what a failure tells, health after each test."""
+"""The plug-in of pytest: fixtures, markers, failure reports, and health checks after each test."""

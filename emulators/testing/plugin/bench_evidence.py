@@ -22,7 +22,8 @@ from tickrig.host.text.trace import Mark
 # Keep what signals of a device were while a test ran.
 
 _MOST: Final = 4_000
-"""Samples of a signal that are kept; of more, every spike, but not every sample."""
+"""Number of samples kept of a signal; if there are more, all spikes are kept, but not all
+samples."""
 
 
 class SignalSampler:
@@ -45,10 +46,10 @@ class SignalSampler:
             self._find(name)
 
     def take(self, now_us: int) -> None:
-        """Look at the device: after each step (`Rig.watchers`), and once at the end.
+        """Read the signals: after each step (`Rig.watchers`), and once at the end.
 
         Args:
-            now_us: the time, not before that of the last call.
+            now_us: the time, not earlier than in the last call.
         """
         for name, points in self._points.items():
             value = read_signal(self._device, name)
@@ -84,7 +85,7 @@ class SignalSampler:
 
 @dataclass(slots=True)
 class _Effect:
-    """A fault that came: its names, its rate, when it began and ended."""
+    """A fault that occurred: its names, its rate, its beginning and end."""
 
     names: tuple[str, str]
     rate: str
@@ -93,7 +94,7 @@ class _Effect:
 
 
 class _OrderedFaults:
-    """Notes the faults of a bench as they come, from its beginning.
+    """Records the faults of a bench when they occur, from the beginning.
 
     Args:
         bench: the bench.
@@ -134,7 +135,7 @@ class _OrderedFaults:
             self._effects.append(effect)
 
     def _take(self, order: FaultOrder, left: list[_Effect]) -> _Effect | None:
-        """Return what came of an order, and take it away; None if nothing did."""
+        """Remove and return the effect of a request; None if the fault has not occurred."""
         for effect in left:
             if order.spec.name in effect.names and self._is_due(order, effect.from_us):
                 left.remove(effect)
@@ -181,12 +182,12 @@ class BenchEvidence(NamedTuple):
 
     Attributes:
         mode: of the bench.
-        now_us: when it was closed.
-        journal: the last that happened.
-        left_out: how many lines came before these.
-        faults: what was ordered, and what came.
+        now_us: time at which the bench was closed.
+        journal: the last events.
+        left_out: number of earlier lines.
+        faults: requested faults, and faults that occurred.
         series: signals that changed.
-        trace: what `tickrig replay` reads; empty if nothing was recorded.
+        trace: of the bench, for `tickrig replay`; empty if nothing was recorded.
     """
 
     mode: str
@@ -199,7 +200,7 @@ class BenchEvidence(NamedTuple):
 
 
 class BenchWitness:
-    """Looks at a bench from its beginning.
+    """Observes a bench from its beginning.
 
     Args:
         bench: the bench.

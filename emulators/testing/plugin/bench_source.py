@@ -51,12 +51,12 @@ _USED: Final = pytest.StashKey[list[object]]()
 
 
 def _fresh(item: pytest.Item, source: BenchSource) -> BenchSource:
-    """Return a source whose devices no other test has used.
+    """Return a source with devices that no other test has used.
 
-    What stands in the parameters of a test is copied.
+    Devices in the parameters of a test are copied.
 
     Raises:
-        ValueError: these are the devices of the test before.
+        ValueError: the devices are those of the previous test.
     """
     params = getattr(item, "callspec", None)
     if params is not None and any(source is value for value in params.params.values()):
@@ -71,13 +71,13 @@ def _fresh(item: pytest.Item, source: BenchSource) -> BenchSource:
 
 
 class WantedBench(NamedTuple):
-    """What a test asked for.
+    """The bench that a test requests.
 
     Attributes:
-        source: what is on the bench.
+        source: the devices on the bench.
         mode: `virtual`, `real` or `hardware`.
-        seed: of all chance; None for that of the source.
-        folder: where relative paths begin.
+        seed: of all random numbers; None for the seed of the source.
+        folder: base of relative paths.
     """
 
     source: BenchSource
@@ -86,10 +86,10 @@ class WantedBench(NamedTuple):
     folder: Path
 
     def settled(self, item: pytest.Item) -> WantedBench:
-        """Return it with what is on the bench of this test itself: made, and of a whole path.
+        """Return the request with the devices of this test: made, and with complete paths.
 
         Raises:
-            ValueError: nothing is, or what another test has used.
+            ValueError: there is no device, or another test has used the devices.
         """
         source = _fresh(item, self.source)
         made = source() if callable(source) else source
@@ -144,15 +144,15 @@ class WantedBench(NamedTuple):
 
     @property
     def _options(self) -> Mapping[str, Any]:
-        """The arguments of `Bench`; a lone device has no name."""
+        """The arguments of `Bench`; a single device has no name."""
         return self.source if isinstance(self.source, Mapping) else {"": self.source}
 
 
 def _placed(source: _Source, folder: Path) -> _Source:
-    """Return a source whose files are found beside the test.
+    """Return a source with paths of files relative to the test.
 
     Raises:
-        ValueError: a text that names no device.
+        ValueError: a text does not name a device.
     """
     if isinstance(source, Mapping):
         return {
@@ -168,7 +168,7 @@ def _placed(source: _Source, folder: Path) -> _Source:
 
 
 def _placed_device(device: Any, folder: Path) -> Any:
-    """Return a device; what a text or path names is found beside the test."""
+    """Return a device; a file that a text or path names is searched in the folder of the test."""
     if not isinstance(device, str | Path):
         return device
     plan = named_device(str(device), folder)
@@ -176,11 +176,11 @@ def _placed_device(device: Any, folder: Path) -> Any:
 
 
 def plan_of(path: Path) -> RigPlan:
-    """Return what a rig file says; it is read once, unless it has changed.
+    """Return the plan of a rig file; it is read again only after a change.
 
     Raises:
         OSError: it cannot be read.
-        ValueError: all that is wrong with it, a line each.
+        ValueError: all errors in the file, one per line.
     """
     return _plan_of(path, path.stat().st_mtime_ns)
 
@@ -207,10 +207,10 @@ def _words_of(item: pytest.Item, marker: str) -> tuple[str, ...]:
 
 
 def allowed_of(item: pytest.Item) -> tuple[str, ...]:
-    """Return what all markers `allows` of a test name.
+    """Return the names in all markers `allows` of a test.
 
     Raises:
-        ValueError: what no marker can allow.
+        ValueError: an unknown name.
     """
     allowed = _words_of(item, "allows")
     for word in allowed:
@@ -243,10 +243,10 @@ def check_mode(needs: Iterable[str], mode: str) -> None:
 
 
 def check_needs(needs: Iterable[str], bench: Bench) -> None:
-    """Raise NotOnThisBench if a bench has not all of what a test needs.
+    """Raise NotOnThisBench unless a bench has everything that a test needs.
 
     Raises:
-        ValueError: a name is misspelt, so that the test would be skipped on every bench.
+        ValueError: a name is misspelt; the test would be skipped on every bench.
     """
     for need in needs:
         lacks = [_lack(choice, bench) for choice in need.split(_OR)]
@@ -258,7 +258,7 @@ def check_needs(needs: Iterable[str], bench: Bench) -> None:
 
 
 def _lack(choice: str, bench: Bench) -> str:
-    """Return why a bench lacks what is needed; empty if it lacks nothing."""
+    """Return what a bench lacks of the needed properties; empty if it has all."""
     if choice in MODES:
         return "" if choice == bench.mode else f"this bench is {bench.mode}"
     if choice == HAND:
@@ -305,15 +305,15 @@ KINDS: Final[Mapping[str, Callable[[Bench], Iterable[str]]]] = {
 # Benches that have done something before the test: once for each test, then out of a snapshot.
 
 WarmUp = Callable[[Bench], Coroutine[Any, Any, None] | None] | None
-"""What is done to a bench before the test; None for nothing."""
+"""Prepares a bench before the test; None if there is no preparation."""
 
 
 class _BenchSnapshot(NamedTuple):
-    """A bench after its warm-up, for others that were the same before it.
+    """A bench after its warm-up, for tests whose bench was equal before the warm-up.
 
     Attributes:
-        digest: of the bench before its warm-up, without its seed.
-        bench: the bench; only twins of it are used.
+        digest: hash of the bench before its warm-up, without its seed.
+        bench: the bench; tests use only twins of it.
     """
 
     digest: bytes
@@ -321,19 +321,20 @@ class _BenchSnapshot(NamedTuple):
 
 
 SNAPSHOTS: Final = pytest.StashKey[dict[str, _BenchSnapshot]]()
-"""By node ID, where tests run many times; missing where they run once."""
+"""Snapshots by node ID, in runs that repeat tests; missing if each test runs once."""
 
 
 def warmed(item: pytest.Item, bench: Bench, warm_up: WarmUp) -> Bench:
-    """Return the bench that a test gets: in virtual time a twin of that which was warmed up.
+    """Return the bench for a test, after the warm-up; in virtual time it is a twin of that bench.
 
-    Nothing of a host, a trigger or a task of the warm-up is there any more.
+    Hosts, triggers and tasks of the warm-up are removed.
 
-    A snapshot is used where nothing is different by it: what was before the warm-up is the same but
-    for the seed, and nothing was drawn by chance in it.
+    A snapshot replaces the warm-up only if the result is the same. The bench before the warm-up
+    must be equal except for its seed, and the warm-up must not have drawn random numbers.
 
     Raises:
-        ValueError: after the warm-up the bench cannot be copied, though it could be before.
+        ValueError: the bench cannot be copied after the warm-up, although it could be copied
+            before.
     """
     if warm_up is None:
         return bench
@@ -363,7 +364,7 @@ def warmed(item: pytest.Item, bench: Bench, warm_up: WarmUp) -> Bench:
 
 
 def _do(warm_up: Callable[[Bench], Coroutine[Any, Any, None] | None], bench: Bench) -> None:
-    """Warm a bench up; it is closed if that fails."""
+    """Warm a bench up; if that fails, close it."""
     try:
         if iscoroutine(body := warm_up(bench)):
             bench.run(body)
@@ -380,7 +381,7 @@ def _digest(state: RigState) -> bytes:
     """Return the hash of a bench with all seeds of its wires left out; empty if it has none.
 
     Raises:
-        TypeError: something in it cannot be copied.
+        TypeError: an object in the bench cannot be copied.
     """
     bare = twin(state)
     for chance in bare.chances:

@@ -1,4 +1,4 @@
-"""A test with its bench: opened before it, looked at after it, closed in any case."""
+"""A test with its bench, which is opened before the test, checked after it, and always closed."""
 
 from __future__ import annotations
 
@@ -75,12 +75,12 @@ class _BenchedTest(TestWithBench):
 
     Args:
         item: the test.
-        wanted: what it asked for.
-        safe: what outputs are when it is over.
-        warm_up: what is done to its bench before.
+        wanted: the requested bench.
+        safe: the safe values of outputs at the end of the test.
+        warm_up: prepares the bench before the test.
 
     Attributes:
-        fingerprint: what happens on it, if that is compared.
+        fingerprint: what happens on the bench, if two runs are compared.
     """
 
     def __init__(
@@ -135,7 +135,7 @@ class _BenchedTest(TestWithBench):
         self._is_misused = True
 
     def close(self) -> None:
-        """Give everything back; a test that has passed fails of what went wrong since."""
+        """Release all resources; a passed test fails if an error has occurred since."""
         since = self.take_unheard() if self._passed else []
         with self._stack:
             if self.bench is not None:
@@ -144,7 +144,7 @@ class _BenchedTest(TestWithBench):
             pytest.fail("\n".join(since), pytrace=False)
 
     def _close(self, bench: Bench) -> None:
-        """Keep what is to be kept of a passed test too; close the bench."""
+        """Keep files of a passed test too, if configured; close the bench."""
         try:
             if self.fingerprint is not None:
                 self.fingerprint.end()
@@ -249,7 +249,7 @@ def benched(
 
 @contextmanager
 def clocked(bench: Bench) -> Iterator[Any]:
-    """Yield a test the clock of its bench; a refusal that a host has swallowed fails the test."""
+    """Run a test with the clock of its bench; a refusal that the host has caught fails the test."""
     try:
         with bench.patched_time() as clock:
             yield clock
@@ -272,7 +272,7 @@ def _libraries(rig: BenchRig) -> list[tuple[str, str]]:
 
 
 def _opened(test: _BenchedTest) -> Bench:
-    """Open the bench; what is wrong with what was asked needs no traceback."""
+    """Open the bench; an error in the request is reported without a traceback."""
     try:
         return test.open()
     except (ValueError, OSError) as error:

@@ -1,4 +1,4 @@
-"""Each test that has a bench, run twice: what differs between the two is a failure."""
+"""Runs each test with a bench twice; a difference between the two runs is a failure."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from tickrig.wire.can import CanFrame, ErrorFrame
 
 
 class Fingerprint:
-    """Takes down what happens on a bench: traffic as it passes, signals when they change.
+    """Records what happens on a bench: traffic, and changes of signals.
 
     Args:
-        rig: of the bench.
+        rig: the rig of the bench.
 
     Attributes:
-        lines: what was taken down.
+        lines: the recorded events.
     """
 
     def __init__(self, rig: BenchRig) -> None:
@@ -55,7 +55,7 @@ class Fingerprint:
         return sha256("\n".join(self.lines).encode()).hexdigest()
 
     def difference(self, other: Fingerprint) -> str:
-        """Return the first line that is not the same in another run; empty if all are."""
+        """Return the first line that differs from another run; empty if all are equal."""
         pairs = zip_longest(self.lines, other.lines, fillvalue="nothing")
         for number, (first, second) in enumerate(pairs, 1):
             if first != second:
@@ -83,7 +83,7 @@ _HASH: Final = "bench_hash"
 """The property of a test that has the hash of all that happened on its bench."""
 
 FINGERPRINT: Final[pytest.StashKey[Fingerprint | None]] = pytest.StashKey()
-"""Of a test with a bench: what happened in its latest run."""
+"""The events of the latest run of a test with a bench."""
 
 _FIRST: Final[pytest.StashKey[Fingerprint]] = pytest.StashKey()
 """Of the first run, while a test runs for the second time."""
@@ -97,8 +97,8 @@ class Compare:
     """The plug-in of `--bench-compare`.
 
     Args:
-        config: of pytest.
-        settings: what was asked for.
+        config: the configuration of pytest.
+        settings: the settings of the plug-in.
 
     Raises:
         pytest.UsageError: no test runs in virtual time.
@@ -152,7 +152,7 @@ class Compare:
 
 
 def _run_twice(item: pytest.Item, nextitem: pytest.Item | None) -> _Reports:
-    """Run a test, and again if it passed; return the reports of the run that counts."""
+    """Run a test, and run it again if it passed; return the reports of the run that counts."""
     properties = list(item.user_properties)
     reports = _run(item, item.parent)  # what it shares with others stays
     before = _fingerprint(item)
@@ -180,7 +180,7 @@ def _fingerprint(item: pytest.Item) -> Fingerprint | None:
 
 
 def _judge(item: pytest.Item, first: Fingerprint, last: pytest.TestReport) -> None:
-    """Fail a test whose runs differ; note the hash of one whose runs are the same."""
+    """Fail a test if its runs differ; if they are equal, record their hash."""
     second, report = _fingerprint(item), item.stash.get(_CALL, None)
     if second is None or report is None:
         return

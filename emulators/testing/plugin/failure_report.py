@@ -32,7 +32,7 @@ _MOST: Final = 80
 
 
 def stem_of(nodeid: str) -> str:
-    """Return what files of a test are called: no path, and no two tests have the same.
+    """Return the base name of the files of a test: without a path, and unique to the test.
 
     >>> stem_of("tests/test_stop.py::test_it_stops[../fast]")
     'tests_test_stop.py_test_it_stops_fast-24cfca'
@@ -42,15 +42,15 @@ def stem_of(nodeid: str) -> str:
 
 
 def keep(bench: Bench, folder: Path, nodeid: str) -> tuple[list[Path], list[str]]:
-    """Write what is kept of a test.
+    """Write the files of a test.
 
     Args:
         bench: its bench, still open.
-        folder: where to; it is made.
+        folder: folder of the files; it is created.
         nodeid: of the test.
 
     Returns:
-        The files, and why others are not there, or not whole, each in a line.
+        The files, and the reasons for missing or incomplete files, one per line.
     """
     kept: list[Path] = []
     failed: list[str] = []
@@ -69,7 +69,7 @@ def keep(bench: Bench, folder: Path, nodeid: str) -> tuple[list[Path], list[str]
 
 
 def _cut(bench: Bench, path: Path) -> list[str]:
-    """Add that a file has only the last lines; a trace has all."""
+    """Add a note that a file has only the last lines; a trace has all lines."""
     missing = "" if path.suffix == _TRACE else missing_of(bench._mode.journal())
     return [f"{path} is not whole: {missing}"] if missing else []
 
@@ -101,14 +101,14 @@ _WRITERS: Final[dict[str, Callable[[Bench, Path], bool]]] = {
     ".log": _candump,
     ".txt": _transcript,
 }
-"""Writers by suffix; each returns whether there was something to write."""
+"""Writers by suffix; each returns whether it has written a file."""
 
 
 # How a test ended, and why, of the reports of its phases.
 
 
 def outcome_of(item: pytest.Item, reports: Sequence[pytest.TestReport]) -> tuple[Outcome, str, str]:
-    """Return how a test ended, why in a line, and what pytest says of it.
+    """Return the outcome of a test, the reason in one line, and pytest's text.
 
     Args:
         item: the test.
@@ -184,7 +184,7 @@ def _wanted(test: TestWithBench) -> str:
 
 
 def _kept(test: TestWithBench) -> str:
-    """Return the files that were kept; a trace is a command."""
+    """Return the kept files; a trace is shown as the command that replays it."""
     paths = [shlex.quote(relpath(path)) for path in test.kept]
     lines = [f"tickrig replay {path}" if path.endswith(_TRACE) else path for path in paths]
     return "\n".join([*lines, *test.not_kept])

@@ -1,4 +1,4 @@
-"""Whether bench and host are well after a test: outputs, losses, clocks, threads, coroutines."""
+"""Checks bench and host after a test: outputs, losses, clocks, threads, coroutines."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ LOST: Final = "lost"
 class Health:
     """Watches a bench from its beginning.
 
-    Errors on a wire, or losses there, are intended if a fault of this wire, or of any device, came
-    before. A line on which no host has sent anything may overflow, because no host reads it.
+    Errors or losses on a wire are intended if a fault of this wire, or of any device, occurred
+    before. A line on which no host has sent anything may overflow, because no host reads the line.
 
     Args:
-        bench: the bench. For real devices, only error frames are known.
+        bench: the bench; for real devices only error frames are known.
     """
 
     def __init__(self, bench: Bench) -> None:
@@ -53,10 +53,10 @@ class Health:
             self._mode.act(self._begin)
 
     def complaints(self, allowed: Container[str] = ()) -> tuple[str, ...]:
-        """Return what is wrong, each in a line; nothing if all is well.
+        """Return the problems, one per line; empty if there are none.
 
         Args:
-            allowed: what may be nevertheless: `ERRORS`, `LOST`.
+            allowed: permitted problems: `ERRORS`, `LOST`.
         """
         found = [] if ERRORS in allowed else list(self._errors.values())
         with suppress(NotOnThisBench):
@@ -141,17 +141,17 @@ def _broken_off(rig: BenchRig) -> list[str]:
 # What outputs are when a test is over.
 
 SafeState = Mapping[str, Setting] | Callable[[Bench], object] | None
-"""Values of outputs by name, or a check: False, or a text that says what is unsafe."""
+"""Values of outputs by name, or a check that returns False or a text with the unsafe state."""
 
 
 def with_plan(
     safe: SafeState, plan: Mapping[str, Mapping[str, Setting]], bench: Bench
 ) -> SafeState:
-    """Return what is safe by the rig file and by the fixture, whose values come first.
+    """Return the safe values of rig file and fixture; those of the fixture have priority.
 
     Args:
-        safe: of the fixture.
-        plan: of the rig file, by device and output.
+        safe: from the fixture.
+        plan: from the rig file, by device and output.
         bench: the bench.
     """
     alone = len(bench.devices) == 1
@@ -211,11 +211,11 @@ THREADS: Final = "threads"
 def dead_threads(note: Callable[[str], None]) -> Iterator[None]:
     """Record threads that start and die during the test: name, place and error.
 
-    For older threads, only pytest's warning appears, which comes for all threads. A thread that
-    ends by `sys.exit()` has not died, unless it passes an error.
+    For threads that started before the test, only pytest's warning appears, which covers all
+    threads. A thread that ends by `sys.exit()` counts as dead only if it passes an error.
 
     Args:
-        note: called in the thread that dies, with a line.
+        note: called with a line, in the thread that dies.
     """
     others, before = set(threading.enumerate()), threading.excepthook
 
@@ -267,10 +267,10 @@ _TOLD: Final = re.compile(r"coroutine '(.*)' was never awaited(?s:.*)  File \"(.
 
 @contextmanager
 def never_awaited(note: Callable[[str], None]) -> Iterator[None]:
-    """Note coroutines that are thrown away without having run, whatever filters warnings.
+    """Record coroutines that are discarded without being awaited, regardless of warning filters.
 
     Args:
-        note: called with a line.
+        note: called with a line for each coroutine.
     """
     depth = sys.get_coroutine_origin_tracking_depth()
     with warnings.catch_warnings():
@@ -300,12 +300,12 @@ CLOCK: Final = "clock"
 def guard(
     mode: str, allowed: Container[str], others: Collection[Thread]
 ) -> AbstractContextManager[None]:
-    """Return what fails a test in virtual time that looks at the clock of the machine.
+    """Return a guard that fails a test in virtual time if it uses the clock of the machine.
 
     Args:
         mode: of its bench.
-        allowed: what its markers allow.
-        others: threads that ran before there was a bench.
+        allowed: names that the markers of the test allow.
+        others: threads that ran before the bench was opened.
     """
     if mode != VIRTUAL or CLOCK in allowed:
         return nullcontext()

@@ -1,4 +1,4 @@
-"""What happened on a bench, for people: CAN frames with what they mean."""
+"""The journal of a bench as readable text; CAN frames are decoded."""
 
 from __future__ import annotations
 
@@ -66,9 +66,9 @@ def buses_of(bench: Bench) -> tuple[str, ...]:
 
 
 def decoded(bench: Bench) -> Iterator[tuple[WireLine, str]]:
-    """Return each line of its journal with its text; frames have their meaning behind them.
+    """Return each line of the journal with its text; a frame is followed by its meaning.
 
-    What PDOs carry is known, too, if it was written before the lines that are kept.
+    PDOs are decoded too, even if their mapping was written before the first kept line.
     """
     meanings, buses = decoder.Decoder(), buses_of(bench)
     for line in bench._mode.mappings():
@@ -94,7 +94,7 @@ def last_lines(bench: Bench, count: int) -> str:
 
 
 def frame_of(line: WireLine) -> CanFrame | ErrorFrame | None:
-    """Return the frame in a line of a CAN bus; None for a fault, and for what it did to a frame."""
+    """Return the frame in a line of a CAN bus; None for a fault and its effect on a frame."""
     if line.mark in {Mark.PHYSICAL, Mark.WIRE}:
         return None
     text = line.data.decode()

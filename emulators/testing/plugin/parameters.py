@@ -1,4 +1,4 @@
-"""The plug-in of `--bench-param`: tests that take a parameter by name run with each value."""
+"""The plug-in of `--bench-param`: runs tests with each value of a named parameter."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from tickrig.host.text.values import parse_setting
 
 
 class ParameterPlugin:
-    """Gives tests the values of `--bench-param`, in place of those of the fixture of this name.
+    """Gives tests the values of `--bench-param`; they replace the fixture with this name.
 
     Args:
-        config: of pytest.
-        settings: what was asked for.
+        config: the configuration of pytest.
+        settings: the settings of the plug-in.
     """
 
     def __init__(self, config: pytest.Config, settings: PluginSettings) -> None:
@@ -25,10 +25,10 @@ class ParameterPlugin:
         self._names: dict[str, None] = {}
 
     def pytest_generate_tests(self, metafunc: pytest.Metafunc) -> None:
-        """Let a test run with each value.
+        """Run a test with each value.
 
         Raises:
-            Collector.CollectError: the test has values of its own.
+            Collector.CollectError: the test already has values of its own.
         """
         self._names.update(dict.fromkeys(metafunc.fixturenames))
         own = _own_names(metafunc)

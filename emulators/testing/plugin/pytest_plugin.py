@@ -44,7 +44,7 @@ _PLUGINS: Final = {
     "parameters": "tickrig.emulators.testing.plugin.parameters:ParameterPlugin",
     "report": "tickrig.emulators.testing.plugin.report_plugin:ReportPlugin",
 }
-"""Plug-ins by the setting that asks for them; each takes the configuration and the settings."""
+"""Plug-ins by the setting that enables them; each takes the configuration and the settings."""
 
 _EXAMPLES: Final = {"needs": "fault:cut", "req": "SAF-12", "allows": "lost"}
 """What each marker could name."""
@@ -95,7 +95,7 @@ def _mode_fixture(modes: tuple[str, ...]) -> object:
     class ModeFixture:
         @pytest.fixture(params=modes if len(modes) > 1 else None)
         def bench_mode(self, request: pytest.FixtureRequest) -> str:
-            """What kind of bench: virtual, real or hardware, as `--bench-mode` says."""
+            """The mode of the bench, set by `--bench-mode`: virtual, real or hardware."""
             mode: str = getattr(request, "param", modes[0])
             return mode
 
@@ -104,7 +104,7 @@ def _mode_fixture(modes: tuple[str, ...]) -> object:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_pycollect_makeitem(collector: pytest.Collector) -> Generator[None, Any, Any]:
-    """Refuse tests whose markers name nothing: they would be run, or count, for nothing."""
+    """Refuse tests with markers without names: such a marker has no effect."""
     made = yield
     for item in made if isinstance(made, list) else ():
         if isinstance(item, pytest.Function):
@@ -113,7 +113,11 @@ def pytest_pycollect_makeitem(collector: pytest.Collector) -> Generator[None, An
 
 
 def _check_markers(collector: pytest.Collector, item: pytest.Function) -> None:
-    """Raise CollectError for a marker without names; other packages may have markers like ours."""
+    """Raise CollectError for a marker without names.
+
+    Markers other than `req` are checked only in tests with a bench, because other packages may have
+    markers of the same name.
+    """
     benched = "bench" in item.fixturenames
     for marker in item.iter_markers():
         example = _EXAMPLES.get(marker.name)
@@ -142,7 +146,7 @@ def bench_config(request: pytest.FixtureRequest) -> BenchSource:
 
 @pytest.fixture
 def bench_safe() -> SafeState:
-    """What outputs are when a test is over; override it: values by name, or a check."""
+    """The safe values of outputs after a test; override it: values by name, or a check."""
     return None
 
 
@@ -168,14 +172,14 @@ def bench(
 
 @pytest.fixture
 def bench_time(bench: Bench) -> Iterator[Any]:
-    """The clock of the bench: `time.sleep` and `time.monotonic` of hosts are on it, too."""
+    """The clock of the bench, which `time.sleep` and `time.monotonic` of hosts use too."""
     with benched_test.clocked(bench) as clock:
         yield clock
 
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)
 def pytest_runtest_setup(item: pytest.Item) -> Generator[None, None, None]:
-    """Note requirements; skip a test whose fixtures its bench cannot give."""
+    """Record requirements; skip a test if its bench cannot provide its fixtures."""
     names = (("req", name) for marker in item.iter_markers("req") for name in marker.args)
     item.user_properties.extend(each for each in names if each not in item.user_properties)
     with skipped_where_it_cannot():
@@ -184,7 +188,7 @@ def pytest_runtest_setup(item: pytest.Item) -> Generator[None, None, None]:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_call(item: pytest.Item) -> Generator[None, None, None]:
-    """Skip a test that its bench cannot run; fail one that leaves its bench in a bad state."""
+    """Skip a test that its bench cannot run; fail a test that leaves its bench in a bad state."""
     test = item.stash.get(BENCHED, None)
     if test is None:
         return (yield)
@@ -228,10 +232,10 @@ def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> bool | None:
 
 
 def _prepare(config: pytest.Config, settings: PluginSettings) -> None:
-    """Look at the rig file, and register what a run asks for.
+    """Read the rig file, and register the plug-ins that the settings enable.
 
     Raises:
-        pytest.UsageError: the rig file cannot be used, or what was asked for does not fit together.
+        pytest.UsageError: the rig file cannot be used, or options contradict each other.
     """
     if settings.rig_file and settings.ordered:
         with _usage():

@@ -1,4 +1,4 @@
-"""Records of tests for a report: made where they run, gathered where the report is written."""
+"""Records of tests for a report: made in workers, collected by the process that writes it."""
 
 from __future__ import annotations
 
@@ -42,12 +42,12 @@ class ReportPlugin:
     """The plug-in of `--bench-report`.
 
     Args:
-        config: of pytest.
-        settings: what was asked for; a report is.
+        config: the configuration of pytest.
+        settings: the settings of the plug-in, with a report.
 
     Raises:
         OSError: the file with the requirements cannot be read.
-        ValueError: what is wrong with it, or the report could not be written.
+        ValueError: errors in the file, or the report could not be written.
     """
 
     def __init__(self, config: pytest.Config, settings: PluginSettings) -> None:
@@ -136,13 +136,13 @@ class ReportPlugin:
 
 
 def _place(report: pytest.TestReport) -> _Place:
-    """Return where a test stands: its file, its line, its name with numbers in their order."""
+    """Return the position of a test: its file, its line, its name with numbers in numeric order."""
     nodeid = str(report.nodeid)
     return nodeid.partition("::")[0], report.location[1] or 0, overview.natural(nodeid)
 
 
 def _statement(item: pytest.Item, error: pytest.ExceptionInfo[BaseException]) -> str:
-    """Return the last statement of a test that was run, on one line; empty if none was."""
+    """Return the last executed statement of a test in one line; empty if none was executed."""
     for entry in reversed(error.traceback):
         if Path(entry.path) == item.path:
             with suppress(Exception):  # who has compiled the test need not have left its source

@@ -22,13 +22,13 @@ _EVERY: Final = "every"
 
 
 class _Option(NamedTuple):
-    """An option of the command line, which the configuration file has as well.
+    """An option of the command line and of the configuration file.
 
     Attributes:
         name: as `bench_mode`: the option is `--bench-mode`.
-        metavar: stands for its value; empty if it has none.
-        text: what it is for.
-        many: whether it may be repeated; in the configuration file it has a line each time.
+        metavar: placeholder of its value; empty if it has no value.
+        text: its help text.
+        many: whether it may be repeated; in the configuration file each value has its own line.
     """
 
     name: str
@@ -56,11 +56,11 @@ OPTIONS: Final = (
 
 
 class _BenchParameter(NamedTuple):
-    """What tests take by name, as an argument or through fixtures.
+    """Values of an argument or fixture of tests.
 
     Attributes:
         name: of the argument or fixture.
-        words: the values, as they were written.
+        words: the values as written.
     """
 
     name: str
@@ -71,10 +71,10 @@ class PluginSettings(NamedTuple):
     """The settings of the command line.
 
     Attributes:
-        rig_file: of the bench, None if tests define it themselves.
+        rig_file: of the bench; None if tests define the bench themselves.
         ordered: whether the command line names the rig file.
         modes: modes in which each test runs.
-        seed: of all randomness, None to use that of the rig file or test.
+        seed: of all random numbers; None to use the seed of the rig file or test.
         artifacts: folder for kept files, None for none.
         every: whether to keep files of passed tests too.
         compare: whether each test runs twice.
@@ -96,7 +96,7 @@ class PluginSettings(NamedTuple):
 
     @classmethod
     def of(cls, config: pytest.Config) -> PluginSettings:
-        """Return those of a test run; UsageError if one is wrong."""
+        """Return the settings of a test run; UsageError if one is invalid."""
         wanted = {option.name: _wanted(config, option) for option in OPTIONS}
         return cls(
             _path(config, "bench", wanted["bench"]),
@@ -113,7 +113,7 @@ class PluginSettings(NamedTuple):
 
     @property
     def head(self) -> str:
-        """What a run begins with; empty if nothing was asked."""
+        """Lines at the start of a run; empty without options."""
         if self == PluginSettings():
             return ""
         seed = "" if self.seed is None else f", seed {self.seed}"
@@ -131,7 +131,10 @@ def _wanted(config: pytest.Config, option: _Option) -> str:
 
 
 def _path(config: pytest.Config, name: str, text: str) -> Path | None:
-    """Return where a file is: from here on the command line, else from the configuration file."""
+    """Return the path of a file, relative to the working directory or the configuration file.
+
+    Paths on the command line are relative to the working directory.
+    """
     if not text:
         return None
     if config.getoption(name) is not None:

@@ -1,4 +1,4 @@
-"""What the bench is to blame for is no failure of a device; a mistake in a test is no lateness."""
+"""Separates errors of the bench, failures of the device, and mistakes in a test."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _LIBRARIES: Final = sys.stdlib_module_names | {"can", "canopen", "serial"}
 
 
 class MisusedError(pytest.fail.Exception):  # type: ignore[name-defined,misc]  # pytest has it
-    """A test that uses its bench wrongly: it calls an async function and does not await it."""
+    """A test uses its bench wrongly: it calls an async function without `await`."""
 
 
 def blocked(
@@ -62,10 +62,11 @@ def blocked(
 
 
 def is_mistake(error: BaseException) -> bool:
-    """Return whether a test would have raised this on a fast machine too.
+    """Return whether a test would raise this error on a fast machine, too.
 
-    A misspelt name is a mistake, and so is all that the bench refuses. A test that takes None
-    for a message, as there was none in time, is not: nor what the host raises of its own.
+    A misspelt name is a mistake in the test, and so is any call that the bench refuses. It is not a
+    mistake if a test uses None as a message because no message arrived in time. An exception that
+    the host itself raises is not a mistake either.
     """
     if isinstance(error, BaseExceptionGroup):
         return any(map(is_mistake, error.exceptions))
@@ -89,10 +90,10 @@ def _raiser(error: BaseException) -> str:
 
 
 def end_at_caller(error: BaseException) -> None:
-    """Cut our frames from the end of a traceback, if a call of ours refused something.
+    """Remove tickrig's frames from the end of a traceback, if a call of tickrig was refused.
 
     Args:
-        error: what a test raised.
+        error: the exception of the test.
     """
     # From the outermost frame inwards: the last one that is not ours becomes the end of the
     # traceback.
@@ -129,11 +130,11 @@ def make_error(report: pytest.TestReport, reason: str) -> None:
 
 
 def _cut(report: pytest.TestReport, *, shown: bool) -> None:
-    """Leave those parts of a traceback away that are ours: they tell nothing of the reason.
+    """Remove tickrig's own entries from a traceback: they do not explain the error.
 
     Args:
-        report: of the test.
-        shown: whether the reason is all there is to tell, so that nothing else need be left.
+        report: the report of the test.
+        shown: whether the reason is already shown; then all entries may be removed.
     """
     traceback = getattr(report.longrepr, "reprtraceback", None)
     entries = getattr(traceback, "reprentries", [])

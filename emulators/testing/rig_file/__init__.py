@@ -1,1 +1,1 @@
-"""Rig files: what is on a bench, where it is on real hardware, and what is wrong with the file."""
+"""Rig files: the devices of a bench, the places of real devices, and the errors in the file."""

@@ -1,4 +1,4 @@
-"""What each device of a rig file is, the wire that it is on, and where hosts or real devices are.
+"""Reads each device of a rig file, its wire, and the places of hosts or real devices.
 
 Tables `[wire]`, `[device]`, `[real]` and `[hardware]`.
 """
@@ -54,13 +54,12 @@ class DeviceReader:
     """Reads the devices and puts them on wires.
 
     Args:
-        section: `[device]`, None if there is none.
-        wires: those of the file, None for one of which it is not known what it is; those that
-            the file leaves out are entered.
-        folder: where files are looked for.
+        section: `[device]`; None if the file has none.
+        wires: of the file; None for a wire of unknown type. Wires that the file omits are added.
+        folder: folder of the files.
 
     Attributes:
-        plans: by name, None for a device of which it is not known what it is.
+        plans: by name; None for a device of unknown type.
         sections: the table of each.
     """
 
@@ -138,7 +137,7 @@ class DeviceReader:
         )
 
     def _wire_of(self, section: Section, device: plan.DevicePlan) -> str | None:
-        """Return the wire of a device; None if it cannot be said."""
+        """Return the wire of a device; None if it is unknown."""
         is_node = device.kind is not plan.DeviceKind.SERIAL
         if not device.wire:
             return self._bus_of(section) if is_node else self._line_of(device.name)
@@ -227,7 +226,7 @@ _OPTIONAL: Final = {"framing", "buffer_bytes", "echo", "bursts"}
 
 
 def read_wires(section: Section | None) -> dict[str, plan.WirePlan | None]:
-    """Read all wires; None for one of which it is not known what it is."""
+    """Read all wires; None for a wire of unknown type."""
     wires: dict[str, plan.WirePlan | None] = {}
     for name, table in section.subs() if section else ():
         try:
@@ -280,12 +279,12 @@ _TOLERANCE_TABLE = "tolerance"
 
 
 class DoorReader:
-    """Reads both sections.
+    """Reads `[real]` and `[hardware]`.
 
     Args:
-        wires: by name, None for one of which it is not known what it is.
-        devices: by name, None as well.
-        folder: where files are looked for.
+        wires: by name; None for a wire of unknown type.
+        devices: by name; None for a device of unknown type.
+        folder: folder of the files.
     """
 
     def __init__(
@@ -392,7 +391,7 @@ class DoorReader:
 
 
 def _is_url(section: Section, url: str) -> bool:
-    """Return whether a line can be served there; else it is noted."""
+    """Return whether a line can be served at a URL; record the error if not."""
     try:
         parse_serve_url(url)
     except ValueError as error:
@@ -412,7 +411,7 @@ def _hardware_schema(wire: plan.WirePlan | None, *, is_device: bool) -> Schema:
 
 
 def _bus(section: Section, found: Mapping[str, Any]) -> plan.BusPlan:
-    """Return a bus; a driver that is not here may be there on another machine."""
+    """Return a bus; its driver may be missing here, because it may exist on another machine."""
     from can import VALID_INTERFACES  # noqa: PLC0415 - slow
 
     name = found["interface"]

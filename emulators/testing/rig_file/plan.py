@@ -56,19 +56,19 @@ class WireType(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WirePlan:
-    """One wire.
+    """A wire.
 
     Attributes:
-        name: what faults, doors and messages call it. A wire that the file leaves out has the
-            name of its device, or is `can`.
-        type: serial line, RS485 or CAN.
-        bit_rate: in bit/s; None for that of its device: `DeviceType.line`, or a DCF's.
+        name: used by faults, connections and messages. A wire that the file omits has the name of
+            its device, or is `can`.
+        type: serial line, RS485 or CAN bus.
+        bit_rate: in bit/s; None for the rate of its device (`DeviceType.line`, or that of a DCF).
         framing: of a byte on a line: data bits, parity, stop bits.
-        buffer_bytes: room of a receiver on a line; None for that of its device.
-        echo: on RS485, each end hears its own bytes too.
-        bursts: on RS485, a receiver takes what was sent back to back when it has ended.
-        given: whether the file has a table for it; if not, it is of `type` because its device
-            is, and the device makes it.
+        buffer_bytes: size of the receive buffer of a line; None for the size of its device.
+        echo: on RS485, whether each end also receives its own bytes.
+        bursts: on RS485, whether bytes sent without a gap arrive together, after the last one.
+        given: whether the file has a table for it. If not, `type` is that of its device, which
+            makes the wire.
     """
 
     name: str
@@ -82,7 +82,7 @@ class WirePlan:
 
     @property
     def frame_bits(self) -> int:
-        """Bits of a byte on a line, its start bit among them; half a stop bit counts as one.
+        """Number of bits of a byte on a line, with the start bit; half a stop bit counts as one.
 
         >>> WirePlan(name="line", framing="7E2").frame_bits
         11
@@ -102,20 +102,20 @@ class DeviceKind(Enum):
 
 
 class MadeDevice:
-    """The device that a reader has made to check the file; the first bench takes it.
+    """The device that a reader has made to check the file; the first bench uses it.
 
-    A copy, in this process or in another, holds none.
+    A copy, in this process or in another one, does not contain the device.
 
     Args:
-        device: a device as `configure` makes it, or a slave.
-        of: what it was made of; it is taken only for the same.
+        device: a device made by `configure`, or a slave.
+        of: the parameters of the device; a bench with other parameters does not use it.
     """
 
     def __init__(self, device: object = None, of: object = None) -> None:
         self._device, self._of = device, of
 
     def take(self, of: object) -> Any:
-        """Return the device once, if it was made of this; else None."""
+        """Return the device once, if it was made with these parameters; else None."""
         if self._device is None or self._of != of:
             return None
         device, self._device = self._device, None
@@ -128,21 +128,21 @@ class MadeDevice:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DevicePlan:
-    """One device.
+    """A device.
 
     Attributes:
         name: its name for tests and signals.
-        kind: kind of `type`.
+        kind: kind of the `type`.
         type: name of a device type (`DEVICES`) or of a model (`MODELS`), path of an EDS or DCF,
             `FILE.yml:NODE` or `FILE.py:Class`.
         wire: name of its wire, of `RigPlan.wires`.
         config: options of a device type by name, as in the file.
-        node_id: 1..127, `UNCONFIGURED`, or None for that of the DCF or model.
-        profile: of a file: `choices.PROFILES`; None for `auto`.
-        store: file in which a CANopen node stores what 1010h and LSS store.
+        node_id: 1..127, `UNCONFIGURED`, or None for the node-ID of the DCF or model.
+        profile: of a file; one of `choices.PROFILES`; None for `auto`.
+        store: file for the data that a CANopen node stores by 1010h and LSS.
         sdo: limits of the SDO servers of a CANopen node.
-        start: inputs at the start by name, members of groups individually: a value, or the signal
-            that drives it.
+        start: initial inputs by name, with the members of groups one by one: a value, or the signal
+            that drives the input.
         made: the device, if the reader has made it and no bench uses it yet.
     """
 
@@ -159,10 +159,10 @@ class DevicePlan:
     made: MadeDevice = field(default_factory=MadeDevice, compare=False, repr=False)
 
     def made_of(self, seed: int = 0) -> tuple[object, ...]:
-        """Return all that decides what the device is like when it is made.
+        """Return all parameters that determine the device when it is made.
 
         Args:
-            seed: of all chance, for a device on a serial line.
+            seed: of all random numbers, for a device on a serial line.
         """
         if self.kind is DeviceKind.SERIAL:
             return self.type, self.config, seed
@@ -171,11 +171,11 @@ class DevicePlan:
 
 @dataclass(frozen=True, slots=True)
 class FaultPlan:
-    """One fault.
+    """A fault.
 
     Attributes:
         owner: name of the device or wire that has it.
-        spec: which, how often, and when.
+        spec: the fault, its rate, and its time.
     """
 
     owner: str
@@ -189,8 +189,8 @@ class BusPlan:
     Attributes:
         interface: its driver.
         channel: of the driver.
-        bit_rate: in bit/s, where the driver sets it.
-        options: more for the driver, by name.
+        bit_rate: in bit/s, if the driver sets it.
+        options: further options of the driver, by name.
     """
 
     interface: str
@@ -201,12 +201,12 @@ class BusPlan:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DoorPlan:
-    """Where a host finds a wire in real time.
+    """The place of a wire for hosts in real time.
 
     Attributes:
-        link: of a line, the symbolic link to make to its pty; None for the pty alone.
-        serve: of a line, the URLs at which it is served too: `rfc2217://`, `socket://`.
-        bus: of a CAN bus, the one outside that it is joined with.
+        link: of a line, the symbolic link to its pty; None for no link.
+        serve: of a line, additional URLs: `rfc2217://`, `socket://`.
+        bus: of a CAN bus, the outside bus that it is connected with.
     """
 
     link: Path | None = None
@@ -219,8 +219,8 @@ class RealPlan:
     """The bench in real time.
 
     Attributes:
-        control: control socket to serve.
-        doors: by the name of the wire; one that is not there has a pty.
+        control: the control socket to serve.
+        doors: by the name of the wire; a wire without an entry has a pty.
     """
 
     control: Path | None = None
@@ -229,11 +229,11 @@ class RealPlan:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PortPlan:
-    """Where a line of real hardware is.
+    """The port of a line on real hardware.
 
     Attributes:
         port: device path, or URL of pyserial.
-        baud: in bit/s; None for that of the wire.
+        baud: in bit/s; None for the rate of the wire.
     """
 
     port: str
@@ -242,10 +242,10 @@ class PortPlan:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PowerPlan:
-    """Commands that switch a device; the operator does it where there is none.
+    """Commands that switch a device; without a command the operator switches it.
 
     Attributes:
-        on: command line that switches it on, word by word; no shell reads it.
+        on: command line that switches the device on, as a list of words; no shell is used.
         off: command line that switches it off.
     """
 
@@ -255,12 +255,12 @@ class PowerPlan:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tolerances:
-    """How exact an operator and a real device are.
+    """Permitted deviations of an operator and a real device.
 
     Attributes:
-        stick_pct: how far a stick held by hand may be off.
-        time_us: how far a time may be off.
-        values: further ones by the name of a signal, in its unit.
+        stick_pct: of a stick held by hand, in per cent.
+        time_us: of a time, in microseconds.
+        values: of further signals by name, in the unit of the signal.
     """
 
     stick_pct: float = _STICK_PCT
@@ -270,15 +270,15 @@ class Tolerances:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HardwarePlan:
-    """Where the real devices are.
+    """The places of the real devices.
 
     Attributes:
-        control: control socket of an emulator that stands in for the operator, by the name of
-            the device; the operator of the others is at the terminal.
+        control: by the name of the device, the control socket of an emulator that replaces the
+            operator. The operator of the other devices is at the terminal.
         ports: of lines, by the name of the wire.
         buses: of CAN buses, by the name of the wire.
-        power: how a device is switched, by its name.
-        tolerance: what is still right.
+        power: commands that switch a device, by its name.
+        tolerance: the permitted deviations.
     """
 
     control: Mapping[str, Path] = field(default_factory=dict)
@@ -290,19 +290,19 @@ class HardwarePlan:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RigPlan:
-    """A whole rig file.
+    """The content of a rig file.
 
     Attributes:
-        seed: of all chance.
-        wires: by name, those that the file leaves out too.
+        seed: of all random numbers.
+        wires: by name, including those that the file omits.
         devices: by name, in the order of the file.
         signals: by name, for formulas.
         faults: in the order of the file.
-        safe: for each device outputs, and what they are when a test is over.
-        body: what drives move, None if nothing.
+        safe: for each device the safe values of outputs at the end of a test.
+        body: the body that drives move; None if there is none.
         real: the bench in real time.
-        hardware: the bench of real devices, None if the file tells none.
-        path: of the file, for messages and relative paths; None if there is none.
+        hardware: the bench of real devices; None if the file has no such section.
+        path: of the file, for messages and relative paths; None without a file.
     """
 
     seed: int = 0
@@ -331,7 +331,7 @@ _WIRES: Final = {WireType.SERIAL: "serial line", WireType.RS485: "RS485", WireTy
 
 
 def summary(plan: RigPlan) -> Iterator[str]:
-    """Yield how much there is, then a line for each wire with what is on it.
+    """Yield the counts of all parts, then lines for each wire with its devices and places.
 
     Args:
         plan: the bench.
@@ -358,7 +358,7 @@ def summary(plan: RigPlan) -> Iterator[str]:
 
 
 def _wire_text(wire: WirePlan) -> str:
-    """Return the wire in words, as far as the file defines it.
+    """Return a description of the wire, with the properties that the file defines.
 
     >>> _wire_text(WirePlan(name="a", bit_rate=9600))
     'serial line 9600 8N1'
@@ -371,7 +371,7 @@ def _wire_text(wire: WirePlan) -> str:
 
 
 def device_text(device: DevicePlan) -> str:
-    """Return the device in words.
+    """Return a description of the device.
 
     >>> from tickrig.emulators.testing.rig_file.plan import DeviceKind
     >>> device_text(DevicePlan(name="left", kind=DeviceKind.MODEL, type="epos", wire="a"))
@@ -394,7 +394,7 @@ def _places(plan: RigPlan, wire: str) -> Iterator[str]:
 
 
 def bus_text(bus: BusPlan) -> str:
-    """Return the bus of python-can in words.
+    """Return a description of the bus of python-can.
 
     >>> bus_text(BusPlan(interface="socketcan", channel="can0"))
     'socketcan can0'
@@ -411,7 +411,7 @@ def _count(number: int, what: str) -> str:
 
 
 def seed_of(seed: int, name: str, *, alone: bool) -> int:
-    """Return the seed of a wire: chance on one wire has nothing to do with that on another."""
+    """Return the seed of a wire; random numbers of different wires are independent."""
     return seed if alone else seed ^ crc32(name.encode())
 
 
@@ -423,10 +423,10 @@ _FRAMING: Final = re.compile(r"[5-8][NEOMS](1|1\.5|2)")
 
 
 class RigFileError(ValueError):
-    """A rig file that cannot be used: all that is wrong with it, a line each.
+    """Errors in a rig file; the message has one line per error.
 
     Attributes:
-        file: what the file is called.
+        file: name of the file.
         mistakes: in the order of their lines.
     """
 

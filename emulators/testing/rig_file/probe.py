@@ -1,4 +1,4 @@
-"""One device of a rig file, made to see what it has; nothing runs."""
+"""Make one device of a rig file to find its inputs, outputs and faults; it does not run."""
 
 from __future__ import annotations
 
@@ -31,17 +31,17 @@ from tickrig.host.text.values import Setting
 
 @dataclass(frozen=True, slots=True)
 class Probe:
-    """What a device has.
+    """The properties of a device.
 
     Attributes:
         physical: its inputs and outputs.
-        wire_faults: those of its end of the wire, or of its bus.
-        title: what it is, for people.
-        baud: of a serial device, that of its type.
-        node_id: of a node, that of its DCF or model.
-        bit_rate: of a node, that of its DCF.
-        start: inputs that are not as usual when it begins.
-        made: the device, for a bench.
+        wire_faults: faults of its end of the wire, or of its bus.
+        title: its name for messages.
+        baud: of a serial device, the rate of its type.
+        node_id: of a node, from its DCF or model.
+        bit_rate: of a node, from its DCF.
+        start: inputs whose initial values differ from the usual ones.
+        made: the device, for use by a bench.
     """
 
     physical: HasSignals
@@ -63,16 +63,16 @@ class Probe:
 
 @cache
 def eds_cache() -> late.EdsCache:
-    """Return the descriptions that this process has read: benches come and go."""
+    """Return the cache of the descriptions that this process has read, for all benches."""
     return late.EdsCache()
 
 
 class WrongDevice(NamedTuple):
-    """Why a device cannot be made.
+    """The reason why a device cannot be made.
 
     Attributes:
-        reason: for people.
-        keys: below its table.
+        reason: the text of the message.
+        keys: the place within its table.
     """
 
     reason: str
@@ -83,11 +83,11 @@ def probe(plan: DevicePlan, seed: int = 0) -> Probe | list[WrongDevice]:
     """Make a device.
 
     Args:
-        plan: what it is.
-        seed: of all chance in it, for a device on a serial line.
+        plan: the device.
+        seed: of all its random numbers, for a device on a serial line.
 
     Returns:
-        What it has, or all that is wrong.
+        Its properties, or all errors.
     """
     if plan.kind is DeviceKind.SERIAL:
         return _serial(plan, seed)
@@ -207,7 +207,7 @@ class _UnknownInputs:
         return value
 
     def names(self, signal_type: SignalType) -> tuple[str, ...]:
-        """Return nothing: it has all."""
+        """Return no names: every name is accepted."""
         return ()
 
     def find(self, name: str, signal_type: SignalType | None = None) -> InputSignal:
@@ -244,10 +244,10 @@ _UNREAD = SignalSpec(Constant(0.0))
 
 
 class StartReader:
-    """Reads starts and signals, and judges them together.
+    """Reads initial inputs and signals, and checks them together.
 
     Args:
-        folder: where files of tables are looked for.
+        folder: folder of the files with tables.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -268,12 +268,12 @@ class StartReader:
         return dict(self._signals)
 
     def read_start(self, device: str, section: Section, physical: HasSignals) -> Start:
-        """Read the start of a device.
+        """Read the initial inputs of a device.
 
         Args:
             device: its name.
             section: the table.
-            physical: what it has.
+            physical: its inputs and outputs.
         """
         start: Start = {}
         names: list[str] = []  # a node has many objects
@@ -295,7 +295,7 @@ class StartReader:
         return start
 
     def check(self, devices: Mapping[str, HasSignals]) -> None:
-        """Note what is wrong with signals together: names that nothing has, ranges, circles."""
+        """Record the errors of all signals together: unknown names, ranges, circular references."""
         for mistake in check_signals(self._signals, devices):
             section, keys = self._places[str(mistake.keys[0])]
             section.wrong(mistake.reason, *keys)
@@ -303,7 +303,7 @@ class StartReader:
     def _inputs(
         self, section: Section, groups: Mapping[str, tuple[str, ...]]
     ) -> Iterator[tuple[TomlPath, str, Any]]:
-        """Yield each input with the keys of its value; a group gives several."""
+        """Yield each input with the keys of its value; a group yields several inputs."""
         for name, value in section.values.items():
             members = groups.get(name)
             if members is None:
@@ -319,7 +319,7 @@ class StartReader:
     def _value(
         self, section: Section, keys: TomlPath, value: Any, full: str
     ) -> Setting | SignalSpec | None:
-        """Return a value, or a signal, which is kept to be checked; None if it is noted."""
+        """Return a value, or a signal, which is checked later; None if an error was recorded."""
         if isinstance(value, bool | int | float | str):
             return int(value) if isinstance(value, bool) else value
         spec = self._spec(section, keys, value)
@@ -350,7 +350,7 @@ class StartReader:
 
 
 def read_safe(section: Section, devices: Mapping[str, HasSignals]) -> dict[str, dict[str, Setting]]:
-    """Read `[safe]`: for each device outputs, and what they are when a test is over.
+    """Read `[safe]`: for each device the safe values of outputs at the end of a test.
 
     Args:
         section: the table.
@@ -371,7 +371,7 @@ def read_safe(section: Section, devices: Mapping[str, HasSignals]) -> dict[str, 
 
 
 def _can_be_safe(section: Section, physical: HasSignals, name: str) -> bool:
-    """Return whether an output or input can be this; else it is noted."""
+    """Return whether an output or input can have this value; record the error if not."""
     value = section.values[name]
     if is_broken(value):
         return False

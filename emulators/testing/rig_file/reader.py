@@ -1,4 +1,4 @@
-"""Read a rig file: what is on the bench, or all that is wrong with it."""
+"""Read a rig file: return the bench, or all errors in the file."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ _SCENARIO: Final = re.compile(
 
 
 def _no_rig_file(text: str) -> str:
-    r"""Return what a text is that is not a rig file; empty if unknown.
+    r"""Return what kind of file a text is if it is not a rig file; empty if unknown.
 
     >>> _no_rig_file("# drive\n0.1s press power_button\n")
     'it is a scenario: --scenario FILE plays it'
@@ -95,7 +95,7 @@ def _no_rig_file(text: str) -> str:
 
 
 def _refuse_old_tables(top: Section) -> Section:
-    """Return a rig file as it is; note what replaces the tables of files of before.
+    """Return a rig file unchanged; record which tables replace those of earlier versions.
 
     Args:
         top: the whole file.
@@ -136,7 +136,7 @@ _TABLE: Final = re.compile(rb"^[ \t]*+\[[\w.-]+\]", re.MULTILINE)
 
 
 def _is_bus_yml(path: Path, data: bytes) -> bool:
-    """Return whether a file is a bus.yml, a good or a bad one; not what only its name says."""
+    """Return whether a file is a bus.yml, valid or not; the name alone does not decide."""
     if _TABLE.search(data):
         return False
     return late.is_bus_file(data) or (_is_named(path) and not _TOML.search(data))
@@ -185,7 +185,7 @@ def _with_nodes(top: Section, folder: Path, *, alone: bool = False) -> Section:
 
 
 def _places(top: Section, path: Path, *, alone: bool) -> dict[str, int]:
-    """Return the lines of the nodes by their names; what is wrong is noted."""
+    """Return the lines of the nodes by their names; record errors."""
     try:
         bus = late.read_bus(path, cache=eds_cache())
     except ImportError as error:
@@ -229,11 +229,11 @@ _Faults = Mapping[str, FaultForm]
 
 
 def _read_faults(section: Section, owners: Mapping[str, _Faults | None]) -> Iterator[FaultPlan]:
-    """Yield the faults that can be.
+    """Yield the valid faults.
 
     Args:
         section: the table.
-        owners: devices and wires by name; None for one whose faults are not known.
+        owners: devices and wires by name; None if the faults of an owner are unknown.
     """
     for owner, value in section.values.items():
         if owner not in owners:
@@ -280,11 +280,11 @@ def _read_body(
 
     Args:
         section: the table.
-        devices: by name; the drives are looked for among them.
-        node_ids: names of nodes by their node-IDs, which may stand for them.
+        devices: by name; the drives are among them.
+        node_ids: names of nodes by their node-IDs; a drive may be given by its node-ID.
 
     Returns:
-        The body, None if it cannot be.
+        The body; None if it is invalid.
     """
     kind = section.values.get("kind")
     sides = SIDES.get(kind) if isinstance(kind, str) else None
@@ -349,17 +349,17 @@ _MAX_MB: Final = 4
 
 
 def read_rig_file(path: Path) -> RigPlan:
-    """Read a rig file, or a bus.yml as one.
+    """Read a rig file, or a bus.yml as a rig file.
 
     Args:
-        path: the file; names of other files in it are looked for beside it.
+        path: the file; names of other files are relative to its folder.
 
     Returns:
-        What it says.
+        The content of the file.
 
     Raises:
         OSError: it cannot be read.
-        RigFileError: all that is wrong with it.
+        RigFileError: all errors in the file.
     """
     try:
         with path.open("rb") as file:
@@ -404,8 +404,8 @@ def parse_rig_file(text: str, path: Path) -> RigPlan:
     """Read the text of a rig file; see `read_rig_file`.
 
     Args:
-        text: the whole.
-        path: of the file, which need not be there.
+        text: the whole text.
+        path: of the file, which need not exist.
     """
     if reason := _no_rig_file(text):
         raise RigFileError(str(path), (Mistake(1, reason),))
@@ -432,7 +432,7 @@ class _Reader:
         self._physical: dict[str, HasSignals] = {}
 
     def read(self) -> RigPlan:
-        """Read all of it; what is wrong is noted."""
+        """Read the whole file; record errors."""
         top = self._top
         seed = top.read({_SEED: TOP[_SEED]}, *(name for name in TOP if name != _SEED)).get(_SEED, 0)
         missing = "device" not in top.values or (not self._devices.plans and not top.notes.all)
@@ -466,7 +466,7 @@ class _Reader:
         )
 
     def _make_probes(self, plans: Mapping[str, DevicePlan | None], seed: int) -> None:
-        """Make each device, of those that are the same one; a bench takes that one."""
+        """Make each device, but equal devices only once; a bench uses the made device."""
         made: dict[str, Probe | list[WrongDevice]] = {}
         alone = len(self._wires) == 1
         for name, plan in plans.items():
@@ -500,7 +500,7 @@ class _Reader:
         return found
 
     def _check_node_ids(self) -> dict[int, str]:
-        """Note nodes without a node-ID, and those that share one; return their names by it."""
+        """Record nodes without a node-ID or with equal ones; return the names by node-ID."""
         names: dict[int, str] = {}
         seen: dict[tuple[str, int], str] = {}
         for name, each in self._probes.items():
