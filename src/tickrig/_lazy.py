@@ -19,7 +19,8 @@ def lazy(
         names: the exported names of each module.
 
     Returns:
-        Its `__all__`, `__getattr__` and `__dir__`; `__version__` is found, but not listed.
+        The package's `__all__`, `__getattr__` and `__dir__`. `__version__` is found, but not
+        listed.
     """
     modules = {name: module for module, offered in names.items() for name in offered}
 
@@ -64,9 +65,10 @@ class LazyModule:
 
 
 def tell_pyserial() -> None:
-    """Register the handler of `tickrig://` with pyserial if it is loaded already.
+    """Register the handler of `tickrig://` with pyserial if pyserial is loaded already.
 
-    Otherwise this happens when the first line gets a name; so an import costs nothing.
+    If pyserial is not loaded yet, the handler is registered when the first line gets a name.
+    Importing tickrig therefore takes no extra time.
     """
     packages = getattr(sys.modules.get("serial"), "protocol_handler_packages", None)
     if packages is not None and "tickrig.emulators.serial.outside" not in packages:

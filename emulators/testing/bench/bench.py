@@ -43,7 +43,7 @@ else:  # POSIX
 
 
 class BenchTranscript(str):
-    """What happened on a bench: a text, which Jupyter shows line by line."""
+    """The events of a bench as text, which Jupyter shows line by line."""
 
     __slots__ = ()
 
@@ -63,11 +63,12 @@ SOON: Final = "100ms"
 class BenchDevice:
     """A device of a bench: its inputs, outputs and faults, and the connections for its host.
 
-    Inputs, outputs, buttons and faults have the names in `describe`.
+    `describe` lists the names of inputs, outputs, buttons and faults.
 
     Args:
-        mode: of the bench.
-        name: of the device; empty for all of them, with signals named `NAME/signal`.
+        mode: the mode of the bench.
+        name: name of the device. If empty, the object stands for all devices, with signals named
+            `NAME/signal`.
 
     Attributes:
         name: of the device.
@@ -77,7 +78,7 @@ class BenchDevice:
         self._mode, self.name = mode, name
 
     def describe(self) -> BenchDescription:
-        """Return all inputs, outputs and faults; printed, it is a readable list.
+        """Return all inputs, outputs and faults; `print` shows them as a readable list.
 
         >>> from tickrig import Bench
         >>> with Bench("rrc") as bench:
@@ -101,11 +102,11 @@ class BenchDevice:
         """Set an input, or all inputs of a group.
 
         Args:
-            name: of the input or group, such as `stick`.
-            values: one, or one for each input of the group; also as a list.
+            name: name of the input or group, such as `stick`.
+            values: one value, or one value for each input of the group, also as a list.
 
         Raises:
-            ValueError: unknown input, or values that it does not accept.
+            ValueError: unknown input, or values that the input does not accept.
             NotOnThisBench: not possible on this bench.
         """
         each = values[0] if len(values) == 1 and isinstance(values[0], list | tuple) else values
@@ -115,7 +116,7 @@ class BenchDevice:
         """Return the present value of an input or output.
 
         Args:
-            name: of the input or output, such as `state`.
+            name: name of the input or output, such as `state`.
 
         Raises:
             ValueError: unknown name.
@@ -130,8 +131,8 @@ class BenchDevice:
         """Press a button, and release it after a time on the bench.
 
         Args:
-            name: of the button.
-            for_: duration, from the tick that sees it.
+            name: name of the button.
+            for_: duration, from the tick in which the device sees the button pressed.
         """
         self._mode.request("press", name=self._full(name), duration_us=us_of(for_))
 
@@ -141,10 +142,11 @@ class BenchDevice:
         """Start a fault: now, at a time, or when a condition becomes true.
 
         Args:
-            spec: such as `cut`, `cut@2s-3s`, `flip=0.001`; a fault of the device or of its wire.
-            when: condition to wait for, such as `on_line("OK:output", nth=3)`; `spec` then has no
-                time.
-            for_: duration from the start of the fault; by default it stays.
+            spec: the fault, such as `cut`, `cut@2s-3s`, `flip=0.001`; a fault of the device or of
+                its wire.
+            when: condition that starts the fault, such as `on_line("OK:output", nth=3)`; `spec`
+                then has no time.
+            for_: duration from the start of the fault; by default the fault stays.
 
         Raises:
             ValueError: unknown fault, or invalid arguments.
@@ -159,10 +161,10 @@ class BenchDevice:
         self._mode.fault(self.name, wanted, when, for_us)
 
     def clear(self, name: str) -> None:
-        """Clear a fault, also a scheduled one.
+        """Clear a fault, or cancel a scheduled one.
 
         Args:
-            name: of the fault.
+            name: name of the fault.
 
         Raises:
             ValueError: unknown fault.
@@ -173,7 +175,7 @@ class BenchDevice:
         """Switch the supply of the device off, or of all devices of the bench.
 
         Raises:
-            NotOnThisBench: it has no switch.
+            NotOnThisBench: the bench cannot switch the supply.
         """
         self._mode.switch_power(self.name, on=False)
 
@@ -181,7 +183,7 @@ class BenchDevice:
         """Switch the supply on again.
 
         Raises:
-            NotOnThisBench: it has no switch.
+            NotOnThisBench: the bench cannot switch the supply.
         """
         self._mode.switch_power(self.name, on=True)
 
@@ -189,12 +191,13 @@ class BenchDevice:
         """Run an action of several steps, such as switching the device off.
 
         Args:
-            text: description, such as `switch VR2 off, unless it is off`, shown to a human
-                operator.
-            do: does it with an emulator; not called if a human does it.
+            text: description, such as `switch VR2 off, unless it is off`, which a human operator
+                sees.
+            do: executes the action with an emulator; it is not called if a human executes the
+                action.
 
         Raises:
-            OperatorRefused: the human did not do it.
+            OperatorRefused: the human did not execute the action.
             NotOnThisBench: not possible on this bench.
         """
         self._mode.perform(self.name, text, do)
@@ -205,8 +208,8 @@ class BenchDevice:
         Args:
             text: description, such as `the motors drive forward at 30 %`; a human answers yes or
                 no.
-            seen: returns the answer for an emulator; not called if a human answers.
-            within: longest wait, besides the tolerance of the bench.
+            seen: returns the answer for an emulator; it is not called if a human answers.
+            within: longest wait; the tolerance of the bench is added.
         """
         return self._mode.observe(self.name, text, seen, us_of(within))
 
@@ -214,9 +217,9 @@ class BenchDevice:
         """Return a condition that is true after a line, or a frame as in candump, has passed.
 
         Args:
-            pattern: the whole line without its end, as `OK:output` or `701#05`; `*` matches
-                anything.
-            nth: number of the occurrence from now on, from 1.
+            pattern: the whole line without its end, such as `OK:output`, or the frame, such as
+                `701#05`; `*` matches anything.
+            nth: number of the occurrence, counted from this call; the first one is 1.
         """
         source = self._mode.wire_of(self.name) if self.name else ""
         trigger = tasks.LineTrigger(pattern, nth, source)
@@ -232,15 +235,15 @@ class BenchDevice:
         """Open the serial line as a pyserial object, typed as the result of `serial_for_url`.
 
         Args:
-            options: those of `serial.Serial`; `timeout` is in the time of the bench.
+            options: options of `serial.Serial`; `timeout` is in the time of the bench.
         """
         return cast("serial.Serial", self._mode.doors.serial(self._wire(), options))
 
     @property
     def url(self) -> str:
-        """URL at which a program can open the serial line itself, while the bench is open.
+        """URL of the serial line, for a program that opens the line itself while the bench is open.
 
-        It is a URL for `serial.serial_for_url`: `tickrig://rrc`, `/dev/pts/7`, `COM3`.
+        The URL is one for `serial.serial_for_url`: `tickrig://rrc`, `/dev/pts/7`, `COM3`.
         """
         address = self._mode.doors.address(self._wire())
         if not isinstance(address, str):
@@ -259,7 +262,7 @@ class BenchDevice:
         """Open the CAN bus as a python-can bus.
 
         Args:
-            options: those of `can.Bus`.
+            options: options of `can.Bus`.
         """
         return self._mode.doors.can_bus(self._wire(), options)
 
@@ -292,22 +295,23 @@ HARDWARE: Final = "hardware"
 
 
 class Bench(BenchDevice, Closing):
-    """Devices on a bench, for a test: in virtual time, in real time, or real ones.
+    """Devices on a bench, for a test: in virtual time, in real time, or real devices.
 
-    Links, serial objects, buses, networks, `run_for` and `wait_until` all advance the same rig, and
-    all stop for scheduled releases of buttons and scheduled faults.
+    Links, serial objects, buses, networks, `run_for` and `wait_until` all advance the time of the
+    same rig. They all stop for scheduled releases of buttons and for scheduled faults.
 
     Args:
         device: the only device: an object, or the name of its type.
-        seed: of all random numbers.
-        line: parameters of the serial lines, if not in the type of the device.
+        seed: the seed of all random numbers.
+        line: parameters of the serial lines, if they differ from those of the device type.
         mode: `virtual` time, or `real` time with hosts at ptys and buses.
-        sdo_timeout: silence of an SDO client after which CANopen nodes abort a transfer; by default
-            5 s, or the time of the given slave.
-        devices: several, by name; CANopen slaves share a bus.
+        sdo_timeout: time after which CANopen nodes abort a transfer if the SDO client is silent; by
+            default 5 s, or the time of the given slave.
+        devices: several devices by name; CANopen slaves share a bus.
 
     Raises:
-        ValueError: no device, or an unknown name; an SDO time-out of 0, or without a node.
+        ValueError: no device, or an unknown name; an SDO time-out of 0, or an SDO time-out without
+            a node.
 
     >>> from tickrig.device.rrc.machine import Rrc
     >>> with Bench(Rrc(), seed=1) as bench:
@@ -402,7 +406,7 @@ class Bench(BenchDevice, Closing):
         """Advance the time.
 
         Args:
-            duration: microseconds, or a text such as `"100ms"`.
+            duration: a number of microseconds, or a text such as `"100ms"`.
         """
         self._mode.run_for(us_of(duration))
 
@@ -410,20 +414,20 @@ class Bench(BenchDevice, Closing):
         """Advance the time until a condition is true.
 
         Args:
-            done: returns the condition, without side effects.
+            done: returns whether the condition is true; it must have no side effects.
             within: longest wait.
 
         Returns:
-            False after the time-out.
+            True, or False after the time-out.
         """
         tasks.check_condition(done)
         return self._mode.wait_until(done, us_of(within))
 
     async def sleep(self, duration: Duration) -> None:
-        """Wait in an async body, while other tasks run.
+        """Wait in an async body; other tasks run during the wait.
 
         Args:
-            duration: microseconds, or a text such as `"100ms"`.
+            duration: a number of microseconds, or a text such as `"100ms"`.
         """
         await tasks.Wait(_never, self.now_us + us_of(duration))
 
@@ -431,11 +435,12 @@ class Bench(BenchDevice, Closing):
         """Wait in an async body until a condition is true.
 
         Args:
-            done: returns the condition, such as `on_line("OK:beep")`, without side effects.
-            within: longest wait; by default unlimited, in virtual time one day.
+            done: returns whether the condition is true, such as `on_line("OK:beep")`; it must have
+                no side effects.
+            within: longest wait; by default one day in virtual time, otherwise unlimited.
 
         Returns:
-            False after the time-out.
+            True, or False after the time-out.
         """
         return await tasks.Wait(done, NEVER if within is None else self.now_us + us_of(within))
 
@@ -443,11 +448,11 @@ class Bench(BenchDevice, Closing):
         """Wait in an async body until an input or output changes.
 
         Args:
-            name: of the input or output.
-            within: longest wait; by default unlimited, in virtual time one day.
+            name: name of the input or output.
+            within: longest wait; by default one day in virtual time, otherwise unlimited.
 
         Returns:
-            Its new value; the old one after the time-out.
+            The new value; after the time-out, the unchanged value.
         """
         before = self.get(name)
         await self.until(lambda: self.get(name) != before, within)
@@ -457,14 +462,14 @@ class Bench(BenchDevice, Closing):
         """Start an async body that runs beside the test while time advances.
 
         Args:
-            body: it awaits `sleep`, `until`, `edge` or a task, and does not advance the time
-                itself.
+            body: the coroutine. It awaits `sleep`, `until`, `edge` or a task, and must not advance
+                the time itself.
 
         Returns:
             The task; `await` it, or call its `result()`.
 
         Raises:
-            NotOnThisBench: real devices; use `run` for a single body.
+            NotOnThisBench: the devices are real; use `run` for a single body.
         """
         try:
             task = self._mode.act(lambda rig: tasks.Task(rig, body))
@@ -483,11 +488,12 @@ class Bench(BenchDevice, Closing):
         """Run an async body to its end, and return its result.
 
         Args:
-            body: it awaits `sleep`, `until`, `edge` or tasks that it starts.
+            body: the coroutine. It awaits `sleep`, `until`, `edge`, or tasks that it starts.
 
         Raises:
-            TypeError: it awaits something else, such as `asyncio.sleep`.
-            RuntimeError: its condition never becomes true, or not within a day of virtual time.
+            TypeError: the body awaits something else, such as `asyncio.sleep`.
+            RuntimeError: the condition of the body does not become true within a day of virtual
+                time, or can never become true.
 
         >>> from tickrig.device.rrc.machine import Rrc
         >>> async def body(bench):
@@ -511,10 +517,14 @@ class Bench(BenchDevice, Closing):
     def patched_time(self) -> AbstractContextManager[Any]:
         """Run hosts that call `time.sleep` or `time.monotonic` in the time of the bench.
 
-        In virtual time, within the `with` block, `time.sleep`, `monotonic`, `time` and
-        `perf_counter`, `wait` of threading's events and conditions, and `get` and `put` of queues
-        use the time of the bench, wherever host code has stored them
-        (docs/reference/bench/hosts.md). In real time nothing changes.
+        In virtual time, within the `with` block, these functions use the time of the bench:
+
+        - `time.sleep`, `monotonic`, `time` and `perf_counter`
+        - `wait` of threading's events and conditions
+        - `get` and `put` of queues
+
+        This holds wherever host code has stored the functions (docs/reference/bench/hosts.md). In
+        real time nothing changes.
 
         Returns:
             A context manager that returns the clock, with the functions of `time`.
@@ -524,9 +534,9 @@ class Bench(BenchDevice, Closing):
         return nullcontext(time)
 
     def transcript(self) -> BenchTranscript:
-        """Return the latest lines and frames, and what was done: time, where, direction, text.
+        """Return the latest lines, frames and actions: time, place, direction, text.
 
-        10,000 are kept; a line above them says how many came before.
+        The latest 10,000 lines are kept. A line above them has the number of earlier lines.
 
         Returns:
             A text; Jupyter shows it line by line.
@@ -534,7 +544,7 @@ class Bench(BenchDevice, Closing):
         return BenchTranscript(text_of(self._mode.journal()))
 
     def trace(self) -> BenchRecording:
-        """Return what `save_trace` saves, to look at it: `bench.trace().to_pandas()`.
+        """Return the recording that `save_trace` saves, as an object: `bench.trace().to_pandas()`.
 
         Raises:
             OSError: no temporary file can be written.
@@ -559,11 +569,11 @@ class Bench(BenchDevice, Closing):
     def save_trace(self, path: Path | str) -> None:
         """Save traffic, inputs and faults of all devices, for `tickrig replay`.
 
-        For real devices it has the traffic of their ports and the operator's actions, for `tickrig
-        compare`.
+        With real devices the file has the traffic of their ports and the operator's actions, for
+        `tickrig compare`.
 
         Args:
-            path: the file; one that exists is replaced.
+            path: the file; an existing file is replaced.
 
         Raises:
             OSError: the file cannot be written.
@@ -573,27 +583,28 @@ class Bench(BenchDevice, Closing):
     def fork(self) -> Bench:
         """Return a twin of the bench that continues independently in virtual time.
 
-        It has the devices, wires, faults and pending events, but no hosts and no triggers.
+        The twin has the devices, wires, faults and pending events, but no hosts and no triggers.
 
         Raises:
-            NotOnThisBench: not in virtual time.
+            NotOnThisBench: the bench is not in virtual time.
         """
         return Bench.of_mode(self._mode.fork())
 
     def snapshot(self, *hosts: object) -> MachineSnapshot:
         """Return a snapshot that restores the present state of the bench any number of times.
 
-        It restores the same bench: references to it and to its links stay valid. It costs a small
-        part of a `fork`. Later tasks, triggers and hosts are removed.
+        The snapshot restores the same bench: references to the bench and to its links stay valid. A
+        snapshot takes a small part of the time of a `fork`. Restoring removes tasks, triggers and
+        hosts that were added later.
 
         Args:
-            hosts: objects to restore with it: hosts and other objects of a test.
+            hosts: hosts and other objects of a test, which are restored together with the bench.
 
         Returns:
             The snapshot; `restore()` restores everything.
 
         Raises:
-            NotOnThisBench: not in virtual time.
+            NotOnThisBench: the bench is not in virtual time.
             TypeError: an object in a host cannot be restored, such as a file or a thread.
 
         >>> from tickrig.device.rrc.machine import Rrc
@@ -623,11 +634,11 @@ def open_bench(path: Path | str, *, mode: str = VIRTUAL, seed: int | None = None
     Args:
         path: the rig file.
         mode: `virtual`, `real` or `hardware`.
-        seed: of all random numbers, instead of that in the file.
+        seed: the seed of all random numbers; it replaces the seed in the file.
 
     Raises:
         OSError: the file cannot be read, or a port is not available.
-        RigFileError: all errors in the file.
+        RigFileError: the file has errors; the message lists all of them.
         ValueError: a device cannot be made.
         PortGone: a bus cannot be opened.
     """

@@ -62,8 +62,8 @@ _ENDS: Final = (b"host", b"device")
 class Journal(WireLog):
     """The latest lines, frames and actions of all wires, in order of time.
 
-    A line counts as passed when the device receives its end, or sends it. A serial line shows the
-    data as sent and received by the host; data that a fault has changed are shown as the device
+    A line counts as passed when the device receives its end or sends it. A serial line shows the
+    data that the host sent or received. Data that a fault has changed are shown as the device
     receives or sends them, with the mark `~`.
     """
 
@@ -92,7 +92,7 @@ class Journal(WireLog):
         Args:
             source: the line, or the node.
             ends: marks of the far and the near end.
-            splitter: of the line; bytes of one without a delimiter are shown in hex.
+            splitter: of the line; bytes of a line without a delimiter are shown in hex.
         """
         is_binary = isinstance(splitter, FrameFormat) and not splitter.delimiter
 
@@ -267,13 +267,14 @@ class Parts:
 
 
 class RigState(Copyable):
-    """State of a bench in virtual and in real time, copied for its twin.
+    """State of a bench in virtual and in real time; a twin gets a copy.
 
     Args:
-        parts: its parts.
+        parts: the parts of the bench.
         bridges: connections with the outside world.
         clock: by default a `VirtualClock`.
-        trace: the file of the recording; without it the run is recorded in memory, if `keeps`.
+        trace: the file of the recording. Without a file the run is recorded in memory, if `keeps`
+            is true.
         keeps: whether to record the run without a file.
 
     Raises:
@@ -333,8 +334,9 @@ class RigState(Copyable):
         """Return the full name of a fault.
 
         Args:
-            owner: the device that has it, or whose wire has it; a wire; empty for any.
-            fault: its name there.
+            owner: the device with the fault, the device whose wire has the fault, or the wire;
+                empty for any.
+            fault: name of the fault at the owner.
 
         Raises:
             ValueError: unknown fault.
@@ -355,7 +357,7 @@ class RigState(Copyable):
             owner: the device or wire; empty for all.
 
         Returns:
-            Full names by their names there.
+            Full names of the faults, by their names at the owner.
         """
         everything = self.operator.faults
         if not owner:

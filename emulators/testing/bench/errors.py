@@ -1,9 +1,13 @@
 """Errors of a bench: unsupported operations, and tests without a verdict.
 
-BenchError NotOnThisBench        this mode cannot do that; the plug-in skips the test BenchBlocked
-no verdict about the device; the plug-in reports an error MachineTooSlow    real time was not kept
-PortGone a port, a bus or an emulator's socket is gone OperatorRefused   a human at the terminal did
-not do what was asked
+`BenchError` is the base class.
+
+- `NotOnThisBench`: this mode cannot do that; the plug-in skips the test.
+- `BenchBlocked`: no verdict about the device; the plug-in reports an error. Its subclasses are the
+  next three.
+- `MachineTooSlow`: real time was not kept.
+- `PortGone`: a port, a bus or an emulator's socket is gone.
+- `OperatorRefused`: a human at the terminal did not execute a request.
 """
 
 from __future__ import annotations

@@ -27,18 +27,18 @@ BIT_RATE: Final = 1_000_000
 
 
 class LineMount(Copyable):
-    """Devices on a serial line; several share one only on RS485.
+    """Devices on a serial line; only on RS485 several devices share a line.
 
     Args:
         name: of the line.
         settings: parameters of the line.
-        line: the line, if it is not made by `settings`; its ends belong to the devices, except
-            `line.b`, the host's.
+        line: the line, if it is not made from `settings`. Its ends belong to the devices, except
+            `line.b`, which is the host's.
 
     Attributes:
         line: the line.
         devices: by name.
-        entries: the trace entry of each.
+        entries: the trace entry of each device.
         tap: traffic at the first device's end, after faults of the line.
     """
 
@@ -59,7 +59,7 @@ class LineMount(Copyable):
         Args:
             name: of the device.
             device: the device.
-            entry: its trace entry, if it can be rebuilt.
+            entry: trace entry of the device, if it can be rebuilt.
             seed: of random faults at its end.
 
         Raises:
@@ -106,7 +106,8 @@ class LineMount(Copyable):
 class BusMount(Copyable):
     """Nodes on a CAN bus.
 
-    One more end of the bus acknowledges frames, so that a node is never alone, even without a host.
+    A further end of the bus acknowledges frames. A node is therefore never alone on the bus, even
+    without a host.
 
     Args:
         name: of the bus.
@@ -116,7 +117,7 @@ class BusMount(Copyable):
     Attributes:
         wire: the bus.
         nodes: by name.
-        node_faults: objects on which faults of each node are armed, by its name.
+        node_faults: by the name of the node, the object on which its faults are armed.
         entries: the trace entry of each.
     """
 
@@ -133,7 +134,7 @@ class BusMount(Copyable):
         Args:
             name: of the node.
             slave: the slave.
-            entry: its trace entry, if it can be rebuilt.
+            entry: trace entry of the slave, if it can be rebuilt.
         """
         node = self.nodes[name] = Node(name, slave, self.wire)
         self.node_faults[name] = NodeFaults(node, self.wire)

@@ -223,8 +223,9 @@ _BUS: Final = "can"
 """Default bus of nodes."""
 
 BenchedDevice = Emulated[bytes] | CanopenSlave | DeviceType | str
-"""A device, a device type, or a `type` as in rig files: the name of a device type or CANopen
-model, an EDS or DCF file, `FILE.py:Class`; the last three with their node-ID: `5=drive.eds`."""
+"""A device, a device type, or a text like `type` in rig files: the name of a device type or of a
+CANopen model, an EDS or DCF file, or `FILE.py:Class`. The last three may have a node-ID in front:
+`5=drive.eds`."""
 
 _NODE: Final = re.compile(r"[0-9]+=")
 
@@ -241,11 +242,11 @@ def mounts_of(
         devices: by name.
         seed: of all random numbers.
         line: parameters of the serial lines; by default those of their type, or 115 200 8N1.
-        sdo_timeout_us: of the SDO servers of all nodes; None for no change.
+        sdo_timeout_us: time-out of the SDO servers of all nodes; None to keep their own.
 
     Raises:
-        ValueError: an object that is neither a device nor a device type; a time-out of 0, or
-            without a node.
+        ValueError: an object that is neither a device nor a device type; a time-out of 0, or a
+            time-out without a node.
     """
     mounts: dict[str, Mount] = {}
     for name, device in devices.items():
@@ -283,12 +284,12 @@ def named_device(text: str, folder: Path, name: str = "") -> DevicePlan:
     """Return the device or type named by a text, like the `type` of a rig file.
 
     Args:
-        text: a name or file; the node-ID of a CANopen device may be before it: `5=drive.eds`.
+        text: a name or file; a CANopen device may have its node-ID in front: `5=drive.eds`.
         folder: folder of the files.
         name: of the device.
 
     Raises:
-        ValueError: it does not name a device.
+        ValueError: the text does not name a device.
     """
     node, _, rest = text.rpartition("=") if _NODE.match(text) else ("", "", text)
     if rest.lower().endswith(RIG_SUFFIXES):

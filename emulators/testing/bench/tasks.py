@@ -1,7 +1,7 @@
 """Async bodies of tests: several observations and actions at the same time.
 
-A body awaits times and conditions of the bench; it is independent of asyncio, whose loop has its
-own clock.
+A body awaits times and conditions of the bench. It does not use asyncio, because the loop of
+asyncio has its own clock.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ class LineTrigger:
 
     Args:
         pattern: the whole line, or the frame in candump's notation; `*` stands for anything.
-        nth: number of the occurrence from now on, from 1.
-        source: the wire or device; any if empty.
+        nth: number of the occurrence, counted from the creation; the first one is 1.
+        source: the wire or device; empty for any.
 
     Attributes:
         count: number of occurrences.
@@ -96,7 +96,7 @@ def _ordinal(number: int) -> str:
 
 
 def when(rig: BenchRig, condition: Condition, act: Callable[[], None]) -> None:
-    """Act once, between two ticks, when a condition is true: now, or after a later step."""
+    """Act once, between two ticks, as soon as a condition is true: now or after a later step."""
 
     def watch(now_us: int) -> None:
         if condition():
@@ -127,7 +127,7 @@ class Wait:
 
     Attributes:
         done: returns the condition.
-        until_us: when it continues without the condition.
+        until_us: time at which the body continues even if the condition is false.
     """
 
     done: Callable[[], bool]
@@ -156,8 +156,9 @@ def run_body(waiting: _TaskWait, body: Coroutine[Any, Any, _T]) -> _T:
     """Run the body of a test, advancing the time while it waits.
 
     Raises:
-        TypeError: it awaits something else, such as `asyncio.sleep`.
-        RuntimeError: its condition never becomes true, or not within a day of virtual time.
+        TypeError: the body awaits something else, such as `asyncio.sleep`.
+        RuntimeError: the condition of the body does not become true within a day of virtual time,
+            or can never become true.
         KeyboardInterrupt: Ctrl-C; the message has the condition and the waiting time.
     """
     came: bool | None = None
@@ -209,10 +210,10 @@ class Task(Generic[_T]):
         return self._wait is None
 
     def result(self) -> _T:
-        """Return its result, or raise its exception.
+        """Return the result of the body, or raise its exception.
 
         Raises:
-            RuntimeError: it has not ended yet.
+            RuntimeError: the body has not ended yet.
         """
         if self._error is not None:
             self._raised = True
@@ -232,7 +233,7 @@ class Task(Generic[_T]):
         return self.result()
 
     def cancel(self) -> None:
-        """Cancel it at its wait; does nothing if it has ended."""
+        """Cancel the body at its wait; no effect if it has ended."""
         if self._wait is not None:
             self._end()
             self._body.close()
@@ -262,7 +263,7 @@ class Task(Generic[_T]):
 
 
 def _step(body: Coroutine[Any, Any, Any], came: bool | None) -> Wait:
-    """Run a body to its next wait; explain what to do if it asks for the asyncio loop."""
+    """Run a body to its next wait; explain the error if the body needs the asyncio loop."""
     try:
         return _wait_of(body.send(came))
     except RuntimeError as error:

@@ -242,7 +242,7 @@ class Crew:
         return worker
 
     def _start(self) -> _WorkerProcess:
-        """Start a worker; one that dies at once is tried again."""
+        """Start a worker; if the worker ends at once, try again."""
         for attempt in range(_ATTEMPTS):
             try:
                 return _WorkerProcess(self.order)

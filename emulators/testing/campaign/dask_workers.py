@@ -156,13 +156,13 @@ class DaskWorkers:
             self._client.close(timeout=1)
 
     def _forget(self) -> None:
-        """Remove the plug-in; Dask waits without a limit for a stopped scheduler or worker."""
+        """Remove the plug-in; without a scheduler or worker, Dask waits here without a limit."""
         with suppress(*_GONE):
             self._client.unregister_worker_plugin(self._plugin.name)
 
 
 async def _ask_for_scheduler(url: str) -> None:
-    """Raise unless a scheduler answers; a `Client` waits for the answer without a limit."""
+    """Raise unless a scheduler answers; a `Client` would wait for the answer without a limit."""
     async with rpc(url, timeout=_CONNECT_S) as scheduler:
         answer = await scheduler.identity()
     if not isinstance(answer, dict) or answer.get("type") != _SCHEDULER:
@@ -176,7 +176,7 @@ def be_quiet() -> None:
 
 
 def _do(name: str, runs: Sequence[Run], digest: str, version: str) -> list[RunVerdict] | str:
-    """Do runs on this worker; a text as result is a refusal."""
+    """Do runs on this worker; a result that is a text is a refusal."""
     worker = get_worker()
     if __version__ != version:
         return f"{worker.address}: there is tickrig {__version__}, here {version}"

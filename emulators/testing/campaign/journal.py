@@ -20,19 +20,20 @@ class JournalFullError(OSError):
 
 
 class CampaignJournal:
-    """Verdicts in a file, each once; a new process continues after the last one.
+    """Verdicts in a file, one per run; a new process continues after the last one.
 
-    A line is a checksum and a JSON array. Torn lines are ignored, and their runs are repeated.
+    A line has a checksum and a JSON array. Incomplete lines are ignored, and their runs are
+    repeated.
 
     Args:
         path: the file.
         head: properties of the campaign, by name.
 
     Attributes:
-        verdicts: those of the file, and those that were added, by the number of the run.
+        verdicts: by the number of the run, the verdicts read from the file and those added later.
 
     Raises:
-        Refusal: the file is of another campaign, or one that runs.
+        Refusal: the file belongs to another campaign, or to a campaign that is running.
         OSError: it cannot be read or written.
     """
 
@@ -89,7 +90,7 @@ class CampaignJournal:
         """Write new verdicts to the disk, and return them.
 
         Raises:
-            JournalFullError: not all could be written; the others are not kept.
+            JournalFullError: some verdicts could not be written; these are not kept.
         """
         new = [verdict for verdict in verdicts if self._keep(verdict)]
         data = b"".join(_line(list(verdict)) for verdict in new)

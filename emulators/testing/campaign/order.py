@@ -26,12 +26,12 @@ class CampaignOrder:
     """Tests that a worker collects, and the time-out of a run.
 
     Attributes:
-        tests: files, folders and node IDs, as for pytest.
+        tests: files, folders and node IDs, as in pytest's command line.
         parameters: as in `--bench-param`.
         bench: rig file, empty for that of the tests.
         keyword: as in `-k`; empty for all.
         timeout_s: time-out of a run.
-        folder: absolute path in which they are searched.
+        folder: absolute path of the folder in which the tests are searched.
         version: of tickrig.
     """
 
@@ -71,9 +71,10 @@ class Collected(NamedTuple):
     """Tests collected by a worker.
 
     Attributes:
-        tests: those with a bench.
-        left_out: node IDs of those without.
-        digest: of their files, and of the project's modules that these import.
+        tests: the tests with a bench.
+        left_out: node IDs of the tests without a bench.
+        digest: hash of the files of the tests, and of the project's modules that these files
+            import.
     """
 
     tests: tuple[CollectedTest, ...]

@@ -22,7 +22,7 @@ class Seeds:
     """Seeds in ascending order, each once.
 
     Attributes:
-        ranges: first and last seed of each, neither touching nor overlapping the next.
+        ranges: first and last seed of each range; ranges do not touch or overlap.
 
     >>> seeds = Seeds.parse("7,0-3,2-4")
     >>> str(seeds), len(seeds), seeds[5]
@@ -87,7 +87,7 @@ _KEPT: Final = "kept"
 
 
 class Shard(NamedTuple):
-    """A part of a campaign: the `part`-th of `parts`, from 1 on.
+    """A part of a campaign, numbered from 1: `3/8` is the third of eight parts.
 
     >>> str(Shard.parse("3/8"))
     '3/8'

@@ -40,7 +40,7 @@ from tickrig.emulators.testing.plugin.stash import BENCHED
 from tickrig.emulators.testing.report.bench_report import Outcome
 
 _IDLE_S: Final = 60.0
-"""Idle time after which a worker ends; another one is started when needed."""
+"""Idle time after which a worker ends; another worker is started when needed."""
 
 _MOST: Final = 300
 """Largest number of characters of a reason."""
@@ -67,7 +67,7 @@ class _Worker:
 
     @pytest.hookimpl(trylast=True)
     def pytest_configure(self, config: pytest.Config) -> None:
-        """Show nothing; pytest up to 9.0 needs a reporter to explain what `assert` compared."""
+        """Disable output; pytest up to 9.0 needs a reporter to explain what `assert` compared."""
         config.pluginmanager.unregister(name=_REPORTER)
         self._silent = pytest.TerminalReporter(config, open(os.devnull, "w"))  # noqa: SIM115
         config.pluginmanager.register(self._silent, _REPORTER)

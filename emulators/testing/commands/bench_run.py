@@ -73,13 +73,13 @@ def run_bench(
 
     Args:
         file: the rig file.
-        virtual: in virtual time.
-        control: where its control socket is to be; None for what the file says.
-        seed: of all chance; None for what the file says.
-        others: the other options, as `_BenchOptions` has them.
+        virtual: whether to run in virtual time.
+        control: place of the control socket; None for the place in the file.
+        seed: of all random numbers; None for the seed in the file.
+        others: the other options, named as in `_BenchOptions`.
 
     Raises:
-        Refused: the command line asks for something that cannot be done.
+        Refused: the command line requests something impossible.
     """
     if virtual and others["for_us"] is None:
         raise Refused("--virtual wants a time: --for 10s")
@@ -129,7 +129,7 @@ class _BenchRun(EmulatorRun[_BenchOptions]):
     """One run.
 
     Args:
-        plan: what the rig file says.
+        plan: content of the rig file.
         options: the command line.
     """
 
@@ -265,7 +265,7 @@ class _BenchRun(EmulatorRun[_BenchOptions]):
 
 
 def _columns(rows: Iterable[tuple[str, ...]]) -> Iterator[str]:
-    """Yield rows with their columns below each other.
+    """Yield rows as text with aligned columns.
 
     >>> list(_columns([("a", "bc"), ("def", "g")]))
     ['a    bc', 'def  g']

@@ -91,8 +91,8 @@ def _compare_port(
         make: makes the device.
         tolerance: time after the end in which the emulator may still answer.
         settle_us: how long the emulator is on before the recording starts. If the first recorded
-            output is the greeting after power-on, that is tried too; other tick phases are tried if
-            an input was set for less than a tick. The closest run counts.
+            output is the greeting after power-on, a start at power-on is tried too. If an input was
+            set for less than a tick, other tick phases are tried. The closest run counts.
     """
     records, device = recording.of(name), make().device
     until_us = recording.until_us + tolerance.allowed_us(recording.until_us)
@@ -111,7 +111,7 @@ def _compare_port(
 
 
 def _has_short_change(records: Iterable[BenchRecord], tick_us: int) -> bool:
-    """Return whether an input was set twice within a tick: only some ticks see what was between."""
+    """Return whether an input was set twice within a tick, so that some ticks miss a value."""
     latest: dict[str, int] = {}
     for record in records:
         if record.mark is Mark.PHYSICAL and (change := record.change) is not None:
@@ -221,16 +221,16 @@ def _compare_bus(
     settle_us: int,
     bit_rate: int,
 ) -> _ComparedRun:
-    """Put the recorded frames of all others on a bus with emulated nodes, at their times.
+    """Replay the recorded frames of all others on a bus with emulated nodes, at their times.
 
-    Frames of a node are identified by its CAN-IDs in its dictionary at that time.
+    The frames of a node are identified by the CAN-IDs that its dictionary has at that time.
 
     Args:
         recording: recorded at a port of the bus.
         make: makes the nodes on a bus.
         tolerance: time after the end in which they may still answer.
         settle_us: how long the nodes are on before the recording starts. If the first frame is one
-            after power-on, that is tried too, and the closer run counts.
+            after power-on, a start at power-on is tried too, and the closer run counts.
         bit_rate: of the bus in bit/s.
     """
     records = [x for x in recording.records if isinstance(x.traffic, CanFrame) or x.text]
@@ -280,7 +280,10 @@ class _Bus:
         return isinstance(traffic, CanFrame) and any(x.has(traffic) for x in self._ids.values())
 
     def _act(self, record: BenchRecord, early: bool, now_us: int) -> None:
-        """Repeat an action of host or operator; `early` means before the nodes were switched on."""
+        """Repeat an action of host or operator.
+
+        If `early` is true, the action happened before the nodes were switched on.
+        """
         frame = record.traffic
         if not isinstance(frame, CanFrame):
             self._do(record)
@@ -290,7 +293,7 @@ class _Bus:
             self._host.send(now_us, (frame,))
 
     def _do(self, record: BenchRecord) -> None:
-        """Repeat a manual action on a node: `5/power_off=1`, or on the only one."""
+        """Repeat a manual action on a node: `5/power_off=1`; without an ID, on the only node."""
         prefix, slash, text = record.text.partition("/")
         node = self._nodes.get(prefix) if slash else next(iter(self._nodes.values()))
         if node is None:

@@ -38,7 +38,7 @@ _LOOK_S: Final = 0.05
 """Period at which the tap checks whether to stop."""
 
 _STOPPED_S: Final = 0.5
-"""Delay from which a check counts as late: the process was stopped, or starved."""
+"""Delay from which a check counts as late: the process was stopped, or got no processor time."""
 
 _READ_BYTES: Final = 4_096
 
@@ -46,18 +46,18 @@ _READ_BYTES: Final = 4_096
 class _PortTap:
     """Passes bytes between the pty of a host and a port.
 
-    One thread reads the port, the caller's reads the pty and what an operator types. A host
-    may close the pty and open it again.
+    One thread reads the port. The caller's thread reads the pty and the lines that an operator
+    types. A host may close the pty and open it again.
 
     Args:
         link: the port, recorded.
         pty: the host's terminal.
         typed: called with each line that an operator types.
-        late: called with the seconds in which the tap was not running.
+        late: called with the number of seconds in which the tap was not running.
 
     Attributes:
-        sent: bytes that went to the device.
-        received: bytes that came from it.
+        sent: number of bytes that went to the device.
+        received: number of bytes that came from the device.
         gone: reason of a lost port, empty while it exists.
     """
 

@@ -1,4 +1,4 @@
-"""What `tickrig replay` does: the devices of a trace made again, or a scenario of a search."""
+"""The work of `tickrig replay`: replay the devices of a trace, or a scenario of a search."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def run_replay(file: Path, *, verbose: bool, host: str | None, run_code: bool) -
 
 
 def _replay_trace(file: Path, *, verbose: bool, run_code: bool) -> int:
-    """Replay a trace, and return the exit status: 1 if a device says anything else."""
+    """Replay a trace, and return the exit status: 1 if the output of a device differs."""
     try:
         data = file.read_bytes()
         if any(line.startswith(b"+") for line in data.splitlines()[:2]):
@@ -60,7 +60,7 @@ def _replay_trace(file: Path, *, verbose: bool, run_code: bool) -> int:
 
 
 def _replay_with_host(file: Path, host: str) -> int:
-    """Do a scenario again; return 1 if something is wrong."""
+    """Replay a scenario; return 1 if the run fails."""
     try:
         machine = find_class(host, bench_machine.BenchMachine)
         steps = host_runs.parse_steps(file.read_text("utf-8"), str(file), machine.rules())
@@ -83,7 +83,7 @@ def _replay_with_host(file: Path, host: str) -> int:
 
 
 class _Played(NamedTuple):
-    """A device that was replayed; it has no name where it is the only one."""
+    """A replayed device; it has no name if it is the only one."""
 
     name: str
     type: str

@@ -1,4 +1,4 @@
-"""The work of `tickrig report`: runs that were kept as JSON become one page."""
+"""The work of `tickrig report`: make one page of runs that were kept as JSON."""
 
 from __future__ import annotations
 

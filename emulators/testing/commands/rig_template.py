@@ -1,4 +1,4 @@
-"""The text of a new rig file: devices as they are, with all that could be said as comments."""
+"""The text of a new rig file: the devices with their defaults, and further options as comments."""
 
 from __future__ import annotations
 
@@ -39,16 +39,16 @@ _NO_NAME: Final = re.compile(r"\W+", re.ASCII)
 
 
 class _TypeRefusedError(ValueError):
-    """A type of which no device can be made; the text says why."""
+    """A type of which no device can be made; the message has the reason."""
 
 
 def rig_template(types: Iterable[str], file: str, folder: Path) -> str:
     """Write a rig file.
 
     Args:
-        types: of the devices, as a rig file has them.
-        file: what it will be called.
-        folder: where it will be: other files are looked for there.
+        types: types of the devices, as in a rig file.
+        file: name of the new file.
+        folder: folder of the new file; other files are relative to it.
 
     Raises:
         _TypeRefusedError: a device cannot be made.

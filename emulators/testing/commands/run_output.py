@@ -76,13 +76,14 @@ class _Signals:
         return self._assembly.read(name) if driver is None else driver.value(name)
 
     def find(self, word: str) -> str:
-        """Return the full name of what a word names.
+        """Return the full name of the signal that a word names.
 
         Args:
-            word: `left/shaft_deg`, `left.shaft_deg`, or `shaft_deg` if one device alone has it.
+            word: `left/shaft_deg`, `left.shaft_deg`, or `shaft_deg` if only one device has this
+                signal.
 
         Raises:
-            ValueError: there is none, there are several, or it is a text.
+            ValueError: no signal or several signals have this name, or its value is a text.
         """
         names = dict.fromkeys((*self.outputs, *self.inputs.table))
         lone = next(iter(self._assembly.parts)) if len(self._assembly.parts) == 1 else ""
@@ -111,8 +112,8 @@ class _Diagram(NamedTuple):
     """One `--plot`: curves over time, or a path.
 
     Attributes:
-        names: the signals; of a path, x and y.
-        is_path: y is drawn over x.
+        names: the signals; for a path, x and y.
+        is_path: whether y is drawn over x.
     """
 
     names: tuple[str, ...]
@@ -157,10 +158,10 @@ _MOST: Final = 50_000
 
 @dataclass(slots=True)
 class _PathSampler:
-    """Takes pairs of values; of too many, every other is dropped.
+    """Records pairs of values; if there are too many, every other pair is dropped.
 
     Args:
-        take_pair: returns both.
+        take_pair: returns the present pair.
     """
 
     take_pair: Callable[[], tuple[float, float]]
@@ -179,12 +180,12 @@ class RunPlots:
     """Curves of a run: `--plot SIGNALS`, and `-o FILE`.
 
     Args:
-        words: each a diagram.
-        files: where the curves are written; none for the terminal.
+        words: the diagrams; one word is one diagram.
+        files: files for the curves; empty for the terminal.
         inputs: files that the run reads.
 
     Raises:
-        Refused: a file that could not be written after the run.
+        Refused: a file cannot be written after the run.
     """
 
     def __init__(
@@ -204,7 +205,7 @@ class RunPlots:
         self._paths: dict[_Diagram, _PathSampler] = {}
 
     def watch(self, rig: BenchRig) -> None:
-        """Look at the signals from now on; Refused if a name is unknown."""
+        """Record the signals from now on; Refused if a name is unknown."""
         self._signals = signals = _Signals(rig)
         with refused_at("--plot"):
             self._diagrams = [_diagram_of(word, signals) for word in self._words]
@@ -322,7 +323,7 @@ def _size() -> tuple[int, int]:
 
 
 def _curve(taken: bench_report.SignalSeries) -> series.Series:
-    """Return a signal as `canmon graph` draws it; one that steps holds its value until then."""
+    """Return a signal as `canmon graph` draws it; a stepped signal holds each value."""
     curve, before = series.Series(taken.name, unit=taken.unit), None
     for at_us, value in taken.points:
         if isinstance(value, int | float):
@@ -376,12 +377,12 @@ class RunPage:
 
     Args:
         path: of the page.
-        plan: what the rig file says.
-        words: of the command line that repeats the run.
+        plan: content of the rig file.
+        words: the words of the command line that repeats the run.
         inputs: files that the run reads.
 
     Raises:
-        Refused: it could not be written after the run.
+        Refused: the page cannot be written after the run.
     """
 
     path: Path
@@ -411,9 +412,9 @@ class RunPage:
         """Write the page.
 
         Args:
-            virtual: the run was in virtual time.
+            virtual: whether the run was in virtual time.
             rows: a row for each wire: name, place, rate, devices.
-            paths: what is drawn over the ground.
+            paths: the paths to draw.
 
         Raises:
             Refused: it cannot be written.

@@ -71,7 +71,7 @@ class SlaveStimulus:
         return ""
 
     def _assign(self, name: str, data: bytes) -> None:
-        """Write an object from the inside; an input object by setting the inputs."""
+        """Write an object from inside the device; for an input object, set the inputs."""
         index, sub = (int(part, 16) for part in name.split(":"))
         if isinstance(self._application, Ds401) and index in _INPUTS:
             value = int.from_bytes(data, "little", signed=index == _ANALOGUE)
@@ -162,17 +162,17 @@ _Buses = dict[str, dict[str, CanopenSlave]]
 def bench_source(
     mode: BenchMode, node_id: int | None = None, name: str = "", device: str = ""
 ) -> ConformSource:
-    """Return the source with the nodes of a bench; some time passes on the bench.
+    """Return the source with the nodes of a bench; the nodes boot, which takes time on the bench.
 
     Args:
-        mode: of the bench; its time is virtual.
-        node_id: of the node whose bus it is; None for the first node.
-        name: of the bench, for people.
-        device: name of the device whose bus to use; empty for any.
+        mode: the mode of the bench, in virtual time.
+        node_id: selects the bus with this node; None for the bus of the first node.
+        name: name of the bench for messages.
+        device: name of the device whose bus is used; empty for any.
 
     Raises:
-        ValueError: the bench is in another mode, has no CANopen node, no node with this node-ID, or
-            several on different buses; or the device is not a node.
+        ValueError: the bench is not in virtual time, has no CANopen node or none with this node-ID,
+            or has several such nodes on different buses; or the device is not a node.
     """
     if not isinstance(mode, VirtualMode):
         raise ValueError("the bench is not in virtual time: canmon conform judges what is there")
@@ -263,7 +263,7 @@ def open_rig(path: Path, node_id: int | None = None) -> ConformSource:
 
     Args:
         path: of the file.
-        node_id: of the node whose bus it is; None for the first node.
+        node_id: selects the bus with this node; None for the bus of the first node.
 
     Raises:
         OSError: it cannot be read.

@@ -54,14 +54,14 @@ from tickrig.wire.instant import NEVER
 class PoweredSlave:
     """A slave that can be switched off and on.
 
-    Its exceptions are reported, and then its program restarts, as after a watchdog; if that fails
-    it is dead until the power is switched.
+    Exceptions of the slave are reported. Then its program restarts, as after a watchdog. If the
+    restart fails, the slave is dead until the power is switched.
 
     Args:
         slave: the slave under test, switched on.
 
     Attributes:
-        on_crash: called with its exceptions.
+        on_crash: called with the exceptions of the slave.
     """
 
     def __init__(self, slave: Slave) -> None:
@@ -128,7 +128,8 @@ class SlaveBench:
     Args:
         slave: the slave under test.
         bit_rate: of the bus, 10 000 to 1 000 000 bit/s.
-        stimulus: sets its inputs; not called with `power`: the supply is switched here.
+        stimulus: sets the inputs of the slave. It is not called with `power`, because the bench
+            switches the supply itself.
 
     Attributes:
         source: its source for the tester.
@@ -185,19 +186,21 @@ def conformance(  # noqa: PLR0913 - by keyword
     """Test a CANopen slave in virtual time; the same slave gives the same report.
 
     Args:
-        node: a slave that gets the time as argument (`Slave`), such as those of `tickrig.device`; a
-            device of a bench in virtual time; or a callable that makes, at each power-on, a
-            callable which takes the time in microseconds and frames, and returns frames.
+        node: one of three: a slave that gets the time as an argument (`Slave`), such as those of
+            `tickrig.device`; a device of a bench in virtual time; or a callable that is called at
+            each power-on. That callable returns another one, which takes the time in microseconds
+            and frames, and returns frames.
         node_id: 1..127; by default that of the slave, if it has one.
-        eds: its EDS, DCF or XDD; without one our slaves describe themselves, others are queried.
-        level: `read-only`, `communication` or `intrusive`. The default is `intrusive` (`canmon
-            conform` only reads), because nothing real can move in virtual time.
+        eds: its EDS, DCF or XDD. Without a file, slaves of tickrig describe themselves, and others
+            are queried.
+        level: `read-only`, `communication` or `intrusive`. The default is `intrusive`, because
+            nothing real can move in virtual time. (`canmon conform` only reads.)
         only: groups or ids of checks, with * and ?, as `"NMT,HB"` or a sequence; by default all.
         allow: indices of profile objects, 6000h..9FFFh, that may be written.
         never: indices of objects that are never written, with priority over `allow`.
-        stimulus: sets inputs: called with `"input", "6000:01", "01"`, `"emergency", "5000", "01"`
-            and similar, returns the value for `"output", NAME`; the power of a `Slave` is switched
-            here.
+        stimulus: sets inputs. It is called with `"input", "6000:01", "01"`, `"emergency", "5000",
+            "01"` and similar, and returns the value for `"output", NAME`. The power of a `Slave` is
+            switched without it.
         seed: of random choices.
         bit_rate: of the bus, 10 000..1 000 000 bit/s.
 
@@ -316,9 +319,9 @@ def write_conformance(
 
     Args:
         report: of `conformance`.
-        path: its suffix selects the format: `.html` one page with all frames, `.xml` JUnit,
-            `.svg` a badge, `.md` the failures to file as issues, `.json`, or `.txt` the failures
-            as a baseline.
+        path: the file. Its suffix selects the format: `.html` a page with all frames, `.xml` JUnit,
+            `.svg` a badge, `.md` the failures to file as issues, `.json`, or `.txt` the failures as
+            a baseline.
         baseline: a file of known failures.
 
     Raises:
@@ -338,7 +341,7 @@ def write_conformance(
 
 
 def known_failures(path: Path | str | None) -> Baseline:
-    """Read a baseline, empty without a file; warn of ids that are not checks.
+    """Read a baseline, empty without a file; warn about ids that are not checks.
 
     Raises:
         OSError: it cannot be read.

@@ -26,11 +26,11 @@ _Entry = tuple[int, int, _Call]
 class DurandSlave:
     """A `durand.Node`, called as by its own network and scheduler.
 
-    durand has one scheduler for the whole process: it is replaced while the node is called, and
-    restored.
+    durand has one scheduler for the whole process. The scheduler is replaced while the node is
+    called, and then restored.
 
     Args:
-        make: makes the node on a network; called once more at each power-on.
+        make: makes the node on a network; called again at each power-on.
 
     Attributes:
         node: the node; it boots in its first tick.

@@ -20,12 +20,11 @@ _Data = bytes | bytearray | Iterable[int] | None
 class LocalNodeSlave:
     """A `canopen.LocalNode`, called as by the library's own network and timers.
 
-    It boots as in the library's documentation (`nmt.send_command(0)`, then Pre-operational);
-    further work of an application, such as restoring values at a reset or sending TPDOs, is
-    missing.
+    The node boots as in the library's documentation (`nmt.send_command(0)`, then Pre-operational).
+    Other work of an application is not done, such as restoring values at a reset or sending TPDOs.
 
     Args:
-        make: makes the node, with its dictionary; called once more at each power-on.
+        make: makes the node with its dictionary; called again at each power-on.
 
     Attributes:
         node: the node.

@@ -51,19 +51,19 @@ def conformance_tests(
 ) -> Test:
     """Return a test function for pytest, which has a parameter for each check.
 
-    The checks of one function run together when the first of them is executed, limited to those
-    that pytest has selected. A check that is not applicable is skipped; one without a verdict is
+    When the first check of a function is executed, all checks of this function that pytest has
+    selected run together. A check that is not applicable is skipped. A check without a verdict is
     blocked, which is not a failure of the device.
 
     Args:
-        node: makes the slave for `conformance`, or is the callable that `conformance` calls at each
-            power-on; or the name of a device of the fixture `bench`, which is then tested check by
-            check, each on a new bench.
-        eds: its EDS, DCF or XDD; its objects have tests of their own.
+        node: a callable or a name. A callable makes the slave for `conformance`, or is the callable
+            that `conformance` calls at each power-on. A name is that of a device of the fixture
+            `bench`; each check then runs on a new bench.
+        eds: its EDS, DCF or XDD; each object in the file has its own tests.
         level: `read-only`, `communication` or `intrusive`, as for `conformance`.
         only: groups or ids of checks, with * and ?, as `"NMT,HB"` or a sequence; by default all.
-        baseline: a file of known failures, one id per line: these are expected to fail; ids that
-            are not checks cause a warning.
+        baseline: a file of known failures, one id per line. These checks are expected to fail. Ids
+            that are not checks cause a warning.
         options: further arguments of `conformance`.
 
     Raises:
@@ -110,7 +110,7 @@ def _test_on_bench(name: str, options: dict[str, Any], baseline: Baseline) -> Te
 
 @dataclass
 class _Unmade:
-    """A failed run: raised once, because each raise makes its traceback longer."""
+    """A failed run; its exception is raised only once, because each raise extends the traceback."""
 
     error: Exception
     raised: bool = False

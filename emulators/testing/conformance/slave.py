@@ -21,26 +21,30 @@ TICK_US: Final = 1_000
 class Slave(Protocol):
     """A CANopen slave as a state machine: time and frames in, frames out.
 
-    A slave of `tickrig.device` is one. Yours is, too, if it takes the time as an argument and
-    reports when it must be called next; it may wrap a C library.
+    The slaves of `tickrig.device` are of this kind. Your slave is one, too, if it takes the time as
+    an argument and reports when it must be called next. It may wrap a C library.
     """
 
     @property
     def tick_us(self) -> int:
-        """Its period in microseconds: it is called at multiples of it; 1000 is usual."""
+        """Period in microseconds; the slave is called at multiples of it. 1000 is usual."""
         ...
 
     @property
     def due_us(self) -> int:
-        """When it acts next without receiving a frame, in microseconds.
+        """Time of the next action without a received frame, in microseconds.
 
-        A time in the past means the next tick, `tickrig.wire.instant.NEVER` not by itself. It is
-        not called before, unless a frame arrives.
+        A time in the past means the next tick. `tickrig.wire.instant.NEVER` means that the slave
+        does not act without a frame. The slave is not called before this time, unless a frame
+        arrives.
         """
         ...
 
     def reset(self) -> None:
-        """Switch the power off and on: it boots in the next tick, and keeps stored parameters."""
+        """Switch the power off and on.
+
+        The slave boots in the next tick, and keeps stored parameters.
+        """
 
     def tick(self, now_us: int, rx: Frames, /) -> Frames:
         """Run one tick.
@@ -193,7 +197,7 @@ class Crashes:
     """Exceptions of a program, kept until a callback is set.
 
     Args:
-        who: owner of the program, for people.
+        who: owner of the program, for messages.
     """
 
     def __init__(self, who: str) -> None:

@@ -27,8 +27,8 @@ _Events = list[tuple[SelectorKey, int]]
 class _BenchLoop(asyncio.SelectorEventLoop):
     """An event loop whose time is that of a rig.
 
-    Instead of waiting for its next timer it advances the time; then it handles events of files,
-    sockets and other threads, but it does not wait for them.
+    Instead of waiting for its next timer, the loop advances the time. Then it handles events of
+    files, sockets and other threads, without waiting for them.
 
     Args:
         passing: the object whose time advances.
@@ -116,7 +116,7 @@ class _PassingSelector(selectors.BaseSelector):
         self._inner.close()
 
     def select(self, timeout: float | None = None) -> _Events:
-        """Return ready events; without any, advance the time until there are, or to the timeout."""
+        """Return ready events; without any, advance the time to the first one or the timeout."""
         found: _Events = self._inner.select(0)
 
         def come() -> bool:

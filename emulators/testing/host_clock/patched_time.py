@@ -73,8 +73,8 @@ _OTHER_CLOCKS: Final = {
 def _check_clock() -> None:
     """Raise HostTimeError if freezegun or time-machine has replaced the clock.
 
-    Both change `datetime` and `time`, and freezegun's `monotonic` is frozen, so that a host that
-    polls until a deadline never reaches it.
+    Both packages change `datetime` and `time`. In freezegun `monotonic` is frozen, so a host that
+    polls until a deadline never reaches the deadline.
     """
     for package, (module, stacks) in _OTHER_CLOCKS.items():
         if (found := sys.modules.get(module)) and any(getattr(found, s, None) for s in stacks):
@@ -257,18 +257,22 @@ def _other_thread() -> str:
 def patched_time(passing: Passing) -> Iterator[SimTime]:
     """Run hosts in the time of a rig.
 
-    Calls of `time` in their code (`sleep`, `time`, `monotonic`, `perf_counter`, and in nanoseconds)
-    use the clock of `passing`; so are `wait` and `wait_for` of threading's events and conditions,
-    `get` and `put` of queues, and a `select` of nothing with a timeout. Each read of the clock
-    takes 100 us, so that a loop that only reads it ends. Event loops of asyncio that are created in
-    the block, if it was imported before, use the time of `passing` too.
+    In host code these functions use the clock of `passing`:
 
-    Host code is all code except Python's own, pytest's, Hypothesis's, coverage's, pyserial's,
-    python-can's, canopen's and ours. The functions are replaced in its modules wherever they are
-    stored: names (`from time import sleep`), attributes of classes, defaults of arguments. Threads
-    that already run keep their time. Of the others, only that of the caller can wait.
+    - of `time`: `sleep`, `time`, `monotonic`, `perf_counter`, and their variants in nanoseconds
+    - `wait` and `wait_for` of threading's events and conditions
+    - `get` and `put` of queues
+    - a `select` of nothing with a timeout
 
-    Not patched: functions stored in objects before, `datetime`, `socket`, `Thread.join`,
+    Each read of the clock takes 100 us, so a loop that only reads the clock ends. If asyncio was
+    imported before, event loops that are created in the block use the time of `passing` too.
+
+    Host code is all code except that of Python, pytest, Hypothesis, coverage, pyserial, python-can,
+    canopen and tickrig. The functions are replaced in its modules wherever they are stored: names
+    (`from time import sleep`), attributes of classes, defaults of arguments. Threads that already
+    run keep their time. Of all other threads, only the caller's thread can wait.
+
+    Not patched: functions that objects have stored before, `datetime`, `socket`, `Thread.join`,
     semaphores, `threading.Timer`, `queue.SimpleQueue`.
 
     Args:
@@ -278,9 +282,9 @@ def patched_time(passing: Passing) -> Iterator[SimTime]:
         The clock.
 
     Raises:
-        HostTimeError: another thread or a callback of the rig waited; it is raised there, and again
-            at the end, because hosts often swallow it. Or freezegun or time-machine has replaced
-            the clock.
+        HostTimeError: another thread or a callback of the rig waited; the error is raised there,
+            and again at the end, because hosts often catch it. It is also raised if freezegun or
+            time-machine has replaced the clock.
     """
     _check_clock()
     clock = SimTime(passing)
@@ -329,10 +333,13 @@ def unpatched_time_fails(
 ) -> Iterator[None]:
     """Raise UnpatchedTimeError if a host sleeps, or reads a clock that does not advance.
 
-    It is raised at the first such call with its file and line, and again at the end if the host has
-    swallowed it; if that caused another exception, it is a note of that one. `patched_time` defines
-    host code; within its block nothing is refused. `perf_counter` is allowed, `time.time` in
-    installed packages, and replacements of these functions by a test.
+    The error is raised at the first such call, with its file and line. If the host has caught it,
+    it is raised again at the end. If it caused another exception, it is added to that exception as
+    a note.
+
+    `patched_time` defines host code; within its block nothing is refused. Always allowed are
+    `perf_counter`, `time.time` in installed packages, and functions with which a test has replaced
+    these functions.
 
     Args:
         allowed: names of allowed packages.

@@ -1,7 +1,7 @@
 """Connections to a CAN bus: a monitored python-can bus, a link, a bridge.
 
-It imports python-can, which takes longer than the rest of a bench: a bench without an outside bus
-does not load it.
+This module imports python-can, which takes longer than the rest of a bench. A bench without an
+outside bus does not load this module.
 """
 
 from __future__ import annotations

@@ -29,8 +29,8 @@ from tickrig.wire.can import CanFrame, Frames
 class PortRecord:
     """Keeps traffic and actions, for `tickrig compare`; safe for several host threads.
 
-    In the trace a serial line has the name of its first device, a CAN bus its own name. Actions on
-    nodes are not in it: a bus is compared by its frames.
+    In the trace a serial line has the name of its first device, and a CAN bus has its own name. The
+    trace has no actions on nodes, because a bus is compared by its frames.
 
     Args:
         plan: the rig file.
@@ -128,12 +128,12 @@ class DoorJournal(Journal):
             self.add(self._now_us(), Mark.PHYSICAL, text.encode(), device)
 
     def lines(self) -> tuple[WireLine, ...]:
-        """Return what is kept; a silence that is over has ended a frame."""
+        """Return the kept lines; a frame that ended with a silence is included."""
         self.look()
         return super().lines()
 
     def look(self) -> None:
-        """Take frames that a silence has ended: no rig stops there."""
+        """Add frames that ended with a silence; no rig does this here."""
         with self._lock:
             self.end_silent(self._now_us())
 
@@ -191,10 +191,10 @@ class _Watch(HostPace):
 
 
 class _BusWatch(_Watch):
-    """Monitor of one of several connections of a bus, each of which sees each frame.
+    """Monitor of one of several connections of a bus; each connection sees each frame.
 
     Attributes:
-        known: frames already in the journal and not yet seen here.
+        known: frames that are already in the journal, but that this connection has not seen yet.
     """
 
     def __init__(self, pace: HostPace, wire: str, journal: DoorJournal) -> None:

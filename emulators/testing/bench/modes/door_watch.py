@@ -251,21 +251,22 @@ _LOOK_US: Final = 10_000
 """Shortest time over which waits are added up; sleeping threads wait a little at each wake-up."""
 
 _LONG_US: Final = 20 * _LOOK_US
-"""Longest such time; over a longer one many short waits add up to a large delay."""
+"""Longest such time; over a longer time many short waits would add up to a large delay."""
 
 
 class CpuWaits:
     """The longest wait within a short time; 0 if the system does not count waits.
 
-    A thread waits for a processor when it could run and others are served. That is in the
-    second number of `schedstat` of each thread (Linux, Documentation/scheduler/sched-stats).
+    A thread waits for a processor when it could run, but other threads run instead. The waiting
+    time is the second number in `schedstat` of each thread (Linux,
+    Documentation/scheduler/sched-stats).
 
     Args:
         tasks: the folder of the threads.
         spares_looker: whether to omit the calling thread, which measures its own delay.
 
     Attributes:
-        worst_us: the longest so far, in about `_LOOK_US`.
+        worst_us: the longest wait until now, measured over about `_LOOK_US`.
     """
 
     def __init__(self, tasks: Path = _TASKS, *, spares_looker: bool = False) -> None:

@@ -168,9 +168,9 @@ _WITHOUT_PTYS: Final = "socket://0"
 class OutsideEnds:
     """Addresses of the wires of a bench in real time.
 
-    A serial line is at a pty (on a system without ptys at a TCP port) and at the addresses in
-    `serve`. A CAN bus is connected with a python-can bus: by default one in this process, on its
-    own channel.
+    A serial line is at a pty and at the addresses in `serve`. On a system without ptys, a TCP port
+    replaces the pty. A CAN bus is connected with a python-can bus; by default that is a bus in this
+    process, on its own channel.
 
     Args:
         mounts: the wires.

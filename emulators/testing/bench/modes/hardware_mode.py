@@ -58,7 +58,7 @@ _POLL_US: Final = 5_000
 class HardwareMode(BenchMode):
     """A `BenchMode` of real devices, which the rig file describes.
 
-    A device is at a port or on a bus; its operator is a human at the terminal, or the control
+    A device is at a port or on a bus. Its operator is a human at the terminal, or the control
     socket of an emulator in place of the device. Conditions are checked on all traffic, and while
     the bench waits.
 
@@ -174,7 +174,7 @@ class HardwareMode(BenchMode):
                 time.sleep(wait_us / 1e6)
 
     def too_slow(self) -> str:
-        """Return why failures are not valid; empty if they are, or if a human has said no."""
+        """Return why failures are not valid; empty if they are valid, or if a human answered no."""
         if self._operators.said_no:
             return ""
         host_us = max(self._pace.late_us, self._waits.worst_us)

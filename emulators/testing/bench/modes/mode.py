@@ -33,9 +33,9 @@ Address = str | dict[str, Any]
 
 
 class _HostDoors(Protocol):
-    """Opens the wires of a bench for hosts; each wire by its name.
+    """Opens the wires of a bench for hosts; each wire has a name.
 
-    A wire of the other kind raises ValueError, one without an address `NotOnThisBench`.
+    A wire of the wrong kind raises ValueError. A wire without an address raises `NotOnThisBench`.
     """
 
     def link(self, wire: str) -> Link[Any]:
@@ -63,12 +63,13 @@ class _HostDoors(Protocol):
 
 
 class BenchMode(ABC):
-    """A mode: place of the devices, and passing of time.
+    """A mode: the place of the devices, and the passing of time.
 
     Unsupported operations raise `NotOnThisBench`.
 
     Args:
-        rig: with the devices; for real devices with equivalent ones, and not running.
+        rig: the rig with the devices; for real devices, a rig with equivalent devices that does not
+            run.
         tolerance: the tolerances.
 
     Attributes:
@@ -146,7 +147,7 @@ class BenchMode(ABC):
         self._query(lambda rig: rig.journal.listeners.append(listener))
 
     def observe(self, owner: str, text: str, seen: Condition, within_us: int) -> bool:
-        """Return an observation at a device; a human is asked the text."""
+        """Return an observation at a device; a human operator is shown the text and answers."""
         return self.wait_until(seen, within_us + self.tolerance.time_us)
 
     def perform(self, owner: str, text: str, do: Callable[[], object]) -> None:
@@ -253,7 +254,7 @@ class EmulatedMode(BenchMode):
 
 
 def _answer_of(answer: Object) -> Object:
-    """Return an answer; ValueError with its text if it is a refusal."""
+    """Return an answer; if it is a refusal, raise ValueError with its text."""
     if not answer["ok"]:
         raise ValueError(str(answer["error"]))
     return answer

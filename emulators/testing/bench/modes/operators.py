@@ -86,13 +86,13 @@ _DONE: Final = "then press Enter (n: not done, c: cannot be done)"
 class Terminal:
     """Asks at the terminal of this process, even if standard input and output are redirected.
 
-    So pytest may capture both. Hosts keep running while it waits.
+    pytest may therefore capture both. Hosts keep running while the terminal waits for an answer.
 
     Args:
-        path: of the terminal.
+        path: path of the terminal.
 
     Attributes:
-        hosts: called in turn with microseconds while it waits for an answer.
+        hosts: called in turn with microseconds during the wait for an answer.
     """
 
     def __init__(self, path: str = _TERMINAL) -> None:
@@ -152,7 +152,7 @@ _HOLD_US: Final = 1_000_000
 class _HumanOperator:
     """The operator of a device: a human at the terminal, with the texts of the device type.
 
-    Set values are stored and not asked for again. Names are those within the device.
+    The operator is not asked twice for the same set value. Names are those within the device.
 
     Args:
         device: name of the device.
@@ -163,7 +163,7 @@ class _HumanOperator:
     Attributes:
         late_us: largest known delay of the device.
         quick: acts without delay.
-        said_no: the human answered no; that is valid however late the machine was.
+        said_no: whether the human answered no; this answer is valid however late the machine was.
     """
 
     late_us, quick = 0, False
@@ -181,7 +181,7 @@ class _HumanOperator:
         self._record = Operator(physical.inputs, physical.tick_us, EventQueue(), no_faults)
 
     def prepare(self, like: HasSignals) -> None:
-        """Switch it off, if a command can; the human is not asked."""
+        """Switch the device off, if a command can; a human is not asked."""
         if self._power is not None:
             self._power.switch(on=False)
 
@@ -291,15 +291,17 @@ _OBJECT: Final = "0x"
 
 
 class _EmulatorOperator:
-    """The operator of a device: the control socket of an emulator. Names are as for a human.
+    """The operator of a device: the control socket of an emulator.
+
+    Names are those within the device, as for a human operator.
 
     Args:
-        path: of its socket.
-        plan: the device; an emulator of several devices has it under its name or node-ID.
+        path: path of the socket.
+        plan: the device; an emulator of several devices has the device under its name or node-ID.
 
     Raises:
-        PortGone: there is no emulator.
-        MachineTooSlow: it does not answer.
+        PortGone: the emulator is not running.
+        MachineTooSlow: the emulator does not answer.
         ValueError: the emulator has several devices, but not this one.
     """
 
@@ -334,9 +336,10 @@ class _EmulatorOperator:
         return late_us
 
     def prepare(self, like: HasSignals) -> None:
-        """Reset it: clear all faults, and set all inputs to their initial values.
+        """Reset the device: clear all faults, and set all inputs to their initial values.
 
-        Its power is then off. The physical state stays: the position of a drive is unchanged.
+        The power of the device is then off. Its physical state stays: the position of a drive is
+        unchanged.
         """
         for name in self._wire_faults:
             self._request("clear", name=name)
@@ -364,7 +367,7 @@ class _EmulatorOperator:
         self._request("set", name=self._prefix + name, value=list(values))
 
     def set_all(self, values: Mapping[str, Setting]) -> None:
-        """Do nothing: `prepare` has done so."""
+        """Do nothing, because `prepare` has already set the inputs."""
 
     def get(self, name: str) -> Setting:
         """Return the present value of an input or output."""
@@ -564,7 +567,7 @@ class Operators:
 
         Args:
             owner: a device or wire, empty for any.
-            order: the fault, which gets its full name; one with a condition must act at once.
+            order: the fault, which gets its full name; a fault with a condition must act at once.
         """
         name = self._like.state.full_fault_name(owner, order.spec.name)
         spec = order.spec = replace(order.spec, name=name)
@@ -603,7 +606,7 @@ class Operators:
                 self._journal.record.was_reset(device)
 
     def sees(self, owner: str, text: str) -> bool | None:
-        """Ask the human at a device, or at the first that has one; None if there is none."""
+        """Ask the human at a device, or at the first device with a human; None if there is none."""
         for device in [owner] if owner else self._plan.devices:
             answer = self._operator_at(device).sees(text)
             if answer is not None:

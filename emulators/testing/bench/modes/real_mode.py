@@ -38,8 +38,9 @@ _JOIN_S: Final = 10.0
 class _RigThread:
     """Runs an emulator, and executes calls of other threads between two of its ticks.
 
-    Before `start` and after its end the time stands still, and callers execute calls themselves. An
-    exception of a device ends it, and is raised once, in the next caller or in `stop`.
+    Before `start` and after the end of the thread the time stands still, and callers execute calls
+    themselves. An exception of a device ends the thread. It is raised once: in the next caller or
+    in `stop`.
 
     Args:
         emulator: the emulator.
@@ -319,8 +320,8 @@ class RealMode(EmulatedMode):
     def wait_until(self, done: Callable[[], bool], within_us: int) -> bool:
         """Wait until a condition is true; return False after the time-out.
 
-        It is checked between the ticks. If it receives from a device it is called in the thread of
-        the caller instead, once per tick.
+        The condition is checked between the ticks. If the condition itself receives from a device,
+        it is called in the thread of the caller instead, once per tick.
         """
         if self._judging and self._thread.here:
             raise HostInCondition

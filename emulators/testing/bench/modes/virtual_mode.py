@@ -81,7 +81,7 @@ _T = TypeVar("_T")
 
 
 class _Offers:
-    """Offered names; a snapshot withdraws later ones."""
+    """The offered names; a snapshot withdraws names that were offered later."""
 
     def __init__(self) -> None:
         self._open: list[AbstractContextManager[object]] = []
@@ -225,9 +225,9 @@ class VirtualMode(EmulatedMode):
     def wait_until(self, done: Callable[[], bool], within_us: int) -> bool:
         """Advance the time until a condition is true; return False after the time-out.
 
-        Without a limit the wait ends when there are no more events, or after a day. The condition
-        is checked after each step, and periodically between: a host that is polled in it may have
-        work.
+        Without a limit, the wait ends when there are no more events, or after a day. The condition
+        is checked after each step. In long steps it is also checked periodically, because it may
+        poll a host that has work to do.
         """
         self._check_open()
         rig = self._rig.rig
