@@ -54,25 +54,27 @@ else:
 # done: after a kill at any time, the next start reads it, skips what it contains, and continues.
 # This gives the rules:
 #
-# - A verdict counts when it is on the disk (`CampaignJournal.add` syncs), not when it
-#   arrives. The bar and the table are made of what `add` returned.
-# - A verdict depends on test and seed alone, so the worker, the number of repetitions and the order
-#   of runs do not matter. A run that was done twice is written once.
-# - The head of the journal (`CampaignPlan.head`) has what a verdict depends on: tests,
+# - A verdict counts when it is on the disk (`CampaignJournal.add` syncs), not when it arrives. The
+#   progress bar and the table use only what `add` returned.
+# - A verdict depends on test and seed alone. The worker, the number of repetitions and the order of
+#   runs do not matter. A run that was done twice is written once.
+# - The head of the journal (`CampaignPlan.head`) has everything that a verdict depends on: tests,
 #   seeds, shard, rig file, version, and a digest of the files of the tests. A journal with another
-#   head is refused, so that one table never has results of two programs.
-# - Workers only answer. One may die (its run is tried three times, then it is `died`) or
-#   hang (it is killed, its run is `hung`): crew.py waits for each verdict with a time-out,
-#   so that a batch always ends.
+#   head is refused, so that a table never has results of two programs.
+# - Workers only answer. If a worker dies, its run is tried three times, then it is `died`. If a
+#   worker hangs, it is killed, and its run is `hung`. crew.py waits for each verdict with a
+#   time-out, so that a batch always ends.
 #
-# Batches. A run takes a millisecond or a minute, which is unknown before. A batch grows
-# while it takes less than a second and shrinks above four, its time in the queue included;
-# towards the end batches get smaller, so that all workers end together. Each worker has two
-# batches: one runs, one waits.
+# Batches. A run takes a millisecond or a minute, which is unknown before. A batch grows while it
+# takes less than a second, and shrinks if it takes more than four. Its time in the queue is
+# included. Towards the end batches get smaller, so that all workers end together. Each worker has
+# two batches: one runs, one waits.
 #
-# Three ends: all done (table written, journal removed), interrupted or full disk (journal
-# kept, the command to go on is printed), refused (nothing started). The table is written
-# before the journal goes.
+# A campaign can end in three ways. The table is written before the journal is removed.
+#
+# - All runs are done: the table is written, and the journal is removed.
+# - Interrupted, or the disk is full: the journal is kept, and the command to continue is printed.
+# - Refused: no run was started.
 
 # A running campaign: runs are submitted, and verdicts returned, until all are done.
 

@@ -16,11 +16,10 @@ from select import select
 from types import FunctionType, MethodType, ModuleType
 from typing import Any, Final, NamedTuple
 
-# What is raised where a host deals with time as it cannot in virtual time.
+# Errors of hosts that use time in a way that virtual time does not support:
 #
-# RuntimeError
-#   HostTimeError         it waits where nobody can make time pass
-#     UnpatchedTimeError  it waits for the clock of this machine
+# - `HostTimeError`, a RuntimeError: the host waits, but nothing can advance the time.
+# - `UnpatchedTimeError`, a HostTimeError: the host waits for the clock of this machine.
 
 
 class HostTimeError(RuntimeError):

@@ -28,35 +28,37 @@ else:
 # Theory of operation
 # ===================
 #
-# A host that calls `time.sleep` lives in the time of a rig if three things hold together,
-# and this folder is these three: the functions of the clock are replaced wherever a host's
-# code may have kept them (patches.py), each call decides by its caller whether it is a
-# host's (host_code.py), and what waits makes the rig's time pass (this file, and
-# bench_loop.py for asyncio).
+# A host that calls `time.sleep` runs in the time of a rig. Three things are needed for this, and
+# this folder has all three:
 #
-# - Who is a host. Everything but Python itself, pytest and the like, our own packages, and
-#   the three libraries that have objects of ours on the rig. A patch looks at the frame
-#   that calls it, so the standard library under a host (queue, threading) keeps the
-#   machine's clock: its waits are patched at their own doors (`Event.wait`, `Queue.get`,
-#   ...) and not by its calls of `time`.
-# - Which thread. Only the owner, the thread that patches, makes time pass. Threads that ran
-#   before keep real time. A thread that a host starts may look at the clock, which stands
-#   still for it, and is refused if it waits: two threads that both drive one rig could not
-#   be repeated.
-# - A look costs 100 us of virtual time (`LOOK_US`), a sleep at least as much. Otherwise a
-#   loop that only polls the clock would never end.
-# - A wait without a timeout ends when the rig makes its condition true. If nothing on the
-#   bench can do that, it is refused (`_ForEver`) in place of hanging the test.
-# - Refusals are raised where they happen and again at the end, because hosts swallow
-#   exceptions.
+# - The functions of the clock are replaced wherever a host's code may have stored them (`Patches`
+#   in host_code.py).
+# - Each call is checked: its caller decides whether it is a host's (`is_host` in host_code.py).
+# - Functions that wait advance the time of the rig (this file, and bench_loop.py for asyncio).
 #
-# `_wait_condition` does what `threading.Condition.wait` does with its waiter locks, by
-# names that begin with an underscore: it has to leave the condition exactly as CPython
-# does, or `notify` of a host wakes nobody. Check it against each new version of Python.
+# The rules are:
 #
-# The order at the end matters: patches come off in the reverse order, a patch is switched
-# off before its place is given back, and a place that somebody else has filled meanwhile is
-# left alone.
+# - Which code is host code. All code except Python itself, pytest and similar tools, our own
+#   packages, and the three libraries that use our objects on the rig. A patch checks the frame that
+#   calls it. The standard library under a host (queue, threading) therefore keeps the machine's
+#   clock. Its waits are patched at their own functions (`Event.wait`, `Queue.get`, ...), not at its
+#   calls of `time`.
+# - Which thread. Only the owner, the thread that patches, advances the time. Threads that ran
+#   before keep real time. A thread that a host starts may read the clock, which stands still for
+#   this thread. If such a thread waits, the wait is refused: two threads that both drive one rig
+#   could not be repeated.
+# - A read of the clock takes 100 us of virtual time (`LOOK_US`), a sleep at least as much.
+#   Otherwise a loop that only polls the clock would never end.
+# - A wait without a timeout ends when the rig makes its condition true. If nothing on the bench can
+#   do that, the wait is refused (`_ForEver`), so that the test does not hang.
+# - Refusals are raised where they occur and again at the end, because hosts catch exceptions.
+#
+# `_wait_condition` does what `threading.Condition.wait` does with its waiter locks, by names that
+# begin with an underscore. It must leave the condition exactly as CPython does, or `notify` of a
+# host wakes no thread. Check it with each new version of Python.
+#
+# The order at the end matters. Patches are removed in the reverse order. A patch is switched off
+# before the original is restored. A place that other code has changed is left unchanged.
 
 _FOR_EVER: Final = (
     "waits endlessly: nothing that happens on the bench ends it, and another thread cannot"

@@ -230,8 +230,9 @@ def _time(t_us: int) -> str:
 
 _LAST_LINES: Final = 12
 
-# A host that calls `sys.exit` and an invariant that calls `pytest.fail` raise no Exception, and
-# have failed all the same. These have not; pytest and Hypothesis (`assume`) are not imported here.
+# The names of exceptions that are not failures. `sys.exit` in a host and `pytest.fail` in an
+# invariant are failures, although they do not raise an Exception. Names are used, because this
+# module does not import pytest and Hypothesis (`assume`).
 _NO_FAILURES: Final = ("KeyboardInterrupt", "Skipped", "Exit", "UnsatisfiedAssumption", "StopTest")
 
 

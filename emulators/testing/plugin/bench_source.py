@@ -299,7 +299,7 @@ KINDS: Final[Mapping[str, Callable[[Bench], Iterable[str]]]] = {
     "output": lambda bench: bench.describe().outputs,
     "device": lambda bench: bench.devices,
 }
-"""The names for `needs`, and how a bench tells whether it has them."""
+"""The names for `needs`, each with a function that returns whether a bench has it."""
 
 
 # Benches that have done something before the test: once for each test, then out of a snapshot.

@@ -43,31 +43,31 @@ else:
 # Theory of operation
 # ===================
 #
-# A test comes by here in each phase of pytest, in this order:
+# Each phase of a test in pytest calls this module, in this order:
 #
-# setup: `open`. What its markers and its mode rule out is skipped before anything is
-# opened. Then the bench, with its warm-up; what it lacks of `needs` (known only of an open
-# bench); what outputs have to be at the end; and last `Health` begins to listen: faults
-# that a warm-up has left on count as ordered.
+# setup: `open`. A test that its markers or its mode exclude is skipped before anything is opened.
+# Then the bench is opened and warmed up. Then two things are checked: whether the bench lacks
+# something of `needs` (known only of an open bench), and whether the safe values of outputs are
+# valid. `Health` starts last, so faults that a warm-up has left on count as requested.
 #
-# call: `judged`, around the body. If the body has passed, and only then, the bench is
-# looked at: tasks, what went wrong in threads and coroutines, health, outputs. A test that
-# breaks off leaves its bench as it may, and its own failure is what people want to read.
+# call: `judged`, around the body. Only if the body has passed, the bench is checked: tasks, errors
+# in threads and coroutines, health, outputs. A failed test may leave its bench in any state,
+# because its own failure is what people want to read.
 #
-# report of each phase: `judge`. Whatever fails is asked whether the bench is to blame;
-# artifacts are kept at the first failure, once, while the bench is still open. An exception
-# here would end the whole run of pytest, so it becomes a section of the report.
+# report of each phase: `judge`. For each failure it determines whether the bench is the cause.
+# Artifacts are kept at the first failure, once, while the bench is still open. An exception here
+# would end the whole run of pytest, so it becomes a section of the report.
 #
-# teardown: `close`. Evidence and artifacts of passed tests come before the bench is closed.
-# What went wrong beside the body since it has passed fails the test here.
+# teardown: `close`. Evidence and artifacts of passed tests are taken before the bench is closed.
+# Errors outside the body that occurred after it had passed fail the test here.
 #
-# Listening to threads and coroutines goes from before the bench is open until after it is
-# closed: a host may begin a thread while it is opened.
+# Threads and coroutines are watched from before the bench is opened until after it is closed,
+# because a host may start a thread while the bench is opened.
 #
-# The bench to blame: a test that did not come to a verdict about the device is an error and
-# no failure. pytest and JUnit call it an error if it happened in setup, so `make_error`
-# (verdict.py) says that it did. A mistake of the test, as a misspelt name, is never blamed
-# on a bench that was too slow (`is_mistake`).
+# Errors of the bench: a test without a verdict about the device is an error and not a failure.
+# pytest and JUnit call it an error if it happened in setup, so `make_error` (verdict.py) reports
+# setup as its phase. A mistake of the test, such as a misspelt name, never counts as an error of a
+# bench that was too slow (`is_mistake`).
 
 
 class _BenchedTest(TestWithBench):

@@ -23,28 +23,36 @@ from tickrig.host.text.trace import Header
 # Theory of operation
 # ===================
 #
-# Each check plays a random session on two benches that differ in one aspect that must not matter,
-# and compares what was sent, with its time, and all outputs: dense and sparse ticks, pieces and
-# whole writes, a pause inside a word, one reset and two, a device that was reset and a fresh one,
-# an original and its copy, a recording and its replay. No check knows what the device should do;
-# the device is compared with itself. So they work for any device.
+# Each check plays a random session on two benches that differ in one aspect that must not matter.
+# It compares what was sent, with its time, and all outputs. The aspects are:
 #
-# The order in `check_ticks` is by cost and by what a finding means: two fresh devices
-# first, because chance or shared state would make every later comparison fail for the wrong
-# reason; then dense against sparse ticks, the commonest fault (`due_us` too late); then the
-# rest.
+# - dense and sparse ticks
+# - pieces and whole writes
+# - a pause inside a word
+# - one reset and two
+# - a reset device and a new one
+# - an original and its copy
+# - a recording and its replay
 #
-# `_check_due_us` finds timers of hours without ticking for hours. A tick before `due_us`
-# must change nothing, so copies are ticked at a few times up to just before it: any change shows
-# that `due_us` was too late. `_refuse` then finds the first such tick by bisection, for the
-# message.
+# No check knows what the device should do, because the device is compared with itself. The checks
+# therefore work for any device.
 #
-# What is not compared: state that no output shows. It is found when it has an effect, for example
+# The order in `check_ticks` follows the cost and the meaning of a finding. Two new devices come
+# first, because random choices or shared state would make every later comparison fail for the wrong
+# reason. Then dense ticks are compared with sparse ticks, to find the most common fault (`due_us`
+# too late). The rest follows.
+#
+# `_check_due_us` finds errors in timers of hours without running ticks for hours. A tick before
+# `due_us` must change nothing. Copies are therefore ticked at a few times up to just before
+# `due_us`, and any change shows that `due_us` was too late. `_refuse` then finds the first such
+# tick by bisection, for the message.
+#
+# State that no output shows is not compared. Such state is found when it has an effect, for example
 # when a word is sent after such a tick (`check_answers`).
 #
 # Devices that work ahead (`horizon`) are observed between ticks here, so copies work tick by tick.
-# RS485 lines are excluded from the check of pieces: there each piece ends on a whole microsecond,
-# because of the line.
+# RS485 lines are excluded from the check of pieces, because each piece ends on a whole microsecond
+# on such a line.
 
 # Words that come with a pause in them: a line means the same, whenever its second half comes.
 
@@ -120,10 +128,10 @@ _AHEAD_US: Final = (0, 10_000, 100_000, 1_000_000, 10_000_000, 60_000_000, 600_0
 a day."""
 
 _MOST_WORDS: Final = 3
-"""So many of the words of a session are said after it."""
+"""Number of words of a session that are sent after the session."""
 
 _MOST_INPUTS: Final = 8
-"""So many inputs are tried at the end of a session."""
+"""Number of inputs that are tried at the end of a session."""
 
 _SETTLES: Final = 50
 """Number of ticks for a device to become idle after an input has changed; if it does not, this
@@ -313,7 +321,7 @@ class DeviceChecks:
         _same(pieces, pieces.play(session), wanted, what, "in pieces", "at once")
 
     def check_reset(self, session: Session, after: Session) -> None:
-        """A reset leaves nothing but the inputs."""
+        """A reset keeps only the inputs."""
         once, twice = self._bench(), self._bench()
         once.play([*session, (0, "reset", None)])
         twice.play([*session, (0, "reset", None), (0, "reset", None)])
@@ -324,7 +332,7 @@ class DeviceChecks:
         _same(once, twice.play(after), once.play(after), what, "after two", "after one")
 
     def _check_inputs_forgotten(self, session: Session) -> None:
-        """What an input does, and a reset after it, leaves the input alone."""
+        """A reset keeps only the input, not its effects."""
         played = self._bench()
         played.play(session)
         for item in _some_inputs(played.device, len(session)):
@@ -332,7 +340,7 @@ class DeviceChecks:
             self._check_fresh(played, device, ())
 
     def _check_fresh(self, once: device_bench.DeviceBench, device: Any, after: Session) -> None:
-        """A device that was reset is as one that was made now, or at 0, with the same inputs."""
+        """A reset device equals one that was made now, or at 0, with the same inputs."""
         was_reset, now_us = twin(device), once.rig.now_us
         now_us += (_SETTLES + 1) * device.tick_us  # it may have been ticked so often since then
         was_reset.reset()
@@ -362,7 +370,7 @@ class DeviceChecks:
             must(differs is None, f"a replay of its trace differs: {differs}")
 
     def check_copies(self, session: Session, after: Session, otherwise: Session) -> None:
-        """A copy goes on as the original, and leaves it alone."""
+        """A copy behaves like the original, and does not change it."""
         original, unchanged = self._bench(), self._bench()
         original.play(session)
         unchanged.play(session)

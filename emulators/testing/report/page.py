@@ -25,10 +25,10 @@ _PAGE_BYTES: Final = 16_000_000
 _JOURNAL_LINES: Final = 200
 _LINE_CHARACTERS: Final = 2_000
 _TEXT_BYTES: Final = 64_000
-"""Of what pytest tells about a failure."""
+"""Largest size of pytest's text of a failure."""
 _TRACE_BYTES: Final = 256_000
 _LINE_BYTES: Final = 48
-"""What a line of a journal has around its text."""
+"""Size of a line of a journal in addition to its text."""
 
 
 class _PagePart(Enum):

@@ -36,7 +36,7 @@ _MOST: Final = 2**63 - 1
 """Limit of integers: as times in microseconds, 292,000 years."""
 
 _MOST_SHARED: Final = 50_000
-"""So many values of a column are remembered before the memory of them is emptied."""
+"""Number of values of a column that are stored before the store is emptied."""
 
 _T = TypeVar("_T")
 
@@ -116,7 +116,7 @@ def _read(file: TextIO) -> BenchReport:
 
 
 _PIECE: Final = 1 << 20
-"""So many characters are read at a time."""
+"""Number of characters that are read at a time."""
 
 
 class _Scanner:

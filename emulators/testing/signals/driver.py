@@ -28,7 +28,7 @@ from tickrig.wire.instant import NEVER
 # What the names in formulas mean: other signals, and inputs and outputs of devices.
 
 _LONGEST: Final = 100
-"""So many signals may need each other in a row."""
+"""Largest number of signals of which each needs the next."""
 
 _TAKEN: Final = ("t", "pi")
 """What formulas name otherwise."""
@@ -213,10 +213,15 @@ def _check_target(scope: _SignalScope, key: str) -> Iterator[SignalMistake]:
 # Theory of operation
 # ===================
 #
-# Signals are a graph: sources of time (ramp, wave, noise, table), formulas of other signals
-# and of what devices show, and filters with a memory (lag, integral). `SignalDriver`
-# evaluates it at the ticks of the rig and sets inputs whose value has changed. It is a coupling:
-# the rig calls `act` between the ticks of devices, and a device sees an input at its next tick.
+# Signals are a graph of three kinds of nodes:
+#
+# - sources of time: ramp, wave, noise, table
+# - formulas of other signals and of the inputs and outputs of devices
+# - filters with a memory: lag, integral
+#
+# `SignalDriver` evaluates the graph at the ticks of the rig, and sets inputs whose value has
+# changed. It is a coupling: the rig calls `act` between the ticks of devices, and a device sees an
+# input at its next tick.
 #
 # One evaluation has three passes, in this order:
 #
@@ -227,17 +232,17 @@ def _check_target(scope: _SignalScope, key: str) -> Iterator[SignalMistake]:
 # A filter is therefore one step behind its source, which makes cycles through a filter possible: a
 # formula may use a lag that follows the formula. Cycles without a filter are refused.
 #
-# Values must not depend on how often they are read. Sources of time are pure functions of time,
-# noise is drawn by number and not in order, and a filter advances in steps of `every_us` regardless
-# of the ticks. `due_us` is the earliest time at which a value may change: it may be too early,
-# never too late. A rig that jumps there sees the same as one that ticks all the time.
+# Values must not depend on how often they are read. Sources of time are pure functions of time.
+# Noise is drawn by number and not in order. A filter advances in steps of `every_us` regardless of
+# the ticks. `due_us` is the earliest time at which a value may change: it may be too early, but
+# never too late. A rig that jumps to `due_us` sees the same values as one that runs every tick.
 #
-# At the start the graph is evaluated as many times as there are filters, and once more: a lag
+# At the start the graph is evaluated once more than there are filters. The reason is that a lag
 # without a start begins at the value of its source, which may be another lag.
 #
 # An input that was set by hand keeps that value until its signal changes, because `_Target`
-# compares with the last value of the signal and not with the input. nan does not change an input,
-# and is reported once.
+# compares with the last value of the signal and not with the input. A value of nan does not change
+# an input, and is reported once.
 
 
 class _RunningSignal(Copyable):

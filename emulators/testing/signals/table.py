@@ -36,7 +36,7 @@ _Points = Sequence[tuple[int, float]]
 """Times in microseconds, and values."""
 
 _MOST: Final = 1_000_000
-"""So many values may be in a file."""
+"""Largest number of values in a file."""
 
 _UNITS: Final = {"_us": 1, "_ms": 1_000, "_s": 1_000_000}
 """Endings of the name of a column with times, and their unit in microseconds; other columns are in
