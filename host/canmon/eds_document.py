@@ -94,7 +94,8 @@ def _number(bus: NodeBus, node_id: int, sub: int) -> int | None:
 def chosen_eds(eds: Path | eds_folder.EdsFolder | None, bus: NodeBus, node_id: int) -> Path | None:
     """Return the EDS of a node: the given file, or the file of a folder that fits the node.
 
-    A line on standard error names the file of a folder, or says that none fits.
+    If a folder is given, a line on standard error names the chosen file, or reports that no file
+    fits.
 
     Raises:
         LinkClosed: the bus is gone.
@@ -127,7 +128,7 @@ def node_eds_option(
 ) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Return a decorator that adds `--eds FILE` and `--eds-dir`, together as `eds`.
 
-    That is a path, a folder, or None.
+    The value of `eds` is a path, a folder, or None.
 
     Args:
         what: the help of `--eds`.
@@ -171,12 +172,12 @@ def read_eds_paths(
 ) -> eds_folder.EdsFiles:
     """Read files by node-ID; Refused if one cannot be read, or is no EDS.
 
-    It reports mistakes in a file, which are not used, on standard error.
+    It reports mistakes in a file on standard error, and does not use the entries with mistakes.
 
     Args:
         paths: the files.
-        folders: searched for those of other nodes.
-        notify: takes a line about each choice.
+        folders: folders to search for files of other nodes.
+        notify: called with a line about each choice of a file.
     """
     found = {node: _read(node, path) for node, path in paths.items()}
     if found:

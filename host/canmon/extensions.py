@@ -40,11 +40,11 @@ _DECODERS: Final = ExtensionGroup[Any](
 
 
 def make_decoder(eds: Mapping[int, EdsObjects], dbc: Sequence[Path] = ()) -> Decoder:
-    """Return a decoder that asks those of installed packages first.
+    """Return a decoder that calls the decoders of installed packages first.
 
     Raises:
         OSError: a DBC file cannot be read.
-        DbcError: it is malformed, or cantools is not there.
+        DbcError: it is malformed, or cantools is not installed.
     """
     from tickrig.host.canmon.model.decode.decoder import Decoder  # noqa: PLC0415 - slow
 

@@ -59,7 +59,7 @@ class ConformSource:
         describe: returns the known description of a node, None if it has no EDS.
         stimulus: makes the stimuli of a node; None if there are none.
         close: closes the bus.
-        watch: reports disturbances of the bus and exceptions of nodes to a run.
+        watch: reports disturbances of the bus, and exceptions that nodes raise, to a run.
     """
 
     link: StampedLink

@@ -134,8 +134,8 @@ def file_text(option: str, report: Report, baseline: Baseline, show: ShowFrames)
 def decoded_frames(eds: Mapping[int, Path | EdsObjects]) -> ShowFrames:
     """Return a writer for the lines of a check; each call starts with the EDS only.
 
-    Frames between two checks are not in the evidence, so transfers and mappings of one check are
-    not valid in the next.
+    The evidence does not contain the frames between two checks. Therefore transfers and mappings of
+    one check are not valid in the next.
 
     Args:
         eds: an EDS, or the result of reading one, by node-ID.
@@ -172,12 +172,12 @@ _FILES: Final = ("html", "junit", "badge", "issue", "write_baseline")
 
 
 class Conformance:
-    """One call.
+    """One call of the command.
 
     Args:
-        word: SOURCE; None if the options name a bus.
+        word: the SOURCE; None if the options name a bus.
         bus: options of a bus.
-        options: the others, by name.
+        options: the other options, by name.
 
     Raises:
         Refused: impossible options; nothing was sent.

@@ -209,7 +209,8 @@ def open_stimulus(text: str) -> Stimulus:
     """Return the stimuli for the inputs.
 
     Args:
-        text: `ask`, `control:PATH` or the path of a control socket, else the words of a command.
+        text: `ask`, `control:PATH`, or the path of a control socket; any other text is a command
+            with its arguments.
 
     Raises:
         Refused: another form.

@@ -1,4 +1,4 @@
-"""The frames of a log, kept bus by bus as arrays, for what is judged once all of them are there."""
+"""The frames of a log as arrays, one set for each bus, for rules that need all frames."""
 
 from __future__ import annotations
 
@@ -49,15 +49,15 @@ class FramePlace(NamedTuple):
 
 
 class Hit(NamedTuple):
-    """Something wrong, before findings of one rule and node are put together.
+    """One violation, before the findings of one rule and node are combined.
 
     Attributes:
         rule: name of the rule.
         node: the node-ID; None if no node is to blame.
         ident: the CAN-ID with flags; None for the bus as a whole.
         text: what is wrong.
-        rows: the frames that show it, by their rows on the bus; one at least.
-        amount: how many times it happened there.
+        rows: rows, on the bus, of the frames that show it; at least one.
+        amount: number of times it happened in these frames.
     """
 
     rule: str
@@ -73,12 +73,12 @@ class BusFrames:
 
     Attributes:
         name: of the bus.
-        at_us: times as the log has them.
+        at_us: times as in the log.
         ident: see `any_ident`; error frames have `ERROR` and their class.
         dlc: bytes of data, for a remote frame its DLC.
-        payload: the first 8 bytes as a little-endian number.
-        number: places in the log, from 1.
-        sent: 1 for what the recorder sent.
+        payload: the first 8 data bytes as a little-endian number.
+        number: positions in the log, from 1.
+        sent: 1 for frames that the recorder sent.
     """
 
     def __init__(self, name: str) -> None:
@@ -177,10 +177,10 @@ class BusFrames:
 
 
 def steady_times(bus: BusFrames, backward: Sequence[int]) -> tuple[array[int], list[int]]:
-    """Return times without single ones that are wrong, and the rows where the clock was set back.
+    """Return corrected times, and the rows where the clock was set back.
 
-    A frame whose time alone is out of order gets that of its neighbour; behind a clock that was
-    set back the times go on as they are.
+    A single frame whose time is out of order gets the time of its neighbour. After the clock was
+    set back, the times are kept unchanged.
     """
     times = bus.at_us
     if not backward:
@@ -247,11 +247,11 @@ class FrameKeeper:
         """Return the frames around one, which must not be CAN FD.
 
         Args:
-            number: its place in the log, from 1.
-            frames: how many before and behind it.
+            number: position of the frame in the log, from 1.
+            frames: number of frames before and after it.
 
         Returns:
-            The place of the first of them, and the frames in the order of the log.
+            The position of the first of these frames, and the frames in the order of the log.
         """
         first, found = max(1, number - frames), list[tuple[int, Record]]()
         for bus in self.buses.values():

@@ -66,13 +66,16 @@ if TYPE_CHECKING:
 
 
 class Checker:
-    """Holds frames against rules; what it keeps grows with identifiers, not with frames.
+    """Checks frames against rules.
+
+    Its memory grows with the number of identifiers, not with the number of frames.
 
     Args:
-        rules: what must hold. Those that are written as expressions want decoded frames.
-        bit_rate: bits a second, for the load.
-        data_bit_rate: of data of CAN FD frames with BRS; without it these count as slow.
-        eds_heartbeats: what EDS files say of 1017h, in ms by node-ID.
+        rules: the rules. Rules that are written as expressions need decoded frames.
+        bit_rate: bits per second, for the load.
+        data_bit_rate: bits per second in the data phase of CAN FD frames with BRS; without it,
+            their data are counted at `bit_rate`.
+        eds_heartbeats: values of 1017h in EDS files, in ms, by node-ID.
 
     Raises:
         ValueError: a limit of the load without a bit rate.
@@ -95,11 +98,11 @@ class Checker:
         self._rates = BitRates(bit_rate or rules.bit_rate, data_bit_rate)
 
     def take(self, record: Record, decoded: Decoded | None = None) -> list[TrafficFinding]:
-        """Return what is wrong with a frame, and with the second that it ended.
+        """Return violations in a frame, and in the second of the load that the frame completed.
 
         Args:
             record: the frame.
-            decoded: what it says, for rules that are expressions.
+            decoded: the decoded frame, for rules that are expressions.
         """
         if decoded is None or not self._expressions:
             return self._taken(record)
@@ -142,13 +145,13 @@ class Checker:
         judged_us: int | None = None,
         errors: Iterable[str] = (),
     ) -> list[TrafficFinding]:
-        """Return what is missing.
+        """Return what is missing at the end of the traffic.
 
         Args:
-            end_us: when listening ended.
-            lost: what the source says was lost or is no frame.
-            judged_us: until when expressions are judged; None for `end_us`.
-            errors: what the source says of errors beside its error frames.
+            end_us: time when listening ended.
+            lost: report of the source about lost frames and items that are not frames.
+            judged_us: time up to which expressions are judged; None for `end_us`.
+            errors: report of the source about errors in addition to its error frames.
         """
         windows = [(channel, load.end()) for channel, load in sorted(self._loads.items())]
         found = [one for channel, window in windows for one in self.judge_window(channel, window)]
@@ -162,11 +165,11 @@ class Checker:
         return found + self._written_ended(now_us)
 
     def unjudged(self, end_us: int, without_errors: str = "") -> Unjudged:
-        """Return what was not judged until a time.
+        """Return what the rules could not judge up to a time.
 
         Args:
-            end_us: when listening ended.
-            without_errors: why the source has no error frames whatever happened.
+            end_us: time when listening ended.
+            without_errors: why the source cannot contain error frames.
         """
         seen = {key: Seen(*values) for key, values in self._seen.items()}
         evidence = CheckedTraffic(seen, end_us, without_errors)
@@ -227,8 +230,8 @@ class Unjudged(NamedTuple):
     """What rules could not judge.
 
     Attributes:
-        rules: why, by the names of those that judged nothing.
-        notes: what others could not judge beside what they have.
+        rules: the reason for each rule that judged nothing, by its name.
+        notes: what the other rules could judge only in part.
     """
 
     rules: Mapping[str, str]
@@ -279,11 +282,11 @@ class _Waiting:
 
 
 class Surroundings:
-    """Gives findings the frames before and after them; they wait for the latter.
+    """Adds the frames before and after a finding to it; holds the finding until these arrive.
 
     Args:
-        frames: how many on either side.
-        rules: names of the rules whose findings want them.
+        frames: number of frames before, and number of frames after.
+        rules: names of the rules whose findings get these frames.
     """
 
     def __init__(self, frames: int, rules: Iterable[str]) -> None:
@@ -329,19 +332,22 @@ class Surroundings:
 
 
 _QUIET_US: Final = 1_000_000
-"""On a bus that is silent a finding waits so long for the frames behind it, and what has not come
-in time for frames that this machine has not taken yet."""
+"""Longest wait on a silent bus.
+
+A finding waits this long for the frames after it. A frame counts as overdue only after this time,
+because this machine may not have read it yet.
+"""
 
 
 class DecodedCheck:
-    """Holds frames against rules; what an expression finds has the frames around it.
+    """Checks frames against rules; findings of expressions contain the frames around them.
 
     Args:
-        rules: what must hold.
+        rules: the rules.
         rates: bit rates of the buses, for the load.
-        decoder: None where no rule asks.
-        around: frames that are shown before and after what such a rule finds.
-        eds_heartbeats: what EDS files say of 1017h, in ms by node-ID.
+        decoder: decodes the frames; None if no rule needs that.
+        around: number of frames shown before and after a finding of such a rule.
+        eds_heartbeats: values of 1017h in EDS files, in ms, by node-ID.
     """
 
     def __init__(
@@ -369,11 +375,11 @@ class DecodedCheck:
         return found
 
     def wait(self, now_us: int, has_clock: bool) -> list[TrafficFinding]:
-        """Return what has not come in time and what waits too long, where no frame comes.
+        """Return overdue frames, and findings that have waited too long, while no frame arrives.
 
         Args:
             now_us: the time at the source, by the clock of this machine.
-            has_clock: the source keeps that clock, as a bus does and a pipe need not.
+            has_clock: whether the source uses that clock: a bus does, a pipe may not.
         """
         if now_us - self._latest_us <= _QUIET_US:
             return []
@@ -417,13 +423,13 @@ class AlarmState(StrEnum):
 
 @dataclass(slots=True)
 class Alarm:
-    """One rule.
+    """The state of one rule.
 
     Attributes:
         rule: its name.
-        count: findings, a lasting one counted once.
+        count: number of findings; a lasting one counts once.
         finding: the latest one.
-        lasting: whether it is broken by something missing.
+        lasting: whether the violation is that something is missing.
         acknowledged: whether the user has acknowledged the latest finding.
     """
 
@@ -444,12 +450,12 @@ class Alarm:
 
 @dataclass(slots=True)
 class Alarms:
-    """Checks frames against rules as they come.
+    """Checks frames against rules as they arrive.
 
     Args:
         rules: the rules.
-        bit_rate: bits a second, for the load.
-        data_bit_rate: of data of CAN FD frames with BRS.
+        bit_rate: bits per second, for the load.
+        data_bit_rate: bits per second in the data phase of CAN FD frames with BRS.
 
     Attributes:
         findings: the latest, oldest first.

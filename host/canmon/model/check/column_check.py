@@ -43,14 +43,14 @@ _Placed = tuple[int, int, TrafficFinding]
 
 
 class ColumnChecker:
-    """Holds blocks of frames against rules, with the findings that `Checker` has frame by frame.
+    """Checks blocks of frames against rules; finds what `Checker` finds frame by frame.
 
-    What it keeps grows with identifiers, not with frames.
+    Its memory grows with the number of identifiers, not with the number of frames.
 
     Args:
-        rules: what must hold.
-        bit_rate: bits a second, for the load.
-        eds_heartbeats: what EDS files say of 1017h, in ms by node-ID.
+        rules: the rules.
+        bit_rate: bits per second, for the load.
+        eds_heartbeats: values of 1017h in EDS files, in ms, by node-ID.
 
     Raises:
         ValueError: a limit of the load without a bit rate.
@@ -90,11 +90,11 @@ class ColumnChecker:
         return [finding for _, _, finding in placed]
 
     def end(self, lost: Iterable[str] = (), errors: Iterable[str] = ()) -> list[TrafficFinding]:
-        """Return what is missing.
+        """Return what is missing at the end of the traffic.
 
         Args:
-            lost: what the source says was lost or is no frame.
-            errors: what the source says of errors beside its error frames.
+            lost: report of the source about lost frames and items that are not frames.
+            errors: report of the source about errors in addition to its error frames.
         """
         found = []
         for channel, seconds in sorted(self._loads.items()):
@@ -149,10 +149,10 @@ class ColumnChecker:
 
 
 class _BusSelection:
-    """Tells which frames of a bus rules must see: by their gaps, first bytes and places.
+    """Selects the frames of a bus that rules must see: by gaps, first bytes and positions.
 
     Args:
-        rules: that say it; no frame but these can change what they find.
+        rules: the rules. Frames that are not selected cannot change their findings.
     """
 
     def __init__(self, rules: Sequence[Rule]) -> None:

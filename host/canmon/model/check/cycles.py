@@ -78,15 +78,16 @@ class _Level(NamedTuple):
 
 
 class Rhythm(NamedTuple):
-    """How frames come.
+    """The rhythm of the frames of an identifier.
 
     Attributes:
-        levels: their periods, in order; more than one where the period changed.
-        missing: gaps in which frames are missing, each with how many.
-        extra: frames that come between two that are right.
-        noisy: gaps from and to which jitter is large, with the usual and the large jitter in us.
-        spread_us: distance of the quartiles of the gaps, where it is usual.
-        share: of the gaps that have the period.
+        levels: the periods, in order; more than one if the period changed.
+        missing: gaps in which frames are missing, each with the number of missing frames.
+        extra: surplus frames, between two frames that keep the period.
+        noisy: the first and last gap of each part with large jitter, and the usual and the large
+            jitter in us.
+        spread_us: interquartile range of the gaps, in parts with usual jitter.
+        share: fraction of the gaps that have the period.
     """
 
     levels: tuple[_Level, ...]
@@ -103,7 +104,7 @@ class Rhythm(NamedTuple):
 
 
 def rhythm_of(times: Sequence[int]) -> Rhythm | None:
-    """Return the rhythm of frames by their times; None if they have none.
+    """Return the rhythm of frames from their times; None if they have no rhythm.
 
     >>> rhythm_of([0, 10_000, 20_000, 30_000, 50_000, 60_000, 70_000, 80_000]).missing
     ((3, 1),)
@@ -215,9 +216,9 @@ def _is_steady(middle: int, spread: int) -> bool:
 
 
 def _runs(windows: _Windows, usual: int) -> list[list[int]]:
-    """Return runs of steady windows with the same middle; noisy ones of that middle join them.
+    """Return runs of steady windows with the same median; noisy windows with it join a run.
 
-    Each has its first window, one behind the last, and its middle.
+    Each run is a tuple: its first window, the window after its last one, and its median.
     """
     runs: list[list[int]] = []
     begin = 0 if isinstance(windows.middles, list) else _array_runs(windows, usual, runs)
@@ -285,11 +286,11 @@ def _levels(windows: _Windows, gaps: int, usual: int) -> list[_Level]:
 def _odd(
     gaps: Sequence[int], level: _Level, quiet: int
 ) -> tuple[list[tuple[int, int]], list[int], int]:
-    """Judge the odd gaps of a level.
+    """Judge those gaps of a level that differ from its period.
 
     Returns:
-        The gaps where frames are missing, the frames that are too many, and how many frames came
-        with events.
+        The gaps in which frames are missing, the surplus frames, and the number of frames that were
+        sent because of events.
     """
     period = level.period_us
     off = max(_NEAR * period, 4 * quiet, min(_FLOOR_US, period / 3))

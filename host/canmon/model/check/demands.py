@@ -73,7 +73,7 @@ def _said(decoded: Decoded) -> str:
 
 
 class RuleBreach(NamedTuple):
-    """What is wrong, and when.
+    """A violation and its time.
 
     Attributes:
         at_us: when it was seen.
@@ -87,14 +87,16 @@ class RuleBreach(NamedTuple):
 
 
 class RuleDemand:
-    """One demand; this one is always met. What it keeps grows with identifiers at most.
+    """One demand; this base class is always met.
+
+    Its memory grows at most with the number of identifiers.
 
     Attributes:
-        due_us: until when something must have come.
-        came: a frame came that it counts; where it counts none, False.
-        judged: something was compared with what is demanded.
-        timed: it is about time: where all frames have one, nothing is judged.
-        doubt: why nothing was judged, where nothing was.
+        due_us: time by which something must have arrived.
+        came: whether a frame that the demand counts has arrived; False if it counts no frames.
+        judged: whether something was compared with the demand.
+        timed: whether the demand is about time; nothing is judged if all frames have the same time.
+        doubt: why nothing was judged; empty if something was.
     """
 
     due_us: int = NEVER
@@ -118,7 +120,7 @@ class RuleDemand:
         return ()
 
     def end(self, end_us: int, running: bool) -> Iterable[str]:
-        """Return what is missing.
+        """Return what is missing at the end.
 
         Args:
             end_us: the end of the traffic, or the current time if it continues.
@@ -136,11 +138,11 @@ MOST_COUNTED: Final = 10_000
 class Truth(RuleDemand):
     """A condition on signals that must never hold, or always.
 
-    It is reported when it starts to be wrong, not with each frame.
+    A violation is reported when it starts, not with each frame.
 
     Args:
         event: the condition.
-        wanted: what it must be.
+        wanted: required value of the condition.
     """
 
     def __init__(self, event: RuleEvent, wanted: bool) -> None:
@@ -183,12 +185,12 @@ class Never(RuleDemand):
 
 
 class Count(RuleDemand):
-    """The number of frames is limited.
+    """A limit of the number of frames.
 
     Args:
         event: the frames.
         least: smallest number; reported at the end.
-        most: largest number; an excess is reported once. None for any number.
+        most: largest number; None for no limit. An excess is reported once.
     """
 
     def __init__(self, event: RuleEvent, least: int, most: int | None) -> None:
@@ -214,12 +216,12 @@ class Count(RuleDemand):
 
 
 class Rate(RuleDemand):
-    """The number of frames in any span of time is limited.
+    """A limit of the number of frames in any span of time.
 
     Args:
         event: the frames.
         most: largest number, up to `MOST_COUNTED`.
-        span_us: the span.
+        span_us: length of the span.
     """
 
     timed = True
@@ -264,7 +266,7 @@ _NodeOnBus = tuple[str, int | None]
 
 
 class Dlc(RuleDemand):
-    """Frames have the length of CiA 301 or of the mapping of a PDO; remote frames are free.
+    """Frames must have the length in CiA 301, or of the mapping of a PDO; not remote frames.
 
     A PDO with an unknown mapping is not judged.
 
@@ -304,7 +306,7 @@ class _Guarding:
 
     Attributes:
         last: toggle bit of its latest answer; None before the first.
-        requested: whether a request waits for its answer; None before the first request.
+        requested: whether a request has no answer yet; None before the first request.
     """
 
     last: int | None = None
@@ -312,13 +314,13 @@ class _Guarding:
 
 
 class Toggle(RuleDemand):
-    """The toggle bit of guarding changes with each answer, from 0 after a boot-up on.
+    """The toggle bit of node guarding must change with each answer; after a boot-up it is 0.
 
-    An answer follows a request. Where a log has no requests, what follows a frame with the bit
-    set is an answer. A node that produces heartbeats answers none.
+    An answer is a frame after a request. If a log has no requests, all frames after a frame with
+    the toggle bit set count as answers. A node that produces heartbeats sends no answers.
 
     Args:
-        event: the answers; those of a node that was guarded before belong to them.
+        event: the answers, including those of a node that was guarded before.
     """
 
     def __init__(self, event: RuleEvent) -> None:
@@ -378,12 +380,12 @@ class Toggle(RuleDemand):
 
 
 class Every(RuleDemand):
-    """Frames of an identifier come again in time; the first after a boot-up when it likes.
+    """Frames of an identifier must repeat in time; the first one after a boot-up may be late.
 
     Args:
         event: the frames.
-        low_us: no sooner.
-        high_us: no later; None for any time.
+        low_us: shortest time from the previous frame.
+        high_us: longest time from the previous frame; None for no limit.
     """
 
     timed = True
@@ -438,11 +440,11 @@ class Every(RuleDemand):
 
 
 class FirstWithin(RuleDemand):
-    """A frame comes in time after the beginning: of the traffic, or of the scope.
+    """A frame must arrive in time after the beginning of the traffic or of the scope.
 
     Args:
         event: the frame.
-        most_us: how long it may take.
+        most_us: longest time until the frame.
     """
 
     timed = True
@@ -525,15 +527,15 @@ class DeadlineDemand(RuleDemand):
 
 
 class Latency(DeadlineDemand):
-    """One event follows another in time.
+    """One event must follow another in time.
 
-    If the first event occurs again before the second, the time since the earlier one counts. Events
-    that name no node are related by the nodes of their frames.
+    If the first event occurs again before the second one, time counts from its earlier occurrence.
+    If the events name no node, both must come from frames of the same node.
 
     Args:
         first: the event that starts the time.
         second: the event that must follow.
-        most_us: how long it may take.
+        most_us: longest time between them.
     """
 
     def __init__(self, first: RuleEvent, second: RuleEvent, most_us: int) -> None:
@@ -554,13 +556,13 @@ class Latency(DeadlineDemand):
 
 
 class Answered(DeadlineDemand):
-    """Requests are answered in time: of an SDO client, and of a master that guards.
+    """Requests of an SDO client, and of a master with node guarding, must be answered in time.
 
-    One that is sent again is measured from the first.
+    For a repeated request, time counts from the first one.
 
     Args:
         event: the requests.
-        most_us: how long it may take.
+        most_us: longest time until the answer.
     """
 
     def __init__(self, event: RuleEvent, most_us: int) -> None:
@@ -602,13 +604,13 @@ class Values:
 
 
 class In(RuleDemand):
-    """A value is one of the valid ones.
+    """A value must be one of the valid values.
 
-    A signal is reported when it starts to be wrong; for other events, each frame is. An EMCY with
-    code 0000h clears an error, and is valid.
+    For a signal, a violation is reported when it starts. For other events, it is reported for each
+    frame. An EMCY with code 0000h clears an error, and is valid.
 
     Args:
-        event: a signal, or frames of a kind, whose first value counts.
+        event: a signal, or a kind of frames; of these the first value counts.
         values: the valid values.
     """
 
@@ -692,10 +694,10 @@ class Counts(Follow):
 
 
 class Steps(Follow):
-    """A value changes from frame to frame by so much at most.
+    """A limit of the change of a value from one frame to the next.
 
     Args:
-        event: as of `In`.
+        event: as for `In`.
         most: the largest change.
     """
 
@@ -712,7 +714,7 @@ class Steps(Follow):
 
 
 class Changes(RuleDemand):
-    """A value does not stay the same for too long; reported once.
+    """A value must change within a time; a violation is reported once.
 
     Args:
         event: as for `In`.

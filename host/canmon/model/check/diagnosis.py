@@ -1,4 +1,4 @@
-"""What is wrong on a bus, judged by all rules that need no parameter.
+"""Find faults on a bus with all rules that need no parameter.
 
 >>> from tickrig.host.canmon.model.frames import Record
 >>> from tickrig.wire.can import CanFrame
@@ -123,18 +123,18 @@ _NO_NODES: Final[Mapping[int, node_memory.EdsObjects]] = MappingProxyType({})
 
 
 class BusFault(NamedTuple):
-    """Something wrong on a bus: all that one rule finds of one node, or of one CAN-ID.
+    """A fault on a bus: all findings of one rule about one node, or about one CAN-ID.
 
     Attributes:
         rule: name of the rule, of `RULES`.
         channel: the bus.
         node: the node-ID; None if no node is to blame.
-        ident: the CAN-ID with flags, of the first time; None for the bus as a whole.
+        ident: the CAN-ID with flags, of the first occurrence; None for the bus as a whole.
         text: what is wrong, in words.
-        first_us: when it was first seen.
-        last_us: when it was last seen.
-        amount: how many times it was seen.
-        frames: the frames that show it, the first thousand.
+        first_us: time of the first occurrence.
+        last_us: time of the last occurrence.
+        amount: number of occurrences.
+        frames: the first thousand frames that show it.
     """
 
     rule: str
@@ -161,13 +161,13 @@ class BusFault(NamedTuple):
 
 
 class Diagnosis(NamedTuple):
-    """What was judged, and what was found.
+    """The result: what was judged, and the faults.
 
     Attributes:
-        faults: by time.
-        judged: the rules that had anything to judge.
-        unjudged: why each other rule had not.
-        frames: how many frames there were.
+        faults: the faults, ordered by time.
+        judged: the rules that judged something.
+        unjudged: why each other rule judged nothing.
+        frames: number of frames.
     """
 
     faults: tuple[BusFault, ...]
@@ -177,16 +177,16 @@ class Diagnosis(NamedTuple):
 
 
 class Diagnoser:
-    """Takes the frames of a source, and judges them once all have come.
+    """Collects the frames of a source, and judges them when all have arrived.
 
     Args:
-        bit_rate: bits a second, for the load; None if it is not known.
-        eds: what EDS files say, by node-ID.
-        without_errors: why the source has no error frames whatever happened.
-        rules: what was learnt from a good log; None for nothing.
+        bit_rate: bits per second, for the load; None if unknown.
+        eds: contents of EDS files, by node-ID.
+        without_errors: why the source cannot contain error frames.
+        rules: rules learnt from a good log; None for no such rules.
 
     Attributes:
-        kept: the frames that came.
+        kept: the frames that arrived.
     """
 
     def __init__(
@@ -207,7 +207,7 @@ class Diagnoser:
     def diagnosis(
         self, lost: Iterable[str] = (), errors: Iterable[str] = (), end_us: int = 0
     ) -> Diagnosis:
-        """Judge the frames so far.
+        """Judge the frames that have arrived.
 
         Args:
             lost: losses that the source reports.
@@ -260,9 +260,9 @@ def diagnose(
     """Judge the frames of a log by all rules that need no parameter.
 
     Args:
-        frames: blocks in the order of the log, each columns or records.
-        bit_rate: bits a second, for the load; None if it is not known.
-        eds: what EDS files say, by node-ID.
+        frames: blocks in the order of the log; each block is columns or records.
+        bit_rate: bits per second, for the load; None if unknown.
+        eds: contents of EDS files, by node-ID.
     """
     one = Diagnoser(bit_rate, eds)
     for block in frames:
@@ -675,10 +675,10 @@ class _BusJudge:
     # Drives, and what comes once
 
     def _drives(self, decoder: Decoder) -> int:
-        """Find the fault bit of statuswords: where a mapping tells them, or TPDO1 looks like it.
+        """Find the fault bit of statuswords: by the mapping, or in a TPDO1 that looks like one.
 
         Returns:
-            How many PDOs have one.
+            The number of PDOs with a statusword.
         """
         drives = 0
         for ident, rows in sorted(self._rows.items()):
@@ -828,9 +828,9 @@ class _BusJudge:
         return [sorted(group) for group in groups]
 
     def _peak(self) -> tuple[int, tuple[int, int]]:
-        """Return the bits a second of the busiest half second, and the ends of one that has many.
+        """Return bits per second of the busiest half second, and the ends of one with a high load.
 
-        That is the first with more than is right, else the busiest.
+        These are the ends of the first half second above the limit, or else of the busiest one.
         """
         first_us, width = self._times[0], _LOAD_US // _LOAD_STEP_US
         steps = self._bits_by_step(first_us)
