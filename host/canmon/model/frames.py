@@ -1,6 +1,6 @@
-"""What a monitor takes in: frames and lines of serial ports, their identifiers, and their text.
+"""The input of a monitor: frames and lines of serial ports, with their identifiers and text.
 
-One number for each kind of frame, the CAN-ID with flags above it, and candump's filters of it.
+An identifier is one number: the CAN-ID with flags above it. candump's filters apply to it.
 
 >>> chosen = CandumpFilter.parse("123:7FF,400~700,#FF")
 >>> [chosen.passes(ident) for ident in (0x123, 0x400, 0x501, ERROR_FLAG | 0x20, ERROR_FLAG | 0x100)]
@@ -50,10 +50,10 @@ class Record(NamedTuple):
     """One frame, CAN FD frame or error frame, as it was on the bus.
 
     Attributes:
-        at_us: when it had ended, microseconds; since the epoch in logs and on real buses.
+        at_us: end of the frame in microseconds; since the epoch in logs and on real buses.
         channel: name of the bus, without blanks.
         frame: the frame.
-        sent: this program sent it.
+        sent: whether this program sent it.
     """
 
     at_us: int
@@ -63,7 +63,7 @@ class Record(NamedTuple):
 
 
 class LineRecord(NamedTuple):
-    """A message of a serial line, beside `Record` in one trace; filters take both.
+    """A message of a serial line; a trace can contain it and `Record`, and filters accept both.
 
     Attributes:
         at_us: time of its last byte.
@@ -120,7 +120,7 @@ def any_ident(frame: CanFrame | FdFrame) -> int:
 
 
 def ident_text(ident: int) -> str:
-    """Write it as candump does, with an R for remote frames and a # for those of CAN FD.
+    """Write an identifier as candump does, with R for remote frames and # for CAN FD frames.
 
     >>> ident_text(0x181), ident_text(0xC000_0605), ident_text(FD | 0x181)
     ('181', '00000605R', '181#')
@@ -157,9 +157,9 @@ _SENDING: Final = frozenset([1, 3, 5, 7, 9, 11, 14])
 
 
 def node_of(ident: int) -> int | None:
-    """Return the node-ID; None where the identifier has none by default.
+    """Return the node-ID of an identifier; None if it has none by default.
 
-    A COB-ID that was configured may belong to another node.
+    A configured COB-ID may belong to another node.
 
     >>> node_of(0x181), node_of(0x701), node_of(0x080), node_of(0x7E5)
     (1, 1, None, None)
@@ -193,15 +193,15 @@ def flagged_id(record: Record) -> int:
 
 @dataclass(frozen=True, slots=True)
 class CandumpFilter:
-    """Which frames are wanted.
+    """The filter that selects frames.
 
-    As in candump, frames pass if one rule holds, with `j` among the words if all
-    do; without a rule all frames pass. Error frames pass by `#MASK` alone.
+    As in candump, a frame passes if it matches one rule. With `j` among the words it must match all
+    rules. Without a rule all frames pass. Error frames pass only by `#MASK`.
 
     Attributes:
         rules: identifier, mask, and whether the rule is inverse.
-        error_mask: classes of error frames that are wanted.
-        joined: all rules must hold.
+        error_mask: classes of error frames that pass.
+        joined: whether a frame must match all rules.
     """
 
     rules: tuple[tuple[int, int, bool], ...] = ()
@@ -237,7 +237,7 @@ class CandumpFilter:
 
 
 def ms_text(time_us: int | None) -> str:
-    """Write a time in milliseconds, no more than 8 characters below 11 days.
+    """Write a time in milliseconds, with at most 8 characters up to 11 days.
 
     >>> ms_text(None), ms_text(1_234), ms_text(999_999), ms_text(12_345_678)
     ('-', '1.234', '999.999', '12345.7')
@@ -268,7 +268,7 @@ def rate_text(per_s: float) -> str:
 
 
 def load_text(bits_s: int, bit_rate: int | None) -> str:
-    """Write a load: a share of the bit rate if that is known, else bits a second.
+    """Write a load: in percent of the bit rate if that is known, otherwise in bits per second.
 
     >>> load_text(123_456, 1_000_000), load_text(123_456, None)
     ('12.3 %', '123.5 kbit/s')
@@ -305,10 +305,10 @@ def stamp_text(stamp: Stamp, at_us: int, origin_us: int, before_us: int) -> str:
     """Write a time.
 
     Args:
-        stamp: how.
+        stamp: format of the time.
         at_us: the time.
-        origin_us: that of the first frame.
-        before_us: that of what comes before it.
+        origin_us: time of the first frame.
+        before_us: time of the previous item.
 
     >>> [stamp_text(one, 3_500_000, 1_000_000, 3_000_000) for one in STAMPS[:3]]
     ['2.500000', '0.500000', '3.500000']
@@ -327,17 +327,17 @@ def stamp_text(stamp: Stamp, at_us: int, origin_us: int, before_us: int) -> str:
 class DumpLines:
     """Writes one line for each frame.
 
-    Identifiers of 11 bits are indented once one of 29 bits was there.
+    After a first 29-bit identifier, 11-bit identifiers are indented.
 
     Args:
-        stamp: what stands before a frame.
-        extra: show whether the frame was received or sent, with B and E for BRS and ESI.
+        stamp: format of the time before a frame.
+        extra: whether to show if the frame was received or sent, and B and E for BRS and ESI.
 
     Attributes:
-        form: what stands before a frame.
-        first_us: when the first frame came; None before it.
-        last_us: when the last one came.
-        width: how many digits identifiers have.
+        form: format of the time before a frame.
+        first_us: time of the first frame; None before it.
+        last_us: time of the last frame.
+        width: number of digits of identifiers.
     """
 
     def __init__(self, stamp: Stamp = Stamp.NONE, extra: bool = False) -> None:
@@ -422,12 +422,12 @@ def date_text(at_us: int) -> str:
 
 
 class LogTime(NamedTuple):
-    """A moment of a log, as a user writes it.
+    """A moment of a log, as written by a user.
 
     Attributes:
-        us: since the epoch where it is dated, else after the first frame of the log.
-        dated: it is a date, or seconds of the epoch.
-        text: how it was written.
+        us: microseconds since the epoch if `dated`, otherwise after the first frame of the log.
+        dated: whether it is a date, or seconds since the epoch.
+        text: the moment as written.
     """
 
     us: int
@@ -444,7 +444,7 @@ _EPOCH_S: Final = 1_000_000_000
 
 
 def parse_log_time(text: str) -> LogTime:
-    """Parse a moment of a log: a time after its first frame, a date, or seconds of the epoch.
+    """Parse a moment of a log: time after its first frame, a date, or seconds since the epoch.
 
     A date without a zone is in the zone of this machine, as displayed.
 

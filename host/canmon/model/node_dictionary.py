@@ -40,10 +40,10 @@ class ObjectRow(NamedTuple):
     Attributes:
         entry: index and sub-index.
         text: its name, type and unit.
-        value: for people; empty where none is known.
-        origin: where that was seen.
-        at_us: when; None for that of the EDS.
-        trouble: why the latest transfer failed, empty if it did not.
+        value: value for display; empty if unknown.
+        origin: where the value was seen.
+        at_us: time of the value; None for a value of the EDS.
+        trouble: why the latest transfer failed; empty if it did not fail.
     """
 
     entry: tuple[int, int]
@@ -59,7 +59,7 @@ class ObjectRow(NamedTuple):
         return "" if self.text.kind is None else self.text.kind.name
 
     def matches(self, wanted: str) -> bool:
-        """Return whether a part of its name, or the beginning of its index, matches.
+        """Return whether a text is part of its name, or the beginning of its index.
 
         >>> row = ObjectRow((0x6041, 0), ObjectText("statusword"))
         >>> [row.matches(wanted) for wanted in ("", "604", "Status", "6041h:00", "word 6", "41")]
@@ -214,8 +214,9 @@ def encode_value(text: ObjectText, words: str) -> bytes:
     """Return the bytes of a value, written as the table shows it: in the unit of the object.
 
     Args:
-        text: what is known of the object; where no type is, bytes are written.
-        words: the value; bytes in hex.
+        text: the known description of the object; without a known type, the value is written as
+            bytes.
+        words: the value as text; bytes are in hex.
 
     Raises:
         ValueError: not a value of this object.

@@ -1,4 +1,4 @@
-r"""Rules that are learnt from a good log, as TOML, and what breaks them in another log.
+r"""Rules learnt from a good log, written as TOML, and their violations in another log.
 
 >>> rules = parse_learnt('[learnt.can0.frame.185]\nlengths = [6]\nperiod = "10ms±20%"\n')
 >>> rules["can0"].frames[0x185].period
@@ -50,19 +50,19 @@ KEPT_FRAMES: Final = 1_000
 
 
 class FrameSummary(NamedTuple):
-    """How the frames of an identifier come.
+    """The frames of an identifier, and their rhythm.
 
     Attributes:
         ident: CAN-ID with flags.
-        name: for people.
-        rows: of all of them.
-        pieces: rows between what changes how they come, where they are enough for a rhythm.
+        name: name for display.
+        rows: rows of all these frames.
+        pieces: rows between two changes of the rhythm, if these are enough to find a rhythm.
         lengths: bytes of data.
         kind: cyclic, sync or event.
-        period_us: None if they have no rhythm.
-        jitter_us: distance of the quartiles of the gaps.
-        few: they are too few to tell a rhythm.
-        irregular: they have none at all.
+        period_us: period of the frames; None if they have no rhythm.
+        jitter_us: interquartile range of the gaps.
+        few: whether the frames are too few to find a rhythm.
+        irregular: whether the frames have no rhythm.
         service: NMT, EMCY, SDO or error control.
     """
 
@@ -83,10 +83,10 @@ class NodeSummary(NamedTuple):
     """The traffic of a node.
 
     Attributes:
-        row: of its first frame.
+        row: row of its first frame.
         identity: the values of 1018h in SDO traffic, None for unknown ones.
-        emcy: error codes, as 8130h.
-        answers: rows of the SDO answers with it, by sub-index.
+        emcy: error codes of its EMCYs, such as 8130h.
+        answers: rows of the SDO answers with the identity, by sub-index.
     """
 
     row: int
@@ -100,13 +100,14 @@ class BusSummary:
     """What is usual on a bus.
 
     Attributes:
-        name: of the bus.
+        name: name of the bus.
         frames: by identifier.
         nodes: by node-ID.
         boot_order: node-IDs in the order of their first boot-ups; those within 100 ms together.
         boots: rows of these boot-ups.
-        bits_per_second: of the busiest half second.
-        busy: rows of the first and last frame in one of too many bits, else in this one.
+        bits_per_second: load of the busiest half second.
+        busy: rows of the first and last frame in a half second with too many bits, or else in the
+            busiest one.
         found: findings of rules that need no parameter, as texts.
     """
 
@@ -121,14 +122,14 @@ class BusSummary:
 
 
 class _LearntFrame(NamedTuple):
-    """What the frames of an identifier must keep.
+    """Requirements for the frames of an identifier.
 
     Attributes:
-        lengths: bytes of data that may come; empty for any.
+        lengths: allowed numbers of data bytes; empty for any.
         kind: cyclic, sync or event.
-        period: in us, and by how much it may differ; None for any.
-        jitter_us: distance of the quartiles of the gaps; None for any.
-        required: they must come.
+        period: period and its tolerance, both in us; None for any period.
+        jitter_us: interquartile range of the gaps; None for any.
+        required: whether the frames must be present.
     """
 
     lengths: tuple[int, ...] = ()
@@ -152,15 +153,15 @@ class _LearntNode(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class LearntBus:
-    """What a bus must keep; see `BusSummary`.
+    """Requirements for a bus; see `BusSummary`.
 
     Attributes:
         frames: by identifier.
         nodes: by node-ID.
         boot_order: groups of node-IDs.
-        bits_per_second: at most; None for any.
-        usual: findings that are none.
-        others: CAN-IDs that are not among the frames may come.
+        bits_per_second: largest load; None for no limit.
+        usual: findings that are usual on this bus, and are not reported.
+        others: whether other CAN-IDs than those in `frames` are allowed.
     """
 
     frames: Mapping[int, _LearntFrame]
@@ -203,8 +204,8 @@ def learnt_text(summaries: Iterable[BusSummary], head: Sequence[str]) -> str:
     """Write rules as TOML.
 
     Args:
-        summaries: of all buses of the good log.
-        head: lines of the comment at the beginning.
+        summaries: summaries of all buses of the good log.
+        head: lines of the comment at the beginning of the file.
     """
     lines = [f"# {one}" for one in head]
     for bus in summaries:
@@ -248,10 +249,10 @@ def _bus_lines(bus: BusSummary) -> Iterator[str]:
 def scanned_text(
     bus: str, nodes: Mapping[int, tuple[Sequence[int | None], int | None]], head: Sequence[str]
 ) -> str:
-    """Write what is known of nodes that were asked, as rules.
+    """Write the values that were read from nodes as rules.
 
     Args:
-        bus: its name.
+        bus: name of the bus.
         nodes: by node-ID, 1018h:01 to 04 and the producer heartbeat time in ms.
         head: lines of the comment at the beginning.
     """
@@ -285,10 +286,10 @@ def _time(us: int) -> str:
 
 
 def parse_learnt(text: str) -> Learnt | None:
-    """Read rules that were learnt; None if a file has others.
+    """Read learnt rules; return None if the file has other rules.
 
     Raises:
-        ValueError: what is wrong, with its place in the file.
+        ValueError: an error in the file; the message names its place.
     """
     words = load_toml(text)
     if "learnt" not in words:
@@ -423,13 +424,13 @@ def _number(text: str, low: int, high: int, place: str) -> int:
 def broken(
     learnt: LearntBus, bus: BusSummary, frames: BusFrames, times: Sequence[int]
 ) -> Iterator[Hit]:
-    """Give what a bus does not keep.
+    """Yield the violations of the requirements for a bus.
 
     Args:
-        learnt: what it must keep.
-        bus: what it does.
-        frames: all of its frames; the last shows what is missing.
-        times: of them.
+        learnt: requirements for the bus.
+        bus: summary of the bus.
+        frames: all frames of the bus; the last one is shown if something is missing.
+        times: times of these frames.
     """
     last_row = len(frames) - 1
     for node in sorted(learnt.nodes.keys() - bus.nodes.keys()):
@@ -499,9 +500,10 @@ def _frame_broken(
 def _odd_rows(
     pieces: Sequence[Sequence[int]], times: Sequence[int], period: int, off: int
 ) -> tuple[int, ...]:
-    """Return the rows behind gaps that a period does not allow, from two such gaps on.
+    """Return the rows after gaps that a period does not allow, if there are at least two.
 
-    A single odd gap before is a frame that was late or lost, and not where the period is another.
+    A single such gap at first comes from a late or lost frame; it is not the start of another
+    period.
     """
     ends = (pair for piece in pieces for pair in pairwise(piece))
     gaps = [(abs(times[row] - times[before] - period) > off, int(row)) for before, row in ends]

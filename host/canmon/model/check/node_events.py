@@ -68,11 +68,11 @@ RULES: Final = {
 
 
 class Cut(NamedTuple):
-    """Something that changes how frames come, so that what was learnt before no longer holds.
+    """An event that changes the rhythm of frames: rhythms learnt before it are not valid after it.
 
     Attributes:
-        at_us: when.
-        node: whose frames; 0 for all.
+        at_us: time of the event.
+        node: node whose frames change; 0 for all nodes.
     """
 
     at_us: int
@@ -113,8 +113,9 @@ class NodeEvents:
 def is_canopen(bus: BusFrames, rows: Mapping[int, Sequence[int]]) -> bool:
     """Return whether the protocol of a bus is CANopen.
 
-    Other protocols use the same CAN-IDs for other purposes, so each kind of identifier is checked:
-    frames of the right length and content count for it, others against it.
+    Other protocols use the same CAN-IDs for other purposes. Therefore each kind of identifier is
+    checked. Frames with the right length and content count for CANopen, other frames count against
+    it.
     """
     good: Counter[str] = Counter()
     bad = 0

@@ -39,10 +39,10 @@ def junit(
     """Return the report.
 
     Args:
-        suite: what was checked.
-        names: of all rules, also of those that hold.
-        findings: in their order.
-        unjudged: why rules without a finding cannot be said to hold; empty if they can.
+        suite: name of the checked source.
+        names: names of all rules, including those without a violation.
+        findings: the findings in their order.
+        unjudged: why rules without a finding do not count as passed; empty if they do.
         skipped: why some rules judged nothing, by their names.
     """
     by_rule: dict[str, list[Judged]] = {name: [] for name in names}
@@ -76,14 +76,14 @@ def sarif(
 ) -> str:
     """Return the report.
 
-    A finding has no line: a log is read as frames. Its time, bus and frame are properties; the
-    frames around it are related locations.
+    A finding has no line number, because a log is read as frames. Its time, bus and frame are
+    properties. The frames around it are related locations.
 
     Args:
-        source: what was checked, as a file or bus.
-        names: of all rules.
-        findings: in their order.
-        unjudged: why rules without a finding cannot be said to hold; empty if they can.
+        source: the checked file or bus.
+        names: names of all rules.
+        findings: the findings in their order.
+        unjudged: why rules without a finding do not count as passed; empty if they do.
         skipped: why some rules judged nothing, by their names.
     """
     uri = quote(source.encode("utf-8", "surrogateescape"))

@@ -81,15 +81,15 @@ NO_GAP_US: Final = -1
 
 
 class FrameSelection(NamedTuple):
-    """Which frames of an identifier a rule must see; no other can change what it finds.
+    """Frames of an identifier that a rule must see; other frames do not change its findings.
 
-    Where nothing is given, all of them.
+    If no attribute is given, the rule must see all frames.
 
     Attributes:
         below_us: frames after a shorter gap.
         above_us: frames after a longer gap.
         first_bytes: frames that begin with one of these.
-        firsts: the first frame of an identifier on a bus.
+        firsts: whether to include the first frame of an identifier on a bus.
     """
 
     below_us: int | None = None
@@ -102,9 +102,9 @@ class Seen(NamedTuple):
     """The frames of an identifier on a bus.
 
     Attributes:
-        first_us: when the first one came.
-        last_us: when the last one came.
-        frames: how many came.
+        first_us: time of the first frame.
+        last_us: time of the last frame.
+        frames: number of frames.
     """
 
     first_us: int
@@ -118,12 +118,12 @@ class Seen(NamedTuple):
 
 
 class CheckedTraffic(NamedTuple):
-    """What there was to be judged.
+    """The traffic that the rules could judge.
 
     Attributes:
-        seen: the frames of each identifier on each bus, error frames beside.
-        end_us: when listening ended.
-        without_errors: why the source has no error frames whatever happened; empty if it may.
+        seen: the frames of each identifier on each bus, in addition the error frames.
+        end_us: time when listening ended.
+        without_errors: why the source cannot contain error frames; empty if it can.
     """
 
     seen: Mapping[tuple[str, int], Seen]
@@ -152,10 +152,10 @@ ONE_TIME: Final = "all frames have one time"
 
 
 class Rule:
-    """One rule; this one sees all frames that it wants, and has nothing to say at the end.
+    """One rule; this base class sees all frames that it wants, and reports nothing at the end.
 
     Attributes:
-        name: as findings and reports have it.
+        name: name of the rule in findings and reports.
     """
 
     name = ""
@@ -169,7 +169,7 @@ class Rule:
         return FrameSelection()
 
     def judge(self, record: Record, gap_us: int | None, /) -> str | None:
-        """Return what is wrong with a frame.
+        """Return the violation that a frame shows.
 
         Args:
             record: the frame.
@@ -184,11 +184,11 @@ class Rule:
     def unjudged(self, evidence: CheckedTraffic, /) -> str:
         """Return why it has judged nothing, so that it does not count as passed.
 
-        A rule judges each frame that it wants, error frames also by their absence; a rule with its
-        own `end` judges what is missing.
+        A rule judges each frame that it wants. The absence of error frames also counts as judged. A
+        rule with its own `end` judges what is missing.
 
         Args:
-            evidence: at least one frame, or error frame.
+            evidence: traffic with at least one frame or error frame.
 
         Returns:
             The reason; empty if it has judged something.
@@ -203,10 +203,10 @@ class Rule:
         return ()
 
     def end(self, latest_us: Mapping[int, int], end_us: int, /) -> Iterable[str]:
-        """Return what is missing.
+        """Return what is missing at the end of the traffic.
 
         Args:
-            latest_us: time of the last frame of each identifier, on any bus.
+            latest_us: times of the last frame of each identifier, on any bus.
             end_us: end of the traffic.
         """
         return ()
@@ -216,14 +216,14 @@ class Rule:
 
 
 class MaxLoad:
-    """No second of a bus is busier.
+    """No second of a bus has a higher load than the limit.
 
     Args:
-        percent: of the bit rate.
-        bit_rate: bits a second.
+        percent: limit of the load, in percent of the bit rate.
+        bit_rate: bits per second.
 
     Attributes:
-        name: as findings have it.
+        name: name of the rule in findings.
     """
 
     name = "max-load"
@@ -246,12 +246,12 @@ _REQUEST_IDS: Final = range(sdo_frame.REQUEST_COB_ID + 1, sdo_frame.REQUEST_COB_
 
 
 class HeartbeatTimes(NamedTuple):
-    """When the heartbeat of a node must come.
+    """Limits of the time between two heartbeats of a node.
 
     Attributes:
         node: its node-ID.
-        low_us: it comes no sooner after the one before.
-        high_us: and no later.
+        low_us: shortest time since the previous heartbeat.
+        high_us: longest time since the previous heartbeat.
     """
 
     node: int
@@ -332,18 +332,18 @@ _SURE_GAPS: Final = 2
 
 
 class _Watched:
-    """What `NoLostHeartbeat` knows of a node on a bus.
+    """State of `NoLostHeartbeat` for a node on a bus.
 
     Args:
         channel: the bus.
         node: its node-ID.
-        period_ms: what its EDS says of 1017h, 0 where none does.
+        period_ms: value of 1017h in its EDS; 0 if there is no such value.
 
     Attributes:
-        has_sent: it has sent a frame of error control.
-        guarded: it is guarded, and sends no heartbeats.
-        requested: a guarding request was not answered yet.
-        judged: a gap was compared with a period that is known.
+        has_sent: whether it has sent a frame of error control.
+        guarded: whether node guarding monitors it: it then sends no heartbeats.
+        requested: whether a guarding request has no answer yet.
+        judged: whether a gap was compared with a known period.
     """
 
     def __init__(self, channel: str, node: int, period_ms: int) -> None:
@@ -432,12 +432,12 @@ class _Watched:
 class NoLostHeartbeat(Rule):
     """No heartbeat of a node that sends one is lost.
 
-    The period is that of 1017h in SDO traffic, else the measured one, else that of an EDS, as on
-    the node board. A boot-up restarts the supervision. Answers to guarding requests are not
-    heartbeats: they have a toggle bit.
+    The period is the value of 1017h in SDO traffic, or else the measured period, or else the value
+    in an EDS. The node board uses the same order. A boot-up restarts the supervision. Answers to
+    guarding requests are not heartbeats, because they have a toggle bit.
 
     Args:
-        periods_ms: values of 1017h in EDS files, by node-ID: these nodes must be present.
+        periods_ms: values of 1017h in EDS files, by node-ID. These nodes must be present.
     """
 
     name = "no-lost-heartbeat"
@@ -719,7 +719,7 @@ class NodesPresent(Rule):
 class NoReboot(CanopenRule):
     """No node that was seen before boots without an NMT reset.
 
-    A frame that begins with 0 is a boot-up: some nodes send more than one byte.
+    Any frame that begins with 0 counts as a boot-up, because some nodes send more than one byte.
     """
 
     name = "no-reboot"

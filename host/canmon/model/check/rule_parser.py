@@ -1,4 +1,4 @@
-"""Rules as text: an event in the words of `-F`, what it must do, and when.
+"""Rules as text: an event in the words of `-F`, a demand on it, and the scope of the demand.
 
 ```
 rule   = event demand (scope) ...
@@ -181,18 +181,18 @@ _NO_MAPPING: Final = "; PDOs without a known mapping came: describe them by --ed
 
 
 class ExpressionRule:
-    """One rule, for one node where it was written for several.
+    """One rule; a rule for several nodes is split into one rule for each node.
 
-    A signal that it names must come: a name may be misspelt, and a rule that judges nothing
-    does not hold.
+    A signal that the rule names must occur in the traffic. Its name may be misspelt, and a rule
+    that judges nothing does not count as passed.
 
     Args:
-        name: as findings and reports have it.
-        demand: what must hold.
-        scopes: when; always where there are none.
-        missing: the signals and words that it names, of which none has come yet.
-        slices: those of them that are bits of frames.
-        mapped: it speaks of what PDOs carry, or of PDOs by their numbers.
+        name: name of the rule in findings and reports.
+        demand: the demand.
+        scopes: when the demand applies; empty for always.
+        missing: the signals and words that the rule names and that have not occurred yet.
+        slices: those of these signals that are bits of frames.
+        mapped: whether the rule is about the contents of PDOs, or names PDOs by number.
     """
 
     def __init__(  # noqa: PLR0913 - what a rule is made of
@@ -306,7 +306,7 @@ def _time_us(text: str) -> int | None:
 
 
 def _tolerance_us(text: str, period_us: int) -> int | None:
-    """Read a share of a period, or a time; None if it is neither.
+    """Parse a percentage of a period, or a time; return None if the text is neither.
 
     >>> _tolerance_us("10%", 10_000), _tolerance_us("250us", 10_000)
     (1000, 250)
@@ -316,10 +316,10 @@ def _tolerance_us(text: str, period_us: int) -> int | None:
 
 
 def _values_of(parts: Sequence[tuple[str, ...]]) -> Callable[[Signal], bool]:
-    """Return a function that tells whether a signal has one of some values.
+    """Return a function that returns whether a signal has one of the given values.
 
     Args:
-        parts: a value each, or the ends of a range, of which one may be empty.
+        parts: each is a value, or the two ends of a range; one of the ends may be empty.
 
     Raises:
         ValueError: an end is not a number, or the lower one is above the other.
@@ -487,15 +487,15 @@ _OTHERS: Final = frozenset(["not", "!", "!="])
 def errors_alone(
     test: filters.Test, tokens: Iterable[Token], signals: Collection[str]
 ) -> filters.Test:
-    """Return the test of frames as events: an EMCY of code 0000h is none.
+    """Return the test of frames as events: an EMCY with code 0000h is not an event.
 
-    It stays one where the filter does not name `emcy`, has a `not`, or names a signal, as
-    `emcy and code = 0`.
+    It is an event if the filter does not name `emcy`, has a `not`, or names a signal, such as `emcy
+    and code = 0`.
 
     Args:
-        test: of the filter.
-        tokens: its words.
-        signals: that it asks for.
+        test: test of the filter.
+        tokens: words of the filter.
+        signals: signals that the filter names.
     """
     words = {token.text for token in tokens}
     if signals or _EMCY not in words or words & _OTHERS:
@@ -685,11 +685,11 @@ class _RuleParser(_QuantityParser):
 
 @dataclass(frozen=True, slots=True)
 class Expression:
-    """A rule that was read.
+    """A parsed rule.
 
     Attributes:
-        name: as findings and reports have it.
-        texts: the rule, once for each node that it is demanded of.
+        name: name of the rule in findings and reports.
+        texts: the rule, once for each node that it applies to.
     """
 
     name: str
@@ -709,14 +709,14 @@ def _made(name: str, text: str) -> ExpressionRule:
 
 
 def parse_rule(text: str, name: str = "") -> Expression:
-    """Read a rule.
+    """Parse a rule.
 
     Args:
         text: the rule.
-        name: what findings call it; empty for the rule itself.
+        name: its name in findings; empty to use its text.
 
     Raises:
-        RuleError: it is none; says the column.
+        RuleError: the text is not a rule; the message names the column.
     """
     demand, *_ = _RuleParser(text).rule()
     name = name or " ".join(text.split())

@@ -35,7 +35,7 @@ class Rules:
     Attributes:
         max_load: percent of the bit rate in any second, None for no limit.
         bit_rate: bits per second, if it is not known otherwise; not a rule by itself.
-        no_emcy: no EMCY but error reset.
+        no_emcy: no EMCY except error reset.
         no_sdo_abort: no aborted SDO transfer.
         no_error_frames: no error frame.
         no_reboot: no second boot-up of a node without an NMT reset.
@@ -43,8 +43,8 @@ class Rules:
         no_loss: no frame lost, no invalid line in a log.
         heartbeats: periods of the heartbeats of some nodes.
         nodes: nodes that must be present.
-        max_gaps: identifiers and the longest gap of each, microseconds.
-        known: all identifiers that may come, None for any.
+        max_gaps: identifiers and the longest allowed gap of each, in microseconds.
+        known: all allowed identifiers; None for any.
         others: factories of further rules, from installed packages.
         expressions: rules about decoded frames. `Checker` checks them if it gets decoded frames;
             the block-wise check does not.
@@ -136,10 +136,10 @@ def parse_rules(words: RuleValues, load_rule: _LoadRule = _no_rule) -> Rules:
 
     Args:
         words: the rules.
-        load_rule: returns what makes a rule of another package, by its name under `rule`.
+        load_rule: returns the factory of a rule of another package, by its name under `rule`.
 
     Raises:
-        ValueError: one that is not known, or not like it must be.
+        ValueError: a rule is unknown, or has an invalid value.
 
     >>> parse_rules({"no_emcy": True, "heartbeat": ["3=100ms±20%"]}).heartbeats
     (HeartbeatTimes(node=3, low_us=80000, high_us=120000),)
@@ -171,7 +171,7 @@ def parse_rules(words: RuleValues, load_rule: _LoadRule = _no_rule) -> Rules:
 
 
 def joined(first: RuleValues, second: RuleValues) -> RuleValues:
-    """Return the rules of both; a number of the second goes before one of the first.
+    """Return the rules of both; a number in the second replaces the number in the first.
 
     >>> joined({"known": "181", "max_load": 50}, {"known": ["182"], "max_load": 60})
     {'known': ['181', '182'], 'max_load': 60}
@@ -290,7 +290,7 @@ def parse_rule_file(text: str, load_rule: _LoadRule) -> RuleValues:
         load_rule: see `parse_rules`.
 
     Raises:
-        ValueError: what is wrong, each mistake with its line.
+        ValueError: the file has mistakes; the message names each with its line.
     """
     try:
         words = load_toml(text)

@@ -1,4 +1,4 @@
-"""Numbers as text, a column at once, as `str` writes each; needs numpy.
+"""Write whole columns of numbers as text, each as `str` writes it; needs numpy.
 
 >>> parts, right = scaled(np.array([1, 3, -25]), Scale.of(0.1, 0))
 >>> joined(3, [*parts, b" "]), right.tolist()
@@ -150,11 +150,11 @@ class Texts:
 
 
 class TextTable:
-    """Texts of numbers of few bits; each is written when it comes first.
+    """Texts of numbers with few bits; each text is written when its number first occurs.
 
     Args:
-        bits: of the numbers.
-        write: writes one.
+        bits: number of bits of each number.
+        write: writes one number.
     """
 
     def __init__(self, bits: int, write: Callable[[int], str]) -> None:
@@ -224,14 +224,14 @@ def _digits(numbers: npt.NDArray[np.int64]) -> Cells:
 
 
 class Scale(NamedTuple):
-    """What makes a float of a whole number: raw * factor + offset.
+    """The conversion of a whole number to a float: raw * factor + offset.
 
     Attributes:
-        factor: what it is multiplied by.
-        offset: what is added.
-        tens: the power of ten by which both are whole numbers.
-        times: the factor, this many times.
-        more: the offset likewise.
+        factor: the factor.
+        offset: the offset.
+        tens: the power of ten that makes both whole numbers.
+        times: the factor multiplied by it.
+        more: the offset multiplied by it.
     """
 
     factor: float

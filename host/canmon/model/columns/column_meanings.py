@@ -213,9 +213,9 @@ class _Column(NamedTuple):
     """A signal of many frames.
 
     Attributes:
-        head: its name, and what stands before its value.
-        write: returns its text in each payload.
-        unit: stands behind it.
+        head: its name, and other text before its value.
+        write: returns the text of its value in each payload.
+        unit: the unit, written after the value.
     """
 
     head: str
@@ -264,9 +264,9 @@ class _Bits(NamedTuple):
 
     Attributes:
         shift: its lowest bit.
-        length: how many it has.
+        length: number of its bits.
         sign: its sign bit, 0 if it has none.
-        swapped: it is big-endian.
+        swapped: whether it is big-endian.
     """
 
     shift: int
@@ -305,14 +305,14 @@ def _each_column(head: str, bits: _Bits, write: Callable[[int], str], unit: str 
 def _whole_column(
     head: str, bits: _Bits, scale: tuple[int, int], write: Callable[[int], str], unit: str = ""
 ) -> _Column:
-    """Return a signal that is a whole number, times one and plus another.
+    """Return a signal that is a whole number, multiplied by a factor, plus an offset.
 
     Args:
-        head: as of a column.
-        bits: of the signal.
-        scale: by what it is multiplied, and what is added.
-        write: writes one number, as it is written.
-        unit: as of a column.
+        head: as for a column.
+        bits: bits of the signal.
+        scale: factor and offset.
+        write: writes one number as text.
+        unit: as for a column.
     """
     times, more = scale
     limit = (cells.WHOLE - abs(more)) // max(1, abs(times))
@@ -421,10 +421,10 @@ _SHORT: Final = 16
 
 
 def _message_writer(file: DbcFile, can_id: int, extended: bool) -> _Write:
-    """Return what writes the frames of a message.
+    """Return a function that writes the frames of a message.
 
-    What is made of a message writes some payloads by chance first: it must write them as cantools
-    does, which knows more of overlapping and odd signals.
+    The function first writes some random payloads. It is used only if it writes these as cantools
+    does, which supports more kinds of overlapping and odd signals.
     """
 
     def decode(data: bytes) -> Decoded:
@@ -525,7 +525,7 @@ _PIECE: Final = 1 << 10
 
 
 class ColumnNodes:
-    """Feeds a node board with blocks; the result at the end equals that frame by frame.
+    """Feeds a node board with blocks; the final result is the same as frame by frame.
 
     `NodeStatus.pdos`, which the verb does not show, contains only PDOs that affect the result.
 
@@ -570,13 +570,13 @@ def one_by_one(frames: Columns, rows: Ints) -> Iterator[tuple[int, Record]]:
 
 
 class Exchanges(NamedTuple):
-    """Expedited SDO transfers, each an answer right after its request, that teach nothing.
+    """Expedited SDO transfers that add no knowledge; each answer directly follows its request.
 
     Attributes:
-        requests: their places.
-        answers: the places of the answers.
-        inner: whether other such exchanges of the node are right before and right after: then this
-            one can be skipped without effect.
+        requests: positions of the requests.
+        answers: positions of the answers.
+        inner: whether another such exchange of the node directly precedes it, and one directly
+            follows it. The exchange can then be skipped without effect.
     """
 
     requests: Ints
@@ -616,13 +616,14 @@ def exchanges(
 ) -> Exchanges:
     """Return the exchanges among SDO frames of the pre-defined connection set.
 
-    A client that polls a node makes most SDO frames of a log, and only the first and the last of
-    such exchanges in a row tell more than that there is one more. What is read of 1000h to 1FFFh
-    is never left out, nor a statusword that differs from the one before, nor anything of a node
-    with block transfers, whose segments may look like anything.
+    A client that polls a node causes most SDO frames of a log. Of several such exchanges in a row,
+    the inner ones only add to the count.
+
+    Never left out are reads of 1000h to 1FFFh, a statusword that differs from the previous one, and
+    all exchanges of a node with block transfers, whose segments may contain any data.
 
     Args:
-        ident: identifiers with flags, of SDO frames alone.
+        ident: identifiers with flags; only SDO frames.
         dlc: bytes of data.
         payload: data as a little-endian number.
         blocks: by node-ID, whether it has block transfers, as `block_nodes` says.
@@ -674,11 +675,11 @@ def of_sdo(ident: npt.NDArray[Any]) -> Ints:
 
 
 class Matter(NamedTuple):
-    """Which frames matter.
+    """The frames that matter.
 
     Attributes:
-        rows: of frames that can change what is known of nodes.
-        settling: of those that can change what a CAN-ID means.
+        rows: rows of frames that can change the knowledge about nodes.
+        settling: rows of frames that can change the meaning of a CAN-ID.
     """
 
     rows: Ints
@@ -686,12 +687,12 @@ class Matter(NamedTuple):
 
 
 def that_matter(bus: BusDecoder, frames: Columns, but: Ints | None = None) -> Matter:
-    """Find the frames that can change what is known of nodes.
+    """Find the frames that can change the knowledge about nodes.
 
     Args:
-        bus: decodes them.
-        frames: of one bus.
-        but: rows of frames that change nothing that PDOs do: they are not returned.
+        bus: decodes the frames.
+        frames: frames of one bus.
+        but: rows to leave out: frames that do not change the state of PDOs.
     """
     can_ids = (frames.ident & STANDARD_MAX).astype(np.int64)
     can_ids[frames.ident & (EXTENDED | ERROR) != 0] = STANDARD_MAX + 1

@@ -1,9 +1,9 @@
-"""A log file as columns, many lines at a time.
+"""Read a log file as columns, many lines at a time.
 
-A candump log is read in blocks. Its usual lines are taken apart all at once
-(`CandumpBlock`); every other line goes through the parser of single lines, so
-that the result is the same, frame for frame. So are the containers of a BLF log
-(`BlfBlocks`). Other formats are read frame by frame.
+A candump log is read in blocks. The usual lines of a block are parsed all at once (`CandumpBlock`).
+The parser of single lines parses every other line, so that the result is the same, frame for frame.
+The containers of a BLF log are read in the same way (`BlfBlocks`). Other formats are read frame by
+frame.
 """
 
 from __future__ import annotations
@@ -65,13 +65,13 @@ _KINDS[list(_FRAMES)], _KINDS[list(can_log.BLF_NOTES)], _KINDS[list(can_log.BLF_
 
 
 class _Objects:
-    """Objects of which any field can be read of all together.
+    """Objects in a log; each field can be read from all of them at once.
 
     Args:
-        data: where they are.
-        places: where each begins.
-        stride: how far each is behind the one before, where that is the same for all: a field
-            is then a view, which takes a fifth of the time of picking it up.
+        data: the bytes that contain the objects.
+        places: offset of each object.
+        stride: distance between two objects, if it is the same for all. A field is then a view,
+            which takes a fifth of the time of gathering its values.
     """
 
     def __init__(self, data: bytes, places: _Places, stride: int = 0) -> None:
@@ -174,9 +174,10 @@ def _alike(data: bytes) -> _Objects | None:
 
 
 def _aligned(data: bytes) -> _Objects | None:
-    """Return the objects where each begins at the end of the one before, at a multiple of four.
+    """Return the objects if each begins at the end of the previous one, at a multiple of four.
 
-    That is how logs are written; it saves two thirds of the time of looking at each byte.
+    Logs are written in this way. Compared with a check of each byte, this saves two thirds of the
+    time.
     """
     words = np.frombuffer(data, "<u4", len(data) >> 2)
     places = np.flatnonzero(words == _SIGNATURE) * 4
@@ -193,11 +194,11 @@ def _anywhere(data: bytes) -> _Objects | None:
 
 
 def _whole(data: bytes, places: _Places, padded: int) -> _Objects | None:
-    """Return the objects that are whole; None where what is behind one is unclear.
+    """Return the complete objects; None if the data after an object are unclear.
 
     Args:
-        data: where they are.
-        places: of all signatures, the first one being that of an object.
+        data: the bytes that contain the objects.
+        places: offsets of all signatures; the first one belongs to an object.
         padded: bytes that may be between two objects.
     """
     places = places[places <= len(data) - can_log.OBJECT_BYTES]
@@ -207,12 +208,12 @@ def _whole(data: bytes, places: _Places, padded: int) -> _Objects | None:
 
 
 def _chain(places: _Places, ends: _Places, length: int, padded: int) -> _Places | None:
-    """Return which signatures begin whole objects, one behind the other; None if that is unclear.
+    """Return which signatures begin complete, consecutive objects; None if that is unclear.
 
     Args:
-        places: of all signatures.
-        ends: where the object of each would end.
-        length: of the data.
+        places: offsets of all signatures.
+        ends: where the object of each signature would end.
+        length: length of the data.
         padded: bytes that may be between two objects.
     """
     if not len(places) or (ends - places < can_log.OBJECT_BYTES).any():
@@ -277,24 +278,24 @@ _4, _8, _16, _32 = np.uint64(4), np.uint64(8), np.uint64(16), np.uint64(32)
 
 
 class CandumpBlock:
-    """Whole lines of a candump log, taken apart all at once.
+    """Complete lines of a candump log, parsed all at once.
 
-    A line as candump writes it has fixed places:
+    A line that candump writes has its fields at fixed positions:
 
         (1436509052.249713) can0 044#2A366C2BBA
         0          11     18 20  the '#' behind 3 or 8 digits, data up to the line's end
 
-    Each place is read for all lines together, as words of eight bytes at any address. A table has
-    turned hex digits into their values before that, and everything else into 0x80; so eight digits
-    are checked by one AND. Values are put together by shifts within the words: two digits, four,
-    eight. A line that fails a check is left to the parser of single lines.
+    Each field is read from all lines at once, as words of eight bytes at any address. Before that,
+    a table converts hex digits to their values, and all other characters to 0x80. One AND then
+    checks eight digits. Shifts within the words combine the values of two, four and eight digits.
+    The parser of single lines reads a line that fails a check.
 
     Args:
         text: the lines, each with its LF.
 
     Attributes:
-        starts: where each line begins.
-        ends: where its data end: before LF, CR and a direction.
+        starts: offset of each line.
+        ends: end of the data in each line, before LF, CR and a direction.
     """
 
     def __init__(self, text: bytes) -> None:
@@ -430,17 +431,18 @@ def read_columns(path: Path) -> ColumnReader:
 
 
 class ColumnReader:
-    """An iterable of blocks of a log; it reads while it is iterated, once.
+    """An iterable of blocks of a log; it reads while it is iterated, and only once.
 
-    It holds one block, whatever the size of the file.
+    It holds one block in memory, regardless of the size of the file.
 
     Attributes:
-        tally: what was no frame, so far.
+        tally: counts items that are not frames.
 
     Raises:
-        OSError: the file cannot be read, while it is iterated.
-        LogError: it is not what its name says, or has more than 256 buses, likewise.
-        NoColumnsError: there is a frame of CAN FD, likewise.
+        OSError: during iteration: the file cannot be read.
+        LogError: during iteration: the content does not match the file's name, or has more than 256
+            buses.
+        NoColumnsError: during iteration: the log contains a CAN FD frame.
     """
 
     def __init__(self, path: Path, kind: log_file.LogFormat) -> None:
@@ -454,9 +456,10 @@ class ColumnReader:
             yield rows.columns(self._channels)
 
     def pieces(self) -> Iterator[Columns | Sequence[log_reader.Item]]:
-        """Read the file, with the marks among its frames: these pieces come as frames.
+        """Read the file, with the marks among its frames; pieces with marks are returned as frames.
 
-        So do those with frames of CAN FD, and formats that have no columns.
+        Pieces with CAN FD frames, and formats that cannot be read as columns, are returned as
+        frames, too.
         """
         if self._kind is log_file.LogFormat.CANDUMP:
             yield from self._pieces_of_lines()
@@ -487,8 +490,8 @@ class ColumnReader:
 
         Args:
             text: the lines, each with its LF.
-            lines: reads them, or counts them.
-            held: number of bytes of the text that were read before.
+            lines: reads the lines, or counts them.
+            held: number of bytes at the start of the text that were read before.
         """
         block = CandumpBlock(text)
         rows = Rows(len(block.starts))

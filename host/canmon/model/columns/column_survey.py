@@ -181,9 +181,9 @@ class ColumnSurvey:
         answer: int,
         states: dict[tuple[int, int], bool],
     ) -> bool:
-        """Count an exchange by its answer; False if it is to be taken frame by frame.
+        """Count an exchange by its answer; return False if it must be read frame by frame.
 
-        `states` remembers which objects are statuswords, of which the node board shows the state.
+        `states` stores which objects are statuswords. The node board shows the state in them.
         """
         survey, node, entry = self._survey, ident & _NODE, answer >> 8 & 0xFF_FFFF
         is_state = states.get((node, entry))

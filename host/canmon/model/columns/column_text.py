@@ -128,7 +128,7 @@ class ScreenText:
 
         Args:
             columns: the frames.
-            meanings: what stands behind each, empty where nothing does; None for none at all.
+            meanings: text after each frame, empty for no text; None if no frame has text.
         """
         for begin in range(0, len(columns), _SLAB):
             rows = slice(begin, begin + _SLAB)
@@ -213,12 +213,12 @@ class ColumnText:
 
 
 def _asc_lines(columns: Columns, begin_us: int, number: Callable[[str], int]) -> str:
-    """Write data and remote frames as a log of Vector's has them, each line with its end.
+    """Write data and remote frames as lines of a Vector log, each line with its end.
 
     Args:
-        columns: the frames; none is from before the beginning.
-        begin_us: of the log.
-        number: tells the number of a bus, from 0.
+        columns: the frames; no frame is earlier than the beginning of the log.
+        begin_us: beginning of the log.
+        number: returns the number of a bus, from 0.
     """
     ident, remote = columns.ident, columns.ident & np.uint32(frames.REMOTE) != 0
     numbers, firsts = np.zeros(len(columns.channels), np.int64), np.unique(columns.channel, True)[1]

@@ -1,9 +1,11 @@
-"""Statistics and nodes of logs in blocks, as `Traffic` and `NodeBoard` have them; needs numpy.
+"""Statistics and nodes of logs in blocks, equal to `Traffic` and `NodeBoard`; needs numpy.
 
-What is kept does not grow with the number of gaps: sums, the shortest and the longest, which
-are exact, and how many gaps each bucket has (see `gaps`), so that a quantile is at most one
-part in 64 too long, and exact below 128 us. A histogram of whole microseconds would be exact
-only up to the length that it ends at, and an exact quantile would take the log a second time.
+The memory does not grow with the number of gaps. It holds sums, the shortest and the longest gap,
+which are exact, and the number of gaps in each bucket (see `gaps`). A quantile is therefore at most
+one part in 64 too long, and exact below 128 us.
+
+A histogram of whole microseconds would be exact only up to its longest time, and exact quantiles
+would require a second pass over the log.
 """
 
 from __future__ import annotations
@@ -54,8 +56,8 @@ def column_bits(
 
     Args:
         ident: see `ident_of`.
-        dlc: data length codes; of a remote frame too.
-        payload: bytes as a little-endian number, 0 for those that are not there.
+        dlc: data length codes, also of remote frames.
+        payload: data bytes as a little-endian number; missing bytes are 0.
     """
     out = np.empty(len(ident), np.int64)
     for begin in range(0, len(ident), _BLOCK):
@@ -233,9 +235,9 @@ class _ColumnGaps:
 def column_buckets(times_us: Ints) -> npt.NDArray[np.int16]:
     """Return the bucket of each time, as `bucket_of` does.
 
-    A bucket is the exponent and the first bits of the mantissa of a floating-point number: both
-    are read off its bits. Longer times than it is exact for lose low bits first, so that none is
-    rounded up.
+    A bucket is the exponent and the first bits of the mantissa of a floating-point number. Both are
+    read from the bits of that number. If a time is too long for an exact conversion, its low bits
+    are cleared first, so that it is not rounded up.
     """
     exact = np.where(times_us >> _MANTISSA_BITS, times_us & _COARSE, times_us)
     bits = exact.astype(np.float64).view(np.int64) >> _MANTISSA_BITS - SUB_BITS
@@ -262,10 +264,10 @@ _SPREAD: Final = (
 class _ColumnChanges:
     """Counts the changes of each bit of each identifier of a bus.
 
-    A payload that is shorter than the one before counts as filled up with zeros.
+    A payload that is shorter than the previous one is padded with zeros.
 
     Attributes:
-        payload: the latest of each.
+        payload: the latest payload of each identifier.
     """
 
     def __init__(self) -> None:

@@ -1,6 +1,6 @@
 """A log as columns of numpy: an array for each property of a frame.
 
-numpy comes with the extra `fast`; this module is imported only where it is there.
+numpy comes with the extra `fast`; this module is imported only if numpy is installed.
 
 The frames of a bus by identifier, block after block; needs numpy.
 
@@ -40,12 +40,12 @@ class Columns:
     """Frames, column by column, in the order of the log.
 
     Attributes:
-        at_us: when each had ended, microseconds.
+        at_us: end of each frame, in microseconds.
         ident: identifier; bit 31 extended, bit 30 remote, bit 29 error frame.
         dlc: data length code, 0 to 8.
-        payload: data as a little-endian number, zeros behind it.
-        sent: the recorder sent it.
-        channel: place of the bus in `channels`.
+        payload: data as a little-endian number, padded with zeros.
+        sent: whether the recorder sent the frame.
+        channel: index of the bus in `channels`.
         channels: names of the buses, in the order in which they appeared.
     """
 
@@ -87,11 +87,11 @@ class ChannelNames:
 
 
 class Rows:
-    """Columns of some frames, of which not all are known yet.
+    """Columns in which some frames are not known yet.
 
     Attributes:
-        at_us, ident, dlc, payload, sent, channel: as in `Columns`; 0 where nothing is known.
-        known: which rows hold a frame.
+        at_us, ident, dlc, payload, sent, channel: as in `Columns`; 0 in unknown rows.
+        known: whether each row holds a frame.
     """
 
     def __init__(self, count: int) -> None:
@@ -198,16 +198,15 @@ _NO_IDENT: Final = 0xFFFF_FFFF
 
 @dataclass(frozen=True, slots=True)
 class Runs:
-    """Rows sorted by identifier, those of one identifier in their order: a run for each.
+    """Rows sorted by identifier; the rows of one identifier keep their order, and form a run.
 
     Attributes:
         order: the rows.
-        begins: where in `order` each run begins.
-        ends: where each ends, one behind its last.
-        numbers: of each run's identifier.
+        begins: start of each run in `order`.
+        ends: end of each run in `order`, one after its last row.
+        numbers: number of each run's identifier.
         fresh: whether a run begins with the first frame of its identifier.
-        gaps_us: the gap before each row of `order`; 0 before a first frame and where time goes
-            back.
+        gaps_us: the gap before each row of `order`; 0 before a first frame, and if time goes back.
     """
 
     order: Ints
@@ -231,9 +230,9 @@ class Identifiers:
     """Numbers the identifiers of a bus as they appear, and sorts blocks of frames by them.
 
     Attributes:
-        idents: by number.
-        first_us: time of the first frame of each.
-        last_us: time of the last frame of each.
+        idents: the identifiers, by number.
+        first_us: time of the first frame of each identifier.
+        last_us: time of the last frame of each identifier.
     """
 
     def __init__(self) -> None:
@@ -299,10 +298,10 @@ class ColumnLoad:
     """Adds up the bits of each second, counted from the first frame.
 
     Args:
-        first_us: when that came.
+        first_us: time of the first frame.
 
     Attributes:
-        load: what was added up.
+        load: the resulting load.
     """
 
     def __init__(self, first_us: int) -> None:

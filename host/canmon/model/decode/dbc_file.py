@@ -23,10 +23,10 @@ class DbcError(ValueError):
 
 
 class DbcFile:
-    """Decodes the CAN-IDs that a DBC file names; for these it counts more than anything else.
+    """Decodes the CAN-IDs that a DBC file names; for these it has precedence over all others.
 
     Args:
-        path: the file, in UTF-8 or else in Windows-1252.
+        path: the file, in UTF-8, or otherwise in Windows-1252.
 
     Raises:
         OSError: the file cannot be read.
@@ -96,11 +96,12 @@ class DbcFile:
     def _chosen(
         self, ident: tuple[int, bool], message: Message, data: bytes
     ) -> tuple[SignalDictType, list[str]]:
-        """Return the signals of a frame that cantools does not decode, and those that are in none.
+        """Return the signals of a frame that cantools does not decode, and the names of the rest.
 
-        It gives no signal where a multiplexer has a value that no signal has, or where one signal
-        overlaps another or reaches beyond the message. Here each is read by itself, and those are
-        returned that no multiplexer selects, or one does by its value.
+        cantools returns no signal if a multiplexer has a value without signals, or if a signal
+        overlaps another one or exceeds the message. In these cases each signal is decoded by
+        itself. Signals without a multiplexer are returned, and signals that the value of their
+        multiplexer selects. The rest are selected signals that cannot be decoded.
         """
         failed: list[str] = []
         if ident not in self._alone:

@@ -48,9 +48,9 @@ class Transfer:
 
     Attributes:
         at_us: time of its first frame.
-        duration_us: from there to its last frame.
+        duration_us: time from its first to its last frame.
         node: the server.
-        direction: upload reads, download writes.
+        direction: an upload reads, a download writes.
         mode: transfer mode.
         index: None if the beginning is missing.
         sub: None if the beginning is missing.
@@ -62,12 +62,12 @@ class Transfer:
         partial: whether its beginning is missing.
         flaws: inconsistencies: a gap, a size, a CRC.
         sized: whether the number of bytes is indicated; an expedited transfer without it has four.
-        length: what is unusual about its length, in words.
+        length: text about an unusual length; empty if the length is usual.
         name: of the object, empty if unknown.
-        value: of the bytes; a number of up to 8 bytes where the type is not known.
+        value: value of the bytes; for an unknown type, up to 8 bytes are a number.
         text: the value as text.
-        unit: of the value.
-        source: where name and type come from.
+        unit: unit of the value.
+        source: source of name and type.
     """
 
     at_us: int
@@ -144,10 +144,11 @@ class Signal(NamedTuple):
     """A value of a frame.
 
     Attributes:
-        name: of an object in lower case, a member of a record behind a dot; `6041h:00` without a
-            name; or the name in the DBC file.
+        name: name of an object in lower case, with a dot before the member of a record. For an
+            object without a name, index and sub-index, such as `6041h:00`. For a DBC file, the name
+            in that file.
         value: the value.
-        unit: as the EDS or DBC file gives it, else empty.
+        unit: unit in the EDS or DBC file, otherwise empty.
         text: the value as text, if it differs from the value.
     """
 
@@ -169,15 +170,15 @@ class Decoded(NamedTuple):
             error, rrc, rtc-lite; unmapped for a PDO without a description, fd for a CAN FD frame,
             raw for all others.
         node: the node of the object; None if there is none.
-        summary: one line; None if transfers or signals contain everything.
-        signals: the values in it.
+        summary: one line of text; None if transfers or signals contain everything.
+        signals: the values in the frame.
         source: `EDS`, `SEEN`, `DBC`; empty if the standard alone defines it.
         entry: index and sub-index that an SDO frame is about.
         transfers: the SDO transfers that ended with this frame.
-        asks: whether its sender waits for an answer: an SDO client, or an NMT master with node
-            guarding.
-        size: bytes that a PDO must have by its mapping, None if unknown.
-        flaw: an inconsistency of an SDO frame that is new in its transfer.
+        asks: whether its sender waits for an answer, as an SDO client does, or an NMT master with
+            node guarding.
+        size: number of bytes of a PDO according to its mapping; None if unknown.
+        flaw: an inconsistency that an SDO frame adds to its transfer.
     """
 
     kind: str

@@ -115,15 +115,15 @@ class Effect(IntEnum):
 
 
 class BusDecoder:
-    """Decodes the frames of one bus, in the order in which they came.
+    """Decodes the frames of one bus, in the order of their arrival.
 
-    The pre-defined connection set defines the CAN-IDs, until an EDS or SDO traffic defines others
+    The pre-defined connection set defines the CAN-IDs until an EDS or SDO traffic changes them
     (1005h, 1012h, 1014h, 1201h.., 1400h.. to 1A00h..).
 
     Args:
         eds: contents of EDS files, by node-ID.
-        files: where to search files of other nodes; None for no search.
-        channel: name of the bus there.
+        files: where to search for files of other nodes; None for no search.
+        channel: name of the bus for that search.
 
     Attributes:
         changes: number of possible changes of the meaning of a CAN-ID.
@@ -172,9 +172,10 @@ class BusDecoder:
         return Effect.NONE if layout is None and route is not services.decode_nmt else Effect.EACH
 
     def lasting(self, can_id: int) -> Route | None:
-        """Return what decodes a CAN-ID by the frame alone until `changes` grows; None for others.
+        """Return a decoder of a CAN-ID that needs no earlier frames; None if earlier frames count.
 
-        Others are error control, SDO and multiplexed PDOs: there it counts what came before.
+        It is valid until `changes` grows. For error control, SDO and multiplexed PDOs, earlier
+        frames count.
         """
         route = self._routes.get(can_id) or self._route(can_id)
         told = route.func if isinstance(route, partial) else route
@@ -190,9 +191,9 @@ class BusDecoder:
         return route if alone or isinstance(getattr(route, "__self__", None), PdoDecoder) else None
 
     def heartbeat(self, can_id: int) -> Route | None:
-        """Return what decodes heartbeats of a node that is not guarded, None for other CAN-IDs.
+        """Return a decoder of heartbeats of a node without node guarding; None for other CAN-IDs.
 
-        It holds until a remote frame comes. A boot-up changes more: it goes through `take`.
+        It is valid until a remote frame arrives. Pass a boot-up to `take`, because it changes more.
         """
         route = self._routes.get(can_id) or self._route(can_id)
         if not isinstance(route, partial) or route.func != self._error_control:
@@ -424,13 +425,13 @@ class Decoder:
     """Decodes frames, in order; each bus has its own nodes.
 
     Args:
-        eds: an EDS or DCF, or its content, by node-ID. It counts on every bus. `EdsFiles` with a
-            folder has those of other nodes, by the identity in the traffic.
+        eds: an EDS or DCF, or its content, by node-ID; valid on every bus. `EdsFiles` with a folder
+            also has files of other nodes, chosen by the identity in the traffic.
         dbc: DBC files; they take precedence for their CAN-IDs.
         first: decoders that are tried before all others.
 
     Attributes:
-        first: these, followed by the DBC files.
+        first: these decoders, followed by the DBC files.
 
     Raises:
         OSError: a file cannot be read.

@@ -1,4 +1,4 @@
-"""EDS files of a folder, chosen by the identity that a node gives in 1018h.
+"""EDS files of a folder, chosen by the identity of a node (1018h).
 
 >>> node_identity([0xFB, 0x65, None])
 EdsIdentity(vendor=251, product=101, revision=None)
@@ -46,12 +46,12 @@ _MAJOR: Final = 16
 
 
 class EdsIdentity(NamedTuple):
-    """Who makes a device, and which it is (1018h).
+    """Vendor, product and revision of a device (1018h).
 
     Attributes:
         vendor: 1018h:01.
         product: 1018h:02.
-        revision: 1018h:03; None if it is not known.
+        revision: 1018h:03; None if unknown.
     """
 
     vendor: int
@@ -185,14 +185,14 @@ def _candidate(path: Path) -> _Candidate | None:
 
 
 class EdsFiles(dict[int, EdsObjects]):
-    """What files say, by node-ID; files of other nodes are chosen in a folder.
+    """Contents of EDS files, by node-ID; files of other nodes are chosen from a folder.
 
-    A file that is chosen is added, so that words for a node are known from then on.
+    A chosen file is added, so that the names in it are known from then on.
 
     Args:
-        given: files that are named for a node: the folder does not count there.
-        folder: where files of other nodes are; None if nowhere.
-        notify: takes a line for people about each choice.
+        given: files of given nodes; the folder is not searched for these nodes.
+        folder: folder with files of other nodes; None for no folder.
+        notify: called with a line of text about each choice.
 
     Attributes:
         folder: as given.
@@ -210,12 +210,14 @@ class EdsFiles(dict[int, EdsObjects]):
         self._said: dict[tuple[str, int], tuple[Path | None, str]] = {}
 
     def find(self, channel: str, node: int, identity: EdsIdentity) -> EdsObjects | None:
-        """Return what the file for a node says; None if none fits, or it is chosen already.
+        """Return the content of the file that fits a node.
+
+        It returns None if no file fits, or if the file for the node is already chosen.
 
         Args:
             channel: the bus.
             node: the node.
-            identity: what it says of itself.
+            identity: the identity that the node reports.
         """
         if self.folder is None or node in self._given:
             return None

@@ -219,12 +219,13 @@ def _word_test(name: str, sign: str, value: str) -> Test:
 
 
 def signal_test(path: str, sign: str = "!=", text: str = "0") -> Test:
-    """Return the test for a signal, or one bit of it; without a comparison: it is not 0.
+    """Return the test for a signal or one of its bits; without a comparison it must not be 0.
 
     Args:
-        path: name, with `.bit` or its number behind it and `node.` before it if need be.
+        path: name of the signal, optionally with `node.` before it, and `.` with the name or number
+            of a bit after it.
         sign: one of `COMPARISONS`.
-        text: what it is compared with.
+        text: the value to compare with.
     """
     find, compare = signal_reader(path), comparison(sign, text)
 
@@ -236,7 +237,9 @@ def signal_test(path: str, sign: str = "!=", text: str = "0") -> Test:
 
 
 def signal_reader(path: str) -> Callable[[Decoded], Signal | None]:
-    """Return what finds a signal, or one bit of it, in a frame; None where it is not there.
+    """Return a function that finds a signal, or one of its bits, in a frame.
+
+    The function returns None if the frame does not contain the signal.
 
     Args:
         path: see `signal_test`.
@@ -269,7 +272,7 @@ def _state_reader(node: int) -> Callable[[Decoded], Signal | None]:
 
 
 def signal_place(path: str) -> tuple[int | None, str, int | None]:
-    """Return node, name, and bit of a signal that a filter asks for; None where it names none.
+    """Return node, name and bit of a signal in a filter; None for a node or bit not named.
 
     >>> signal_place("3.statusword.fault"), signal_place("position")
     ((3, 'statusword', 3), (None, 'position', None))
@@ -305,11 +308,11 @@ def _whole(text: str) -> int:
 
 
 def comparison(sign: str, text: str) -> Callable[[Signal], bool]:
-    """Return what compares a signal, by its number or its text.
+    """Return a function that compares a signal, by its number or its text.
 
     Args:
-        sign: one of `COMPARISONS`; of `_EQUALITIES` where the text is no number.
-        text: what it is compared with.
+        sign: one of `COMPARISONS`; one of `_EQUALITIES` if the text is not a number.
+        text: the value to compare with.
     """
     wanted, compare = number(text), COMPARISONS[sign]
     if wanted is None:
@@ -334,11 +337,11 @@ def _can_id(record: AnyRecord) -> int | None:
 
 
 class MissingSignals:
-    """Waits for signals by name, and for words that no decoder of ours says.
+    """Waits for signals by name, and for words that no built-in decoder produces.
 
     Args:
-        paths: as filters write them: `position`, `3.position`, `statusword.fault`.
-        words: field and word, as `Filter.words` has them.
+        paths: names of signals as in filters: `position`, `3.position`, `statusword.fault`.
+        words: field and word, as in `Filter.words`.
     """
 
     def __init__(self, paths: Iterable[str], words: Iterable[tuple[str, str]] = ()) -> None:
@@ -663,7 +666,7 @@ class Filter:
     Attributes:
         text: as written.
         matches: returns whether a frame passes.
-        signals: names of its signals, to report if none of them ever comes.
+        signals: names of its signals, to report those that never occur.
         words: field and word for each word that only a decoder of an installed package can produce.
     """
 

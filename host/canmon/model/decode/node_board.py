@@ -1,6 +1,6 @@
-"""All nodes at a glance: what they do, as rows, as text and JSON, and a card of each.
+"""The state of all nodes, as rows, as text and as JSON, and a card of each node.
 
-Who a node is, and what its PDOs carry, as far as anybody said it.
+The known identity of a node, and the known contents of its PDOs.
 
 >>> from tickrig.host.canmon.model.decode.node_memory import EdsObjects, NodeMemory
 >>> values = {(0x1000, 0): 0x20192, (0x1018, 1): 0x13F, (0x1018, 3): 0x10002, (0x1A00, 0): 1}
@@ -80,26 +80,27 @@ class NodeStatus:
     Args:
         channel: its bus.
         node: its node-ID.
-        memory: the known objects.
+        memory: the known objects of the node.
 
     Attributes:
         state: last reported NMT state, None before the first.
-        commanded: the state commanded since by the NMT master, None once it has reported its state.
+        commanded: the state that the NMT master has commanded since; None after the node has
+            reported its state.
         boots: number of boot-up messages.
-        unrequested_boots: number of those without an NMT command, after an earlier frame of the
-            node.
+        unrequested_boots: number of boot-ups without an NMT command that follow an earlier frame of
+            the node.
         late: gaps between heartbeats that were longer than `LATE` periods.
         emcys: the latest, oldest first.
-        emcy_count: all.
-        error_code: of the latest EMCY, 0 if that took an error back.
-        sdo_errors: transfers that were aborted, unanswered or broken off.
-        sdo_error: the last of them, in words.
-        drive_state: of CiA 402, empty before the first statusword.
+        emcy_count: number of all EMCYs.
+        error_code: error code of the latest EMCY; 0 if it cleared an error.
+        sdo_errors: number of transfers that were aborted, unanswered or incomplete.
+        sdo_error: the last of these transfers, in words.
+        drive_state: state of CiA 402; empty before the first statusword.
         name: the device name that it reported.
         present: whether it has sent a frame that is known to be its own.
-        pdos: the latest of each of its PDOs, by kind.
-        doubled: whether two nodes have this node-ID, according to heartbeats and boot-ups: the row
-            then mixes both, and the gaps do not give a period.
+        pdos: the latest frame of each of its PDOs, by kind.
+        doubled: whether two nodes have this node-ID, according to heartbeats and boot-ups. The row
+            then mixes both nodes, and the gaps do not give a period.
     """
 
     channel: str
@@ -240,13 +241,14 @@ _ERROR_CONTROL: Final = ("heartbeat", "guard")
 class NodeBoard:
     """Keeps the status of every node that sends.
 
-    A node is on the board once it has reported its state, sent an EMCY, answered an SDO request or
-    sent a PDO that is known to be its own or has a CAN-ID of the pre-defined connection set without
-    another meaning. A node with an EDS is on the board from the beginning.
+    A node is on the board from its first reported state, EMCY or answer to an SDO request. It is
+    also on the board from its first PDO, if the PDO is known to be its own, or has a CAN-ID of the
+    pre-defined connection set without another meaning. A node with an EDS is on the board from the
+    beginning.
 
     Args:
         decoder: decodes the frames that the board processes.
-        expected: nodes with an EDS, on the first bus with a frame.
+        expected: nodes with an EDS; they belong to the first bus with a frame.
     """
 
     def __init__(self, decoder: Decoder, expected: Mapping[int, str] | None = None) -> None:
@@ -412,11 +414,13 @@ def _emcy(row: NodeStatus) -> str:
 def emcy_history(
     rows: Sequence[NodeStatus], stamp: Stamp = Stamp.ABSOLUTE, origin_us: int = 0
 ) -> list[str]:
-    """Return an empty line, a head, and the EMCYs of all nodes, the latest first; or nothing.
+    """Return an empty line, a head, and the EMCYs of all nodes, the latest first.
+
+    Without EMCYs it returns nothing.
 
     Args:
         rows: the nodes.
-        stamp: how times are written.
+        stamp: format of times.
         origin_us: the time of the first frame.
     """
     found = sorted((emcy.at_us, row.node, emcy.text) for row in rows for emcy in row.emcys)
@@ -470,7 +474,7 @@ class _PdoContent(NamedTuple):
         can_id: its own.
         receives: whether the node receives it.
         names: of the objects in it; empty if the mapping is unknown.
-        text: these, with their latest values if the PDO was sent, and their source.
+        text: these names with their source, and with their latest values if the PDO was sent.
     """
 
     kind: str
@@ -528,9 +532,9 @@ def name_text(row: NodeStatus) -> str:
 
 
 def told_identity(row: NodeStatus) -> str:
-    """Return what was read from the node, and behind it what else its EDS says of its kind.
+    """Return the identity read from the node, followed by further values of its EDS.
 
-    A serial number of an EDS is that of no device, so it is left out.
+    The serial number in an EDS is left out, because it belongs to no real device.
     """
     memory = row.memory
 

@@ -76,9 +76,9 @@ class ObjectText(NamedTuple):
         name: as in `Signal.name`.
         kind: its data type, None if unknown.
         unit: its unit, empty if unknown.
-        factor: multiply the number by it to get this unit.
+        factor: factor that converts the number to this unit.
         source: as in `Decoded.source`.
-        in_hex: a set of bits, or an identifier.
+        in_hex: whether to write the value in hex: it is a set of bits, or an identifier.
     """
 
     name: str = ""
@@ -89,12 +89,12 @@ class ObjectText(NamedTuple):
     in_hex: bool = False
 
     def fitted(self, data: bytes, *, sized: bool = True) -> bytes:
-        """Return the bytes of the value, of more that an SDO carried.
+        """Return the bytes of the value, without surplus bytes of the SDO transfer.
 
         Args:
-            data: as carried.
-            sized: whether their number was indicated. If not, surplus bytes have no meaning; if so,
-                they are dropped only if they are padding.
+            data: the bytes in the transfer.
+            sized: whether the transfer indicated their number. If not, surplus bytes have no
+                meaning. If so, they are dropped only if they are padding.
         """
         size = 0 if self.kind is None else self.kind.size
         if not 0 < size < len(data):
@@ -105,9 +105,9 @@ class ObjectText(NamedTuple):
         return value if filled or not sized else data
 
     def read(self, data: bytes, *, sized: bool = True) -> tuple[Value, str]:
-        """Return value and text of some bytes, as `fitted` has them.
+        """Return value and text of some bytes, after `fitted`.
 
-        A type that does not fit them is not used.
+        The data type is ignored if the bytes do not fit it.
         """
         data = self.fitted(data, sized=sized)
         if self.kind is not None and not self.in_hex:
@@ -237,14 +237,14 @@ def _standard_text(name: str, kind: DataType) -> ObjectText:
 
 @dataclass(frozen=True, slots=True)
 class EdsObjects:
-    """What a file says of a node.
+    """The content of a file for a node.
 
     Attributes:
         texts: name, type and unit by index and sub-index.
-        values: power-on values, as bytes on the wire, likewise.
-        name: of the device, empty where the file has none.
-        findings: what is wrong in the file, whose objects are then not used.
-        vendor: who makes the device, empty where the file does not say it.
+        values: power-on values as bytes on the wire, by index and sub-index.
+        name: name of the device; empty if the file has none.
+        findings: errors in the file; objects with errors are not used.
+        vendor: name of the vendor; empty if the file has none.
     """
 
     texts: Mapping[Entry, ObjectText] = field(default_factory=dict)
@@ -264,7 +264,7 @@ def read_eds_objects(path: Path, node_id: int) -> EdsObjects:
 
     Raises:
         OSError: the file cannot be read.
-        EdsError: it has no object that can be used.
+        EdsError: it has no usable object.
     """
     device, findings = read_sound(path)
     return eds_objects(device, node_id, path.stem, findings)
@@ -311,13 +311,13 @@ Entry = tuple[int, int]
 
 
 class NodeMemory:
-    """The values of a node's objects, as far as they are known.
+    """The known values of a node's objects.
 
-    A value that was written lasts until the node boots; then those count that it had
-    before, unless it has stored them (1010h).
+    A written value is valid until the node boots. After that the earlier values are valid again,
+    unless the node has stored the written ones (1010h).
 
     Args:
-        eds: what its file says; power-on values count until traffic says otherwise.
+        eds: content of its file; the power-on values are valid until traffic shows other values.
     """
 
     def __init__(self, eds: EdsObjects | None = None) -> None:
@@ -401,10 +401,10 @@ class NodeMemory:
 
     @property
     def is_drive(self) -> bool:
-        """Whether it is a drive of CiA 402.
+        """Whether the node is a drive of CiA 402.
 
-        Its device type says so; where that is not known or has several profiles, 6041h:00 with
-        16 bits does.
+        The device type decides. If it is unknown or has several profiles, the node is a drive if it
+        has 6041h:00 with 16 bits.
         """
         device_type = self.number(*DEVICE_TYPE)
         # 1000h: profile in the low half; FFFFh above it stands for several of them (CiA
@@ -443,9 +443,9 @@ class Heartbeats:
     Attributes:
         last_us: time of its last reported state, None before the first.
         since_us: time since which a heartbeat is expected; None for never.
-        gaps: between the latest heartbeats, in us. A delayed node sends all pending heartbeats at
-            once: a gap shorter than half of the previous one is averaged with it, which restores
-            the period after such a burst.
+        gaps: gaps between the latest heartbeats, in us. A delayed node sends all pending heartbeats
+            at once. Therefore a gap shorter than half of the previous one is averaged with that,
+            which restores the period after such a burst.
     """
 
     memory: NodeMemory = field(compare=False)
@@ -511,11 +511,11 @@ PAIR_US: Final = 100_000
 
 
 class TwoBeats(NamedTuple):
-    """Two heartbeats that go beside each other: each second one keeps the period.
+    """Two interleaved heartbeats: every second frame keeps the period.
 
     Attributes:
-        period_us: of one of them.
-        places: of the gaps where one comes beside the other.
+        period_us: period of one heartbeat.
+        places: positions of the gaps between one heartbeat and the other.
     """
 
     period_us: int
@@ -523,7 +523,7 @@ class TwoBeats(NamedTuple):
 
 
 def two_beats(times: Sequence[int]) -> TwoBeats | None:
-    """Find two heartbeats beside each other in the times of one CAN-ID.
+    """Find two interleaved heartbeats in the times of one CAN-ID; return None if there are not.
 
     >>> two_beats([0, 30, 100, 130, 200, 230, 300, 330]).period_us
     100

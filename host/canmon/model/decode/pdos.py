@@ -28,16 +28,16 @@ _Convert = Callable[[int], Value]
 
 
 class Field(NamedTuple):
-    """Where a signal is and how it is read.
+    """The place of a signal in a frame, and its conversion.
 
     Attributes:
         name: of the signal.
         shift: its lowest bit.
-        mask: of its bits, moved down.
+        mask: mask of its bits, shifted to bit 0.
         sign: its sign bit, 0 if it has none.
-        convert: makes the value of the number, None where that is the value.
-        unit: as `Signal.unit`.
-        write: makes the text, None where that is the value.
+        convert: converts the number to the value; None if the number is the value.
+        unit: as in `Signal.unit`.
+        write: writes the value as text; None if the text is the value.
     """
 
     name: str
@@ -53,13 +53,13 @@ class PdoDecoder:
     """Decodes the frames of one PDO.
 
     Args:
-        pdo: kind, node and source, as of `Decoded`.
-        fields: its signals; none where the mapping is not known.
-        bits: how many are mapped.
-        note: what people must know of the mapping.
+        pdo: kind, node and source, as in `Decoded`.
+        fields: its signals; empty if the mapping is unknown.
+        bits: number of mapped bits.
+        note: note for users about the mapping.
 
     Attributes:
-        size: how many bytes are mapped.
+        size: number of mapped bytes.
     """
 
     def __init__(
@@ -93,8 +93,8 @@ class _MpdoLayout:
     """Decodes multiplexed PDOs: each frame names its object.
 
     Args:
-        pdo: kind, node and source, as of `Decoded`.
-        describe: tells the objects of the node.
+        pdo: kind, node and source, as in `Decoded`.
+        describe: returns the descriptions of the node's objects.
     """
 
     def __init__(

@@ -64,13 +64,13 @@ class _OpenTransfer:
     """The known part of a transfer.
 
     Args:
-        at_us: when it began.
+        at_us: time of its first frame.
         node: the server.
-        direction: which way the value goes.
-        mode: as the request wants it.
+        direction: direction of the value.
+        mode: transfer mode of the request.
         index: None if the beginning is missing.
         sub: None if the beginning is missing.
-        begun_by: the request, to detect its repetition.
+        begun_by: the first request, to detect its repetition.
 
     Attributes:
         phase: what is expected next.
@@ -80,9 +80,10 @@ class _OpenTransfer:
         sent: the segment of a download that is not confirmed yet.
         requested_toggle: toggle bit of the requested upload segment.
         taken: toggle bit of the latest accepted segment.
-        block_last: place of the last segment in its block, once it was seen.
-        block_size: segments of a block, as its receiver requires; 0 until it has sent this.
-        done: whether nothing more is expected.
+        block_last: position of the last segment in its block; valid after that segment.
+        block_size: number of segments of a block that the receiver requires; 0 until the receiver
+            has sent it.
+        done: whether no more frames are expected.
         new_flaw: what the latest frame added to `flaws`; empty if nothing.
     """
 
@@ -380,14 +381,14 @@ def _end(running: _OpenTransfer, end: sdo_frame.BlockEnd) -> str:
 
 
 class SdoStep(NamedTuple):
-    """What one SDO frame did.
+    """The effect of one SDO frame.
 
     Attributes:
-        text: the step, where no transfer ended with it.
-        entry: index and sub-index it is about, as far as known.
-        ended: the transfers that ended with it.
-        asks: the client waits for an answer to it.
-        flaw: what does not fit with it, where that is new in its transfer.
+        text: the step of the transfer, if no transfer ended with the frame.
+        entry: index and sub-index that the frame is about, if known.
+        ended: the transfers that ended with the frame.
+        asks: whether the client waits for an answer to the frame.
+        flaw: an inconsistency that the frame adds to its transfer.
     """
 
     text: str
@@ -400,9 +401,9 @@ class SdoStep(NamedTuple):
 class SdoChannel:
     """Follows the transfers between one client and one server, as a monitor sees them.
 
-    It can start in the middle of a transfer: the known part is returned, marked as partial. It has
-    no time-outs, which belong to the client: a transfer is unanswered when its client starts
-    another one or the trace ends.
+    It can start in the middle of a transfer: it returns the known part, marked as partial. It has
+    no time-outs, because only the client has them. A transfer is unanswered if its client starts
+    another one, or if the trace ends.
 
     Args:
         node: the server's node-ID.
@@ -552,9 +553,9 @@ class SdoChannel:
 
 
 def _named(message: sdo.Request | sdo.Response) -> tuple[int, int] | None:
-    """Return the index and sub-index that a frame names itself.
+    """Return the index and sub-index in a frame.
 
-    Some clients name none with an abort: 0000h:00 is no object.
+    Some clients abort without naming an object: they send 0000h:00, which is not an object.
     """
     if isinstance(message, sdo.Abort) and not (message.index or message.sub):
         return None

@@ -43,9 +43,9 @@ def ticks(low: float, high: float, about: int) -> tuple[_Tick, ...]:
     """Return round numbers between two others.
 
     Args:
-        low: the least.
-        high: the greatest, above `low`.
-        about: how many are wanted; there are at most twice as many and one.
+        low: the lower number.
+        high: the higher number, above `low`.
+        about: wanted number of results; at most 2 * `about` + 1 are returned.
     """
     exponent, step = _step(low, high, max(1, about))
     digits = max(0, -exponent)
@@ -82,10 +82,10 @@ class _Bar(NamedTuple):
     """The samples of one column.
 
     Attributes:
-        first: the earliest value, which a line comes from the left to,
-        low: the least,
-        high: the greatest,
-        last: the latest, which a line leaves from.
+        first: the earliest value; the line from the left ends at it.
+        low: the least value.
+        high: the greatest value.
+        last: the latest value; the line to the right starts at it.
     """
 
     first: float
@@ -101,7 +101,7 @@ def decimate(series: Series, from_us: int, to_us: int, columns: int) -> list[_Ba
         series: the samples.
         from_us: beginning of the first column.
         to_us: the last time of the last column.
-        columns: how many, at least 1.
+        columns: number of columns, at least 1.
     """
     at_us, values = series.at_us, series.values
     span_us = max(1, to_us + 1 - from_us)
@@ -116,11 +116,11 @@ def decimate(series: Series, from_us: int, to_us: int, columns: int) -> list[_Ba
 
 
 class _Stop(NamedTuple):
-    """One stop of a curve: a column, and what lies in it.
+    """One stop of a curve: a column, and the values in it.
 
     Attributes:
-        x: number of the column; outside the picture for the neighbours of what is seen.
-        bar: its values.
+        x: number of the column; outside the picture for the neighbours of the visible columns.
+        bar: values in the column.
     """
 
     x: int
@@ -129,13 +129,13 @@ class _Stop(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """A curve as it is drawn: from stop to stop.
+    """A curve for drawing, from stop to stop.
 
     Attributes:
-        label: what people call it.
+        label: its displayed name.
         axis: its vertical axis.
-        unit: of its values.
-        stops: from left to right.
+        unit: unit of its values.
+        stops: its stops, from left to right.
     """
 
     label: str
@@ -176,10 +176,10 @@ class Chart:
     """All curves and bands of a picture.
 
     Attributes:
-        view: what is seen.
-        columns: how many columns the picture has.
-        curves: in the order in which they were asked for.
-        bands: likewise, of signals whose values are states.
+        view: the visible part.
+        columns: number of columns of the picture.
+        curves: the curves in the requested order.
+        bands: the bands in the requested order; a band is a signal whose values are states.
         ranges: least and greatest value by axis, in the order of the axes.
     """
 
@@ -286,9 +286,9 @@ class _Area(NamedTuple):
 
 
 def _area_of(series: Sequence[Series], width: int, height: int, title: str = "") -> _Area:
-    """Return what remains for the curves beside axes, bands and legend: 50 pixels at least.
+    """Return the height left for curves by axes, bands and legend: at least 50 pixels.
 
-    Above bands it is 150: the picture grows with them.
+    With bands it is at least 150 pixels, and the picture grows with the bands.
     """
     curves = [one for one in series if one.names is None]
     left = _AXIS_WIDTH
@@ -493,13 +493,13 @@ class Canvas:
         self._layers = [[0] * (width * DOTS_X) for _ in range(layers)]
 
     def fill(self, x: int, top: int, bottom: int, layer: int = 0) -> None:
-        """Set the dots of a column from one row to another, both included; what is outside is cut.
+        """Set the dots of a column from one row to another, both included; clip to the canvas.
 
         Args:
             x: column of dots, within the canvas.
             top: row of dots, 0 at the top.
             bottom: row of dots, not above `top`.
-            layer: on which layer.
+            layer: number of the layer.
         """
         top, bottom = max(0, top), min(self.height * DOTS_Y - 1, bottom)
         if top <= bottom:
@@ -518,14 +518,14 @@ class Canvas:
 
 
 class _Reading(NamedTuple):
-    """A curve at a moment.
+    """The value of a curve at a moment.
 
     Attributes:
-        label: of the curve.
+        label: name of the curve.
         value: of the latest sample at or before the moment; None before the first.
-        age_us: how old that sample is.
-        unit: of the value.
-        state: its name, where the value is a state.
+        age_us: age of that sample.
+        unit: unit of the value.
+        state: name of the value, if it is a state.
     """
 
     label: str
@@ -567,17 +567,17 @@ _LEAST_HEIGHT: Final = 6
 def render(
     series: Sequence[Series], view: View, width: int, height: int, *, colour: bool = False
 ) -> list[str]:
-    """Return the picture as lines, as many as it is high and none longer than it is wide.
+    """Return the picture as lines: `height` lines, each at most `width` long.
 
-    The first lines name the curves; the second axis is written on the right. A smaller size than
-    30 by 6 is taken as that.
+    The first lines name the curves. The second axis is on the right. The smallest size is 30 by 6;
+    a smaller size counts as that size.
 
     Args:
         series: the curves.
-        view: what is seen; with a cursor, the first lines say the values there.
-        width: in cells.
-        height: in lines.
-        colour: colour the curves with ANSI codes.
+        view: the visible part; with a cursor, the first lines show the values there.
+        width: width in cells.
+        height: height in lines.
+        colour: whether to colour the curves with ANSI codes.
     """
     width, height = max(width, _LEAST_WIDTH), max(height, _LEAST_HEIGHT)
     names = _names(series, view.cursor_us, width, colour)[: height - 5]

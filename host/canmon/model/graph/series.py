@@ -70,17 +70,17 @@ _FLOATS: Final = {32: "f", 64: "d"}
 
 @dataclass(frozen=True, slots=True)
 class FrameSlice:
-    """Which bits of which frame, and what they count.
+    """Bits of a frame, and their conversion to a value.
 
     Attributes:
         can_id: identifier of the frame.
-        extended: a 29-bit identifier.
-        first_bit: 0..511, in classic CAN to 63; bit 0 is the lowest of byte 0.
-        bits: 1..64.
+        extended: whether the identifier has 29 bits.
+        first_bit: 0..511, in classic CAN 0..63; bit 0 is the lowest bit of byte 0.
+        bits: number of bits, 1..64.
         kind: `u` unsigned, `s` signed, `f` float.
-        big_endian: the first byte is the highest; whole bytes only.
-        factor: the value is the number times this,
-        offset: plus this.
+        big_endian: whether the first byte is the highest one; for whole bytes only.
+        factor: the number is multiplied by it.
+        offset: then added.
     """
 
     can_id: int
@@ -203,9 +203,9 @@ class ObjectName:
     """An object of a node, or one bit of it.
 
     Attributes:
-        node: node-ID, None for any: a signal of a DBC file has none.
-        name: as the decoder names it, or how that begins; in lower case.
-        bit: which bit, None for the whole value.
+        node: node-ID; None for any node, also for a signal of a DBC file, which has no node.
+        name: name that the decoder uses, or its beginning; in lower case.
+        bit: number of the bit; None for the whole value.
     """
 
     node: int | None
@@ -224,11 +224,11 @@ class ObjectName:
 
 @dataclass(frozen=True, slots=True)
 class _BusSignal:
-    """What a bus or a node does, beside the values of objects.
+    """A signal of a bus or a node that is not the value of an object.
 
     Attributes:
-        kind: of `BUS_SIGNALS`.
-        node: node-ID, None for any.
+        kind: a key of `BUS_SIGNALS`.
+        node: node-ID; None for any node.
     """
 
     kind: str
@@ -303,16 +303,17 @@ class Series:
     """A signal's values in the order of their times.
 
     Args:
-        label: what people call it.
+        label: its displayed name.
         axis: the vertical axis it is drawn on, from 1.
-        unit: of the values, empty where unknown.
-        most: how many samples are kept; when there are twice as many, the oldest go. 0 keeps all.
+        unit: unit of the values; empty if unknown.
+        most: number of samples to keep. When there are twice as many, the oldest are removed. 0
+            keeps all.
 
     Attributes:
         at_us: the times.
-        values: as many values.
-        not_numbers: how many values were NaN or infinite; they are left out.
-        names: of values that are states; None where they are numbers.
+        values: the values at these times.
+        not_numbers: number of values that were left out because they were NaN or infinite.
+        names: names of the values if they are states; None if they are numbers.
     """
 
     label: str
@@ -382,15 +383,15 @@ LEAST_US = 10
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """A span of time, and where wanted the ranges of vertical axes.
+    """A span of time, and optionally the ranges of vertical axes.
 
     Attributes:
-        from_us: its beginning,
-        to_us: its end, later.
-        ranges: least and greatest value by axis; other axes fit what is seen.
+        from_us: its beginning.
+        to_us: its end, after the beginning.
+        ranges: least and greatest value by axis; other axes fit the visible values.
         cursor_us: a moment that is marked.
         origin_us: the moment that is written as 0.
-        stamp: how times are written: since the origin, as seconds of the epoch, or as dates.
+        stamp: format of times: since the origin, as seconds since the epoch, or as dates.
     """
 
     from_us: int
@@ -448,10 +449,10 @@ class Collector:
 
     Args:
         words: the signals.
-        decoder: for objects; without one they have no values.
-        most: as `Series.most`.
-        rates: of the bus, for its load.
-        each_node: whether a signal of any node has a series for each node that has it.
+        decoder: decodes objects; without a decoder they have no values.
+        most: as in `Series.most`.
+        rates: bit rates of the bus, for its load.
+        each_node: whether a signal without a node has one series for each node that sends it.
 
     Attributes:
         series: one for each word.
@@ -565,13 +566,13 @@ _NO_ERROR: Final = range(0x0000, 0x0100)
 
 
 class _Sampler:
-    """Takes a signal that no frame carries: what a bus or a node does.
+    """Collects a signal of a bus or a node that is not in the data of a frame.
 
     Args:
-        word: as it was written.
-        wanted: the signal; one of any node is that of the first that has it.
-        series: of its values.
-        rates: of the bus.
+        word: the signal as written.
+        wanted: the signal; a signal of any node is that of the first node that has it.
+        series: series for its values.
+        rates: bit rates of the bus.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""Vector's ASC logs: whatever header they have, with absolute and with relative times.
+"""Vector's ASC logs, with any header, with absolute and with relative times.
 
 >>> lines, tally = _AscLines(), log_file.LogTally()
 >>> for line in ("base hex  timestamps relative", " 0.100000 1  705  Rx d 1 7F", " 0.1 1  705  Rx d 1 05"):
@@ -87,8 +87,8 @@ _MONTHS: Final = {
 class _AscLines:
     """Reads the lines of an ASC log, in their order.
 
-    Times count from the date of the header or of the trigger block that they stand in, or, with
-    `timestamps relative`, from the line before that has one.
+    Times count from the date of the header, or of the trigger block that contains the line. With
+    `timestamps relative` a time counts from the previous line that has a time.
     """
 
     def __init__(self) -> None:
@@ -129,10 +129,10 @@ class _AscLines:
         return text
 
     def _advance(self, span_us: int) -> None:
-        """Take the time of a line.
+        """Read the time of a line.
 
-        The first of a trigger block tells whether times go on counting from the header: then
-        they are as late as the block is dated.
+        The first time of a trigger block shows whether times continue to count from the header. If
+        they do, the time corresponds to the date of the block.
         """
         if self._relative:
             self._now_us += span_us
@@ -244,7 +244,7 @@ def _note_errors(event: str, tally: log_file.LogTally) -> None:
 
 
 def _date_us(text: str) -> int | None:
-    """Read a date of a header, which is local time; None if it is none.
+    """Parse a date of a header, which is local time; return None if it is not a date.
 
     >>> _date_us("Sam Sep 30 15:06:13.191 2017") == _date_us("Sat Sep 30 03:06:13.191 pm 2017")
     True

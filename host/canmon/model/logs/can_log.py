@@ -1,8 +1,10 @@
 """Log files that python-can reads: BLF and, with asammdf, MF4.
 
-A BLF log is a header and objects. Most are containers, whose contents, put together,
-are the objects of interest; one may lie across two containers. python-can reads a truncated log
-as far as possible without a report, and skips two of the three kinds of error frames.
+A BLF log is a header followed by objects. Most objects are containers. The contents of all
+containers, joined, are the objects of interest; an object may extend over two containers.
+
+python-can reads a truncated log up to its end and does not report the truncation. It skips two of
+the three kinds of error frames.
 """
 
 from __future__ import annotations
@@ -173,10 +175,10 @@ class BlfBlock(NamedTuple):
     """The content of a container.
 
     Attributes:
-        rows: its frames, in the form of its parser.
+        rows: its frames, in the form that its parser returns.
         frames: number of frames.
-        notes: place, size and type of the objects that report errors.
-        end: where its last whole object ends.
+        notes: offset, size and type of the objects that report errors.
+        end: end of its last complete object.
     """
 
     rows: Any
@@ -214,11 +216,11 @@ _COUNTERS: Final = struct.Struct("<2xBB")
 
 
 class _BlfReader(can.BLFReader):
-    """python-can's reader, with all error frames, and an end at objects without a size.
+    """python-can's reader, with all error frames; it stops at objects without a size.
 
     Attributes:
-        tally: takes what objects say of errors that are no frames.
-        apart: takes containers apart that hold usual frames alone.
+        tally: counts objects that report errors and are not frames.
+        apart: parses containers that hold only usual frames.
     """
 
     tally: LogTally
@@ -289,10 +291,10 @@ def _objects(data: bytes) -> Iterator[tuple[int, int, int]]:
 
 
 def _missing_end(file: BinaryIO) -> str:
-    """Return what is missing at the end of a log; empty if nothing is.
+    """Return what is missing at the end of a log; empty if the log is complete.
 
     Args:
-        file: a log that python-can has read without an error; it is read from its beginning.
+        file: a log that python-can has read without an error; it is read again from its start.
     """
     file.seek(0)
     _, header_bytes, _, declared = _FILE.unpack(file.read(_FILE.size))
@@ -369,13 +371,13 @@ _EXACT_US: Final = 1 << 51
 
 
 class _AscWriter:
-    """Begins at a millisecond of local time; a frame from before begins another block.
+    """A writer that begins at a millisecond of local time; an earlier frame begins a new block.
 
-    python-can's own dates the file with the time of writing, writes 5 ms of a date as `.5`, and a
-    frame from before the start with its absolute time.
+    python-can's own writer dates the file with the time of writing, and writes 5 ms of a date as
+    `.5`. It writes a frame from before the start with its absolute time.
 
     Args:
-        file: a text file, which is closed with the log.
+        file: a text file; it is closed with the log.
     """
 
     def __init__(self, file: TextIO) -> None:
@@ -392,10 +394,12 @@ class _AscWriter:
         self._file.write(f"{seconds:4d}.{micros:06d} {_event(message)}\n")
 
     def write_block(self, block: TextBlock, number: Callable[[str], int]) -> bool:
-        """Write many frames at once, 0.4 us each where one by one takes 6; False if it cannot.
+        """Write many frames at once; return False if that is not possible.
 
-        It leaves error frames, a frame that begins another block, and times that are not exact as
-        floating-point numbers to who writes them one by one.
+        A frame takes 0.4 us; written one by one, it takes 6 us.
+
+        The caller must write the following one by one: error frames, a frame that begins another
+        block, and times that are not exact as floating-point numbers.
         """
         first_us, earliest_us = block.first_us, block.earliest_us
         begin_us = self._begin_us
@@ -510,10 +514,10 @@ def _fd_trc_line(message: can.Message, number: int, begin_s: float) -> str:
 
 
 class _BlfWriter(can.BLFWriter):
-    """Begins at a second; BLF holds nothing from before.
+    """A writer that begins at a full second; BLF cannot hold earlier frames.
 
     Attributes:
-        early: frames from before, which have got the time of the beginning.
+        early: number of earlier frames; these get the time of the beginning.
     """
 
     early = 0
@@ -531,9 +535,9 @@ class _BlfWriter(can.BLFWriter):
         self.log_event(mark.text, max(at_s, self._begin(at_s)))
 
     def flush(self) -> None:
-        """End a container: what is in it can be read if no end follows.
+        """End a container, so that its content is readable even if the end of the log is missing.
 
-        python-can's own tells when the log began in its end alone.
+        python-can's own writer stores the start time of the log only at the end.
         """
         self._flush()
         if not self._dated and self.start_timestamp is not None:
@@ -572,13 +576,13 @@ _MARKS: Final = "marks of gaps and triggers"
 
 
 class CanLogWriter:
-    """A log that python-can writes.
+    """A log written by python-can.
 
-    These formats number their buses: `can3` is number 3, others take free numbers,
-    and `words` says which.
+    These formats number their buses. `can3` is number 3. Buses with other names get free numbers,
+    which `words` lists.
 
     Raises:
-        LogError: python-can cannot write it here.
+        LogError: python-can cannot write the format on this machine.
         OSError: the file cannot be written.
     """
 

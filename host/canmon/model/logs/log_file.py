@@ -51,15 +51,15 @@ marks."""
 
 
 class Mark(NamedTuple):
-    """Something else than a frame, at its place among the frames.
+    """An event that is not a frame, at its place among the frames.
 
     Attributes:
-        at_us: when; by the clock of this machine, where no frame tells it.
+        at_us: time of the event; by the clock of this machine if no frame gives it.
         event: its kind, one of those above.
-        text: one line for people, in ASCII.
-        channel: the bus it is about; empty for all.
-        frames: how many were lost.
-        away_us: for how long the bus was away.
+        text: one line of text for display, in ASCII.
+        channel: bus that the event is about; empty for all buses.
+        frames: number of lost frames.
+        away_us: time for which the bus was away.
     """
 
     at_us: int
@@ -103,7 +103,7 @@ def triggered(at_us: int, why: str) -> Mark:
 
 
 def read_mark(at_us: int, text: str) -> Mark | None:
-    """Return the mark that a log has in these words; None for others.
+    """Return the mark that these words of a log stand for; None for other words.
 
     >>> read_mark(5, "can0 is back after 3.250000 s") == back(5, "can0", 3_250_000)
     True
@@ -200,9 +200,9 @@ class LogTally:
             items that are not frames (`_NO_FRAMES`).
         lost: frames that the recorder reports as lost.
         untimed: frames without a time in the log; they get that of the previous frame.
-        undated: dates that could not be read; times count from 0 there.
+        undated: number of unreadable dates; times after such a date count from 0.
         shifted_us: offset added to the times of the log.
-        errors_told: number of lines and objects other than frames that report bus errors, by kind.
+        errors_told: number of items that are not frames and report bus errors, by kind.
         without_errors: why the log cannot contain error frames; empty if it can.
     """
 
@@ -352,7 +352,7 @@ def read_blocks(file: BinaryIO, path: Path, block_bytes: int) -> Iterator[bytes]
     Of a truncated or damaged compressed file, everything readable is returned.
 
     Raises:
-        LogError: after that: where it is truncated or damaged.
+        LogError: raised after that; the message names where it is truncated or damaged.
         OSError: it cannot be read.
     """
     pieces, held, lines = list[bytes](), 0, 0

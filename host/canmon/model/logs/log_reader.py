@@ -1,4 +1,4 @@
-r"""Log files, and logs that come in pieces, as the frames that are in them.
+r"""Read frames from log files, and from logs that arrive in pieces.
 
 >>> lines = WholeLines()
 >>> lines.push(b"one\ntw"), lines.push(b"o"), lines.push(b"\n"), lines.finish()
@@ -92,13 +92,14 @@ _WRAP_US: Final = 1 << 32
 
 
 class ScreenClock:
-    """Tells the time of a frame from the stamp before it.
+    """Computes the time of a frame from the stamp before it.
 
     Args:
-        deltas: spans count from the frame before (`-t d`), not from the first (`-t z`).
+        deltas: whether spans count from the previous frame (`-t d`), not from the first one (`-t
+            z`).
 
     Attributes:
-        shift_us: what is added to a counter of microseconds, so that no time is below 0.
+        shift_us: offset added to a counter of microseconds, so that no time is below 0.
     """
 
     def __init__(self, deltas: bool = False) -> None:
@@ -115,10 +116,10 @@ class ScreenClock:
         return cls(len(falls) * 4 > len(spans) or max(falls, default=0) > _LATE_US)
 
     def at_us(self, sign: str, seconds: str | None, date: str | None, fraction: str | None) -> int:
-        """Return the time of a stamp; of the frame before, where there is none.
+        """Return the time of a stamp; without a stamp, the time of the previous frame.
 
         Raises:
-            ValueError: a date that there is not.
+            ValueError: a date that does not exist.
         """
         micros = int(f"{fraction or '':0<6.6}")
         if date is not None:
@@ -132,10 +133,10 @@ class ScreenClock:
         return self._now_us
 
     def counted_us(self, count: int) -> int:
-        """Return the time of a counter of microseconds, as an adapter has it.
+        """Return the time for a counter of microseconds of an adapter.
 
-        One that begins below 0 begins at 0; one of 32 bits that overflows, with a sign or without,
-        goes on.
+        Times begin at 0 if the counter begins below 0. After an overflow of a 32-bit counter,
+        signed or unsigned, times continue to increase.
         """
         before = self._count
         if before is None:
@@ -170,7 +171,7 @@ def _parse_screen_line(line: str, tally: LogTally, clock: ScreenClock) -> Record
 
 
 def _lost_frames(comment: str) -> int:
-    """Return how many frames a comment of a log says were lost; 0 for any other.
+    """Return the number of lost frames in a comment of a log; 0 for any other comment.
 
     >>> _lost_frames("# 12 frames were lost"), _lost_frames("# a note")
     (12, 0)
@@ -182,10 +183,10 @@ def _lost_frames(comment: str) -> int:
 
 
 def _beside(line: str, text: str, tally: LogTally, clock: ScreenClock) -> Record | str | None:
-    """Return what other lines of a screen say.
+    """Return the content of other lines of a screen.
 
-    These are lines of serial ports, error frames in words, frames that candump says were dropped,
-    and frames that python-can prints.
+    These lines are lines of serial ports, error frames in words, candump's reports of dropped
+    frames, and frames that python-can prints.
     """
     if _SERIAL.fullmatch(text):
         tally.passed_over[SERIAL_LINES] += 1
@@ -281,20 +282,20 @@ _XL: Final = re.compile(r"[0-9A-Fa-f]{5}#[0-9A-Fa-f:]{14}#(?:[0-9A-Fa-f]{2})+")
 def parse_log_line(
     line: str, number: int, tally: LogTally, clock: ScreenClock | None = None
 ) -> Record | None:
-    """Read a line; None if it holds no frame, and then the tally says why.
+    """Parse a line; return None if it holds no frame, and count the reason in the tally.
 
-    Beyond what `candump -L` writes at present it reads what others write in its name: stamps in
-    nanoseconds or with fewer digits, a direction behind the frame, the raw length code behind
-    eight bytes, error frames with less than eight bytes.
+    In addition to the present output of `candump -L`, it reads variants that other programs write:
+    stamps in nanoseconds or with fewer digits, a direction after the frame, the raw length code
+    after eight bytes, and error frames with fewer than eight bytes.
 
-    Empty lines and comments (`#`, `;`, `//`) hold none, and are no fault; what a comment of ours
-    says was lost is counted.
+    Empty lines and comments (`#`, `;`, `//`) hold no frame, and are not errors. If a comment
+    written by canmon reports lost frames, these are counted.
 
     Args:
         line: without its LF.
-        number: of the line, from 1.
-        tally: takes what was no frame.
-        clock: of the lines of a screen.
+        number: number of the line, from 1.
+        tally: counts items that are not frames.
+        clock: clock for the lines of a screen.
     """
     text = line.strip()
     if not text or text.startswith(_COMMENTS):
@@ -347,15 +348,15 @@ def holds_frame(line: str) -> bool:
 
 
 class LogLines:
-    """A decoder of a log in text: `push` what has come in, `finish` at its end.
+    """A decoder of a text log: `push` received bytes, and call `finish` at the end.
 
-    Bytes that are no ASCII make a line bad; they never raise.
+    A line with bytes outside ASCII is invalid; such bytes never raise an exception.
 
     Attributes:
-        tally: what was no frame.
-        marks: marks among the frames that were returned last, with how many of these are in
-            front of each.
-        number: how many lines there were.
+        tally: counts items that are not frames.
+        marks: marks among the frames that were returned last, each with the number of these frames
+            before it.
+        number: number of lines.
     """
 
     def __init__(self) -> None:
@@ -374,12 +375,12 @@ class LogLines:
         return self._frames(lines[:-1].decode("latin-1")) if lines else []
 
     def skip(self, lines: int, latest_us: int | None, unusual: bool) -> None:
-        """Pass over lines that hold frames, as `holds_frame` has it, and were read as columns.
+        """Skip lines that hold frames according to `holds_frame`, and were read as columns.
 
         Args:
-            lines: how many.
-            latest_us: when the last frame among them came; None if there was none.
-            unusual: one was not as `is_usual` has it.
+            lines: number of lines.
+            latest_us: time of the last frame in them; None if there was no frame.
+            unusual: whether one of them was not usual according to `is_usual`.
         """
         self.number += lines
         if unusual:
@@ -477,11 +478,11 @@ class LogReader(Protocol):
     """An iterable of frames; it reads while it is iterated, from the beginning each time.
 
     Attributes:
-        tally: what was no frame, so far.
+        tally: counts items that are not frames.
 
     Raises:
-        OSError: the file cannot be read, while it is iterated.
-        LogError: it is not what its name says, likewise.
+        OSError: during iteration: the file cannot be read.
+        LogError: during iteration: the content does not match the file's name.
     """
 
     tally: LogTally
@@ -536,19 +537,19 @@ class _LineParser(Protocol):
     """Reads the lines of one log, in their order."""
 
     def read(self, line: str, tally: LogTally, /) -> Record | str | None:
-        """Return a frame, what the line is instead, or None for a bad line.
+        """Return a frame; another item that the line contains; or None for an invalid line.
 
         Raises:
-            ValueError: this is no such log.
+            ValueError: the file is not a log of this format.
         """
 
 
 class LineLogReader:
-    """A reader of a log whose head tells how its lines are read.
+    """A reader of a log whose header defines the format of its lines.
 
     Attributes:
-        comments: what lines begin with that may be marks.
-        make_lines: makes what reads the lines.
+        comments: beginnings of the lines that may be marks.
+        make_lines: makes the parser of the lines.
     """
 
     comments: tuple[str, ...] = ()
@@ -601,7 +602,7 @@ _NUMBERLESS: Final = "canX"
 
 
 def bus_name(number: str) -> str:
-    """Return the name of a bus of a log that numbers them from 1; ValueError if it is no number.
+    """Return the name of a bus by its number from 1; ValueError if it is not a number.
 
     >>> bus_name("1"), bus_name("0")
     ('can0', 'canX')

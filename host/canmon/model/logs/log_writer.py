@@ -41,11 +41,11 @@ class LogWriter(Protocol):
 
 
 class TextBlock(Protocol):
-    """Many frames that write themselves as lines at once; `column_text` has it.
+    """Many frames that write themselves as lines at once; `column_text` implements it.
 
     Attributes:
-        first_us: when the first frame came.
-        last_us: when the last one came.
+        first_us: time of the first frame.
+        last_us: time of the last frame.
         earliest_us: the least time.
         latest_us: the greatest time.
         errors: whether there are error frames.
@@ -79,9 +79,9 @@ def write_log(path: Path) -> LogWriter:
     """Begin a log; a file that exists is replaced.
 
     Raises:
-        LogFormatError: the file's name tells no format.
+        LogFormatError: the file's name has no known format.
         OSError: it cannot be written.
-        LogError: its format needs a library that is not there.
+        LogError: its format needs a library that is not installed.
     """
     kind = log_file.log_format(path)
     writer: LogWriter = log_file.writer_of(kind)(path, kind)

@@ -25,8 +25,8 @@ _ERROR: Final = re.compile(r"([23][0-9A-Fa-f]{7})#((?:[0-9A-Fa-f]{2}){0,8})")
 def parse_frame(notation: str) -> AnyFrame:
     """Parse a frame; WireError if it is invalid.
 
-    The raw length code after eight bytes is ignored; an error frame may have less
-    than eight bytes.
+    The raw length code after eight bytes is ignored. An error frame may have fewer than eight
+    bytes.
     """
     if error := _ERROR.fullmatch(notation):
         data = bytes.fromhex(error[2]).ljust(8, b"\0")
@@ -45,12 +45,12 @@ _LINE_EVENT: Final = "line"
 
 
 def json_line(record: Record, more: str = "") -> str:
-    """Write a frame; `more` are further members, each with its comma in front.
+    """Write a frame in JSON; `more` are further members, each with a comma before it.
 
     A frame is an object with `v`, `t` (seconds), `ch`, `id`, `x` (1: extended), `dir` and `data`
-    (hex); a remote frame has `rtr`, its length, and an error frame has `err`: 1 and its class as
-    `id`; one of CAN FD has `fd`: 1, with `brs`: 1 and `esi`: 1 where it has these.
-    `{"v":1,"ev":"drop","n":12}` says what was lost; a line of a serial port is an event, too.
+    (hex). A remote frame has `rtr`, its length. An error frame has `err`: 1, and its class as `id`.
+    A CAN FD frame has `fd`: 1, and `brs`: 1 and `esi`: 1 if these bits are set.
+    `{"v":1,"ev":"drop","n":12}` reports lost frames. A line of a serial port is an event, too.
 
     >>> json_line(Record(1_500_000, "can0", can.CanFrame(0x185, b"7")))
     '{"v":1,"t":1.500000,"ch":"can0","id":389,"x":0,"dir":"rx","data":"37"}'
@@ -72,7 +72,7 @@ def json_line(record: Record, more: str = "") -> str:
 
 
 def line_json(line: LineRecord, more: str = "") -> str:
-    """Write an event in JSON; `more` are further members, each with its comma in front.
+    """Write an event in JSON; `more` are further members, each with a comma before it.
 
     >>> from tickrig.host.canmon.model.decode.decoded import Decoded
     >>> line_json(LineRecord(1_500_000, "ttyS0", False, b"EV:PowerOn", Decoded("rrc")))
@@ -181,9 +181,10 @@ _DUMPED: Final = re.compile(
 def csv_row(record: Record) -> str:
     """Write a frame below `LOG_HEADER`.
 
-    python-can does not tell who sent a frame. Here a `>` behind its data, which base64 does not
-    have and python-can passes over, says that this program did. Nor does it tell CAN FD: here a
-    `#` there says so, `!` that it has BRS, `*` that it has ESI.
+    python-can's format does not contain the sender of a frame. Here a `>` after the data marks a
+    frame that this program sent; base64 does not use `>`, and python-can ignores it. The format
+    does not contain CAN FD either. Here a `#` in the same place marks a CAN FD frame, `!` marks
+    BRS, and `*` marks ESI.
     """
     at_us, _, frame, sent = record
     marks = _SENT * sent
@@ -226,9 +227,9 @@ def gvret_row(record: Record, bus: int) -> str:
 
 
 def parse_csv_line(text: str, tally: log_file.LogTally, clock: _Counting) -> Record | str | None:
-    """Return a frame, the name of a header or of what was counted instead, or None.
+    """Return a frame, the name of a header or of a counted item, or None.
 
-    What a row is, itself tells: one of python-can, of `canmon dump --csv`, or of SavvyCAN.
+    The row itself shows its format: python-can, `canmon dump --csv`, or SavvyCAN.
     """
     if text.startswith((LOG_HEADER, DUMP_HEADER)) or _GVRET_HEAD.fullmatch(text):
         return text

@@ -170,7 +170,7 @@ class _Interface(NamedTuple):
         is_can: whether its packets are frames.
         parts: units of its times per second.
         offset_us: offset added to them.
-        snap_bytes: packets are truncated to this size; 0 for no limit.
+        snap_bytes: size to which packets are truncated; 0 for no limit.
     """
 
     name: str
@@ -198,7 +198,7 @@ class _PcapngReader:
     Args:
         name: name of the file.
         tally: counts what is not a frame.
-        marks: whether to return marks among the frames: a comment of a frame precedes it.
+        marks: whether to return marks among the frames; the comment of a frame is a mark before it.
     """
 
     def __init__(self, name: str, tally: log_file.LogTally, marks: bool = False) -> None:
@@ -495,10 +495,10 @@ _BLOCK_FRAMES: Final = 256
 
 
 class PcapngWriter:
-    """A capture. A mark is a comment of the frame behind it, where Wireshark shows it.
+    """A capture; Wireshark shows a mark as a comment of the frame after it.
 
     Raises:
-        LogError: a file of pcap, the format before it, which does not name its buses.
+        LogError: the file is pcap, the predecessor of pcapng, which does not name its buses.
         OSError: the file cannot be written.
     """
 

@@ -93,8 +93,8 @@ def _name(channel: str) -> str:
 class TraceLogReader:
     """A reader of the frames in a trace.
 
-    Of a trace that was recorded at the devices it gives the frames in the order in which they
-    were sent, or first received: what several nodes received of the host is one frame.
+    From a trace that was recorded at the devices, it returns the frames in the order in which they
+    were sent or first received. A frame of the host that several nodes received is returned once.
     """
 
     def __init__(self, path: Path, kind: log_file.LogFormat) -> None:

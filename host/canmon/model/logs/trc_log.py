@@ -89,10 +89,10 @@ class _TrcLines:
         self._columns: Sequence[str] = _VERSIONS["1.0"]
 
     def read(self, line: str, tally: log_file.LogTally) -> Record | str | None:
-        """Return a frame, what the line is instead, or None for a bad line.
+        """Return a frame; another item that the line contains; or None for an invalid line.
 
         Raises:
-            ValueError: the columns are not known.
+            ValueError: the columns are unknown.
         """
         text = line.strip()
         if not text or text.startswith(";"):
@@ -226,10 +226,10 @@ def _length(cells: dict[str, str], *, fd: bool) -> int:
 
 
 def _error(row: _Row) -> can.ErrorFrame:
-    """Return an error frame as Linux tells it.
+    """Return an error frame in the notation of Linux.
 
-    Up to version 1.3 the CAN-ID is its type, and the data are direction, place and both counters;
-    from 2.0 on the data begin with the type.
+    Up to version 1.3 the CAN-ID is the type of the error, and the data are direction, place and
+    both counters. From version 2.0 on the data begin with the type.
     """
     data = [*_Row({}, [word for word in row.data if word != ERROR]).hex_bytes()]
     if "I" in row.cells:
