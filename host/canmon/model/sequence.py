@@ -60,11 +60,14 @@ _LONGEST: Final = 1_000
 def fill_in(text: str, variables: Mapping[str, int]) -> str:
     """Replace each field by its number.
 
-    In a frame, which has a `#`, that is two hex digits, else a decimal number. `:3` is three hex
-    digits, `:i16` two bytes, the lowest first, `:d` a decimal number.
+    A text with a `#` is a frame: there a field becomes two hex digits. In other texts it becomes a
+    decimal number. `:3` in a field means three hex digits, `:i16` two bytes with the low byte
+    first, `:d` a decimal number. `:3` is three hex digits, `:i16` two bytes, the lowest first, `:d`
+    a decimal number.
 
     Raises:
-        ValueError: an unknown variable, no whole number, or one that does not fit.
+        ValueError: an unknown variable, a value that is not a whole number, or a number that does
+            not fit.
     """
     usual = "2" if "#" in text else "d"
     return _FIELD.sub(lambda match: _written(match[1], match[2] or usual, variables), text)
@@ -181,7 +184,7 @@ def parse_pattern(text: str) -> FrameCondition:
     """Read a frame in candump notation, with `?` for any hex digit and `*` for any more bytes.
 
     Raises:
-        ValueError: it is none.
+        ValueError: the text is not such a frame.
     """
     match = _NOTATION.fullmatch(text.strip())
     if match is None:
@@ -261,17 +264,17 @@ _Play = Generator[_Pause, bool, bool]
 class SequenceRun:
     """Executes a sequence as time passes.
 
-    Waits are counted from when the step before was due, so they do not drift. The frames of a call
-    are processed before its time-outs.
+    A wait counts from the time at which the previous step was due, so that waits do not drift. In
+    each call, frames are processed before time-outs.
 
     Args:
-        sequence: what to do.
+        sequence: the sequence to execute.
 
     Attributes:
         done: whether it has ended.
         met: number of expectations that were met.
         missed: number of expectations that were missed.
-        events: what happened; the code that shows them may remove them.
+        events: the events of the execution; code that displays them may remove them.
     """
 
     def __init__(self, sequence: Sequence) -> None:
@@ -409,10 +412,10 @@ _FRAME: Final = re.compile(r"\+([0-9]{1,9}(?:\.[0-9]{1,3})?)\s+(\S+)")
 
 
 def parse_lines(text: str, file: str) -> Sequence:
-    """Read a sequence of lines.
+    """Parse a sequence that is written as lines.
 
-    `+10 123#DEADBEEF` sends a frame 10 ms after the line above; `loop 3` as the first line does
-    all of it three times, `loop forever` until it is stopped; `#` begins a comment.
+    `+10 123#DEADBEEF` sends a frame 10 ms after the line above. `loop 3` as the first line runs all
+    lines three times, `loop forever` until the sequence is stopped. `#` begins a comment.
 
     Raises:
         StepError: `FILE:LINE: what came, what is allowed`.
@@ -478,14 +481,14 @@ class _Wrong(Exception):  # noqa: N818 - never leaves this file
 
 
 class TomlSequence:
-    """Reads one file.
+    """Parses one file.
 
     Args:
-        text: the file.
+        text: content of the file.
         file: its name, for messages.
-        variables: values that go before those of `[vars]`.
-        resolve: makes a frame of what a step sends, where it is no frame in candump notation.
-        condition: makes a condition of what a step expects, where it is no pattern of a frame.
+        variables: values that override those of `[vars]`.
+        resolve: makes a frame from what a step sends, if that is not a frame in candump notation.
+        condition: makes a condition from what a step expects, if that is not a pattern of a frame.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""What happened on buses over the time of a log, in as much detail as a page can draw.
+"""The activity on buses over the time of a log, in as much detail as a page can show.
 
 >>> bins = TimeBins(most=4, width_us=10)
 >>> for at_us in (0, 5, 12, 35, 77):
@@ -48,16 +48,16 @@ _MOST_SIGNALS: Final = 400
 
 
 class TimeBins(Generic[_Key]):
-    """Sums over spans of time of equal width, which doubles when there are too many.
+    """Sums over spans of time of equal width; the width doubles when there are too many spans.
 
     Args:
-        most: how many spans there may be.
-        width_us: of a span at first.
+        most: largest number of spans.
+        width_us: initial width of a span.
 
     Attributes:
-        width_us: of a span.
-        sums: by key, the sum of each span that has one.
-        ranges: by key, the least and the greatest value of each span that has one.
+        width_us: present width of a span.
+        sums: by key, the sum of each span with values.
+        ranges: by key, the least and the greatest value of each span with values.
     """
 
     def __init__(self, most: int = _MOST_BINS, width_us: int = _FIRST_WIDTH_US) -> None:
@@ -101,11 +101,11 @@ class TimeBins(Generic[_Key]):
 
 
 class Thinned(Generic[_T]):
-    """Things in their order: all of them, or every second, every fourth once they are many.
+    """Items in their order: all of them, or, if there are many, every second or every fourth one.
 
     Attributes:
-        items: those that are kept.
-        count: how many there were.
+        items: the items that are kept.
+        count: number of all items.
     """
 
     def __init__(self, most: int = _MOST_MARKS) -> None:
@@ -131,11 +131,11 @@ class Thinned(Generic[_T]):
 
 
 class _Bands:
-    """States as the times at which they begin; of many in one span of time the last is kept.
+    """States, with their start times; of several in one span of time, the last one is kept.
 
     Attributes:
         changes: time and state, in order.
-        count: how many changes there were.
+        count: number of all changes.
     """
 
     def __init__(self, most: int = _MOST_MARKS) -> None:
@@ -172,11 +172,11 @@ class SignalTrack:
     """A signal over time; its values are in the bins.
 
     Attributes:
-        unit: of the values.
-        source: where its name comes from.
-        count: how many values there were.
-        low, high: the least and the greatest of them.
-        states: of a signal whose values have names; None for a number.
+        unit: unit of the values.
+        source: source of its name.
+        count: number of values.
+        low, high: the least and the greatest value.
+        states: states of a signal whose values have names; None for a number.
     """
 
     unit: str = ""
@@ -197,9 +197,9 @@ class Mark(NamedTuple):
     """A moment on the lane of a node.
 
     Attributes:
-        at_us: when, since the first frame.
-        text: what it is.
-        span_us: how long it took.
+        at_us: time since the first frame.
+        text: description of the event.
+        span_us: duration of the event.
     """
 
     at_us: int
@@ -216,9 +216,9 @@ class _NodeLane:
         boots: boot-ups.
         commands: NMT commands to it.
         emcys: EMCYs.
-        transfers: SDO transfers that ended well.
-        failures: those that did not.
-        gaps: times without a due heartbeat, from the last one on.
+        transfers: successful SDO transfers.
+        failures: failed SDO transfers.
+        gaps: times without a due heartbeat, each from the last heartbeat on.
     """
 
     states: _Bands = field(default_factory=_Bands)
@@ -231,23 +231,23 @@ class _NodeLane:
 
 
 class Survey(NodeBoard):
-    """A node board that remembers what happened when.
+    """A node board that also stores the history.
 
     Args:
-        decoder: decodes what is taken here, too.
-        expected: as of `NodeBoard`.
+        decoder: decodes the frames that the survey processes.
+        expected: as for `NodeBoard`.
         rates: of the buses, for the length of CAN FD frames.
 
     Attributes:
-        first_us: time of the first frame, None before there was one.
-        last_us: of the latest.
-        frames: how many there were, by bus.
+        first_us: time of the first frame; None before it.
+        last_us: time of the latest frame.
+        frames: number of frames, by bus.
         counts: frames by bus and identifier.
-        bits: on each bus.
+        bits: number of bits on each bus.
         errors: error frames on each bus.
-        values: of signals.
-        lanes: of nodes, by bus and node-ID.
-        signals: by name.
+        values: values of signals.
+        lanes: lanes of nodes, by bus and node-ID.
+        signals: the signals, by name.
         signals_left: names of signals for which there was no room.
     """
 
@@ -425,15 +425,15 @@ class _Excerpt:
 
 
 def excerpts(pieces: Iterable[Piece], numbers: Iterable[int], frames: int) -> dict[int, _Frames]:
-    """Return the frames around some of them.
+    """Return the frames around given frames.
 
     Args:
         pieces: all frames of a log.
-        numbers: the places of these in the log, from 1.
-        frames: how many before and behind each.
+        numbers: positions of the given frames in the log, from 1.
+        frames: number of frames before and after each.
 
     Returns:
-        By number, the place of the first frame in the log, and the frames.
+        By number, the position of the first of its frames in the log, and these frames.
     """
     order = deque(sorted(set(numbers)))
     found: dict[int, _Frames] = {}

@@ -92,9 +92,9 @@ class _TopColumn(NamedTuple):
 
     Attributes:
         title: its head.
-        width: characters.
-        rank: the highest goes first where there is no room.
-        text: what it says of a row at a time.
+        width: width in characters.
+        rank: without room for all columns, the one with the highest rank is left out first.
+        text: returns its text for a row at a time.
     """
 
     title: str
@@ -174,13 +174,13 @@ class _LineRow(NamedTuple):
 
     Attributes:
         channel: name of the line.
-        sent: to the device.
-        word: what kind of message.
-        messages: how many.
-        first_us: when the first came.
-        last_us: when the latest came.
-        gap_us: since the one before it; None for the first.
-        text: what the latest says.
+        sent: whether it goes to the device.
+        word: kind of the message.
+        messages: number of messages.
+        first_us: time of the first message.
+        last_us: time of the latest message.
+        gap_us: time between the previous and the latest message; None for the first.
+        text: content of the latest message.
     """
 
     channel: str
@@ -285,18 +285,18 @@ _ORDER_KEYS: Final[dict[RowOrder, Callable[[traffic.IdRow], float]]] = {
 
 @dataclass(frozen=True, slots=True)
 class TableView:
-    """How the table is shown.
+    """Settings of the display of the table.
 
     Attributes:
-        order: of its rows.
-        bits: bits instead of bytes.
-        held: the picture stands still.
-        top: rows that are scrolled past.
-        styled: changes are marked; text of a file is not.
-        bit_rate: of the buses, None if it is not known.
-        keys: a line tells the keys.
-        meaning: what the latest frame of a row means, shown instead of its bytes.
-        unread: what came and is no frame of CAN or CAN FD.
+        order: order of its rows.
+        bits: whether to show bits instead of bytes.
+        held: whether the display is paused.
+        top: number of rows scrolled past.
+        styled: whether to mark changes; not in text for a file.
+        bit_rate: bit rate of the buses; None if unknown.
+        keys: whether to show a line with the keys.
+        meaning: returns the meaning of the latest frame of a row, shown instead of its bytes.
+        unread: items received that are not frames of CAN or CAN FD.
     """
 
     order: RowOrder = RowOrder.ID
@@ -320,11 +320,11 @@ def render(
     """Return the lines, no more than `height`, none wider than `width`.
 
     Args:
-        snapshot: what there is to show.
-        view: how.
-        lost: frames that did not get here.
-        width: characters of the screen.
-        height: lines of the screen.
+        snapshot: the traffic to show.
+        view: settings of the display.
+        lost: number of lost frames.
+        width: width of the screen in characters.
+        height: height of the screen in lines.
     """
     head = [_bus_line(bus, view.bit_rate)[:width] for bus in snapshot.buses]
     head.append(_state_line(snapshot, view, lost)[:width])
@@ -365,14 +365,15 @@ def _state_line(snapshot: traffic.TrafficSnapshot, view: TableView, lost: int) -
 
 
 class _Table(NamedTuple):
-    """What of the rows has room.
+    """The parts of the rows that fit the screen.
 
     Attributes:
         ids: the leading column.
-        columns: of numbers.
+        columns: columns of numbers.
         payload: the last cell of a row, and its title.
-        styled: what changed is marked, in lines that are not cut: a style may not be.
-        width: characters of the screen.
+        styled: whether to mark changes; the lines are then not cut, because a style must not be
+            cut.
+        width: width of the screen in characters.
     """
 
     ids: _IdText

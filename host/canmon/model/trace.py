@@ -28,12 +28,12 @@ class TraceRow(NamedTuple):
     """One frame of the trace, or one line of a serial port.
 
     Attributes:
-        number: of the frame since the trace began, from 0.
+        number: number of the frame since the trace began, from 0.
         record: the frame.
-        since_us: since the frame before it on any bus; None for the first.
-        gap_us: since the frame before it with this identifier on this bus; None for the first.
-        changed: bits in which its payload differs from that one's; see `BitRow`.
-        decoded: what it means, where that was asked.
+        since_us: time since the previous frame on any bus; None for the first.
+        gap_us: time since the previous frame with this identifier on this bus; None for the first.
+        changed: bits in which its payload differs from that previous frame; see `BitRow`.
+        decoded: its meaning, if it was decoded.
     """
 
     number: int
@@ -97,15 +97,15 @@ class Ring:
 
 
 class FrameTrace(Ring):
-    """Keeps the latest frames; what is older is given up, and counted.
+    """Keeps the latest frames; removes older ones, and counts them.
 
-    Times that go back count as 0.
+    If time goes back, the time between the frames is 0.
 
     Args:
-        capacity: how many frames are kept.
+        capacity: number of frames to keep.
 
     Attributes:
-        origin_us: the time of the first frame, from which others are counted; None before it.
+        origin_us: time of the first frame, the origin of displayed times; None before it.
     """
 
     def __init__(self, capacity: int = _CAPACITY) -> None:
@@ -170,8 +170,8 @@ class DisplayFilter:
     """Follows a trace.
 
     Args:
-        trace: where rows come from; those that it keeps already are taken.
-        wanted: which rows pass; None for all.
+        trace: source of the rows; rows that it already holds are included.
+        wanted: returns whether a row passes; None for all.
 
     Attributes:
         passed: rows that passed; the trace itself if all do.

@@ -12,7 +12,7 @@ The times between frames of one identifier.
 >>> bucket_of(100), bucket_of(10_000), bucket_range(bucket_of(10_000))
 (100, 526, (9984, 10111))
 
-The bit rates of a bus, and how long a CAN FD frame is at both of them.
+The bit rates of a bus, and the duration of a CAN FD frame at these rates.
 
 >>> frame = can.FdFrame.parse("123##1AABB")
 >>> BitRates(500_000, 2_000_000).bits(frame), BitRates().bits(frame)
@@ -62,11 +62,11 @@ def middle_us(bucket: int) -> int:
 
 
 def quantile(counts: Mapping[int, int], per_mille: int) -> int:
-    """Return the bucket that holds the value at a share of all, counted from the lowest.
+    """Return the bucket that contains a quantile of the values.
 
     Args:
-        counts: how many values each bucket has, at least one in all.
-        per_mille: the share, 1 to 1000.
+        counts: number of values in each bucket; at least one value in total.
+        per_mille: the quantile in per mille, counted from the lowest value, 1 to 1000.
     """
     rank = -(-sum(counts.values()) * per_mille // 1_000)
     for bucket in sorted(counts):
@@ -87,17 +87,17 @@ _CYCLIC_PERCENT: Final = 75
 
 
 class GapRow(NamedTuple):
-    """What the gaps of one identifier were, all of them.
+    """Statistics of all gaps of one identifier.
 
     Attributes:
         min_us: the shortest.
-        mean_us: rounded down.
-        p99_us: no more than 1 % were longer; it is at most one part in 64 too long.
+        mean_us: the mean, rounded down.
+        p99_us: at most 1 % of the gaps were longer; the value is at most one part in 64 too long.
         max_us: the longest.
-        jitter_us: mean of how much a gap differs from the one before, rounded down.
-        cycle_us: of frames that came and frames that missed; None unless three quarters of the
+        jitter_us: mean difference between a gap and the previous one, rounded down.
+        cycle_us: cycle of the frames, including the missed ones; None unless three quarters of the
             gaps are within a quarter of the median.
-        missed: frames of that cycle that did not come, at most; None without a cycle.
+        missed: upper limit of the number of missed frames of that cycle; None without a cycle.
     """
 
     min_us: int
@@ -110,15 +110,15 @@ class GapRow(NamedTuple):
 
 
 class Gaps:
-    """Counts gaps; what it keeps does not grow with their number.
+    """Counts gaps; its memory does not grow with their number.
 
     Attributes:
-        count: how many gaps.
+        count: number of gaps.
         total_us: their sum.
         min_us: the shortest.
         max_us: the longest.
-        wander_us: the sum of how much each differs from the one before.
-        buckets: how many gaps each bucket has.
+        wander_us: sum of the differences between each gap and the previous one.
+        buckets: number of gaps in each bucket.
     """
 
     __slots__ = ("_last_us", "buckets", "count", "max_us", "min_us", "total_us", "wander_us")
@@ -183,15 +183,15 @@ PAYLOAD_BITS: Final = 64
 
 
 class BitRow(NamedTuple):
-    """What changed in the payloads of one identifier.
+    """Changes of bits in the payloads of one identifier.
 
-    A payload is a number here: bit 0 of byte 0 is bit 0, bit 7 of byte 7 is bit 63; in CAN FD
-    it goes on to bit 511.
+    A payload is a number here: bit 0 of byte 0 is bit 0, and bit 7 of byte 7 is bit 63. In CAN FD
+    the bits continue to bit 511.
 
     Attributes:
-        latest: bits in which the latest payload differs from the one before.
-        planes: plane n holds bit n of each payload bit's count of changes.
-        notched: bits whose changes are known and not shown.
+        latest: bits in which the latest payload differs from the previous one.
+        planes: plane n holds bit n of the change count of each payload bit.
+        notched: bits whose changes are known, and therefore not shown.
     """
 
     latest: int = 0
@@ -204,7 +204,9 @@ class BitRow(NamedTuple):
         return reduce(or_, self.planes, 0) & ~self.notched
 
     def counts(self) -> tuple[int, ...]:
-        """Return how often each bit changed: of 64 bits, in CAN FD of as many as changed.
+        """Return the number of changes of each bit.
+
+        These are 64 bits; in CAN FD, all bits up to the highest changed one.
 
         >>> BitRow(planes=(0b01, 0b11)).counts()[:3]
         (3, 2, 0)
@@ -217,9 +219,9 @@ class BitRow(NamedTuple):
 
 
 class BitMemory:
-    """Counts the changes of each bit, all bits at once: the counts lie across big numbers.
+    """Counts the changes of all bits at once: each big number holds one binary digit of all counts.
 
-    A payload that is shorter than the one before counts as filled up with zeros.
+    A payload that is shorter than the previous one is padded with zeros.
 
     Attributes:
         notched: bits whose changes are known.
@@ -256,18 +258,18 @@ class BitMemory:
 
 
 class IdRow(NamedTuple):
-    """What one identifier did on one bus.
+    """The traffic of one identifier on one bus.
 
     Attributes:
         channel: the bus.
         ident: see `ident_of` and `fd_ident`.
-        frames: how many.
-        first_us: when the first of them came.
-        last_us: when the latest came.
-        frame: the latest.
-        gap_us: the latest gap, None before the second frame.
+        frames: number of frames.
+        first_us: time of the first frame.
+        last_us: time of the latest frame.
+        frame: the latest frame.
+        gap_us: the latest gap; None before the second frame.
         gaps: all gaps, None before the second frame.
-        bits: bits of all frames on the bus; those of CAN FD as `BitRates` has it.
+        bits: number of bits of all frames on the bus; CAN FD frames count as in `BitRates`.
         changed: which payload bits change.
     """
 
@@ -292,15 +294,15 @@ class IdRow(NamedTuple):
 class _IdTally:
     """Counts the frames of one identifier on one bus.
 
-    A frame with an earlier time than the one before it has a gap of 0.
+    A frame with an earlier time than the previous one has a gap of 0.
 
     Args:
-        at_us: when the first frame came.
-        frame: the frame; those that follow are of its kind.
-        measure: tells its bits on the bus.
+        at_us: time of the first frame.
+        frame: the first frame; the following frames are of the same kind.
+        measure: returns its number of bits on the bus.
 
     Attributes:
-        length: bits of the latest frame on the bus.
+        length: number of bits of the latest frame on the bus.
         memory: which payload bits change.
     """
 
@@ -353,8 +355,8 @@ class BitRates(NamedTuple):
     """Bit rates in bit/s; None if unknown.
 
     Attributes:
-        nominal: of arbitration, and of all of a classic frame.
-        fast: of the data of CAN FD frames with BRS.
+        nominal: bit rate of the arbitration phase, and of a whole classic frame.
+        fast: bit rate of the data phase of CAN FD frames with BRS.
     """
 
     nominal: int | None = None
@@ -365,9 +367,9 @@ class BitRates(NamedTuple):
         return not frame.brs or bool(self.nominal and self.fast)
 
     def bits(self, frame: can.FdFrame) -> int:
-        """Return how long a frame takes, in bits of the nominal rate, rounded up.
+        """Return the duration of a frame, in bits of the nominal rate, rounded up.
 
-        Fast bits count as nominal ones where a rate is not known: then it takes less.
+        If a rate is unknown, fast bits count as nominal ones. The frame is then in fact shorter.
         """
         nominal, fast = can.fd_bits(frame)
         if self.nominal and self.fast:
@@ -472,13 +474,13 @@ class BusSecond(NamedTuple):
 
 
 class _LoadRow(NamedTuple):
-    """The load of a bus, without error frames and broken frames: their length is unknown.
+    """The load of a bus. Error frames and broken frames have no known length, and do not count.
 
     Attributes:
-        bits: of all frames.
-        latest: the latest second that is over, or the first one while it is not.
-        peak: the busiest second, the first of them.
-        mean_bit_s: bits a second from the first window to the one with the latest frame.
+        bits: bits of all frames.
+        latest: the latest complete second; during the first second, that one.
+        peak: the busiest second; the first one of several.
+        mean_bit_s: mean bits per second, from the first window to the one with the latest frame.
     """
 
     bits: int
@@ -490,7 +492,7 @@ class _LoadRow(NamedTuple):
 class Load:
     """Adds up the bits of each second, counted from the first frame.
 
-    A frame with an earlier time than one before it counts for the window that is open.
+    A frame with an earlier time than a previous one counts for the present window.
     """
 
     __slots__ = ("_bits", "_ended", "_first_us", "_open", "_peak")
@@ -559,7 +561,8 @@ class BusRow(NamedTuple):
         errors: its error frames.
         went_back: number of frames with an earlier time than the one before.
         fd: number of CAN FD frames.
-        unrated: number of these with data at an unknown bit rate: the load is too low.
+        unrated: number of CAN FD frames with data at an unknown bit rate; if not 0, the load is not
+            exact.
     """
 
     channel: str
@@ -646,7 +649,9 @@ class _BusTally:
 
 
 class Traffic:
-    """Counts all frames of all buses; its memory grows with identifiers, not with frames.
+    """Counts all frames of all buses.
+
+    Its memory grows with the number of identifiers, not with the number of frames.
 
     Not counted: frames lost before they were read; see `Loss`.
 

@@ -1,4 +1,4 @@
-"""Frames that a user of a panel sends: one by one, or cyclically, and only while it is armed.
+"""Frames that a user of a panel sends, one by one or cyclically, while the panel is armed.
 
 >>> words = parse_row_text("123#00 --every 10ms --counter 0:0..14 --name alive")
 >>> words.every, words.counters, words.name, str(words)
@@ -48,21 +48,23 @@ ALGORITHMS: Final[Mapping[str, Callable[[bytes], int]]] = {
     "crc8-2f": crcmod.mkCrcFun(0x12F, initCrc=0x00, rev=False, xorOut=0xFF),
     "crc8-07": crcmod.mkCrcFun(0x107, initCrc=0x00, rev=False, xorOut=0x00),
 }
-"""By name. `neg8` makes the sum of all bytes 0. The CRCs are SAE J1850, AUTOSAR 8H2F and SMBus;
-the first two begin with 0xFF, which crcmod wants as it is after the final xor.
+"""Checksums by name.
+
+`neg8` makes the sum of all bytes 0. The CRCs are SAE J1850, AUTOSAR 8H2F and SMBus. The first two
+have the initial value 0xFF; crcmod requires this value after the final xor.
 """
 
 
 @dataclass(frozen=True, slots=True)
 class _Counter:
-    """Bits of one byte that count up and begin again.
+    """Bits of one byte that count up, and start again after the end.
 
     Attributes:
-        byte: which byte.
-        shift: its lowest bit there.
-        bits: how many.
-        low: what it begins with.
-        high: what it ends with.
+        byte: number of the byte.
+        shift: its lowest bit in that byte.
+        bits: number of bits.
+        low: its first value.
+        high: its last value.
     """
 
     byte: int
@@ -84,10 +86,11 @@ class _ChecksumField:
     """One byte that is computed from others.
 
     Attributes:
-        byte: which byte.
+        byte: number of the byte.
         algorithm: a name of `ALGORITHMS`.
-        first: first byte that is covered.
-        last: last byte that is covered, None for that of the frame; `byte` itself never is.
+        first: first byte that the checksum covers.
+        last: last byte that it covers; None for the last byte of the frame. `byte` itself is never
+            covered.
     """
 
     byte: int
@@ -130,10 +133,13 @@ class FrameFields:
 
 
 def parse_counter(text: str) -> _Counter:
-    """Read `BYTE:LOW..HIGH`, as `0:0..255`, or of some bits `0.4+4:0..14`.
+    """Parse a counter of a byte, such as `0:0..255`, or of some bits, such as `0.4+4:0..14`.
+
+    `0:0..255` counts byte 0 from 0 to 255. `0.4+4:0..14` counts 4 bits of byte 0, from bit 4 on,
+    from 0 to 14.
 
     Raises:
-        ValueError: not a counter, or one that its bits do not hold.
+        ValueError: not a counter, or its values do not fit its bits.
     """
     match = _COUNTER.fullmatch(text)
     if match is None:
@@ -181,13 +187,13 @@ class _Place(NamedTuple):
 
 
 class PdoFrames:
-    """Makes frames of what people call them.
+    """Makes frames from the names that users give.
 
-    An object that is not named has the value that was remembered, else its power-on value, else
-    0. Values are those on the wire: nothing is scaled.
+    An object that is not named gets its stored value, or else its power-on value, or else 0. Values
+    are those on the wire, without scaling.
 
     Args:
-        eds: what the files say, by node-ID.
+        eds: contents of EDS files, by node-ID.
     """
 
     def __init__(self, eds: Mapping[int, EdsObjects]) -> None:
@@ -203,7 +209,7 @@ class PdoFrames:
         """Return the frame of `NODE.rpdoN NAME=VALUE ...`.
 
         Raises:
-            ValueError: a node, PDO, object or value that there is not; it names those there are.
+            ValueError: unknown node, PDO, object or value; the message names the known ones.
         """
         can_id, fields = self._fields(text)
         return CanFrame(can_id, pack_bits([(value, place.mapped.bits) for place, value in fields]))
@@ -296,21 +302,21 @@ _ONCE: Final = 0
 
 @dataclass(slots=True)
 class TransmitRow:
-    """A frame that is sent by hand, or each period; deadlines are absolute, so it does not drift.
+    """A frame that is sent by hand, or cyclically without drift: its deadlines are absolute.
 
-    A completely missed period is not caught up, only counted.
+    A completely missed period is only counted; its frame is not sent later.
 
     Args:
         name: its name.
         frame: the frame to send.
-        period_us: of a cyclic row, else `_ONCE`.
+        period_us: period of a cyclic row; `_ONCE` for a row that is sent by hand.
         fields: fields that change each time.
-        due_us: time of the next transmission, `NEVER` while it is not enabled.
+        due_us: time of the next transmission; `NEVER` while the row is not enabled.
         count: number of transmissions, 0 for no limit.
 
     Attributes:
-        sent: number of transmissions so far.
-        missed: number of periods without it.
+        sent: number of past transmissions.
+        missed: number of periods without a transmission.
 
     Raises:
         ValueError: a period below 0, or a field that is not in the frame.
@@ -374,14 +380,14 @@ class TransmitRow:
 class TransmitList:
     """Rows, and the key that arms them.
 
-    Nothing is sent until it is armed; stopping disarms it and disables all rows, so that arming
-    it again sends nothing by itself.
+    Nothing is sent until the list is armed. Stopping disarms it and disables all rows, so that
+    arming it again sends nothing by itself.
 
     Args:
         rows: the frames.
 
     Attributes:
-        armed: rows may send.
+        armed: whether rows may send.
     """
 
     rows: list[TransmitRow] = field(default_factory=list)
@@ -440,14 +446,14 @@ _OPTIONS: Final = ("every", "counter", "checksum", "name")
 
 @dataclass(frozen=True, slots=True)
 class RowText:
-    """What a row says.
+    """The text of a row, in its parts.
 
     Attributes:
-        frame: a frame as `123#DEADBEEF`, or a PDO as `5.rpdo1 target_velocity=100`.
-        every: its period as `10ms`; empty for a row that is sent by hand.
-        counters: bytes that count, as `0:0..255`.
-        checksums: bytes that are computed, as `7:crc8`.
-        name: what people call it; empty for its frame.
+        frame: a frame such as `123#DEADBEEF`, or a PDO such as `5.rpdo1 target_velocity=100`.
+        every: its period, such as `10ms`; empty for a row that is sent by hand.
+        counters: bytes that count, such as `0:0..255`.
+        checksums: bytes that are computed, such as `7:crc8`.
+        name: its displayed name; empty to show its frame.
     """
 
     frame: str

@@ -37,7 +37,7 @@ class NetCall:
     Attributes:
         word: SOURCE; None if the options name a bus.
         bus: options of a bus.
-        timeout_us: time-out of an answer.
+        timeout_us: time-out for an answer.
     """
 
     word: str | None

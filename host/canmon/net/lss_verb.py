@@ -30,13 +30,13 @@ class LssSettings:
     """Options of the command line.
 
     Attributes:
-        address: of the slave; None for those found by fastscan.
-        only_node: for the only slave on the bus.
+        address: address of the slave; None for slaves found by fastscan.
+        only_node: whether the command is for the only slave on the bus.
         node_ids: new node-IDs, for one slave each; empty for none.
-        bit_rate: in bit/s, None for none.
+        bit_rate: new bit rate in bit/s; None for no change.
         delay_ms: delay for activating the bit rate; None for no activation.
-        store: store both.
-        dry_run: configure nothing.
+        store: whether to store both.
+        dry_run: whether to configure nothing.
     """
 
     address: LssAddress | None = None

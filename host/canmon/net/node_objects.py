@@ -70,9 +70,9 @@ class NamedObjects:
 
     Args:
         node_id: the node.
-        file: its EDS, None without one.
-        known: the EDS, if known without a file.
-        name: of that EDS.
+        file: its EDS; None for no file.
+        known: content of the EDS, if known without a file.
+        name: name of that EDS.
 
     Attributes:
         node_id: as given.
@@ -187,7 +187,7 @@ def known_objects(
         node_id: the node.
         eds: its EDS, or a folder that has it.
         what: the option or argument that names it, for messages.
-        strict: refuse an EDS of another device; else warn.
+        strict: whether to refuse an EDS of another device; otherwise warn.
 
     Raises:
         Refused: the EDS cannot be used.
@@ -274,7 +274,9 @@ def shown(objects: NamedObjects, entry: Entry, data: bytes) -> str:
 
 
 def encoded(objects: NamedObjects, entry: Entry, words: str) -> bytes:
-    """Return the bytes of a value, such as `100`, `0x64`, `-1.5` in the object's unit, `u16:100`.
+    """Return the bytes of a value.
+
+    A value is written as `100`, `0x64`, `u16:100`, or `-1.5` in the object's unit.
 
     Raises:
         Refused: it is not a value of this object.
@@ -323,9 +325,9 @@ class _ValueDifference(NamedTuple):
 
     Attributes:
         entry: index and sub-index.
-        wanted: as on the wire.
-        found: likewise, None if the node refuses the read.
-        why: reason of the refusal.
+        wanted: wanted value, as on the wire.
+        found: present value, as on the wire; None if the node refuses the read.
+        why: reason for the refusal.
     """
 
     entry: Entry

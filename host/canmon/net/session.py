@@ -46,7 +46,7 @@ class _Work:
     """The planned steps, so that the message of an early end can list the finished ones.
 
     Attributes:
-        ending: final state of the nodes, in any case; empty if there is nothing to report.
+        ending: final state of the nodes, reported in any case; empty if there is nothing to report.
     """
 
     def __init__(self) -> None:
@@ -82,7 +82,7 @@ class NetSession:
 
     Args:
         source: the bus, and the known nodes.
-        timeout_us: time-out of an answer.
+        timeout_us: time-out for an answer.
 
     Attributes:
         bus: communicates with its nodes.

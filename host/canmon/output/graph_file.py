@@ -29,8 +29,8 @@ from tickrig.host.text.whole_file import replacing, write_whole
 def write_csv(file: TextIO, series: Sequence[Series], view: View) -> None:
     """Write the samples in a view: a row for each time, a column for each series.
 
-    A cell is empty where a series has no sample at that time; where it has several, the last
-    counts. Times are seconds with six digits, as in the log.
+    A cell is empty if a series has no sample at that time. If it has several, the last one counts.
+    Times are seconds with six digits, as in the log.
     """
     writer = csv.writer(file, lineterminator="\n")
     writer.writerow(["t_s", *(_heading(one) for one in series)])
@@ -159,17 +159,17 @@ def check_graph_path(path: Path) -> None:
 def write_graph(
     path: Path, series: Sequence[Series], view: View, size: tuple[int, int], title: str = ""
 ) -> None:
-    """Write curves as the file's name says.
+    """Write curves in the format given by the file's name.
 
     Args:
-        path: its suffix is one of `_KINDS`.
+        path: the file; its suffix is one of `_KINDS`.
         series: the curves.
-        view: what is seen.
+        view: the visible part.
         size: width and height of a picture in pixels.
-        title: of a picture.
+        title: title of a picture.
 
     Raises:
-        Refused: matplotlib is not there, for PNG.
+        Refused: for PNG: matplotlib is not installed.
         SourceFailed: the file cannot be written.
     """
     try:

@@ -58,10 +58,10 @@ _PATIENCE_S: Final = 0.02
 
 
 class _Screen:
-    """The controlling terminal, also if standard input is a pipe.
+    """The controlling terminal, even if standard input is a pipe.
 
-    The end restores the terminal, also after errors. A terminal that is stuck does not block:
-    nothing is painted until it has accepted the last picture.
+    The terminal is restored at the end, also after errors. A stuck terminal does not block the
+    program: no new picture is written until the terminal has accepted the last one.
 
     Raises:
         OSError: there is no terminal.
@@ -112,9 +112,9 @@ class _Screen:
         return [_ARROWS.get(key, key) for key in _KEY.findall(text)]
 
     def paint(self, lines: Sequence[str]) -> None:
-        """Show lines, if the terminal has taken those of before.
+        """Show lines, if the terminal has accepted the previous ones.
 
-        The only codes in them that the terminal obeys are those of colours.
+        The only control codes in the lines that have an effect are those of colours.
         """
         if not self._output.catches_up(_PATIENCE_S):
             return
@@ -153,12 +153,13 @@ def _difference(before: Sequence[str], lines: Sequence[str]) -> str:
 
 
 class Stopwatch:
-    """Goes on from the latest frame's time by the clock of this machine.
+    """Continues the time of the latest frame by the clock of this machine.
 
-    The stamps of a driver need not be those of our clock: only their differences count.
+    The clock of a driver's time stamps may differ from that of this machine. Therefore only
+    differences of stamps count.
 
     Attributes:
-        latest_us: when the latest frame came.
+        latest_us: time of the latest frame.
     """
 
     def __init__(self) -> None:
@@ -184,9 +185,9 @@ _SLACK_NS: Final = 1_000
 
 
 class Pace:
-    """Time since it was made, in microseconds.
+    """A clock: microseconds since its creation.
 
-    It sleeps to absolute moments, so what is paced by it does not drift.
+    It sleeps until absolute times, so that actions timed by it do not drift.
     """
 
     def __init__(self) -> None:
@@ -249,10 +250,10 @@ def expect_frames(source: AnySource[object], meaning: FilteredDecoder | None = N
 
 
 class _Interruptions(Interrupter):
-    """Ctrl-C and the signals that end a program: they end what goes on, at once or behind it.
+    """Ctrl-C and the signals that end a program: they end the present work, at once or after it.
 
     Attributes:
-        came: one has come.
+        came: whether a signal has arrived.
     """
 
     def __init__(self) -> None:
@@ -329,15 +330,15 @@ def follow(  # noqa: PLR0913 - how, on a screen and without
     *,
     press: Callable[[str], None] = lambda key: None,
 ) -> None:
-    """Read until the source ends, the time is over or the user interrupts.
+    """Read until the source ends, the time has passed or the user interrupts.
 
     Args:
-        source: where frames come from.
+        source: source of the frames.
         words: its SOURCE words.
         take: called with the records.
-        span_us: for how long; None if not given.
+        span_us: duration; None if not given.
         lines: status lines of a live source, shown if there is a terminal.
-        press: called with keys pressed there.
+        press: called with keys pressed on the terminal.
     """
     with until_interrupted():
         if lines is not None and source.live and sys.stdout.isatty():
@@ -376,10 +377,10 @@ def take_blocks(log: BlockLog, take: Callable[[Columns], None], span_us: int | N
     Args:
         log: the log.
         take: called with each block.
-        span_us: for how long by the times of the log; None for all of it.
+        span_us: duration by the times of the log; None for the whole log.
 
     Returns:
-        False if it holds CAN FD: then all of it must be read frame by frame.
+        False if the log contains CAN FD frames; the whole log must then be read frame by frame.
     """
     last_us: int | None = None
     with until_interrupted():
@@ -428,14 +429,14 @@ def _paint(
     span_us: int | None,
     press: Callable[[str], None] = lambda key: None,
 ) -> None:
-    """Paint until q is pressed, the source ends or the time is over.
+    """Update the display until q is pressed, the source ends or the time has passed.
 
     Args:
-        source: where frames come from; it is live.
-        take: takes what comes.
-        lines: what is shown.
-        span_us: for how long; None for no end.
-        press: acts on other keys, and what it does is shown at once.
+        source: live source of the frames.
+        take: called with the records.
+        lines: returns the lines to show.
+        span_us: duration; None for no end.
+        press: called with other keys; the display is updated at once.
     """
     watch, begin_s, due_s = Stopwatch(), time.monotonic(), 0.0
     with _Screen() as screen:

@@ -90,7 +90,7 @@ class FilteredDecoder:
     def messages(self) -> list[str]:
         """Return the signals and kinds in the filter that never came, one line each.
 
-        If none is missing, say that no frame passed.
+        If all of them came, the line reports that no frame passed.
         """
         said = [] if self._missing is None else self._missing.messages()
         if not said and self.nothing_passed and self._wanted is not None:
@@ -115,13 +115,13 @@ class DumpFormat(StrEnum):
 
 
 def printer_of(output: DumpFormat, lines: DumpLines, raw: bool, errors: bool = False) -> _Printer:
-    """Return what prints a frame.
+    """Return a function that prints a frame.
 
     Args:
-        output: as what.
+        output: format of the output.
         lines: writes lines of text.
-        raw: leave out what frames mean,
-        errors: but not of error frames.
+        raw: whether to omit the meaning of frames.
+        errors: whether to keep the meaning of error frames if `raw`.
     """
     write = _writer(output, lines)
     if not raw:
@@ -222,9 +222,9 @@ class BlockPrinter:
     """Writes the lines of many frames at once, with the same result as `printer_of`.
 
     Args:
-        output: text, or a log.
-        lines: writes single lines of text; both continue where the other ended.
-        decoder: decodes frames; others may feed it in between. None for no decoding.
+        output: format: text, or a log.
+        lines: writes single lines of text; each of the two continues where the other ended.
+        decoder: decodes frames; other code may feed it between two calls. None for no decoding.
     """
 
     def __init__(self, output: DumpFormat, lines: DumpLines, decoder: Decoder | None) -> None:
@@ -247,10 +247,10 @@ _MARKS: Final = {DumpFormat.LOG: comment, DumpFormat.JSONL: Mark.json}
 
 
 class StdoutWriter:
-    """Lines on standard output; in JSON and in a log, what is between frames among them.
+    """Lines on standard output; in JSON and in a log, events between frames are lines, too.
 
-    A log and CSV keep their characters, so that they are read again as they were written, but
-    on a terminal.
+    A log and CSV are written with unchanged characters, so that they can be read again exactly.
+    This does not apply to a terminal.
     """
 
     def __init__(self, printer: _Printer, output: DumpFormat) -> None:

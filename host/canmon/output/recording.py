@@ -54,11 +54,11 @@ class LogFile:
 
     Args:
         plan: its settings; a single file replaces an existing one.
-        source: SOURCE words of what is read.
-        live: whether time passes without frames.
+        source: SOURCE words of the source.
+        live: whether time also passes without frames.
         triggers: what it waits for, if the plan has a trigger.
         wanted: which frames are recorded; None for all.
-        kept: whether the file stays if writing fails.
+        kept: whether to keep the file if writing fails.
 
     Raises:
         Refused: the name has no known format, the format needs a missing package, or the file is
@@ -135,8 +135,8 @@ class LogFile:
 def whole_log(path: Path, source: Sequence[str]) -> Iterator[Path]:
     """Open a log for writing: a new file, which replaces `path` at the end.
 
-    If the source is not a file, this may take long, and others may read the log: then it is `path`
-    itself.
+    If the source is not a file, writing may take long, and other programs may read the log during
+    that time. In this case the log is written to `path` directly.
 
     Raises:
         Refused: its name has no known format, or it is being read.
@@ -166,10 +166,10 @@ def _check_not_read(path: Path, source: Sequence[str]) -> None:
 
 
 def write_records(path: Path, records: Sequence[AnyRecord]) -> list[str]:
-    """Write frames into a new log; say how many, and what could not be held.
+    """Write frames into a new log; report their number, and what the format cannot hold.
 
     Raises:
-        ValueError: it is there already, or cannot be written.
+        ValueError: the file exists already, or cannot be written.
     """
     frames = [record for record in records if isinstance(record, Record)]
     if path.exists():
@@ -219,21 +219,21 @@ NAMES: Final = ("rotate", "disk", "at_limit", "trigger", "pre", "post")
 
 
 class RecordingOptions:
-    """What the options of a recording say.
+    """The parsed options of a recording.
 
     Args:
-        path: of the file.
-        options: by their names.
-        bit_rate: of the bus, for a limit of the load among the rules.
-        parts: it is in parts, whatever the options say.
+        path: path of the file.
+        options: the options, by name.
+        bit_rate: bit rate of the bus, for a rule that limits the load.
+        parts: whether to record in parts, regardless of the options.
 
     Attributes:
-        plan: what it shall be.
-        triggers: what it waits for.
-        decodes: whether a trigger asks what frames mean.
+        plan: settings of the recording.
+        triggers: what the recording waits for.
+        decodes: whether a trigger needs decoded frames.
 
     Raises:
-        Refused: one that is wrong.
+        Refused: an option is invalid.
     """
 
     def __init__(
@@ -248,7 +248,7 @@ class RecordingOptions:
         """Start the recording.
 
         Args:
-            source: SOURCE words of what is recorded.
+            source: SOURCE words of the recorded source.
             live: whether time passes without frames.
             wanted: which frames are recorded; None for all.
 

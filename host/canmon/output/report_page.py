@@ -63,11 +63,12 @@ _ALONE: Final = {
 
 
 class Verdict(NamedTuple):
-    """What is wrong.
+    """The faults that a page shows.
 
     Attributes:
-        diagnosis: all of it.
-        around: by the number of a frame, the number of the first one around it, and these.
+        diagnosis: the whole diagnosis.
+        around: by the number of a frame, the number of the first frame around it, and the frames
+            around it.
     """
 
     diagnosis: Diagnosis
@@ -76,13 +77,13 @@ class Verdict(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class ReportHead:
-    """What a page says of itself.
+    """The title of a page and other information about it.
 
     Attributes:
-        title: of the page.
-        source: what was read, in words.
-        about: lines at its end, each with what is shown as code.
-        bit_rate: of the buses, None where it is not known.
+        title: title of the page.
+        source: description of the source.
+        about: lines at the end of the page, each with a text that is shown as code.
+        bit_rate: bit rate of the buses; None if unknown.
     """
 
     title: str
@@ -331,8 +332,8 @@ def _gaps(
 ) -> Thinned[Mark]:
     """Return the gaps that a finding confirms.
 
-    A survey sees a gap at once, by the heartbeats before it; the rules see the whole log, and
-    know two nodes with one node-ID. A node that is guarded has no heartbeats to judge.
+    A survey detects a gap at once, from the heartbeats before it. The rules see the whole log, and
+    detect two nodes with one node-ID. A node with node guarding has no heartbeats to judge.
     """
     guarded = (row.channel, nmt.ERROR_CONTROL_COB_ID + row.node | REMOTE) in survey.counts.sums
     if guarded or "no-lost-heartbeat" not in diagnosis.judged:
@@ -495,10 +496,10 @@ def _unboxed() -> Sequence[str]:
 
 
 def print_page(page: Path, path: Path) -> None:
-    """Draw a page as PDF or PNG, as the suffix of the file says.
+    """Draw a page as PDF or PNG, according to the suffix of the file.
 
     Raises:
-        BrowserError: Chromium is not there, or wrote nothing.
+        BrowserError: Chromium is not installed, or wrote no file.
     """
     what = "--print-to-pdf" if path.suffix.lower() == ".pdf" else "--screenshot"
     with TemporaryDirectory(prefix="canmon-") as folder:

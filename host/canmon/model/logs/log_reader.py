@@ -95,8 +95,8 @@ class ScreenClock:
     """Computes the time of a frame from the stamp before it.
 
     Args:
-        deltas: whether spans count from the previous frame (`-t d`), not from the first one (`-t
-            z`).
+        deltas: whether spans count from the previous frame (`-t d`), or from the first
+            one (`-t z`).
 
     Attributes:
         shift_us: offset added to a counter of microseconds, so that no time is below 0.

@@ -80,10 +80,11 @@ class RecordingPlan:
     Attributes:
         path: the file, or the base name of its parts.
         rotate_bytes: a part ends before it exceeds this size; None for no limit.
-        rotate_us: a part ends at the first frame that is this much later than its first.
-        disk_bytes: the largest size of all parts together.
-        at_limit: what happens there.
-        around: what is kept before a trigger, and recorded after it; None to record all.
+        rotate_us: a part ends at the first frame that is at least this much later than its first
+            one.
+        disk_bytes: limit of the total size of all parts.
+        at_limit: what happens at that limit.
+        around: spans of traffic to record before and after a trigger; None to record everything.
         parts: whether to record in parts, even if no setting requires it.
     """
 
@@ -140,12 +141,12 @@ def read_plan(  # noqa: PLR0913 - all that people may say
 
     Args:
         path: the file; parts are named after it.
-        rotate: sizes and times, one of each at the most.
-        disk: size of all parts.
+        rotate: at most one size and one time.
+        disk: limit of the total size of all parts.
         at_limit: `oldest` or `end`.
-        pre: before a trigger.
-        post: after it.
-        waits: whether it waits for a trigger, even without `pre` and `post`.
+        pre: span to record before a trigger.
+        post: span to record after it.
+        waits: whether the recording waits for a trigger, even without `pre` and `post`.
         parts: whether to record in parts, even if nothing else requires it.
 
     Raises:
@@ -200,10 +201,10 @@ def _parse_bytes(name: str, word: str, least: int = _MIN_BYTES) -> int:
 
 
 def _parse_span(name: str, word: str | None) -> TriggerSpan:
-    """Read a number of frames, or a time; without a word 5 s.
+    """Parse a number of frames, or a time; without a word, return 5 s.
 
     Raises:
-        ValueError: it is neither, or too many frames before a trigger.
+        ValueError: the word is neither, or is too many frames before a trigger.
     """
     if word is None:
         return DEFAULT_SPAN
@@ -248,22 +249,22 @@ _USUAL_BYTES: Final = 64
 
 
 class _RecordingPart:
-    """A log under way, and what is in it.
+    """A log that is being written, and its content.
 
     Args:
         path: the file; one that exists is replaced.
 
     Attributes:
-        frames: how many were written.
-        safe_frames: how many of them the operating system has, so that they can be read.
-        bytes: size of the file, as far as it is written.
-        first_us: when the first frame came; None before it.
-        last_us: when the last one came.
+        frames: number of written frames.
+        safe_frames: number of frames that were passed to the operating system, and are readable.
+        bytes: size of the written part of the file.
+        first_us: time of the first frame; None before it.
+        last_us: time of the last frame.
 
     Raises:
         OSError: it cannot be written, now or later.
-        LogFormatError: its name tells no format.
-        LogError: its format cannot be written here.
+        LogFormatError: its name has no known format.
+        LogError: its format cannot be written on this machine.
     """
 
     def __init__(self, path: Path) -> None:
@@ -352,9 +353,9 @@ class _RecordingPart:
 
 
 def _recovered(path: Path) -> dict[str, object]:
-    """Return the index entry of a file that its recorder could not end: what can be read.
+    """Return the index entry of a file that its recorder did not complete, from its content.
 
-    A large one is not read, because new frames would have to wait.
+    A large file is not read, because new frames would have to wait.
 
     Raises:
         OSError: it cannot be read.
@@ -378,15 +379,15 @@ _END: Final = "end"
 
 
 class _Index:
-    """A file to which lines are appended, each at once; an existing file is continued.
+    """A file that gets each line appended at once; an existing file is continued.
 
     Args:
         path: of the file.
-        is_part: whether a name is that of a part; lines about others are ignored.
+        is_part: returns whether a name is that of a part; lines about other files are ignored.
 
     Attributes:
         files: size of each completed file that still exists, the oldest first.
-        bytes: total size of them.
+        bytes: total size of these files.
         unended: files that were started, and neither completed nor removed.
 
     Raises:
@@ -465,7 +466,7 @@ _LOOK_FRAMES: Final = 512
 class Files:
     """Writes frames and marks into one file, or into parts that the index lists.
 
-    A recording with an existing index is continued: its parts stay, and count.
+    A recording with an existing index is continued: its parts stay, and count for the limits.
 
     Args:
         plan: its settings.

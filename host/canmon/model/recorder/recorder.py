@@ -156,10 +156,10 @@ class PreTrigger:
     """Keeps the latest frames, and the marks among them.
 
     Args:
-        span: how many before the latest, or for how long.
+        span: number of frames before the latest one, or a time.
 
     Attributes:
-        short: frames of the span had to go, for there were too many of them.
+        short: whether frames of the span were dropped, because there were too many.
     """
 
     def __init__(self, span: TriggerSpan) -> None:
@@ -239,27 +239,27 @@ class _Window:
 
 
 class Recorder:
-    """Records what it is given.
+    """Records the frames that it gets.
 
-    Times are those of the source: frames have them, and `now_us` goes on from the latest frame.
-    Where a file cannot be written the recording ends; what comes then is counted as missing.
+    Times are those of the source: frames contain them, and `now_us` continues from the latest
+    frame. If a file cannot be written, the recording ends. Later frames are counted as missing.
 
     Args:
-        plan: what the recording shall be.
+        plan: settings of the recording.
         now_us: the time.
-        triggers: what it waits for, where the plan has it wait.
+        triggers: what it waits for, if the plan has a trigger.
         wanted: which frames are recorded; None for all. Triggers see all of them.
-        lost: how many frames the source lost before.
+        lost: number of frames that the source lost before.
 
     Attributes:
-        plan: what the recording is.
-        failed: why it ended before its time; empty if it did not.
-        triggers: how often it was triggered.
+        plan: settings of the recording.
+        failed: why the recording ended early; empty if it did not.
+        triggers: number of triggers that occurred.
 
     Raises:
-        OSError: nothing can be written there.
-        LogFormatError: the name of the file tells no format.
-        LogError: its format cannot be written here.
+        OSError: the file cannot be written.
+        LogFormatError: the name of the file has no known format.
+        LogError: its format cannot be written on this machine.
     """
 
     def __init__(
@@ -310,13 +310,13 @@ class Recorder:
         now_us: int,
         marks: Sequence[Mark] = (),
     ) -> None:
-        """Take what came.
+        """Process frames and marks that have arrived.
 
         Args:
-            decoded_frames: frames alone, and what they mean where a filter asks.
-            lost: how many frames were lost until now.
+            decoded_frames: frames, each with its meaning if a filter needs that.
+            lost: total number of lost frames.
             now_us: the time.
-            marks: what happened behind these frames.
+            marks: events after these frames.
         """
         if self.state in (RecorderState.FAILED, RecorderState.ENDED):
             self._missing += len(decoded_frames)
@@ -333,10 +333,10 @@ class Recorder:
             self._fail(error)
 
     def take_block(self, block: TextBlock, now_us: int) -> bool:
-        """Take many frames, one at least; False where they are to be taken one by one.
+        """Process many frames; return False if they must be processed one by one.
 
         Args:
-            block: frames, behind which nothing happened.
+            block: at least one frame, with no event after the frames.
             now_us: the time.
         """
         whole = self._before is None and self._wanted is None
