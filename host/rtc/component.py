@@ -2,25 +2,25 @@
 
 # Theory of operation
 #
-# A component (`RtComponent`) is alive between `initialize` and `finalize`. Alive, it takes part in
-# execution contexts, and in each it is Inactive, Active or in Error. A context has a rate; its
-# periods begin at the multiples of `period_us`, in the time that `tick(now_us)` is given: no clock
-# is read and nothing waits.
+# A component (`RtComponent`) is alive between `initialize` and `finalize`. An alive component takes
+# part in execution contexts, and in each context it is Inactive, Active or in Error. A context has
+# a rate. Its periods begin at the multiples of `period_us`, in the time that the caller passes to
+# `tick(now_us)`. A context reads no clock and does not wait.
 #
-# Who asks for a move (`activate_component`, `reset_component`, ...) learns at once whether it is
-# allowed in the present state. The move itself is made at the beginning of the next period. So a
-# component changes its state between two of its own `on_execute`, never in the middle of one, and
-# the order in which requests came cannot be seen by components.
+# A request for a move (`activate_component`, `reset_component`, ...) returns at once whether the
+# move is allowed in the present state. The context makes the move at the beginning of the next
+# period. So a component changes its state between two calls of its `on_execute`, never during one.
+# Components cannot see the order in which requests came.
 #
 # A period has three passes over all components, in the order in which they were added:
 #
-#   pre   configuration sets that were changed take effect, then the moves that were asked for
+#   pre   changed configuration sets take effect, then the requested moves are made
 #   do    on_execute in Active, on_error in Error
 #   post  on_state_update in Active, of those that override it
 #
-# `do` of all comes before `post` of any: what a component writes in `do` is on the ports of the
-# others when they are asked in `post`. RefHardRh3 depends on that: it sends the speeds of this
-# period in `post`, and takes the answer to them in the next `do`.
+# The `do` pass of all components ends before the `post` pass begins. So a value that a component
+# writes in `do` is on the ports of the others when their `post` runs. RefHardRh3 depends on this
+# order: it sends the speeds of this period in `post`, and takes the answer in the next `do`.
 #
 # Moves and their callbacks, in order:
 #
@@ -31,14 +31,14 @@
 #   Inactive  Error     on_aborting
 #   Error     Inactive  on_reset; if it fails, the state stays Error
 #
-# A callback that returns another code than RTC_OK, or raises, brings its component to Error in the
-# next pre-pass: `wanted` is then Error, and a request that comes later does not take its place. No
-# exception leaves a component: what one does must not end the others.
+# A callback that raises, or returns another code than RTC_OK, brings its component to Error in the
+# next pre-pass. Until then `wanted` is Error, and a later request does not replace it. Exceptions
+# of a component are caught, so that they do not end the other components.
 #
-# `ExecutionContexts` is what a schedule ticks. It keeps the earliest `due_us` of its contexts, so
-# that a tick before that costs one comparison. A context whose due time changes (start, stop,
-# another rate) calls `replan`. Contexts that were not due do not note the time; `now_us` is then
-# the `quiet_us` of all.
+# A schedule ticks an `ExecutionContexts`. This object keeps the earliest `due_us` of its contexts,
+# so a tick before that time costs one comparison. A context whose due time changes (start, stop,
+# another rate) calls `replan`. Contexts that were not due do not store the time of a tick: their
+# `now_us` is then the common `quiet_us`.
 
 from __future__ import annotations
 
@@ -77,10 +77,10 @@ P = TypeVar("P", bound=AnyPort)
 def guarded(
     who: str, callback: Callable[A, ReturnCode], *args: A.args, **kwargs: A.kwargs
 ) -> ReturnCode:
-    """Run a callback; what it raises is logged and counts as RTC_ERROR.
+    """Run a callback; an exception is logged and counts as RTC_ERROR.
 
-    Any exception is caught, here and from listeners of ports: what one
-    component does must not end the others.
+    Any exception is caught, also from listeners of ports, so that one component cannot end the
+    others.
     """
     try:
         return callback(*args, **kwargs)
@@ -95,12 +95,12 @@ def failed(who: str, callback: Callable[..., ReturnCode]) -> ReturnCode:
 
 
 class ComponentAction:
-    """What a component does, one method a callback; each does nothing until overridden.
+    """The callbacks of a component; each does nothing until a subclass overrides it.
 
-    A callback returns RTC_OK or what went wrong: then Error comes next, but where its
-    docstring says otherwise. An exception is logged and counts as RTC_ERROR. No callback
-    waits: time passes between them. Its argument `ec` is the execution context that runs it;
-    the time is `ec.now_us`.
+    A callback returns RTC_OK or an error code. After an error code the component goes to Error,
+    unless the docstring of the callback says otherwise. An exception is logged and counts as
+    RTC_ERROR. Callbacks must not wait: time passes only between them. The argument `ec` is the
+    execution context that runs the callback; the time is `ec.now_us`.
     """
 
     def on_initialize(self) -> ReturnCode:
@@ -154,14 +154,14 @@ class ComponentAction:
 
 @dataclass(frozen=True, slots=True)
 class ModuleSpec:
-    """What is the same for all components of a class (OpenRTM-aist 1.x, module profile).
+    """The properties that all components of a class share (OpenRTM-aist 1.x, module profile).
 
     Attributes:
         type_name: of the class, such as `ConsoleIn`.
-        description: in a line.
+        description: one line of text.
         version: of the class.
         vendor: who made it.
-        category: what it is for, such as `sensor`.
+        category: purpose of the class, such as `sensor`.
     """
 
     type_name: str
@@ -187,20 +187,20 @@ class RtComponent(ComponentAction):
     (`add_port`, `configuration.bind`), and overrides the callbacks that it needs
     (`on_activated`, `on_execute`, ...). A `Manager` creates components and runs them.
 
-    Not emulated: composite components, and states per execution context beside
-    that of the life cycle.
+    Not emulated: composite components, and a state of its own in each execution context in
+    addition to the state of the life cycle.
 
     Args:
         instance_name: unique in a system, such as `ConsoleIn0`.
 
     Attributes:
-        spec: what is the same for all components of the class; each subclass sets it.
+        spec: properties that all components of the class share; each subclass sets it.
         instance_name: as above.
         alive: True between `initialize` and `finalize`.
         configuration: its configuration sets; one of them is active.
         ports: by name, in the order in which they were added.
         contexts: execution contexts it takes part in; the first decides its state.
-        own_contexts: those that end with it.
+        own_contexts: execution contexts that end with the component.
     """
 
     spec: ClassVar[ModuleSpec]
@@ -230,7 +230,7 @@ class RtComponent(ComponentAction):
             The port itself.
 
         Raises:
-            RtcRefused: one has its name.
+            RtcRefused: another port of the component has this name.
         """
         if port.name in self.ports:
             raise RtcRefused(f"{self.instance_name} has a port {port.name!r} already")
@@ -251,7 +251,7 @@ class RtComponent(ComponentAction):
             context: the execution context.
 
         Returns:
-            What `ExecutionContext.add_component` says.
+            The result of `ExecutionContext.add_component`.
         """
         code = context.add_component(self)
         if code is ReturnCode.RTC_OK:
@@ -259,11 +259,11 @@ class RtComponent(ComponentAction):
         return code
 
     def initialize(self) -> ReturnCode:
-        """Created to alive, with on_initialize; then its own execution contexts start.
+        """Call on_initialize, make the component alive, and start its own execution contexts.
 
         Returns:
-            PRECONDITION_NOT_MET unless Created; else what on_initialize returned, and it
-            stays Created unless that is RTC_OK.
+            PRECONDITION_NOT_MET unless the component is Created; else the result of
+            on_initialize. If that is not RTC_OK, the component stays Created.
         """
         if self.alive:
             return ReturnCode.PRECONDITION_NOT_MET
@@ -275,11 +275,11 @@ class RtComponent(ComponentAction):
         return code
 
     def finalize(self) -> ReturnCode:
-        """End, with on_finalize, whatever that returns.
+        """Call on_finalize and end the component, regardless of the result of on_finalize.
 
         Returns:
-            PRECONDITION_NOT_MET in Created or while it takes part in an execution context;
-            else what on_finalize returned.
+            PRECONDITION_NOT_MET in Created, or while the component takes part in an execution
+            context; else the result of on_finalize.
         """
         if not self.alive or self.contexts:
             return ReturnCode.PRECONDITION_NOT_MET
@@ -287,13 +287,13 @@ class RtComponent(ComponentAction):
         return guarded(self.instance_name, self.on_finalize)
 
     def exit(self) -> ReturnCode:
-        """Leave all execution contexts, Active with on_deactivated; stop those it owns; finalize.
+        """Leave all execution contexts, stop the contexts that it owns, and finalize.
 
-        Components that took part in a context it owns do so no more. Not to be
-        called from a callback.
+        If the component is Active, on_deactivated is called first. Other components are removed
+        from the contexts that it owns. Do not call this method from a callback.
 
         Returns:
-            PRECONDITION_NOT_MET in Created; else what on_finalize returned.
+            PRECONDITION_NOT_MET in Created; else the result of on_finalize.
         """
         if not self.alive:
             return ReturnCode.PRECONDITION_NOT_MET
@@ -320,8 +320,8 @@ class _Participant:
     """A component as its execution context sees it.
 
     Attributes:
-        state: the present state; Created after it was removed.
-        wanted: the state it is to be moved to in the next pre-pass, if any.
+        state: the present state; Created after the component was removed.
+        wanted: the state to which the next pre-pass moves the component, if any.
     """
 
     __slots__ = ("_context", "_updates", "component", "state", "wanted")
@@ -436,13 +436,14 @@ _MOVES: Final[dict[tuple[LifeCycleState, LifeCycleState], Callable[[_Participant
 
 
 class ExecutionContexts:
-    """Execution contexts that go on together, in the order in which they were added.
+    """Execution contexts that are ticked together, in the order in which they were added.
 
-    It keeps when the first of them is due, and a tick before that asks none: 11 us of each
-    tick with 127 of them.
+    The object keeps the earliest due time. A tick before that time does not check the contexts,
+    which would take 11 us of each tick with 127 contexts.
 
     Attributes:
-        quiet_us: the time of the latest tick in which none was due; they do not note it.
+        quiet_us: the time of the latest tick in which no context was due; the contexts do not
+            store this time.
     """
 
     __slots__ = ("_contexts", "_due_us", "_known", "quiet_us")
@@ -460,10 +461,10 @@ class ExecutionContexts:
         return self._due_us
 
     def tick(self, now_us: int) -> None:
-        """Run a period of each that is due.
+        """Run a period of each context that is due.
 
         Args:
-            now_us: the present; never less than before.
+            now_us: the current time; never less than before.
         """
         if now_us < self.due_us:
             self.quiet_us = now_us
@@ -496,28 +497,30 @@ MoveListener = Callable[["RtComponent", LifeCycleState, ReturnCode], object]
 class ExecutionContext:
     """Runs components period by period: three passes over all of them, in the order of adding.
 
-    - pre: moves that were asked for (activate, deactivate, reset, abort);
+    - pre: requested moves (activate, deactivate, reset, abort);
     - do: on_execute in Active, on_error in Error;
     - post: on_state_update in Active.
 
-    Requests are checked when they are made, and take effect in the next
-    period: nothing waits. Periods fall on the multiples of `period_us`.
-    It is PERIODIC; EVENT_DRIVEN and OTHER are not emulated.
+    Requests are checked when they are made, and take effect in the next period; they do not wait.
+    Periods begin at the multiples of `period_us`. The kind of the context is PERIODIC; EVENT_DRIVEN
+    and OTHER are not emulated.
 
     Args:
         rate_hz: periods a second, 1 uHz to 1 MHz; a period is a whole number of microseconds.
 
     Attributes:
-        due_us: when the next period begins; `NEVER` while it is stopped.
+        due_us: when the next period begins; `NEVER` while the context is stopped.
         rate_hz: periods a second.
-        period_us: one period.
-        running: between start and stop.
-        allows_period: asked for each new period in us, where not all are possible.
-        on_move: called with a component, its state and what the callback of the move returned,
-            after each move that it made or, after on_reset, could not make; Created if it left.
+        period_us: length of a period.
+        running: True between start and stop.
+        allows_period: called with each new period in us, where not all periods are possible;
+            returns whether this one is.
+        on_move: called after each move with the component, its state and the result of the
+            callback of the move. It is also called if on_reset failed and the component stayed in
+            Error. The state is Created if the component left the context.
 
     Raises:
-        ValueError: a rate that is not in the range.
+        ValueError: the rate is out of range.
     """
 
     kind: Final = ExecutionKind.PERIODIC
@@ -545,10 +548,10 @@ class ExecutionContext:
         return tuple(participant.component for participant in self._participants)
 
     def tick(self, now_us: int) -> None:
-        """Go on, and run a period if one is due.
+        """Advance the time, and run a period if one is due.
 
         Args:
-            now_us: the present.
+            now_us: the current time.
         """
         self._ticked_us = now_us
         if now_us < self.due_us:
@@ -561,10 +564,10 @@ class ExecutionContext:
                     step(participant)
 
     def start(self) -> ReturnCode:
-        """Start it, with on_startup of every participant.
+        """Start the context, and call on_startup of every participant.
 
         Returns:
-            PRECONDITION_NOT_MET if it runs or a participant is not alive.
+            PRECONDITION_NOT_MET if the context runs or a participant is not alive.
         """
         if self.running or not all(component.alive for component in self.components):
             return ReturnCode.PRECONDITION_NOT_MET
@@ -574,10 +577,10 @@ class ExecutionContext:
         return ReturnCode.RTC_OK
 
     def stop(self) -> ReturnCode:
-        """Stop it, with on_shutdown of every participant; their states stay as they are.
+        """Stop the context, and call on_shutdown of every participant; their states do not change.
 
         Returns:
-            PRECONDITION_NOT_MET unless it runs.
+            PRECONDITION_NOT_MET unless the context runs.
         """
         if not self.running:
             return ReturnCode.PRECONDITION_NOT_MET
@@ -587,10 +590,10 @@ class ExecutionContext:
         return ReturnCode.RTC_OK
 
     def join(self, others: ExecutionContexts) -> None:
-        """Continue after others from now on; called by `Manager`.
+        """Join a group of contexts, as its last one; called by `Manager`.
 
         Args:
-            others: notified when its due time changes.
+            others: the group; notified when the due time of this context changes.
         """
         self._ticked_us, self._others = self.now_us, others
 
@@ -603,13 +606,13 @@ class ExecutionContext:
             self._release(participant)
 
     def set_rate(self, rate_hz: float) -> ReturnCode:
-        """Change the rate, with on_rate_changed of every participant.
+        """Change the rate, and call on_rate_changed of every participant.
 
         Args:
             rate_hz: periods a second.
 
         Returns:
-            BAD_PARAMETER unless 1 uHz <= rate <= 1 MHz, and its period is allowed.
+            BAD_PARAMETER unless 1 uHz <= rate <= 1 MHz and the period of the rate is allowed.
         """
         if not _possible(rate_hz):
             return ReturnCode.BAD_PARAMETER
@@ -622,13 +625,13 @@ class ExecutionContext:
         return ReturnCode.RTC_OK
 
     def add_component(self, component: RtComponent) -> ReturnCode:
-        """Let a component take part, Inactive, after all that do.
+        """Add a component as the last participant, in the state Inactive.
 
         Args:
-            component: which.
+            component: the component.
 
         Returns:
-            PRECONDITION_NOT_MET if it takes part already.
+            PRECONDITION_NOT_MET if the component takes part already.
         """
         if self._find(component) is not None:
             return ReturnCode.PRECONDITION_NOT_MET
@@ -638,10 +641,10 @@ class ExecutionContext:
         return ReturnCode.RTC_OK
 
     def remove_component(self, component: RtComponent) -> ReturnCode:
-        """Let a component take part no more.
+        """Remove a component from the participants.
 
         Args:
-            component: which.
+            component: the component.
 
         Returns:
             BAD_PARAMETER if it does not take part, PRECONDITION_NOT_MET while it is Active.
@@ -655,10 +658,10 @@ class ExecutionContext:
         return ReturnCode.RTC_OK
 
     def release_component(self, component: RtComponent) -> ReturnCode:
-        """Let a component take part no more, with on_deactivated at once if it is Active.
+        """Remove a component from the participants; if it is Active, call on_deactivated at once.
 
         Args:
-            component: which.
+            component: the component.
 
         Returns:
             BAD_PARAMETER if it does not take part.
@@ -670,10 +673,10 @@ class ExecutionContext:
         return ReturnCode.RTC_OK
 
     def activate_component(self, component: RtComponent) -> ReturnCode:
-        """Ask for Inactive to Active.
+        """Request the move from Inactive to Active.
 
         Args:
-            component: which.
+            component: the component.
 
         Returns:
             BAD_PARAMETER if it does not take part or is not alive, PRECONDITION_NOT_MET
@@ -682,10 +685,10 @@ class ExecutionContext:
         return self._request(component, LifeCycleState.INACTIVE, LifeCycleState.ACTIVE)
 
     def deactivate_component(self, component: RtComponent) -> ReturnCode:
-        """Ask for Active to Inactive.
+        """Request the move from Active to Inactive.
 
         Args:
-            component: which.
+            component: the component.
 
         Returns:
             BAD_PARAMETER if it does not take part or is not alive, PRECONDITION_NOT_MET
@@ -694,10 +697,10 @@ class ExecutionContext:
         return self._request(component, LifeCycleState.ACTIVE, LifeCycleState.INACTIVE)
 
     def reset_component(self, component: RtComponent) -> ReturnCode:
-        """Ask for Error to Inactive.
+        """Request the move from Error to Inactive.
 
         Args:
-            component: which.
+            component: the component.
 
         Returns:
             BAD_PARAMETER if it does not take part or is not alive, PRECONDITION_NOT_MET
@@ -706,12 +709,12 @@ class ExecutionContext:
         return self._request(component, LifeCycleState.ERROR, LifeCycleState.INACTIVE)
 
     def abort_component(self, component: RtComponent) -> ReturnCode:
-        """Ask for Error, from Inactive or Active; for a proxy whose device went there.
+        """Request the move from Inactive or Active to Error, for a proxy whose device failed.
 
-        Not in OMG RTC, where only a callback that fails leads to Error.
+        OMG RTC has no such request: only a callback that fails leads to Error there.
 
         Args:
-            component: which.
+            component: the component.
 
         Returns:
             BAD_PARAMETER if it does not take part or is not alive, PRECONDITION_NOT_MET

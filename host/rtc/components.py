@@ -38,8 +38,8 @@ _SEQ_PORTS: Final[Mapping[str, Any]] = {
 class ConsoleIn(RtComponent):
     """Writes one number that was entered in each period.
 
-    That of OpenRTM waits for a number; here nothing blocks, and the owner of the console calls
-    `enter`.
+    The component of OpenRTM waits for a number. This one does not block: the owner of the console
+    calls `enter`.
 
     Attributes:
         waiting: numbers that were entered and not yet written.
@@ -99,7 +99,7 @@ class ConsoleOut(RtComponent):
 
 
 class SeqIn(RtComponent):
-    """Keeps the latest value of each of its ports, as OpenRTM's shows it.
+    """Keeps the latest value of each of its ports; the component of OpenRTM displays the values.
 
     Attributes:
         ins: its ports by name.
@@ -122,7 +122,7 @@ class SeqIn(RtComponent):
 
 
 class SeqOut(RtComponent):
-    """Writes a value to each of its ports in each period: counted up, where OpenRTM's are random.
+    """Writes a counted-up value to each of its ports in each period; those of OpenRTM are random.
 
     Attributes:
         outs: its ports by name.

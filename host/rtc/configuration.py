@@ -36,7 +36,7 @@ _COMPARE: Final[dict[str, Callable[[float, float], bool]]] = {
 
 
 class Constraint:
-    """What values a parameter may have, in OpenRTM's notation.
+    """The values that a parameter may have, in OpenRTM's notation.
 
     | notation | allows |
     |---|---|
@@ -45,8 +45,8 @@ class Constraint:
     | `(slow, fast)` | one of the words |
     | `x>0, x<5` | one constraint for each element |
 
-    A single constraint holds for every element of a sequence. `{key: x>0}`, for
-    values with names of their own, is not supported.
+    A single constraint applies to every element of a sequence. OpenRTM's notation `{key: x>0}`, for
+    named values, is not supported.
 
     >>> Constraint("0<=x<=10").allows(11)
     False
@@ -57,7 +57,7 @@ class Constraint:
         text: the notation.
 
     Raises:
-        ValueError: a text in another notation.
+        ValueError: the text has another notation.
     """
 
     def __init__(self, text: str = "") -> None:
@@ -85,15 +85,15 @@ class Parameter(Generic[V]):
     Args:
         name: in the configuration sets.
         default: bool, int, float, str or a tuple of one of these with at least one element.
-        constraint: what values it may have.
+        constraint: the values that it may have.
         unit: of the value, for people.
         widget: how an editor shows it, such as `text` or `slider.10`.
 
     Attributes:
-        value: the present value; it changes between the callbacks of its component only.
+        value: the present value; it changes only between callbacks of its component.
 
     Raises:
-        ValueError: a default that the constraint does not allow, or a constraint in no notation.
+        ValueError: the constraint does not allow the default, or its notation is unknown.
     """
 
     def __init__(
@@ -110,7 +110,7 @@ class Parameter(Generic[V]):
         """Return the value that a text stands for.
 
         Raises:
-            RtcRefused: the text is no such value, or its constraint does not allow it.
+            RtcRefused: the text is not a value of the type, or the constraint does not allow it.
         """
         try:
             value: V = self._read(text)
@@ -194,12 +194,12 @@ DEFAULT: Final = "default"
 class Configuration:
     """Sets of parameter values, one of them active.
 
-    A change is checked at once and takes effect before the callbacks of the
-    component's next period, at `initialize`, or when `update` is called.
+    A change is checked at once. It takes effect before the callbacks of the component's next
+    period, at `initialize`, or when `update` is called.
 
     Attributes:
-        active_id: the set whose values hold, or will at the next update.
-        changed: whether an update has something to do.
+        active_id: the set whose values apply, or will apply after the next update.
+        changed: whether there are changes for the next update.
         on_update: called with the ID of the active set after its values took effect.
     """
 
@@ -227,15 +227,15 @@ class Configuration:
         Args:
             name: in the configuration sets.
             default: bool, int, float, str or a tuple of one of these; the type of the values.
-            constraint: what values it may have, as `0<=x<=10` (`Constraint`).
+            constraint: the values that it may have, such as `0<=x<=10` (`Constraint`).
             unit: of the value, for people.
             widget: how an editor shows it, such as `text` or `slider.10`.
 
         Returns:
-            The parameter; its `value` is what holds.
+            The parameter; its `value` is the present value.
 
         Raises:
-            ValueError: a default that the constraint does not allow, or no constraint.
+            ValueError: the constraint does not allow the default, or is not a constraint.
         """
         parameter = Parameter(name, default, constraint, unit=unit, widget=widget)
         self._parameters[name] = parameter
@@ -243,10 +243,10 @@ class Configuration:
         return parameter
 
     def set(self, name: str, text: str, set_id: str = "") -> None:
-        """Change a value in a set, the active one if none is named.
+        """Change a value in a set; without a name, in the active set.
 
         Raises:
-            RtcRefused: no such set or parameter, or a value it may not have.
+            RtcRefused: the set or parameter is unknown, or the value is not allowed.
         """
         values = self._set(set_id or self.active_id)
         self._check(name, text)
@@ -254,10 +254,10 @@ class Configuration:
         self.changed = True
 
     def add_set(self, set_id: str, values: Mapping[str, str]) -> None:
-        """Add a set, or replace one; parameters left out keep their default in it.
+        """Add or replace a set; a parameter that `values` leaves out has its default in the set.
 
         Raises:
-            RtcRefused: no such parameter, or a value it may not have.
+            RtcRefused: a parameter is unknown, or a value is not allowed.
         """
         for name, text in values.items():
             self._check(name, text)
@@ -265,14 +265,14 @@ class Configuration:
         self.changed = True
 
     def remove_set(self, set_id: str) -> None:
-        """Remove a set; RtcRefused for one that is not there, the default and the active one."""
+        """Remove a set; RtcRefused if it is unknown, the default set or the active set."""
         self._set(set_id)
         if set_id in (DEFAULT, self.active_id):
             raise RtcRefused(f"configuration set {set_id!r} is in use")
         del self._sets[set_id]
 
     def activate(self, set_id: str) -> None:
-        """Let the values of a set hold from the next update on; RtcRefused if it is not there."""
+        """Make a set active from the next update on; RtcRefused if it is unknown."""
         self._set(set_id)
         self.active_id, self.changed = set_id, True
 
