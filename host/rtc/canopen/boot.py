@@ -44,12 +44,12 @@ def probe() -> Script[None]:
 def boot(
     entry: NodeEntry, file: DeviceFile, writes: Iterable[SdoEntry]
 ) -> Script[tuple[PdoLayout, ...]]:
-    """Set a node up: identity, heartbeat, values, PDOs; return the PDOs that are on.
+    """Set a node up: identity, heartbeat, values, PDOs; return the PDOs that are enabled.
 
     Raises:
-        WrongIdentity: it is another device.
-        SdoAborted: it refuses something.
-        SdoTimeout: it does not answer.
+        WrongIdentity: the node is another device.
+        SdoAborted: the node refuses an access.
+        SdoTimeout: the node does not answer.
     """
     yield from _check_identity(file)
     yield from download_number(_HEARTBEAT, 0, entry.heartbeat_ms, 2)

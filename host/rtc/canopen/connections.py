@@ -17,15 +17,15 @@ from tickrig.host.rtc.system.manager import Manager
 
 
 class PortConnections:
-    """Makes connectors as soon as both ports are there; keeps those of a component that goes.
+    """Makes connectors as soon as both ports exist; makes them again after a component returns.
 
     Args:
         manager: has the ports.
         wanted: connectors to be made.
-        notify: called with what became of each.
+        notify: called with the result of each attempt.
 
     Attributes:
-        wanted: those that have not been made.
+        wanted: connectors that have not been made.
     """
 
     def __init__(
@@ -104,12 +104,12 @@ class PdoLinks:
     """Makes PDO links when both nodes are ready: an RPDO receives the TPDO of another node.
 
     Args:
-        nodes: by node-ID.
-        links: those of the System Definition.
-        notify: called with what became of each.
+        nodes: the nodes by node-ID.
+        links: PDO links of the System Definition.
+        notify: called with the result for each link.
 
     Attributes:
-        links: all that are wanted.
+        links: all wanted links.
     """
 
     def __init__(
@@ -200,9 +200,9 @@ def find_layout(name: definition.PdoName, layouts: Iterable[PdoLayout]) -> PdoLa
 
 
 def check_lengths(link: definition.PdoLink, source: PdoLayout, target: PdoLayout) -> None:
-    """Raise ServerRefused if the frame of one is not as long as that of the other.
+    """Raise ServerRefused if the frames of the two PDOs differ in length.
 
-    Dummy bits fill up an RPDO, and nothing the TPDO of the same Booleans.
+    An RPDO of Booleans is filled up with dummy bits, but the TPDO of the same Booleans is not.
     """
     if source.size != target.size:
         raise definition.ServerRefused(

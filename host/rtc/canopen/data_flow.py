@@ -21,14 +21,14 @@ _Send = Callable[[int, bytes], None]
 
 
 class PdoDataFlow:
-    """Writes received PDOs to OutPorts, and sends what comes to InPorts.
+    """Writes received PDOs to OutPorts, and sends the values of InPorts.
 
-    Data pass while the proxy is Active; for the device not before it is Operational.
+    Data pass while the proxy is Active. Data to the device also wait until it is Operational.
 
     Args:
-        nodes: by node-ID.
-        send: takes CAN-ID and data.
-        notify: takes events.
+        nodes: the nodes by node-ID.
+        send: called with CAN-ID and data.
+        notify: called with events.
     """
 
     def __init__(self, nodes: Mapping[int, ServedNode], send: _Send, notify: Notify) -> None:
@@ -111,15 +111,15 @@ class PdoDataFlow:
 
 
 class SdoDataFlow:
-    """Reads objects for OutPorts, and writes what comes to InPorts, by SDO.
+    """Reads objects for OutPorts, and writes the values of InPorts to objects, by SDO.
 
-    While a proxy is Active and its device Operational, each port of it that has something to do
-    is transferred once a period at most: all of them in one job, and the next job begins with the
-    period after its end.
+    This happens while a proxy is Active and its device Operational. Each port with a pending
+    transfer is transferred once a period at most. One job transfers all such ports of a proxy, and
+    the next job begins in the period after the end of this job.
 
     Args:
-        nodes: by node-ID.
-        notify: takes events.
+        nodes: the nodes by node-ID.
+        notify: called with events.
     """
 
     def __init__(self, nodes: Mapping[int, ServedNode], notify: Notify) -> None:

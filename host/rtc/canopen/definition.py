@@ -15,17 +15,17 @@ from tickrig.wire.canopen.eds.object_table import Access
 from tickrig.wire.canopen.pdo import MAX_PDO_BITS, MappedObject
 from tickrig.wire.rtc_canopen import PortDirection
 
-# What RTC-CANopen raises where a person is to read it.
+# Errors of RTC-CANopen whose messages are for people.
 #
 # DefinitionError (ValueError)    a System Definition that cannot be used
-# ServerRefused (ValueError)      a command to the server that cannot be
+# ServerRefused (ValueError)      a command that the server cannot execute
 
 
 class DefinitionError(ValueError):
     """A System Definition that cannot be used.
 
     Attributes:
-        line: where, counted from 1; 0 if it is nowhere in the text.
+        line: number of the line with the error, from 1; 0 if the error is in no line of the text.
     """
 
     def __init__(self, message: str, line: int = 0) -> None:
@@ -60,7 +60,7 @@ class PdoName:
 
     Attributes:
         node: node-ID.
-        pdo: `tpdo1`.. or `rpdo1`.., as the device has it.
+        pdo: `tpdo1`.. or `rpdo1`.., from the point of view of the device.
     """
 
     node: int
@@ -91,11 +91,11 @@ class MasterEntry:
 
     Attributes:
         node: its node-ID.
-        heartbeat_ms: its producer heartbeat time, 0 for none.
-        rate_hz: of the execution context of the proxies.
-        remove_after_ms: after how long without a sign of life a proxy is removed.
-        reconnect: whether a proxy that comes back has its connections again.
-        leave: what the server leaves the nodes in: `pre_operational` or `stopped`.
+        heartbeat_ms: its producer heartbeat time, 0 for no heartbeat.
+        rate_hz: rate of the execution context of the proxies.
+        remove_after_ms: time without a frame of the node after which its proxy is removed.
+        reconnect: whether the connections of a proxy are made again when it returns.
+        leave: state in which the server leaves the nodes: `pre_operational` or `stopped`.
         sync_ms: communication cycle period, 0 for no SYNC.
     """
 
@@ -133,9 +133,9 @@ class SdoPortEntry:
     """A port whose object is read or written by SDO.
 
     Attributes:
-        index: of the object; all elements of an array are one value.
-        direction: `out` gives what is read, `in` writes.
-        type: name in Table 4; None for the one of the data type in the EDS.
+        index: index of the object; all elements of an array are one value.
+        direction: `out` if the object is read for the port, `in` if it is written from the port.
+        type: name in Table 4; None for the name that belongs to the data type in the EDS.
     """
 
     index: int
@@ -150,13 +150,13 @@ class NodeEntry:
     Attributes:
         id: node-ID.
         name: instance name of its proxy.
-        eds: file that describes it, seen from the System Definition.
-        role: what it is.
+        eds: file that describes it; its path is relative to the System Definition.
+        role: the role of the node.
         heartbeat_ms: its producer heartbeat time.
         ports: names of ports by PDO, such as `tpdo2`.
-        pdos: what is written into PDOs, by the same names.
-        restart: how often one after the other it is restarted when it was lost.
-        sdo_ports: ports beside those of PDOs, by name.
+        pdos: the parameters that are written into PDOs, also by PDO.
+        restart: how often in a row the node is restarted after it was lost.
+        sdo_ports: ports of objects that are transferred by SDO, by name.
     """
 
     id: int
@@ -175,7 +175,7 @@ class SdoEntry:
     """A value that is written while its node boots.
 
     Attributes:
-        size: bytes: 1, 2, 4 or 8.
+        size: number of bytes: 1, 2, 4 or 8.
     """
 
     node: int
@@ -209,11 +209,11 @@ class RtConnection:
 
 @dataclass(frozen=True, slots=True)
 class StartEntry:
-    """In which order nodes are activated, and whether by themselves.
+    """In which order nodes are activated, and whether this happens automatically.
 
     Attributes:
-        order: node-IDs; those that are left out follow in the order of the nodes.
-        autoactivate: activate a node when it is ready and all before it are Active.
+        order: node-IDs; nodes that are left out follow in the order of the node list.
+        autoactivate: activate a node when it is ready and all nodes before it are Active.
     """
 
     order: tuple[int, ...] = ()
@@ -262,7 +262,7 @@ class MappableObject:
 
     Attributes:
         mapped: its mapping entry.
-        name: in the EDS.
+        name: its name in the EDS.
         way: Access.TPDO, Access.RPDO or both.
     """
 
@@ -277,11 +277,11 @@ class DeviceFile:
 
     Attributes:
         identity: values of `_IDENTITY` that the file gives.
-        defaults: bytes of the power-on values that it gives; a node-ID is not added.
+        defaults: bytes of the power-on values that the file gives; the node-ID is not added.
         data_types: data type by index and sub-index.
-        pdos: communication parameters that it has.
-        relative: those of `defaults` to which a device adds its node-ID.
-        findings: what is wrong in the file, whose objects are then not used.
+        pdos: PDO communication parameters of the device.
+        relative: entries of `defaults` to which a device adds its node-ID.
+        findings: errors in the file; the objects that they concern are not used.
         mappable: objects that its PDOs may carry.
     """
 

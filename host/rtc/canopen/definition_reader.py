@@ -199,7 +199,7 @@ def read_definition(path: Path) -> definition.SystemDefinition:
 
     Raises:
         OSError: the file cannot be read.
-        DefinitionError: it cannot be used; the line says where and why.
+        DefinitionError: the definition cannot be used; the error has the line and the reason.
     """
     try:
         return parse_definition(path.read_text("utf-8"))
@@ -213,7 +213,7 @@ def parse_definition(content: str) -> definition.SystemDefinition:
     """Read a System Definition.
 
     Raises:
-        DefinitionError: what is wrong, with its line.
+        DefinitionError: the text is not a valid definition; the error has the line and the reason.
     """
     root = _compose(content)
     known = _children(root, "the file")

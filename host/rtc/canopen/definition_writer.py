@@ -48,12 +48,12 @@ _Dumper.add_representer(_Hex, _represent)
 
 
 def save_definition(definition: SystemDefinition, folder: Path, path: Path) -> None:
-    """Write a System Definition; the file is there whole or as it was.
+    """Write a System Definition; if that fails, the old file is kept unchanged.
 
     Args:
-        definition: what is written.
-        folder: where its EDS files are seen from.
-        path: the file; EDS files are seen from its folder then.
+        definition: the definition.
+        folder: folder to which the paths of its EDS files are relative now.
+        path: the file; in the file the paths of EDS files are relative to the file's folder.
 
     Raises:
         OSError: the file cannot be written.

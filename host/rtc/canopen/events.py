@@ -53,9 +53,9 @@ class ServerEvent:
     """Something that happened.
 
     Attributes:
-        at_us: on the clock of the server.
-        node: node-ID, 0 if it is of no node.
-        text: more, for people.
+        at_us: time on the clock of the server.
+        node: node-ID, 0 if the event belongs to no node.
+        text: additional text for people.
     """
 
     at_us: int

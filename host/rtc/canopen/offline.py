@@ -57,13 +57,13 @@ def _answer(step: Step, values: dict[tuple[int, int], bytes]) -> sdo.Response | 
 
 
 def check_offline(server: RtcCanopenServer) -> tuple[str, ...]:
-    """Return what will be refused on the bus, where devices are as their EDS says.
+    """Return the settings that nodes on the bus will refuse, if devices match their EDS.
 
-    It also names PDOs that several nodes send with one COB-ID; no node refuses them. A node whose
-    EDS leaves values out is not judged, nor is a component that is not there.
+    The result also names PDOs that several nodes send with one COB-ID, although no node refuses
+    them. Nodes whose EDS leaves values out are not checked, nor are components that do not exist.
 
     Args:
-        server: it gets proxies of devices that are none, and is of no other use any more.
+        server: it gets proxies without devices, and cannot be used otherwise afterwards.
     """
     layouts = dict[int, _Layouts]()
     for node_id, node in server.nodes.items():
@@ -128,7 +128,7 @@ def draw_graph(server: RtcCanopenServer) -> str:
     """Return the graph: connections through the PC, and PDO links dashed.
 
     Args:
-        server: it is of no other use any more, as after `check_offline`.
+        server: it cannot be used otherwise afterwards, as after `check_offline`.
     """
     check_offline(server)
     entries = {node.id: node for node in server.definition.nodes}

@@ -121,12 +121,12 @@ class _RestartCounter:
     """Counts the restarts of a node.
 
     Args:
-        most: restarts one after the other, 0 for none.
+        most: largest number of restarts in a row, 0 for no restarts.
 
     Attributes:
-        pending: it was lost, and nothing was done about it yet.
-        to_activate: it was Active, and is to be again once it is Inactive.
-        was_active: it was Active when it was lost.
+        pending: the node was lost, and was not restarted yet.
+        to_activate: the node was Active, and is to be activated again once it is Inactive.
+        was_active: the node was Active when it was lost.
     """
 
     def __init__(self, most: int) -> None:
@@ -187,7 +187,7 @@ class NodeOperations:
         notify: called with events.
 
     Attributes:
-        proxy: the RT component, None without.
+        proxy: the RT component; None if there is no proxy.
         nmt_state: last reported state of the device, None before the first report.
         now_us: the current time.
         resetting: whether a reset requested by the RT side is not finished.
@@ -283,10 +283,10 @@ class NodeOperations:
             proxy.contexts[0].reset_component(proxy)
 
     def begin_restart(self, *, to_start: bool = False) -> bool:
-        """Take a restart and report it; return False if none is left.
+        """Use up one restart and report it; return False if no restart is left.
 
         Args:
-            to_start: it is activated without a restart.
+            to_start: whether the node is activated without a restart.
         """
         if which := self.restart.take(self.now_us):
             self._notify(ServerEventType.RESTARTED, self._entry.id, which)

@@ -1,4 +1,4 @@
-"""Change the PDOs of a node: what is allowed, the scripts that write it, and DCF files of it.
+"""Change the PDOs of a node: allowed changes, the scripts that write them, and DCF files.
 
 >>> pdo = PdoDescription(0x190, (0x6000_0108,), relative=False)
 >>> pdo = with_entry(pdo, 1, MappedObject(0x6401, 1, 16), insert=True)
@@ -10,21 +10,26 @@ True
 
 # Theory of operation
 #
-# The editor changes a `PdoDescription` on the screen, and `rewrite_pdo` brings it into the node, in
-# the order of CiA 301: the PDO is disabled by bit 31 with its old CAN-ID, sub-index 0 of the
-# mapping becomes 0, then come the entries, their number, the parameters, and the COB-ID that
-# enables it. Then all of it is read back. If the node refuses a step, or keeps something else, the
-# old description is written in the same order.
+# The editor changes a `PdoDescription` on the screen, and `rewrite_pdo` writes it into the node in
+# the order of CiA 301:
 #
-# A node may be lost between two steps. So while a rewrite runs, the entry of the node in the
-# definition has the old description, and every boot of a node writes what its entry has: a node
-# that comes back has its old mapping (`Rewrite.begin`). Success puts the new description there,
-# so that the node has it after each boot, and a saved definition contains it.
+#   1. the PDO is disabled by bit 31, with its old CAN-ID;
+#   2. sub-index 0 of the mapping becomes 0;
+#   3. the entries, their number and the parameters are written;
+#   4. the COB-ID is written without bit 31, which enables the PDO.
 #
-# Afterwards the node is set up again by the same script as at its boot: its ports follow from its
-# PDOs, so it gets a new proxy, connections and links are restored, and a node that was Active is
+# Then all values are read back. If the node refuses a step, or keeps another value, the old
+# description is written in the same order.
+#
+# A node may be lost between two steps. Every boot of a node writes the values of its entry in the
+# definition. While a rewrite runs, this entry has the old description, so a node that returns gets
+# its old mapping (`Rewrite.begin`). After success the entry has the new description: the node gets
+# it at each boot, and a saved definition contains it.
+#
+# Afterwards the node is set up again by the same script as at its boot. Its ports follow from its
+# PDOs, so it gets a new proxy. Connections and links are restored, and a node that was Active is
 # activated. Many devices accept a mapping in Pre-operational only, so the node enters this state
-# first, as its role requires (a drive is switched off before).
+# first, in the way that its role requires (a drive is switched off before).
 
 from __future__ import annotations
 
@@ -82,10 +87,10 @@ def with_entry(
     """Return a PDO with another mapping.
 
     Args:
-        pdo: as it is.
-        place: of the entry, from 0.
-        entry: what is to be there; None removes what is there.
-        insert: move what is there back instead of replacing it.
+        pdo: the present PDO.
+        place: position of the entry, from 0.
+        entry: the new entry at this position; None removes the present entry.
+        insert: insert the entry before the present one instead of replacing it.
 
     Raises:
         ValueError: the PDO would have more than 64 bits or 64 entries.
@@ -147,7 +152,7 @@ class _PdoRefused(SdoFailed):
     """A PDO that a node did not take.
 
     Attributes:
-        restored: the node has the values of before; else its next boot writes them.
+        restored: whether the node has its previous values; if not, its next boot writes them.
     """
 
     def __init__(self, message: str, index: int, sub: int, *, restored: bool) -> None:
@@ -192,7 +197,7 @@ def _optional(index: int, sub: int, file: definition.DeviceFile) -> Script[int]:
 
 
 def _rewrite_pdos(before: Pdos, wanted: Pdos, file: definition.DeviceFile) -> Script[None]:
-    """Write PDOs and read them back; if the node refuses one, all have their old values again.
+    """Write PDOs and read them back; if the node refuses a PDO, restore the old values of all.
 
     Raises:
         _PdoRefused: the node refused something, does not answer, or keeps other values.
@@ -268,12 +273,12 @@ class Rewrite:
 
     Args:
         node: the node.
-        before: what the node has.
-        wanted: what it is to have, of some of them.
-        linked: those of them that receive the TPDO of another node: their CAN-ID is not their own.
+        before: the PDOs that the node has.
+        wanted: the new descriptions of some of these PDOs.
+        linked: PDOs that receive the TPDO of another node; their CAN-ID belongs to that TPDO.
 
     Raises:
-        ServerRefused: the node does not answer SDO requests now, or a CAN-ID is that of a link.
+        ServerRefused: the node does not answer SDO requests now, or a CAN-ID belongs to a link.
     """
 
     def __init__(
@@ -359,11 +364,11 @@ class _Table:
 
 
 def read_parameters(path: Path) -> Script[Mapping[int, bytes]]:
-    """Read all that a DCF contains of a node, by its EDS: parameters that can be written.
+    """Read all values of a node that a DCF contains: the writable parameters in its EDS.
 
     Raises:
         OSError: the EDS cannot be read.
-        EdsError: it has no object that can be used.
+        EdsError: the EDS has no usable object.
     """
     values = {}
     for row in read_sound(path)[0].entries:
@@ -376,14 +381,14 @@ def read_parameters(path: Path) -> Script[Mapping[int, bytes]]:
 def save_dcf(
     path: Path, eds: Path, node_id: int, bit_rate: int, values: Mapping[int, bytes]
 ) -> None:
-    """Write a DCF of a node; the file is there whole or as it was.
+    """Write a DCF of a node; if that fails, the old file is kept unchanged.
 
     Args:
         path: the file.
-        eds: of the node.
+        eds: EDS of the node.
         node_id: 1..127.
         bit_rate: in bit/s.
-        values: what was read of the node, by index << 8 | sub-index.
+        values: the values read from the node, by index << 8 | sub-index.
 
     Raises:
         OSError: a file cannot be read or written.
@@ -394,11 +399,11 @@ def save_dcf(
 
 
 def pdos_of_dcf(path: Path, node_id: int, file: definition.DeviceFile, there: Pdos) -> Pdos:
-    """Return those PDOs of a node that a DCF wants to be other than they are.
+    """Return the PDOs of a node that differ in a DCF, as the DCF describes them.
 
     Raises:
         OSError: the DCF cannot be read.
-        ValueError: it is of another device, or gives no values.
+        ValueError: the DCF belongs to another device, or has no values.
     """
     sheet, device = read_sheet(path)
     values = dcf_values(sheet, device, node_id)

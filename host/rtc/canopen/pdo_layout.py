@@ -1,7 +1,7 @@
 """A PDO of a device as its proxy has it (NEDO report, Fig. 109, Table 4; ours: K5).
 
-A PDO has room for one 64-bit value: those have no sequence there. INTEGER8, which RTC
-has not, is a short. UNICODE_STRING of 16 bits is a wide character. The canopen library
+A PDO has room for one 64-bit value only, so there are no sequences of 64-bit types. INTEGER8, which
+RTC does not have, is a short. UNICODE_STRING of 16 bits is a wide character. The canopen library
 reads A0h, VISIBLE_CHAR, as DOMAIN; no other DOMAIN has 8 bits.
 
 >>> PDO_FIELD_TYPES[DataType.INTEGER16, 16].decode(0xFFFE)
@@ -31,13 +31,13 @@ from tickrig.wire.rtc_types.rtc import (
 
 @dataclass(frozen=True, slots=True)
 class _PdoFieldType:
-    """How objects of a data type are seen at ports.
+    """How ports represent objects of a data type.
 
     Attributes:
-        row: of Table 4.
-        one: of a port for one object.
-        many: of a port for several, None if two do not fit into a PDO.
-        bits: of one object in a PDO.
+        row: row of Table 4.
+        one: type of a port for one object.
+        many: type of a port for several objects; None if two objects do not fit into a PDO.
+        bits: number of bits of one object in a PDO.
     """
 
     row: table_4.CanopenPortType[Any]
@@ -124,8 +124,8 @@ class _PdoField:
     """A mapped object.
 
     Attributes:
-        shift: bits before it in the PDO.
-        type: how it is seen at a port.
+        shift: number of bits before it in the PDO.
+        type: how a port represents the object.
     """
 
     mapped: MappedObject
@@ -135,14 +135,14 @@ class _PdoField:
 
 @dataclass(frozen=True)
 class PdoLayout:
-    """What a PDO carries.
+    """The content of a PDO.
 
     Attributes:
-        index: communication parameter in the device.
+        index: index of the communication parameter in the device.
         cob_id: CAN-ID.
         fields: the mapped objects, without dummies.
         bits: length of the PDO.
-        unknown: mapped objects of a type that no port has; no ports are made then.
+        unknown: mapped objects whose type no port has; if there are any, no ports are made.
     """
 
     index: int
@@ -224,9 +224,9 @@ _LETTERS: Final[Mapping[tuple[DataType, int], str]] = {
 
 
 def pdo_decoder(layout: PdoLayout) -> _PdoDecoder:
-    """Return a decoder for the layout; it takes a ninth of the time for four objects.
+    """Return a decoder for the layout; it is nine times as fast for four objects.
 
-    This holds if the objects are aligned like the fields of a C struct.
+    This speed requires that the objects are aligned like the fields of a C struct.
 
     >>> mapping = (MappedObject(0x6401, 1, 16), MappedObject(0x6401, 2, 16))
     >>> types = {(0x6401, 1): DataType.INTEGER16, (0x6401, 2): DataType.INTEGER16}

@@ -27,11 +27,11 @@ class _PortShape:
 
     Args:
         layout: the PDO.
-        name: of the port, or what those of single objects begin with.
+        name: name of the port, or the beginning of the names of ports for single objects.
 
     Attributes:
-        names: of the ports.
-        types: what each carries.
+        names: names of the ports.
+        types: the type that each port carries.
         single: whether one port has all objects as a sequence.
     """
 
@@ -57,7 +57,7 @@ class PdoSource:
 
     Attributes:
         layout: the PDO.
-        size: bytes that a frame has at least.
+        size: least number of bytes of a frame.
         ports: the OutPorts.
     """
 
@@ -83,14 +83,14 @@ class PdoSource:
 
 
 class PdoSink:
-    """An RPDO of the device: each value that comes to an InPort is one frame.
+    """An RPDO of the device: each value that arrives at an InPort is sent in one frame.
 
-    Where objects have ports of their own, the others are sent as they were last.
+    If each object has its own port, the frame has the last values of the other objects.
 
     Attributes:
         layout: the PDO.
         ports: the InPorts.
-        linked: another device sends this PDO; nothing is sent from here.
+        linked: whether another device sends this PDO; then the server does not send it.
     """
 
     def __init__(self, layout: pdo_layout.PdoLayout, name: str) -> None:
@@ -162,12 +162,12 @@ class _SdoPortLayout:
     """The objects of a port.
 
     Attributes:
-        name: of the port.
-        direction: `out` gives what is read, `in` writes.
-        index: of the object.
+        name: name of the port.
+        direction: `out` if the object is read for the port, `in` if it is written from the port.
+        index: index of the object.
         subs: sub-indices of the elements.
-        kind: type of the value, as Table 4 has it.
-        struct: what the port carries.
+        kind: type of the value, as in Table 4.
+        struct: the struct that the port carries.
     """
 
     name: str
@@ -204,7 +204,7 @@ class _SdoPortLayout:
 
 
 class SdoSource:
-    """An object of the device that an OutPort gives.
+    """An object of the device whose value goes to an OutPort.
 
     Attributes:
         layout: the object.
@@ -216,12 +216,12 @@ class SdoSource:
 
 
 class SdoSink:
-    """An object of the device that takes what comes to an InPort; only the newest counts.
+    """An object of the device that receives the newest value of an InPort.
 
     Attributes:
         layout: the object.
         port: the InPort.
-        pending: bytes that are to be written, None for nothing.
+        pending: bytes that are to be written; None if there are none.
     """
 
     def __init__(self, layout: _SdoPortLayout) -> None:
@@ -244,11 +244,11 @@ class SdoSink:
 def lay_out_sdo_ports(
     entry: NodeEntry, data_types: Mapping[tuple[int, int], int]
 ) -> tuple[tuple[_SdoPortLayout, ...], tuple[str, ...]]:
-    """Return the ports that a node is given, and why others cannot be.
+    """Return the ports of a node's SDO objects, and for all others why they cannot be made.
 
     Args:
         entry: the node.
-        data_types: of its EDS, by index and sub-index.
+        data_types: data types in its EDS, by index and sub-index.
     """
     made, refused = list[_SdoPortLayout](), list[str]()
     for name, port in entry.sdo_ports.items():
@@ -315,24 +315,24 @@ class ProxyRtc(RtComponent):
     """An ordinary RT component that represents a device.
 
     Its callbacks record requests; the server executes them on the bus after the period. on_reset
-    refuses until the device has booted again, so Error lasts until then.
+    fails until the device has booted again, so the proxy stays in Error until then.
 
     Not emulated: a CANopen node of its own on the bus (`visible_proxies` of K1).
 
     Args:
-        entry: its node.
+        entry: its node in the System Definition.
         layouts: PDOs of the device.
         sdo_layouts: objects of the device that have ports by SDO.
 
     Attributes:
-        node_id: of the device.
+        node_id: node-ID of the device.
         sources: TPDOs of the device, whose data go to OutPorts.
         sinks: RPDOs of the device, which take data from InPorts.
         sdo_sources: objects of the device whose values go to OutPorts.
         sdo_sinks: objects of the device that take values from InPorts.
-        requested: the request of the callbacks.
-        passing: true between on_activated and on_deactivated: data from the device pass.
-        confirmed: whether the device has reported Operational: then data to it pass as well.
+        requested: the request that the callbacks recorded.
+        passing: True between on_activated and on_deactivated; data from the device pass.
+        confirmed: whether the device has reported Operational; then data to the device pass, too.
         ready: whether the device can leave Error.
     """
 

@@ -18,7 +18,7 @@ _FULL_PCT: Final = 100.0
 
 
 class Joystick(RtComponent):
-    """Writes the velocity that its stick asks for, in each period.
+    """Writes the velocity that its stick commands, in each period.
 
     Attributes:
         velocity: OutPort; forward in m/s, to the left in rad/s.
@@ -82,8 +82,8 @@ class WheeledBase(RtComponent, ABC):
 
     Attributes:
         velocity: InPort; m/s, rad/s.
-        position: OutPort; the estimated position relative to that of activation.
-        pose: the same.
+        position: OutPort; the estimated position relative to the position at activation.
+        pose: the estimated position, as a pose.
         refused: number of ignored velocities.
     """
 
@@ -112,7 +112,7 @@ class WheeledBase(RtComponent, ABC):
         """Return how far the wheels of each side have turned since the last call, rad.
 
         Args:
-            since_s: how long ago that was.
+            since_s: time since the last call.
         """
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
@@ -161,10 +161,10 @@ _FASTEST_RPM: Final = 8_000
 
 
 class Beego(WheeledBase):
-    """Tells two drives their velocity in rpm of the motor, and reads their positions in counts.
+    """Sends two drives their velocity in rpm of the motor, and reads their positions in counts.
 
-    The sizes of its makers are not at hand: those in the configuration are ours, as in
-    `examples/rigs/beego.toml`.
+    The maker's dimensions of the robot are not available. The dimensions in the configuration are
+    those of `examples/rigs/beego.toml`.
 
     Attributes:
         speeds: OutPorts `left_speed`, `right_speed`, for 60FFh.
@@ -227,9 +227,9 @@ _FULL: Final = 32_767
 
 
 class FourX(WheeledBase):
-    """Steers as a tank does, in velocity mode; the pose is added up from measured speeds.
+    """Steers like a tank, in velocity mode; the pose is integrated from measured speeds.
 
-    Where no speed arrives, the last one is thought to last.
+    If no new speed arrives, the last one is used.
 
     Attributes:
         references: OutPorts `fl_reference` and so on, for 6411h:01.

@@ -24,10 +24,10 @@ def serve(
     until_us: int = NEVER,
     done: Callable[[], bool] = lambda: False,
 ) -> None:
-    """Let a server work until a time on the link's clock, or until `done()`.
+    """Run a server until a time on the link's clock, or until `done()` is true.
 
     Raises:
-        LinkClosed: the bus is gone.
+        LinkClosed: the bus is closed.
     """
     while link.now_us < until_us and not done():
         _step(server, link, until_us)
@@ -45,8 +45,8 @@ class ServerRunner:
         late_ticks: number of ticks that began more than 1 ms late.
         worst_late_us: the largest delay of a tick, us.
         after_tick: called with the time after each tick.
-        serve: called between the ticks with the time in us that it may take, at least every
-            `pause_us`; for example a control socket.
+        serve: called between the ticks, at least every `pause_us`, with the time in us that it may
+            take; it can serve a control socket, for example.
         pause_us: 20 ms; the longest time that a served client waits.
     """
 
@@ -93,7 +93,8 @@ def open_server(path: Path) -> RtcCanopenServer:
 
     Raises:
         OSError: the definition cannot be read.
-        DefinitionError: it or an EDS cannot be used; the line says where and why.
+        DefinitionError: the definition or an EDS cannot be used; the error has the line and the
+            reason.
     """
     definition = read_definition(path)
     return RtcCanopenServer(definition, read_files(definition, path.parent))
@@ -103,7 +104,7 @@ def read_files(definition: SystemDefinition, folder: Path) -> dict[str, DeviceFi
     """Read the EDS files of a definition, each once.
 
     Raises:
-        DefinitionError: one cannot be used, or has not a PDO that the definition names.
+        DefinitionError: a file cannot be used, or lacks a PDO that the definition names.
     """
     names = dict.fromkeys(node.eds for node in definition.nodes)
     files = {name: read_device_file(folder / name) for name in names}

@@ -44,24 +44,25 @@ _IDENTITY: Final = frozenset({0x1000, 0x1018})
 class DuplicateNodeDetector:
     """Monitors the frames of a node-ID, by the time stamps of the bus.
 
-    Two nodes with one node-ID show by frames that one alone cannot send:
+    Two nodes with one node-ID are detected by frames that a single node cannot send:
 
     - a boot-up, and heartbeats that continue at the previous times;
     - Operational, or Pre-operational after Stopped, without a command, twice;
     - two answers to a request for the identity, such as the serial number.
 
-    The number of frames alone shows nothing: a delayed node sends all pending frames at once. Two
-    heartbeats in each producer time are a suspicion.
+    The number of frames alone is no evidence, because a delayed node sends all pending frames at
+    once. Two heartbeats in each producer time are only a suspicion.
 
-    Not seen: nodes that send the very same frames at the very same time.
+    Not detected: nodes that send identical frames at identical times.
 
     Args:
         period_us: producer heartbeat time.
 
     Attributes:
-        sure_us: the time from which a booted node has no twin, if there was no sign of one.
-        sign: the evidence for two nodes, empty without one.
-        suspicion: the hint at two nodes, empty without one.
+        sure_us: the time from which a booted node is known to be the only one, unless there was
+            evidence for a second node before.
+        sign: the evidence for two nodes; empty if there is none.
+        suspicion: the suspicion of two nodes; empty if there is none.
     """
 
     def __init__(self, period_us: int) -> None:
@@ -102,12 +103,12 @@ class DuplicateNodeDetector:
             self.sign = f"{answer.index:04X}h:{answer.sub:02X} is {values}"
 
     def receive(self, at_us: int, state: NmtState, *, listening: bool) -> None:
-        """Take a boot-up or heartbeat.
+        """Process a boot-up or heartbeat.
 
         Args:
-            at_us: when it was on the bus.
-            state: what it says.
-            listening: whether nothing was said to the node since it booted.
+            at_us: when the frame was on the bus.
+            state: the state in the frame.
+            listening: whether nothing was sent to the node since it booted.
         """
         before, self._state = self._state, state
         if state is NmtState.INITIALISING:
@@ -229,7 +230,7 @@ class NodeServer(Protocol):
 
 
 class ServedNode:
-    """A node: detects that it comes and goes, sets it up, keeps it and its proxy in step.
+    """A node: detects when it boots or is lost, sets it up, keeps it and its proxy in step.
 
     Args:
         entry: its entry in the System Definition.
@@ -240,12 +241,12 @@ class ServedNode:
 
     Attributes:
         entry, file, writes: as given.
-        phase: how far it has come.
+        phase: the phase of its set-up.
         received_us: time of its last frame.
         lost: whether its heartbeat is late.
-        problem: why it is refused, in words.
+        problem: the reason why it is refused, as text.
         layouts: its PDOs.
-        to_start: whether it is to be activated in its turn.
+        to_start: whether it is to be activated in the start order.
         dialogue: the dialogue with the node.
         operations: its proxy, and its NMT state.
         due_us: when to call `tick` next.
@@ -299,8 +300,8 @@ class ServedNode:
     def restart(self, now_us: int) -> None:
         """Reset the node from any state, on request of a user.
 
-        Its proxy is removed; it is set up when it boots, and activated again if it was Active,
-        or lost while it was.
+        Its proxy is removed. The node is set up when it boots. It is activated again if it was
+        Active, or was lost while it was Active.
         """
         operations = self.operations
         operations.now_us = now_us

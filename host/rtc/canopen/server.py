@@ -3,25 +3,26 @@
 # Theory of operation
 #
 # A node of the System Definition is a `ServedNode`; a node that has booted has a proxy, which is an
-# ordinary RT component. Its life cycle and the NMT state of the device are kept equal (NEDO report,
-# table 3):
+# ordinary RT component. The state of the proxy and the NMT state of the device are kept equal (NEDO
+# report, table 3):
 #
-#   proxy     NMT state        the proxy asks with   from the bus it follows
-#   Inactive  Pre-operational  on_deactivated        a heartbeat that says so
-#   Active    Operational      on_activated          a heartbeat that says so
-#   Error     Stopped          on_aborting           a heartbeat that says so, and silence
+#   proxy     NMT state        requested by          on the bus it follows from
+#   Inactive  Pre-operational  on_deactivated        a heartbeat with this state
+#   Active    Operational      on_activated          a heartbeat with this state
+#   Error     Stopped          on_aborting           a heartbeat with this state, or none in time
 #
-# Both sides may move first. The callbacks of a proxy cannot wait for a bus: they record a request
-# (`ProxyRequest`), and `_carry_out` executes it on the bus after the period, as a script of SDO and
-# NMT (operations.py). A state that a heartbeat reports changes that of the proxy, unless a script
-# that changes the state of the device is running or a request is pending: then the heartbeat is
-# outdated. Error ends when the device was reset and has booted again: on_reset refuses until then
-# (`ready`).
+# Either side may change first. The callbacks of a proxy cannot wait for a bus. They record a
+# request (`ProxyRequest`), and `_carry_out` executes it on the bus after the period, as a script of
+# SDO and NMT (operations.py). A state that a heartbeat reports changes the state of the proxy. The
+# heartbeat is outdated, and ignored, while a request is pending or a script that changes the state
+# of the device is running. Error ends when the device was reset and has booted again: on_reset
+# fails until then (`ready`).
 #
-# A PDO is one port, or one port per object if their types differ; an object may be a port by SDO.
-# The values of a TPDO are written to OutPorts when the frame arrives. The values of InPorts are
-# sent at the end of the tick, one frame per value. `passing` opens the way from the device with
-# on_activated; `confirmed` opens the way to it when the script of the activation has ended.
+# A PDO has one port, or one port per object if their types differ. An object may have a port that
+# is transferred by SDO. The values of a TPDO are written to OutPorts when the frame arrives. The
+# values of InPorts are sent at the end of the tick, one frame per value. From on_activated on,
+# `passing` is true and data from the device pass. Data to the device pass when the script of the
+# activation has ended and `confirmed` is true.
 #
 # The rest relies on the order within `tick`:
 #
@@ -31,11 +32,11 @@
 #   4. requests of proxies are executed, the next node of the start order is activated;
 #   5. PDOs of InPorts, SDO transfers, SYNC and the server's own heartbeat.
 #
-# So components have the value of a TPDO in the tick in which it arrives, if a period begins in it,
-# and this tick returns their answer. `due_us` is the next due time; `wake` makes it earlier.
+# So if a period begins in the tick in which a TPDO arrives, components read its value in this tick,
+# and the tick returns their answer. `due_us` is the next due time; `wake` makes it earlier.
 #
-# A server that ticks too late (`_be_late`) does not know what the nodes sent before: it must not
-# count them as lost.
+# A server that ticks too late (`_be_late`) does not know which frames the nodes sent before, so it
+# must not count them as lost.
 
 from __future__ import annotations
 
@@ -245,14 +246,14 @@ _LATE_US: Final = 100_000
 class RtcCanopenServer:
     """Runs the nodes of a System Definition; without a clock or bus, driven by `tick`.
 
-    `tick` takes the time and the received frames, and returns the frames to send, as devices do:
-    the same server runs in virtual time on a rig and on a real bus.
+    Like the `tick` of a device, `tick` takes the time and the received frames, and returns the
+    frames to send. So the same server runs in virtual time on a rig, and on a real bus.
 
     Not emulated: flying master, TIME, program download, a CANopen node for
     each proxy on the bus.
 
     Args:
-        definition: what it manages.
+        definition: the System Definition.
         files: contents of the EDS files, by their names in the definition.
         manager: holds the proxies and all other components; by default a new one.
 
@@ -342,19 +343,19 @@ class RtcCanopenServer:
         self.due_us = self.now_us
 
     def put(self, name: str, value: Struct) -> ReturnCode:
-        """Send a value to a device past all connectors, by the full name of an InPort.
+        """Send a value to a device without a connector, by the full name of an InPort.
 
         Returns:
             BAD_PARAMETER if there is no such port or the value does not fit,
-            PRECONDITION_NOT_MET while its proxy is not Active or another device sends it.
+            PRECONDITION_NOT_MET while the proxy is not Active or another device sends the PDO.
         """
         result = self._by_sdo.put(name, value)
         return self._data.put(name, value) if result is None else result
 
     def start(self) -> None:
-        """Activate all nodes in the start order, each when those before it are Active.
+        """Activate all nodes in the start order, each when all nodes before it are Active.
 
-        A node that does not come holds up those behind it.
+        A node that does not boot delays all nodes after it.
         """
         for node in self._start_order:
             node.to_start = True

@@ -35,11 +35,11 @@ class PortView:
     """A port of a proxy.
 
     Attributes:
-        name: full name, as `Palette0.ai`.
-        data_type: name of its type, as `TimedShort`.
-        out: it gives data.
+        name: full name, such as `Palette0.ai`.
+        data_type: name of its type, such as `TimedShort`.
+        out: whether it is an OutPort.
         peers: full names of the ports that it is connected with.
-        pdo: the PDO that carries its values; None if none does.
+        pdo: the PDO that carries its values; None if no PDO does.
     """
 
     name: str
@@ -54,11 +54,11 @@ class PdoView:
     """An enabled PDO of a device.
 
     Attributes:
-        name: as `16.tpdo2`.
-        cob_id: its CAN-ID; while an RPDO is linked, that of its source.
-        bits: its length.
-        index: of its communication parameter in the device.
-        proxy_index: of the same in the proxy.
+        name: such as `16.tpdo2`.
+        cob_id: its CAN-ID; for a linked RPDO the CAN-ID of the source.
+        bits: its length in bits.
+        index: index of its communication parameter in the device.
+        proxy_index: index of this parameter in the proxy.
     """
 
     name: PdoName
@@ -73,11 +73,11 @@ class NodeView:
     """A node and its proxy.
 
     Attributes:
-        nmt_state: such as `OPERATIONAL`, empty before its first frame.
-        heartbeat_age_us: time since its last frame, `NOT_HEARD` before the first.
+        nmt_state: such as `OPERATIONAL`; empty before its first frame.
+        heartbeat_age_us: time since its last frame; `NOT_HEARD` before the first frame.
         late: whether its heartbeat is missing.
-        proxy_state: such as `ACTIVE`, empty without a proxy.
-        problem: why it is refused, empty if it is not.
+        proxy_state: such as `ACTIVE`; empty without a proxy.
+        problem: the reason why the node is refused; empty if it is not refused.
     """
 
     node_id: int
@@ -95,10 +95,10 @@ class NodeView:
 
 @dataclass(frozen=True, slots=True)
 class ComponentView:
-    """A component beside the proxies.
+    """A component that is not a proxy.
 
     Attributes:
-        state: as `ACTIVE`.
+        state: its state, such as `ACTIVE`.
     """
 
     name: str
@@ -125,12 +125,12 @@ class PendingTransfer(Generic[_T]):
     """SDO transfers with a waiting caller.
 
     Args:
-        empty: the result before the end.
+        empty: the result until the transfers have ended.
 
     Attributes:
-        done: whether they have ended.
-        data: what was read; `empty` after a write.
-        problem: why they failed, empty if they did not.
+        done: whether the transfers have ended.
+        data: the values read; `empty` after a write.
+        problem: the reason for a failure; empty if the transfers did not fail.
     """
 
     def __init__(self, empty: _T) -> None:
@@ -261,12 +261,12 @@ class ServerView:
     def write_pdos(
         self, node_id: int, before: pdo_edit.Pdos, wanted: pdo_edit.Pdos
     ) -> PendingTransfer[None]:
-        """Change PDOs of a device, and set it up again; ServerRefused if that cannot be now.
+        """Change PDOs of a device, and set it up again; ServerRefused if that is not possible now.
 
         Args:
             node_id: the node.
-            before: what it has.
-            wanted: what it is to have, of some of them.
+            before: the PDOs that the node has.
+            wanted: the new descriptions of some of these PDOs.
         """
         node, transfer = self._node(node_id), PendingTransfer(None)
         linked = {link.target.index for link in self.links if link.target.node == node_id}

@@ -128,12 +128,12 @@ def _pdo(port: rtc_canopen.PlacedPort) -> str:
 def run_builder(
     path: Path, out: Path | None, warn: Callable[[str], None], *, force: bool, every: bool
 ) -> Iterator[str]:
-    """Check a profile and write its files; yield the lines that show it.
+    """Check a profile and write its files; yield the lines that describe it.
 
     Args:
-        path: of the profile.
+        path: the file of the profile.
         out: folder for the files; nothing is written if left out.
-        warn: takes a line about a file that is kept.
+        warn: called with a line about each file that is kept.
         force: overwrite a skeleton.
         every: show every object, not only those of ports.
     """

@@ -49,7 +49,7 @@ _IMPORTED: Final = frozenset(("CanopenInPort", "CanopenOutPort", "PortTransport"
 
 
 def python_name(name: str) -> str:
-    """Return an attribute of a component; a name that is taken, or a constant, gets an underscore.
+    """Return the name of a component's attribute; a taken name or a constant gets an underscore.
 
     >>> python_name("in"), python_name("target_um")
     ('in_', 'target_um')
@@ -64,7 +64,7 @@ def c_name(name: str) -> str:
 
 
 def snake_name(name: str) -> str:
-    """Return a name in lower case, as files and constants want it.
+    """Return a name in lower case, as files and constants need it.
 
     >>> snake_name("UnsignedLongLong"), snake_name("Gripper2")
     ('unsigned_long_long', 'gripper2')
@@ -104,12 +104,12 @@ class _ProfileError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Project:
-    """What a profile says.
+    """The content of a profile.
 
     Attributes:
         profile: the component with its ports.
-        node_id: in the System Definition.
-        strict_cia301: whether NMT leads out of Error as CiA 301 has it (DECISION K9).
+        node_id: node-ID in the System Definition.
+        strict_cia301: whether NMT commands lead out of Error, as in CiA 301 (DECISION K9).
     """
 
     profile: RtcProfile
@@ -121,8 +121,8 @@ def parse_project(text: str) -> Project:
     """Read a profile.
 
     Raises:
-        _ProfileError: no TOML, an unknown key, a value of another kind, or what no
-            DeviceRTC can be.
+        _ProfileError: the file is not TOML, a key is unknown, a value has the wrong type, or no
+            DeviceRTC can have such a profile.
     """
     from tickrig.host.text.toml_reader import load_toml  # noqa: PLC0415 - a TAB needs none
 

@@ -23,8 +23,8 @@ def run_editor(
 
     Args:
         file: the definition.
-        log: where events are written, a line of JSON each.
-        components: of users' files, as `Logger0=parts.py:Logger`.
+        log: file to which events are written, a line of JSON each.
+        components: components of users' files, as `Logger0=parts.py:Logger`.
         start: activate all nodes.
         bus_options: the bus of the command line.
     """

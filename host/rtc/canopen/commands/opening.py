@@ -45,7 +45,7 @@ _NOT_HERE: Final = ("create", "delete", "save")
 
 
 class ServerControl(SystemControl):
-    """Answers requests about one server: those for a system, and those for its nodes by node-ID.
+    """Answers requests about one server: about its system, and about its nodes by node-ID.
 
     Args:
         server: the server; it must not tick during a request.
@@ -94,9 +94,10 @@ STANDARD_OUTPUT: Final = Path("-")
 
 
 def read_server(file: Path, components: Sequence[str]) -> RtcCanopenServer:
-    """Make the server of a System Definition, with components; Refused if one is not usable.
+    """Make the server of a System Definition with its components.
 
-    Findings in its EDS files that do not matter for it are printed to standard error.
+    Raises Refused if the definition or a component is not usable. Findings in EDS files that do
+    not prevent this are printed to standard error.
     """
     try:
         server = open_server(file)
@@ -110,14 +111,14 @@ def read_server(file: Path, components: Sequence[str]) -> RtcCanopenServer:
 
 
 def add_components(server: RtcCanopenServer, words: Sequence[str]) -> None:
-    """Put components of users' files beside the proxies.
+    """Add components of users' files to a server.
 
     Args:
-        server: they run at the rate of its proxies.
-        words: as `Logger0=parts.py:Logger`.
+        server: the server; the components run at the rate of its proxies.
+        words: the components, each as `Logger0=parts.py:Logger`.
 
     Raises:
-        ValueError: one cannot be.
+        ValueError: a component cannot be added.
     """
     for word in words:
         name, equals, spec = word.partition("=")
@@ -135,12 +136,12 @@ def add_components(server: RtcCanopenServer, words: Sequence[str]) -> None:
 def open_link(
     options: BusOptions, bus_state: Callable[[ErrorState], None], stack: ExitStack
 ) -> tuple[StampedLink, str]:
-    """Open the bus of a server; return it, and how people call it.
+    """Open the bus of a server; return the bus, and its name for people.
 
     Args:
-        options: which bus.
-        bus_state: called with what its CAN controller reports.
-        stack: closes it.
+        options: the options that select the bus.
+        bus_state: called with each report of the CAN controller.
+        stack: closes the bus.
     """
     bus, interface, channel = open_raw(options)
     link = CanLink(bus, f"{interface}:{channel}", drops=True)
@@ -193,13 +194,13 @@ _QUICK_US: Final = 2_000
 
 
 def run_server(file: Path, span_us: int, engines: EngineOptions, options: dict[str, Any]) -> None:
-    """Serve a System Definition; or check it, or draw it, if the options say so.
+    """Serve a System Definition, or check or draw it, depending on the options.
 
     Args:
         file: the definition.
-        span_us: how long; `NEVER` for no end.
-        engines: to join with.
-        options: the others of the command line.
+        span_us: how long to serve it, us; `NEVER` for no end.
+        engines: the engines to join with.
+        options: the other options of the command line.
     """
     server = read_server(file, options.pop("components"))
     definition = server.definition

@@ -40,8 +40,8 @@ _ObjectRow = CursorRow[Entry]
 class _NodeObjects:
     """Reads the visible objects of a node by SDO, and writes them.
 
-    Each is read once when it becomes visible, or repeatedly if the pane is live. An object that
-    could not be read is read again only on request.
+    Each object is read once when it becomes visible, or repeatedly if the pane is live. An object
+    that could not be read is read again only on request.
 
     Args:
         node_id: the node.
@@ -100,7 +100,7 @@ class _NodeObjects:
         """Write an object, and read it afterwards.
 
         Raises:
-            ValueError: no value of its type.
+            ValueError: the value does not fit the type of the object.
         """
         data = _encode_words(self._eds.texts[entry], words)
         self._writing.append((entry, view.write(self.node_id, *entry, data)))
@@ -192,7 +192,7 @@ def _encode_words(text: ObjectText, words: str) -> bytes:
 
 
 def _words_of(text: ObjectText, data: bytes) -> str:
-    r"""Return the words that `_encode_words` makes these bytes of.
+    r"""Return the words from which `_encode_words` makes these bytes.
 
     >>> _words_of(ObjectText("mode", DataType.INTEGER8), b"\xfe")
     '-2'
@@ -208,7 +208,7 @@ class ObjectsPane(CursorView[Entry]):
     """Shows the objects of one node at a time.
 
     Attributes:
-        objects: those of the node, None without one.
+        objects: the objects of the node; None if no node is shown.
     """
 
     HELP = """

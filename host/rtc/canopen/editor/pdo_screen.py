@@ -38,8 +38,8 @@ class _PdoPlace:
     """A row of the screen.
 
     Attributes:
-        index: communication parameter of the PDO.
-        entry: place in its mapping, from 0; -1 for the PDO itself.
+        index: index of the communication parameter of the PDO.
+        entry: position in its mapping, from 0; -1 for the PDO itself.
     """
 
     index: int
@@ -57,10 +57,10 @@ def _pdo_rows(
 
     Args:
         node_id: the node.
-        pdos: as the node has them.
-        wanted: those that were changed here.
-        names: of objects, by index and sub-index.
-        links: of the whole system.
+        pdos: the PDOs as the node has them.
+        wanted: the PDOs that were changed on this screen.
+        names: names of objects, by index and sub-index.
+        links: PDO links of the whole system.
     """
     rows = []
     for index, there in pdos.items():
@@ -97,15 +97,15 @@ def _pdo_line(
 
 
 class PdoScreen(ModalScreen[None]):
-    """Shows the PDOs of a node and changes them; the node has a change when it is written.
+    """Shows the PDOs of a node and changes them; changes reach the node when they are written.
 
     Args:
         session: the server.
         node_id: the node.
 
     Attributes:
-        pdos: as the node has them; empty before they were read.
-        wanted: those that were changed and are not written yet.
+        pdos: the PDOs as the node has them; empty before they were read.
+        wanted: PDOs that were changed and are not written yet.
     """
 
     BINDINGS: ClassVar[list[BindingType]] = [

@@ -24,7 +24,7 @@ AddComponents = Callable[[RtcCanopenServer], None]
 
 
 class EditorSession:
-    """Runs the server of a System Definition; another definition needs another server.
+    """Runs the server of a System Definition; each definition needs a new server.
 
     Hold `lock` to access the server.
 
@@ -36,8 +36,8 @@ class EditorSession:
         listeners: called with the events of each server.
 
     Attributes:
-        lock: of the server.
-        path: where the System Definition was last read or saved.
+        lock: protects the server.
+        path: file from which the System Definition was last read, or to which it was saved.
         server: the server.
     """
 
@@ -74,11 +74,11 @@ class EditorSession:
         return {node.id: self._folder / node.eds for node in nodes}
 
     def load(self, path: Path) -> None:
-        """Serve another definition; the nodes of this one are left first.
+        """Serve another definition, after leaving the nodes of the present one.
 
         Raises:
-            DefinitionError: it or an EDS cannot be used.
-            OSError: it cannot be read.
+            DefinitionError: the definition or an EDS cannot be used.
+            OSError: the definition cannot be read.
         """
         server = open_server(path)
         self._add_components(server)

@@ -45,8 +45,8 @@ def _system_rows(
     """Return the rows.
 
     Args:
-        system: what there is.
-        folded: keys of nodes and components that are shown without what they have.
+        system: the system to show.
+        folded: keys of nodes and components whose ports and PDOs are hidden.
         marked: key of the port or PDO that is to be connected.
     """
     sources = {link.target: link.source for link in system.links}
@@ -216,12 +216,12 @@ def remove(view: ServerView, item: Item) -> None:
 
 
 class SystemPane(CursorView[Item]):
-    """Shows a system; the cursor chooses what commands are about.
+    """Shows a system; commands apply to the row under the cursor.
 
     Attributes:
-        folded: keys of rows that are shown without what they have.
+        folded: keys of rows whose sub-rows are hidden.
         marked: the port or PDO that is to be connected.
-        node_id: the node in whose rows the cursor was last; 0 for none.
+        node_id: the node in whose rows the cursor was last; 0 for no node.
     """
 
     HELP = """
