@@ -30,7 +30,7 @@ class DeviceComponent(RtComponent, ABC, Generic[C]):
     next activation opens a new one.
 
     Attributes:
-        client: talks with the device while the component is Active.
+        client: communicates with the device while the component is Active.
     """
 
     def __init__(self, instance_name: str) -> None:

@@ -31,16 +31,16 @@ def _is_typed_to(component: object) -> TypeGuard[_TypedTo]:
 
 
 class Console:
-    """Shows what components tell, as `ConsoleOut0 5` or `PositionInput0 FINISH`.
+    """Shows the output of components, such as `ConsoleOut0 5` or `PositionInput0 FINISH`.
 
-    A line that is typed goes to each component that takes it. If none does, the console
-    prints why. A component may have the attributes `report` and `prompt`: the console sets `report`
-    to a function that shows a line, and `prompt` to one that shows it to people alone.
+    A typed line goes to each component that accepts it. If no component does, the console prints
+    the reason. A component may have the attributes `report` and `prompt`. The console sets `report`
+    to a function that shows a line, and `prompt` to one that shows a line only to people.
 
     Args:
-        manager: whose components.
+        manager: has the components.
         show: prints a line.
-        warn: prints a line that is for people alone.
+        warn: prints a line that is only for people.
 
     Attributes:
         is_open: whether more may be typed; False once the standard input ends.

@@ -83,17 +83,17 @@ complete_type: Final = _completer(lambda system: system["types"])
 
 
 def settle(socket: Path, name: str, wanted: str, wait_us: int) -> None:
-    """Return when a component is in the wanted state.
+    """Wait until a component is in the wanted state.
 
     Args:
         socket: control socket of its system.
         name: the component.
         wanted: name of a life-cycle state.
-        wait_us: how long to wait; with 0 not at all.
+        wait_us: how long to wait; 0 returns without waiting.
 
     Raises:
         Refused: the component or its system is gone.
-        click.ClickException: it went to Error instead, or needs longer.
+        click.ClickException: the component went to Error instead, or the time is over.
     """
     start_s = time.monotonic()
     while wait_us:

@@ -50,7 +50,7 @@ def run_system(lite_boot: str, **given: Any) -> None:
     """Run the system of a command line until it is stopped.
 
     Raises:
-        Refused: the command line is not possible.
+        Refused: the command line is invalid.
     """
     engines, boot_us = take_engines(given), time_us("--lite-boot", lite_boot)
     options = _SystemOptions(lite_boot_us=boot_us, engines=engines, **given)

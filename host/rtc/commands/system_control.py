@@ -58,11 +58,11 @@ class _WatchedPort:
 class Probes:
     """Watches OutPorts and injects into InPorts, each by a connector of its own.
 
-    The connectors belong to no component, so they are not in a saved system.
-    One that injects ends when what it carries was read.
+    The connectors belong to no component, so a saved system does not contain them. A connector
+    that injects a value ends when the value was read.
 
     Args:
-        manager: whose ports.
+        manager: has the ports.
     """
 
     def __init__(self, manager: Manager) -> None:
@@ -71,17 +71,17 @@ class Probes:
         self._injections: dict[AnyPort, OutPort[Any]] = {}
 
     def watch(self, name: str, since: int = 0) -> tuple[tuple[_NumberedValue, ...], int]:
-        """Watch an OutPort from the first call on, and return what it wrote.
+        """Watch an OutPort from the first call on, and return the values that it wrote.
 
         Args:
-            name: of the port, as `Manager.port` takes it.
-            since: number of the last value that is known.
+            name: name of the port, as in `Manager.port`.
+            since: number of the last value that the caller knows.
 
         Returns:
-            The values after that, 1000 at most, and the number of the latest.
+            The values after `since`, 1000 at most, and the number of the latest value.
 
         Raises:
-            RtcRefused: no such port, or no OutPort.
+            RtcRefused: there is no such port, or it is not an OutPort.
         """
         port = self._manager.port(name)
         if not isinstance(port, OutPort):
@@ -95,11 +95,11 @@ class Probes:
         """Write a value to an InPort, as a connected OutPort would, and return it.
 
         Args:
-            name: of the port, as `Manager.port` takes it.
-            given: as JSON has it; see `literal`.
+            name: name of the port, as in `Manager.port`.
+            given: the value as JSON; see `literal`.
 
         Raises:
-            RtcRefused: no such port, no InPort, or a value that does not fit.
+            RtcRefused: there is no such port, it is not an InPort, or the value does not fit.
         """
         port = self._manager.port(name)
         if not isinstance(port, InPort):
@@ -131,7 +131,7 @@ class Probes:
 
 
 class _Runner(Protocol):
-    """What runs a system: `RealTime`, or the loop of a server that has one.
+    """An object that runs a system: `RealTime`, or the loop of a server that contains the system.
 
     Attributes:
         after_tick: called with the time in us after each tick.
@@ -154,7 +154,7 @@ class _Runner(Protocol):
 
 
 class SystemControl(RequestDispatcher):
-    """Answers requests about one system; it must not tick during a request.
+    """Answers requests about one system; the system must not tick during a request.
 
     Args:
         manager: the system.

@@ -44,11 +44,11 @@ def _component_row(component: Any) -> str:
 
 
 def component_lines(component: Any, *, long: bool) -> Iterator[str]:
-    """Write what `cat` shows.
+    """Write a component as `cat` shows it.
 
     Args:
         component: its description.
-        long: connectors with their properties, and all configuration sets.
+        long: whether to show the properties of connectors, and all configuration sets.
     """
     yield f"{component['name']}  {component['state'].capitalize()}"
     yield f"  {'Path':<14}{component['path']}"
@@ -98,7 +98,7 @@ def _configuration_lines(configuration: Any, *, long: bool) -> Iterator[str]:
 
 
 def _value_line(value: Any) -> str:
-    """Write a value of a port: its time in seconds if it has one, and its data.
+    """Write a value of a port: its time in seconds, if it has a time, and its data.
 
     >>> _value_line({"tm": {"sec": 1, "nsec": 500000000}, "data": -5})
     '1.500000 -5'

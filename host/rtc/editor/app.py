@@ -37,10 +37,10 @@ class _Setting(NamedTuple):
     """A row of the details.
 
     Attributes:
-        set_id: a configuration set; empty for the parameters that hold.
-        parameter: one of its parameters; empty for the set itself.
-        value: its value.
-        peer: the other end of a connector of the port under the cursor; empty for none.
+        set_id: a configuration set; empty for the present parameter values.
+        parameter: one parameter of the set; empty for the set itself.
+        value: value of the parameter.
+        peer: the other end of a connector of the port under the cursor; empty for other rows.
     """
 
     set_id: str = ""
@@ -50,11 +50,11 @@ class _Setting(NamedTuple):
 
 
 def _detail_rows(component: Any, port: str = "") -> list[CursorRow[_Setting]]:
-    """Return what the details show of a component.
+    """Return the rows that the details show of a component.
 
     Args:
         component: its description.
-        port: full name of the port under the cursor; its connectors come first.
+        port: full name of the port under the cursor; its connectors are the first rows.
     """
     rows = list(_connector_rows(component, port)) if port else []
     configuration = component["configuration"]
@@ -105,7 +105,7 @@ class SystemScreen(FramedApp):
 
     Args:
         link: the system.
-        name: how it is called.
+        name: name of the system.
     """
 
     TITLE = "RT System Editor"
@@ -323,7 +323,7 @@ def edit_system(at: Path) -> None:
     """Show a system on the terminal until its user leaves.
 
     Raises:
-        Refused: no system answers there, or there is no terminal.
+        Refused: no system answers, or there is no terminal.
     """
     request_system(at, "status")
     if not sys.stdout.isatty():

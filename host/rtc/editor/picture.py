@@ -11,9 +11,9 @@
 
 # Theory of operation
 #
-# The picture is a grid. A box stands in a column, one further right than the boxes that feed it
+# The picture is a grid. The column of a box is one further right than the boxes that feed it
 # (`_layers`; wires that close a loop do not count). If the screen has fewer columns than there are
-# layers, the next layers begin below, at the left again. Boxes that nothing joins come last.
+# layers, the next layers begin below, at the left. Boxes without wires come last.
 #
 # Between two columns there is a channel, between two rows a street:
 #
@@ -24,24 +24,24 @@
 #   row 1           [ box ]                [ box ]
 #   street 2
 #
-# A wire has straight pieces only. It leaves its port sideways into the channel there and runs in a
-# lane of that channel: to the port at the other end, if this is at the same channel, else to a
-# street, along a track of it to the channel of the other port, and in a lane there to the port.
-# Two wires never share a piece of a lane or track, so where they meet they cross (`┼`). What makes
-# that true:
+# A wire has straight pieces only. It leaves its port sideways into the adjacent channel and runs in
+# a lane of that channel. If the other port is at the same channel, the lane ends at this port. Else
+# the lane leads to a street, a track of the street leads to the channel of the other port, and a
+# lane of that channel leads to the port. Two wires never share a piece of a lane or track, so where
+# they meet they cross (`┼`). This follows from two rules:
 #
 #   - In ports are on even lines of a box, out ports on odd ones. All boxes of a row begin on one
-#     line, so a wire that leaves a column and one that enters the next are never on one line. Boxes
-#     with ports at one side, across from a box without any, have a port on each line.
-#   - Lanes are intervals of lines, tracks are intervals of channels; both are given out so that no
-#     two intervals on one overlap (`_packed`).
+#     line, so a wire that leaves a column and one that enters the next are never on one line. If
+#     the facing box has no ports on its side, a box with ports at one side has one on each line.
+#   - A wire occupies an interval of the lines of a lane, or of the channels of a track. Lanes and
+#     tracks are assigned so that no two intervals on one lane or track overlap (`_packed`).
 #
-# The order of the steps follows from what needs what: tracks by channels (no line is needed), then
-# heights of streets, lines of rows and ports, then lanes by lines, then widths of channels and all
-# columns. Wires of one port share the piece beside the port.
+# Each step needs the results of the steps before it: first the tracks from the channels, then the
+# heights of streets, then the lines of rows and ports, then the lanes from the lines, then the
+# widths of channels and all columns. Wires of one port share the piece next to the port.
 #
-# Columns are cells of a terminal: a wide character takes two. Names come from other people's
-# systems: what a terminal would obey, and what takes no cell, is replaced before anything is
+# Columns are cells of a terminal; a wide character takes two. Names come from other people's
+# systems. So control characters and characters without a cell are replaced before names are
 # measured.
 
 from __future__ import annotations
@@ -94,7 +94,7 @@ class Picture(NamedTuple):
 
     Attributes:
         lines: text with styles.
-        places: of boxes by their names, of ports by their full names.
+        places: places of boxes by their names, and of ports by their full names.
     """
 
     lines: tuple[_Line, ...]
@@ -116,9 +116,9 @@ def draw(
 
     Args:
         boxes: components.
-        edges: connectors; an end that no box has gets a box of its own.
-        columns: cells of the screen; a picture is wider only if one column of boxes is.
-        lit: styles of boxes and ports that stand out, by name; wires of such ports do, too.
+        edges: connectors; an end that belongs to no box gets a box of its own.
+        columns: width of the screen in cells; a wider picture has a single column of boxes.
+        lit: styles of highlighted boxes and ports, by name; wires of such ports have them, too.
     """
     wires = [replace(one, source=_key(one.source), target=_key(one.target)) for one in edges]
     return _fitting(tuple(boxes), tuple(dict.fromkeys(wires)), columns).paint(lit or {})
@@ -147,11 +147,11 @@ def _fitting(boxes: tuple[Box, ...], wires: tuple[Edge, ...], columns: int) -> _
 
 
 def neighbour(places: Mapping[str, _Place], name: str, right: int, down: int) -> str:
-    """Return what is next to a box or port in a direction; itself if there is nothing.
+    """Return the next box or port in a direction; the same one if there is no other.
 
     Args:
-        places: of a picture.
-        name: of a box or port.
+        places: places of a picture.
+        name: name of a box or port.
         right: 1 for right, -1 for left, else 0.
         down: 1 for down, -1 for up, else 0.
     """
@@ -203,7 +203,7 @@ def _with_others(boxes: list[Box], wires: Sequence[Edge]) -> list[Box]:
 def _split(port: str) -> tuple[str, str]:
     """Return the component and the port of a full name, as `A0.out` or `host/A0.rtc:out`.
 
-    An engine may know no more of a port elsewhere than one name.
+    For a port of another system an engine may know only a single name.
     """
     at = max(port.rfind("."), port.rfind(":"))
     return port[: max(0, at)] or port, port[at + 1 :]
@@ -256,9 +256,9 @@ class _End:
     """One end of a wire.
 
     Attributes:
-        row, column: of its box in the grid.
-        line: of the port, from the first line of the box.
-        channel: at the side of the port.
+        row, column: position of its box in the grid.
+        line: line of the port, counted from the first line of the box.
+        channel: the channel at the side of the port.
     """
 
     row: int
@@ -268,14 +268,14 @@ class _End:
 
 
 class _Layout:
-    """Where boxes and wires are, for a number of columns of boxes.
+    """The places of boxes and wires, for a number of columns of boxes.
 
     Args:
-        boxes: with unique names.
-        wires: each between ports that boxes have.
-        count: columns of boxes.
-        gap: cells from lane to lane.
-        most: cells of the screen.
+        boxes: boxes with unique names.
+        wires: wires between ports of these boxes.
+        count: number of columns of boxes.
+        gap: number of cells from lane to lane.
+        most: width of the screen in cells.
     """
 
     def __init__(

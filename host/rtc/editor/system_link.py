@@ -19,11 +19,11 @@ _PERIOD_S: Final = 0.2
 
 @dataclass(frozen=True, slots=True)
 class _Answer:
-    """What came of a request.
+    """The result of a request.
 
     Attributes:
-        text: for people; empty if there is nothing to say.
-        refused: it was not done.
+        text: text for people; may be empty.
+        refused: whether the request was refused.
     """
 
     text: str
@@ -38,16 +38,16 @@ class _Request:
 
 
 class SystemLink:
-    """Asks a system what it is and what shall be done, in a thread of its own.
+    """Reads the state of a system and sends it requests, in a thread of its own.
 
-    The connection is made again if it breaks: the system may be started again, or another one.
+    The connection is made again if it breaks, because the system may be restarted or replaced.
 
     Args:
         socket: the control socket of the system.
 
     Attributes:
-        components: their descriptions, as they were last.
-        problem: why nothing is known now; empty while the system answers.
+        components: the latest descriptions of the components.
+        problem: the reason why the state is unknown; empty while the system answers.
     """
 
     def __init__(self, socket: Path) -> None:
@@ -62,12 +62,12 @@ class SystemLink:
     def request(
         self, do: str, then: Callable[[Object], str] | None = None, **fields: object
     ) -> None:
-        """Have something done soon; `take_answers` says what came of it.
+        """Queue a request; `take_answers` returns its result.
 
         Args:
             do: the verb of the request.
-            then: is called with the answer in the thread, and returns what people are shown.
-            fields: of the request.
+            then: called in the thread with the answer; returns the text to show.
+            fields: fields of the request.
         """
         self._requests.put(_Request(do, fields, then or (lambda answer: "")))
 

@@ -19,9 +19,9 @@ class SystemPicture(LineView):
     """Shows components as boxes and connectors as wires.
 
     Attributes:
-        at: the box or port under the cursor, by its full name; empty without boxes.
-        marked: the port that is to be connected; empty for none.
-        picture: what is shown.
+        at: full name of the box or port under the cursor; empty if there are no boxes.
+        marked: the port that is to be connected; empty if there is none.
+        picture: the picture that is shown.
     """
 
     HELP = """

@@ -20,12 +20,12 @@ _T = TypeVar("_T")
 
 
 class CursorRow(NamedTuple, Generic[_T]):
-    """A line, and what it stands for.
+    """A line, and the item that it represents.
 
     Attributes:
-        key: the same as long as it stands for the same, and that of no other row.
+        key: unique key of the item; it does not change while the item exists.
         line: the text.
-        item: what it stands for.
+        item: the represented item.
     """
 
     key: str
@@ -40,14 +40,14 @@ _MARGIN: Final = 2
 
 
 class CursorView(LineView, Generic[_T]):
-    """Shows rows; the cursor stays on what it was on while others come and go.
+    """Shows rows; the cursor stays on its item while other rows are added and removed.
 
-    What a row under the cursor ends with stands below, too, where the row is cut.
+    If the row under the cursor is cut off, its end is shown below the rows.
 
     Attributes:
         rows_shown: the rows.
         cursor: the number of the row under the cursor.
-        title: stands in the frame above.
+        title: shown in the upper border.
     """
 
     BINDINGS: ClassVar[list[BindingType]] = [
@@ -67,7 +67,7 @@ class CursorView(LineView, Generic[_T]):
         """The row under the cursor was chosen.
 
         Attributes:
-            view: whose row.
+            view: the view that has the row.
         """
 
         def __init__(self, view: CursorView[_T]) -> None:
@@ -168,11 +168,11 @@ class CursorView(LineView, Generic[_T]):
 
 
 class QuestionScreen(ModalScreen[str | None]):
-    """Asks for a line; None is no answer.
+    """Asks for a line; the result is None without an answer.
 
     Args:
         text: the question.
-        answer: what stands there to begin with.
+        answer: the initial answer.
     """
 
     BINDINGS: ClassVar[list[BindingType]] = [Binding("escape", "leave", "leave")]
@@ -205,11 +205,13 @@ class QuestionScreen(ModalScreen[str | None]):
 
 
 class ChoiceScreen(ModalScreen[_T | None]):
-    """Asks for one of several rows; what is typed leaves those that contain it; None is no answer.
+    """Asks for one of several rows; only rows that contain the typed text are shown.
+
+    The result is None without an answer.
 
     Args:
         text: the question.
-        rows: what can be chosen.
+        rows: the rows to choose from.
     """
 
     BINDINGS: ClassVar[list[BindingType]] = [

@@ -31,7 +31,7 @@ def engines_joined(
 
     Args:
         options: the engines and their settings.
-        manager: of the system; it is not running yet.
+        manager: the manager of the system; it is not running yet.
         attach: makes the calls of other threads run in the manager's thread.
         stop: ends the command, if a peer requests that.
         fixed: only the command creates and ends components, peers cannot.

@@ -23,17 +23,17 @@ _CONSTRAINTS: Final = "__constraints__"
 
 
 class ConfigurationServant:
-    """Answers for a configuration; its methods are the operations of the IDL.
+    """The servant of a configuration; its methods are the operations of the IDL.
 
-    A change is checked as a whole and takes effect in the next period. Two more sets,
-    `__widget__` and `__constraints__`, tell editors of the parameters; they cannot be changed.
+    A change is checked as a whole and takes effect in the next period. Two more sets, `__widget__`
+    and `__constraints__`, describe the parameters to editors. These sets cannot be changed.
 
     Not emulated: parameters outside of sets, services and organizations that peers add.
 
     Args:
         configuration: the configuration.
-        calls: those of the manager's thread.
-        stubs: of our IDL.
+        calls: runs calls in the manager's thread.
+        stubs: stubs of Tickrig's IDL.
     """
 
     def __init__(self, configuration: Configuration, calls: CallQueue, stubs: Stubs) -> None:

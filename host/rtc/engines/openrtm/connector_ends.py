@@ -61,10 +61,10 @@ def completed(properties: _Properties) -> _Properties:
 
 
 def agreed_endian(text: str) -> Endian:
-    """Return the first byte order of a list that is known here, little if none was named.
+    """Return the first known byte order of a list; little if the list is empty.
 
     Raises:
-        RtcRefused: none of them is known.
+        RtcRefused: no byte order of the list is known.
     """
     words = [word.strip().lower() for word in text.split(",") if word.strip()] or [Endian.LITTLE]
     known = [endian for word in words for endian in Endian if endian == word]
@@ -77,8 +77,8 @@ def _agreed(port: DataPort[Any], values: dict[str, str]) -> dict[str, str]:
     """Return the settings of a connector of a data port with a peer.
 
     Raises:
-        RtcRefused: another interface type than corba_cdr, another data type than the port's, or an
-            unknown byte order.
+        RtcRefused: the interface type is not corba_cdr, the data type is not that of the port, or
+            the byte order is unknown.
     """
     if (interface := values.get(INTERFACE, CORBA_CDR)) != CORBA_CDR:
         raise RtcRefused(f"{INTERFACE}: {interface!r} is not {CORBA_CDR}")
@@ -105,16 +105,16 @@ def offered(port: DataPort[Any]) -> dict[str, str]:
 
 @dataclass(frozen=True, slots=True)
 class ConnectorPlace:
-    """Where a connector is made.
+    """The surroundings of a connector: ORB, threads and names.
 
     Attributes:
-        orb: of this process.
-        calls: those of the manager's thread.
-        threads: call peers, for all data ports.
-        post: has a call made there before the next tick.
-        connector_id: of the connector.
-        name: of the connector, for people.
-        peer: the peer's port, for people.
+        orb: the ORB of this process.
+        calls: runs calls in the manager's thread.
+        threads: the threads that call peers, for all data ports.
+        post: schedules a call in the manager's thread before the next tick.
+        connector_id: ID of the connector.
+        name: name of the connector, for people.
+        peer: name of the peer's port, for people.
     """
 
     orb: Orb
@@ -144,27 +144,29 @@ class ConnectorEnd(ABC):
 
     @abstractmethod
     def publish(self, values: dict[str, str]) -> dict[str, str]:
-        """Serve what the peer is to call.
+        """Serve the object that the peer is to call.
 
         Args:
             values: properties of the connector.
 
         Returns:
-            Properties that lead the peer there.
+            Properties with which the peer finds the object.
 
         Raises:
-            RtcRefused: the properties cannot be.
+            RtcRefused: the properties are invalid.
         """
 
     @abstractmethod
     def join(self, values: dict[str, str]) -> ConnectorBase:
-        """Take what is to be called at the peer, who is not called yet, and join the connector.
+        """Store the object of the peer that is to be called, and join the connector.
+
+        This method does not call the peer.
 
         Args:
-            values: properties of the connector, with those of the peer.
+            values: properties of the connector, including those of the peer.
 
         Raises:
-            RtcRefused: they cannot be.
+            RtcRefused: the properties are invalid.
         """
 
     def close(self) -> None:
@@ -185,13 +187,13 @@ class ConnectorEnd(ABC):
         return self._place.orb.text(self._served[-1])
 
     def reference(self, ior: str, kind: Any) -> Reference:
-        """Return the reference that an IOR stands for, as one of an interface.
+        """Return the reference in an IOR, narrowed to an interface.
 
-        The peer is not asked whether it has this interface: it says so in the IOR, and who lies
-        answers its first call with an error.
+        No request asks the peer whether it has this interface. The IOR names the interface; if that
+        is wrong, the first call ends with an error.
 
         Raises:
-            RtcRefused: it is no reference.
+            RtcRefused: the text is not a reference.
         """
         try:
             found = self._place.orb.reference(ior)
@@ -241,8 +243,8 @@ class InPortClient:
     """Puts values into the InPort of a peer (OpenRTM-aist, InPortCorbaCdrConsumer).
 
     Args:
-        reference: of an InPortCdr.
-        peer: its port, for people.
+        reference: reference of an InPortCdr.
+        peer: name of the peer's port, for people.
     """
 
     def __init__(self, reference: Reference, peer: str) -> None:
@@ -264,8 +266,8 @@ class _OutPortClient:
     """Gets values from the OutPort of a peer (OpenRTM-aist, OutPortCorbaCdrConsumer).
 
     Args:
-        reference: of an OutPortCdr.
-        peer: its port, for people.
+        reference: reference of an OutPortCdr.
+        peer: name of the peer's port, for people.
     """
 
     def __init__(self, reference: Reference, peer: str) -> None:
@@ -338,14 +340,14 @@ _OUTPORT_IOR: Final = "dataport.corba_cdr.outport_ior"
 
 
 class DataEnd(ConnectorEnd):
-    """The end of a data connector.
+    """The local end of a data connector.
 
-    Who is called by the peer publishes: an InPort that is pushed into, an OutPort that is
-    pulled from. Who calls subscribes.
+    An end that the peer calls publishes: an InPort into which the peer pushes, or an OutPort from
+    which the peer pulls. An end that calls the peer subscribes.
 
     Args:
-        place: where it is.
-        port: of ours.
+        place: the surroundings of the connector.
+        port: the local port.
     """
 
     def __init__(self, place: ConnectorPlace, port: InPort[Any] | OutPort[Any]) -> None:
@@ -400,17 +402,16 @@ _OPERATIONS: Final[Mapping[str, tuple[str, ...]]] = {"RefHard": ("Go", "Stop")}
 
 
 class ServiceEnd(ConnectorEnd):
-    """The end of a connector of service ports.
+    """The local end of a connector of service ports.
 
-    A call of a peer is carried out in the manager's thread. A call of ours returns at once and
-    is made in the thread of the peer; one that has no answer is a line in the log and not
-    made again.
+    A call from a peer is executed in the manager's thread. A call to a peer returns at once and is
+    made in the thread of the peer. A call without an answer is logged and not repeated.
 
-    Not there: interfaces whose operations have arguments or results.
+    Not emulated: interfaces whose operations have arguments or results.
 
     Args:
-        place: where it is.
-        port: of ours.
+        place: the surroundings of the connector.
+        port: the local port.
     """
 
     def __init__(self, place: ConnectorPlace, port: ServicePort) -> None:

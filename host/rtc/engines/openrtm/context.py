@@ -30,16 +30,16 @@ class _Entry:
 
 
 class ServantReferences:
-    """The components and execution contexts that peers can call, by reference and back.
+    """The components and execution contexts that peers can call, and their references.
 
-    What is entered and removed is so in the manager's thread; any thread looks things up.
+    Entries are added and removed in the manager's thread. Any thread may look them up.
 
     Args:
         orb: serves them.
-        stubs: of our IDL.
-        calls: those of the manager's thread.
-        fixed: components come and go as their process decides: peers neither create nor end
-            any, nor move one to another execution context.
+        stubs: stubs of Tickrig's IDL.
+        calls: runs calls in the manager's thread.
+        fixed: whether only this process creates and ends components; peers cannot do so, and
+            cannot move a component to another execution context.
     """
 
     def __init__(self, orb: Orb, stubs: Stubs, calls: CallQueue, *, fixed: bool = False) -> None:
@@ -230,22 +230,23 @@ def move(
     request: Request,
     timeout_us: int = CALL_TIMEOUT_US,
 ) -> ReturnCode:
-    """Ask for a move and wait for its end; in any thread but that of the manager.
+    """Request a move and wait for its end; in any thread but that of the manager.
 
     Args:
-        calls: those of the manager's thread.
+        calls: runs calls in the manager's thread.
         context: the execution context.
-        component: which takes part in it.
+        component: a participant of the context.
         request: `ExecutionContext.activate_component`, `deactivate_component` or
             `reset_component`.
         timeout_us: how long to wait, first for the manager's thread, then for the end.
 
     Returns:
-        What the request gives if it is refused; RTC_OK if the component is where it was to go
-        to; RTC_ERROR if the callback failed, or it went elsewhere, or is not there in time.
+        The result of the request if it is refused; RTC_OK if the component is in the requested
+        state; RTC_ERROR if the callback failed, the component went to another state, or did not
+        reach the requested state in time.
 
     Raises:
-        TimeoutError: the manager's thread had no time; then nothing was asked for.
+        TimeoutError: the manager's thread had no time; then the move was not requested.
         RtcRefused: the system has ended.
     """
     wanted, future = _WANTED[request], Future[ReturnCode]()
@@ -284,8 +285,8 @@ class ExecutionContextServant:
 
     Args:
         context: the execution context.
-        owner: the component with which it ends, if there is one.
-        references: of the components.
+        owner: the component with which the context ends, if there is one.
+        references: references of the components.
     """
 
     def __init__(

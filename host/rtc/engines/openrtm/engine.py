@@ -11,23 +11,26 @@
 #                         executes it between two ticks. A call that takes too long is TIMEOUT.
 #   the manager's thread  ticks, and serves those calls while it waits. It never calls a peer.
 #   threads for peers     make all calls into peers (system/peer_thread.py): `submit` returns at
-#                         once. A peer that hangs delays only itself, for the 1 s of a CORBA call.
+#                         once. A peer that hangs delays only its own calls, for the 1 s of a CORBA
+#                         call.
 #
-# The exception is connecting: `notify_connect` is a call that goes from port to port and comes back
-# with what each added. A thread of the ORB makes it without holding a lock, because the peer may
-# call back before it answers. So a connector takes two steps: `reserve` checks it and serves the
-# objects for the peer; `keep` joins it with the peer's answer. If a step fails, `drop` reverts the
-# first one and notifies the peer.
+# Connecting is an exception: `notify_connect` is passed from port to port, and returns the
+# properties that each port added. A thread of the ORB makes this call without holding a lock,
+# because the peer may call back before it answers. So a connector is made in two steps: `reserve`
+# checks it and serves the objects for the peer; `keep` joins it with the peer's answer. If a step
+# fails, `drop` reverts the first step and notifies the peer.
 #
 # The first port in the list connects the other one and notifies it of the end. Two local ports are
 # recognized by their object keys and joined directly, without CORBA.
 #
-# Data are bytes of CDR (`InPortCdr`, `OutPortCdr`): encoded in the manager's thread when a port is
-# written, decoded in the thread of the ORB in which they come. They do not wake the manager: no
-# code reads them before the next tick, at whose beginning `Arrivals` delivers them.
+# Data are bytes of CDR (`InPortCdr`, `OutPortCdr`). They are encoded in the manager's thread when a
+# port is written, and decoded in the thread of the ORB that receives them. Received data do not
+# wake the manager, because no code reads them before the next tick. `Arrivals` delivers them at the
+# beginning of that tick.
 #
-# Stubs are compiled from our IDL files (stubs.py), so an installation without omniORB has all but
-# this room. An ORB is one in a process: what this engine opened it closes, in the reverse order.
+# Stubs are compiled from Tickrig's IDL files (stubs.py), so an installation without omniORB lacks
+# only this engine. A process has one ORB at most: the engine closes all that it opened, in the
+# reverse order.
 
 from __future__ import annotations
 
@@ -58,20 +61,20 @@ class _Served:
 
 
 class _OpenRtmEngine:
-    """Makes the components of a manager known to a name server, and answers for them.
+    """Registers the components of a manager with a name server, and serves them to peers.
 
-    To be made and closed in the manager's thread.
+    Create and close the engine in the manager's thread.
 
     Args:
-        options: where, and under which names.
+        options: addresses and names.
         rtcs: the manager.
-        calls: of its thread.
-        stop: ends the process in its own way, where a peer asks for that.
-        fixed: peers neither create nor end components.
+        calls: runs calls in its thread.
+        stop: called to end the process if a peer requests that.
+        fixed: whether peers cannot create or end components.
 
     Raises:
-        OrbFailed: there can be no ORB at that address.
-        RtcRefused: the stubs cannot be made, or a remote component has a path that leads nowhere.
+        OrbFailed: no ORB can be made at that address.
+        RtcRefused: the stubs cannot be made, or the path of a remote component is invalid.
     """
 
     def __init__(

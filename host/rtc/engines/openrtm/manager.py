@@ -30,16 +30,16 @@ _RATE: Final = "exec_cxt.periodic.rate"
 
 
 class ManagerServant:
-    """Answers for a manager; its methods are the operations of the IDL.
+    """The servant of a manager; its methods are the operations of the IDL.
 
-    It creates and deletes components of the types that its process knows, and ends the
-    process. It loads no modules, knows no other managers and has no settings to change:
-    UNSUPPORTED, and empty lists.
+    It creates and deletes components of the types that its process knows, and ends the process.
+    Operations on modules, other managers and settings are not supported: they return UNSUPPORTED
+    or empty lists.
 
     Args:
         manager: the manager.
-        references: of components.
-        stop: ends the process in its own way.
+        references: references of components.
+        stop: called to end the process.
     """
 
     def __init__(

@@ -31,8 +31,8 @@ class NameServer:
     again; both events are logged.
 
     Args:
-        orb: of this process.
-        address: of the name server.
+        orb: the ORB of this process.
+        address: address of the name server.
         renew_us: interval at which all names are bound.
         look_us: retry interval while it does not answer.
 
@@ -52,11 +52,11 @@ class NameServer:
         self._thread.submit(self._look)
 
     def bind(self, path: str, reference: Reference) -> None:
-        """Bind a name to an object, from now on; another object with this name loses it.
+        """Bind a name to an object, and keep it bound; another object with this name loses it.
 
         Args:
             path: such as `robot.host_cxt/ConsoleIn0.rtc`.
-            reference: of the object.
+            reference: reference of the object.
         """
         with self._lock:
             self._bound[path] = reference

@@ -51,18 +51,18 @@ class _OrbFailed(RuntimeError):  # noqa: N818 - what an ORB did
 
 
 class Orb:
-    """The ORB; omniORB knows one in a process, and another one only after this was closed.
+    """The ORB; a process can have one ORB of omniORB, and another one after this was closed.
 
-    A call into a peer that gives no answer ends after 1 s with `CORBA.TRANSIENT`.
+    A call into a peer that does not answer ends after 1 s with `CORBA.TRANSIENT`.
 
     Args:
-        endpoint: where it listens.
+        endpoint: address at which it listens.
 
     Attributes:
         endpoint: as given.
 
     Raises:
-        OrbFailed: it cannot listen there.
+        OrbFailed: it cannot listen at this address.
     """
 
     def __init__(self, endpoint: Endpoint | None = None) -> None:
@@ -90,7 +90,7 @@ class Orb:
                 with a line in the log.
 
         Returns:
-            Its reference; the same calls in this process take no socket.
+            Its reference; calls through it within this process use no socket.
         """
         return self._poa.id_to_reference(self._poa.activate_object(_servant(skeleton, answers)))
 
@@ -118,7 +118,7 @@ class Orb:
         """Return the reference for an IOR or a corbaloc; this sends no request.
 
         Raises:
-            ValueError: it is neither.
+            ValueError: the text is neither an IOR nor a corbaloc.
         """
         try:
             return self._orb.string_to_object(text)
@@ -131,10 +131,10 @@ class Orb:
         return ior
 
     def close(self) -> None:
-        """Answer the calls that run, refuse all others, and free the port.
+        """Answer the running calls, refuse all others, and free the port.
 
-        omniORB repeats a call for as long as the peer closes the connection in place of an
-        answer. Such a call does not end; then the ORB is left as it is, with a line in the log.
+        If a peer closes the connection instead of answering, omniORB repeats the call, and such a
+        call may not end. Then the ORB is not closed, and a line is logged.
         """
         for poa, name in self._named:  # they would outlive this ORB
             poa.deactivate_object(name)
@@ -164,8 +164,8 @@ def _serves() -> bool:
 def nvlist(values: Mapping[str, str]) -> list[Any]:
     """Return an NVList of strings.
 
-    What a string of CORBA cannot carry becomes U+FFFD, with a line in the log: the ORB would
-    refuse the whole answer behind the servant, where nothing can be logged.
+    Characters that a CORBA string cannot carry become U+FFFD, and a line is logged. Otherwise the
+    ORB would refuse the whole answer after the servant returned, where nothing can be logged.
     """
     name_value = stubs().sdo.NameValue
     return [

@@ -36,16 +36,17 @@ _USUAL: Final = {
 class Peers:
     """Maintains the connectors of a system with components that run elsewhere.
 
-    Each is checked once a second, in its own thread. One that cannot be made is tried again; one
-    whose peer restarted is made again. One that was ended while the peer ran is not made again.
+    Each connector is checked once a second, in its own thread. A connector that cannot be made is
+    tried again. A connector whose peer restarted is made again. A connector that was ended while
+    the peer ran is not made again.
 
     Args:
-        ports: of the system.
-        manager: of the system; its `remotes` list the wanted connectors.
-        look_us: interval at which each is checked.
+        ports: ports of the system.
+        manager: manager of the system; its `remotes` list the wanted connectors.
+        look_us: interval at which each connector is checked.
 
     Raises:
-        RtcRefused: a path that names no port.
+        RtcRefused: a path names no port.
     """
 
     def __init__(self, ports: SystemPorts, manager: Manager, look_us: int = _LOOK_US) -> None:
@@ -64,7 +65,7 @@ class _Kept:
     """A connector that is kept.
 
     Attributes:
-        name: of the connector.
+        name: name of the connector.
     """
 
     def __init__(self, wanted: RemoteConnection, ports: SystemPorts, manager: Manager) -> None:
@@ -160,13 +161,13 @@ def refuse_wrong_paths(manager: Manager) -> None:
 
 
 def parse_path(path: str) -> tuple[Endpoint, str]:
-    """Read a path as rtshell writes it: a name server, then the name in it.
+    """Read a path as rtshell writes it: a name server, then a name in this server.
 
     >>> parse_path("localhost:2809/robot.host_cxt/Joystick0.rtc")
     (Endpoint(host='localhost', port=2809), 'robot.host_cxt/Joystick0.rtc')
 
     Raises:
-        RtcRefused: it is not like that.
+        RtcRefused: the text is not such a path.
     """
     server, _, name = path.lstrip("/").partition("/")
     if not name or not all(name.split("/")):

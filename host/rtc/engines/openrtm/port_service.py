@@ -37,7 +37,7 @@ class _PortSystem(Protocol):
     """The ports of the same system, and its ORB.
 
     Attributes:
-        threads: call peers, for all data ports.
+        threads: the threads that call peers, for all data ports.
         arrivals: received values, until the next tick.
         ending: connectors that have ended, by ID, until their peers are notified.
     """
@@ -71,14 +71,14 @@ class _PeerConnection:
     """A connector of a local port with a port of a peer.
 
     Attributes:
-        connector_id: of the connector.
+        connector_id: ID of the connector.
         place: position of the local port in the list of ports.
         peer: the peer's port.
         peer_name: its name, for messages.
         end: the local end.
         additions: properties for the peer.
         profile: as peers and tools see it; None until it is joined.
-        peer_knows: whether the peer knows that it ends, or need not know.
+        peer_knows: whether the peer knows that the connector ends, or need not know.
     """
 
     def __init__(
@@ -105,11 +105,11 @@ class _PeerConnection:
 
 
 class _PeerConnections:
-    """What joins a port of ours with peers.
+    """The connectors of a local port with peers.
 
     Args:
-        port: of ours.
-        system: its own.
+        port: the local port.
+        system: all ports of its system.
     """
 
     def __init__(self, port: AnyPort, system: _PortSystem) -> None:
@@ -121,18 +121,19 @@ class _PeerConnections:
     def reserve(
         self, profile: _Profile, values: dict[str, str], peer_name: str
     ) -> _PeerConnection | None:
-        """Begin a connector: check it, and serve what the peer is to call.
+        """Begin a connector: check it, and serve the object that the peer is to call.
 
         Args:
-            profile: of the connector.
+            profile: profile of the connector.
             values: its properties.
-            peer_name: how the other port is called, for people.
+            peer_name: name of the other port, for people.
 
         Returns:
-            What is still to be joined, or None if both ports are ours: then it is done.
+            The connection that is still to be joined; None if both ports are local, because these
+            are joined at once.
 
         Raises:
-            RtcRefused: it cannot be.
+            RtcRefused: the connector cannot be made.
         """
         place, other = self._place(profile)
         peer = profile.ports[1 - place]
@@ -160,12 +161,12 @@ class _PeerConnections:
         """Complete a reserved connector.
 
         Args:
-            connection: what `reserve` returned.
+            connection: the result of `reserve`.
             profile: as returned by the peer.
             values: its properties.
 
         Raises:
-            RtcRefused: it is not possible, or the port is gone.
+            RtcRefused: this is not possible, or the port no longer exists.
         """
         if self._closed or self._by_id.get(connection.connector_id) is not connection:
             message = f"{self._port.full_name} has ended"
@@ -187,9 +188,9 @@ class _PeerConnections:
             self._end(connection)
 
     def look(self, connector_id: str) -> tuple[_PeerConnection | None, bool]:
-        """Return the connector with this ID, and whether there is one, or was a moment ago.
+        """Return the connector with this ID, and whether it exists or has just ended.
 
-        From now on its peer need not be notified of the end.
+        After this call its peer need not be notified of the end.
         """
         if (connection := self._by_id.get(connector_id)) is not None:
             connection.peer_knows = True
@@ -277,7 +278,7 @@ class _PortAnswers:
     Args:
         port: the local port.
         connections: its connectors with peers.
-        calls: those of the manager's thread.
+        calls: runs calls in the manager's thread.
         describe: returns the PortProfile, in the manager's thread.
     """
 
@@ -408,9 +409,10 @@ def _code(code: ReturnCode) -> Any:
 
 
 def _peer_name(profile: _Profile, our_name: str) -> str:
-    """Return the name of the peer's port: tools name a connector after both, `A0.out_B0.in`.
+    """Return the name of the peer's port.
 
-    For a connector without a name the peer is asked, unless it is the one that calls.
+    Tools name a connector after both ports, such as `A0.out_B0.in`. If the connector has no such
+    name, this function calls the peer for it, unless the peer is the present caller.
     """
     if rest := _line(profile.name.removeprefix(our_name).removesuffix(our_name).strip("_")):
         return rest
@@ -437,18 +439,18 @@ class SystemPorts:
     """All ports of a system that peers see.
 
     Args:
-        orb: of this process.
-        calls: those of the manager's thread.
-        manager: of the system.
+        orb: the ORB of this process.
+        calls: runs calls in the manager's thread.
+        manager: manager of the system.
 
     Attributes:
         orb: as given.
         calls: as given.
         references: the PortService of each port.
         ending: connectors that have ended, by ID, until their peers are notified.
-        components: those that are served.
+        components: the served components.
         arrivals: values from peers, until the next tick.
-        threads: call peers, for all data ports.
+        threads: the threads that call peers, for all data ports.
     """
 
     def __init__(self, orb: Orb, calls: CallQueue, manager: Manager) -> None:
@@ -521,7 +523,7 @@ class ComponentPorts:
 
     Args:
         system: all ports of the system.
-        component: of ours.
+        component: the local component.
         owner: its RTObject.
     """
 

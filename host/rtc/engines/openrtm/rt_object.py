@@ -26,15 +26,15 @@ class _Ports(Protocol):
 
 
 class RtObjectServant:
-    """Answers for a component; its methods are the operations of the IDL.
+    """The servant of a component; its methods are the operations of the IDL.
 
-    Not emulated: organizations and composite components (lists of them are empty), and
-    services that peers bring along.
+    Not emulated: organizations and composite components (lists of them are empty), and services
+    that peers add.
 
     Args:
         component: the component.
-        manager: has it.
-        references: of components.
+        manager: its manager.
+        references: references of components.
 
     Attributes:
         ports: its ports, once they are served.

@@ -33,19 +33,19 @@ _MODULES: Final = ("SDOPackage", "RTC", "OpenRTM", "RTM", "_GlobalIDL")
 
 
 class Stubs:
-    """The modules of our IDL as omniORB's Python mapping has them.
+    """The modules of Tickrig's IDL in omniORB's Python mapping.
 
-    Their names are known at run time only, so their type is `Any`.
+    Their names are known only at run time, so their type is `Any`.
 
     Args:
-        modules: by name, those of skeletons (`RTC__POA`) too.
+        modules: the modules by name, including those of skeletons (`RTC__POA`).
 
     Attributes:
         sdo: `SDOPackage`.
         rtc: `RTC`.
         openrtm: `OpenRTM`, of the component and of data ports.
         rtm: `RTM`, of the manager.
-        services: what stands in no IDL module: `RefHard`.
+        services: definitions outside of IDL modules: `RefHard`.
     """
 
     def __init__(self, modules: dict[str, Any]) -> None:
@@ -55,10 +55,10 @@ class Stubs:
         )
 
     def skeleton(self, interface: str) -> type:
-        """Return the class that `Orb.serve` wants for an interface.
+        """Return the skeleton class of an interface, for `Orb.serve`.
 
         Args:
-            interface: such as `RTC.PortService`; without a module such as `RefHard`.
+            interface: such as `RTC.PortService`, or `RefHard`, which is in no module.
         """
         module, _, name = interface.rpartition(".")
         found: type = getattr(self._modules[f"{module or '_GlobalIDL'}__POA"], name)
@@ -70,7 +70,7 @@ def stubs() -> Stubs:
     """Import the stubs; the first time on a machine they are compiled, which takes 0.5 s.
 
     Raises:
-        RtcRefused: no omniORB here, or the stubs cannot be made.
+        RtcRefused: omniORB is not installed, or the stubs cannot be made.
     """
     try:
         import omniORB  # noqa: PLC0415 - an extra
@@ -90,12 +90,12 @@ def compile_idl(files: Iterable[Path], folder: Path, package: str = _PACKAGE) ->
     """Write stubs into a folder.
 
     Args:
-        files: in IDL; what they include is found beside ours.
-        folder: where the package comes to be.
-        package: below which the modules are.
+        files: IDL files; the files that they include are in the folder of Tickrig's IDL.
+        folder: folder for the package.
+        package: package that contains the modules.
 
     Raises:
-        RtcRefused: omniidl is not there, or says what is wrong.
+        RtcRefused: omniidl is not installed, or reports an error.
         OSError: the folder cannot be written.
     """
     options = ["-bpython", f"-C{folder}", f"-Wbpackage={package}", f"-I{IDL}", *_preprocessor()]
@@ -133,10 +133,10 @@ def _key(files: list[Path], version: str) -> str:
 
 
 def _compiled(files: list[Path], cached: Path) -> Path:
-    """Return the folder with new stubs: the cached one, or where that cannot be written, another.
+    """Return the folder with new stubs: the cached one, or another if that cannot be written.
 
-    They come to be in a folder of their own, which then gets its name: two processes at once do
-    not meet, and who is faster makes it for both.
+    The stubs are written into a temporary folder, which is then renamed. So two processes can do
+    this at the same time: both use the folder of the faster one.
     """
     try:
         cached.parent.mkdir(parents=True, exist_ok=True)
