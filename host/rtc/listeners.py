@@ -20,7 +20,7 @@ def call_listeners(
     Args:
         who: owner of the listeners, for messages.
         listeners: called in their order; a listener may add or remove listeners.
-        args: of each call.
+        args: positional arguments of each call.
         kwargs: keyword arguments of each call.
     """
     for listener in tuple(listeners):

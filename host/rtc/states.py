@@ -11,15 +11,15 @@ MIN_RATE_HZ: Final = 1e-6
 
 
 class ReturnCode(IntEnum):
-    """What an operation or a callback returns (ReturnCode_t).
+    """The result of an operation or a callback (ReturnCode_t).
 
     Attributes:
-        RTC_OK: it was done.
-        RTC_ERROR: it went wrong.
-        BAD_PARAMETER: an argument is not possible.
-        UNSUPPORTED: there is no such operation here.
+        RTC_OK: the operation succeeded.
+        RTC_ERROR: the operation failed.
+        BAD_PARAMETER: an argument is invalid.
+        UNSUPPORTED: the operation is not supported.
         OUT_OF_RESOURCES: there is no more room.
-        PRECONDITION_NOT_MET: not in this state.
+        PRECONDITION_NOT_MET: the operation is not allowed in the present state.
     """
 
     RTC_OK = 0
@@ -48,10 +48,10 @@ class ExecutionKind(IntEnum):
 
 
 class RtcRefused(ValueError):  # noqa: N818 - what the model did
-    """An operation on components, ports or connectors that cannot be.
+    """An operation on components, ports or connectors is not possible.
 
     Attributes:
-        code: what OMG RTC returns for it.
+        code: the return code of OMG RTC for this case.
     """
 
     def __init__(self, message: str, code: ReturnCode = ReturnCode.BAD_PARAMETER) -> None:
@@ -60,7 +60,7 @@ class RtcRefused(ValueError):  # noqa: N818 - what the model did
 
 
 class PortStatus(IntEnum):
-    """Result of a write (OpenRTM-aist 1.x, DataPortStatus); what cannot come is left out.
+    """Result of a write (OpenRTM-aist 1.x, DataPortStatus), without codes that never occur here.
 
     Only ports that are joined with those of peers give PORT_ERROR, BUFFER_EMPTY and
     CONNECTION_LOST.

@@ -36,16 +36,16 @@ class PeerState(StrEnum):
 
 
 class PeerWatch:
-    """Notes how each call into a peer ended; a peer that goes or comes back is logged in a line.
+    """Records how each call into a peer ended; logs a line when a peer is lost or returns.
 
-    One thread notes, any thread looks.
+    One thread records; any thread may read.
 
     Args:
         who: the connector, for people.
 
     Attributes:
-        state: of the peer.
-        status: what the latest call gave; CONNECTION_LOST without an answer.
+        state: state of the peer.
+        status: status of the latest call; CONNECTION_LOST without an answer.
     """
 
     def __init__(self, who: str) -> None:
@@ -77,11 +77,11 @@ _SEND_LENGTH: Final = "64"
 
 @dataclass(frozen=True, slots=True)
 class Codec(Generic[T, P]):
-    """How values of a port pass to a peer and back: as bytes, or as messages of an engine.
+    """Converts values of a port to the form that a peer gets: bytes, or messages of an engine.
 
     Attributes:
-        encode: makes what passes of a value; ValueError if that cannot be.
-        decode: makes a value of what passed; ValueError if it is none.
+        encode: converts a value to this form; ValueError if that is not possible.
+        decode: converts this form to a value; ValueError if it is not a value.
     """
 
     encode: Callable[[T], P]
@@ -95,11 +95,11 @@ def cdr(data_type: type[T], endian: Endian = Endian.LITTLE) -> Codec[T, bytes]:
 
 @dataclass(frozen=True, slots=True)
 class PeerEnd:
-    """What is agreed about a connector with a peer.
+    """The settings of a connector on which both peers agree.
 
     Attributes:
-        port: how the peer's port is called, such as `other/ConsoleOut0.rtc:in`.
-        connector_id: unique here.
+        port: name of the peer's port, such as `other/ConsoleOut0.rtc:in`.
+        connector_id: unique in this system.
         properties: `dataport.*`, as `ConnectorOptions.parse` takes them; others are kept.
         name: for people; the ID if left out.
     """
@@ -120,10 +120,10 @@ class PeerEnd:
         return connector.ConnectorOptions.parse(self.properties)
 
     def profile(self, port: DataPort[Any]) -> ConnectorProfile:
-        """Return how the connector with a port of ours is described.
+        """Return the profile of the connector with a local port.
 
         Raises:
-            RtcRefused: the port has a connector of this ID.
+            RtcRefused: the port has a connector with this ID.
         """
         refuse_known_id(port, self.connector_id)
         data_type = {"dataport.data_type": port.data_type.idl_id()}
@@ -158,9 +158,9 @@ class _LockedBuffer(RingBuffer[P]):
 
 
 class _ArrivalBuffer(RingBuffer[P]):
-    """A ring buffer whose values come from other threads: they wait until they are let in.
+    """A ring buffer whose values come from other threads and wait until they are admitted.
 
-    What waits counts as if it were in the buffer; so the status of a value is known at once.
+    Waiting values count as if they were in the buffer, so the status of a value is known at once.
     """
 
     __slots__ = ("_arrived", "_lock")
@@ -173,7 +173,7 @@ class _ArrivalBuffer(RingBuffer[P]):
         """Take a value, in any thread.
 
         Returns:
-            What `write` would return, and whether it is the first that waits.
+            The status that `write` would return, and whether the value is the first that waits.
         """
         options = self._options
         with self._lock:
@@ -196,11 +196,11 @@ class _SendBuffer(RingBuffer[P]):
     """A ring buffer that one thread fills and another one empties.
 
     Args:
-        options: its length, and what is lost when it is full.
-        wake: called when there is something to take; `take` is called until it gives nothing.
+        options: its length, and which values are lost when it is full.
+        wake: called when there are values to take; then `take` is called until the buffer is empty.
 
     Attributes:
-        dropped: how many values were lost because it was full.
+        dropped: number of values that were lost because the buffer was full.
     """
 
     __slots__ = ("_lock", "_wake", "_woken", "dropped")
@@ -247,9 +247,9 @@ class _OutPortConsumer(Protocol[_P_co]):
     """An OutPort of a peer, as an engine reaches it (OpenRTM-aist 1.x, OutPortConsumer)."""
 
     def get(self) -> _P_co | None:
-        """Take the next value out of the peer's port; None if it has none.
+        """Take the next value out of the peer's port; None if the port has no value.
 
-        It may wait up to a time-out. Whatever it raises means that there was no answer.
+        The call may wait up to a time-out. Any exception means that there was no answer.
         """
         ...
 
@@ -278,18 +278,18 @@ class _InPortConnector(connector.Connector[T], Generic[T, P]):
 
 
 class InPortPushConnector(_InPortConnector[T, P]):
-    """Takes what a peer puts into an InPort.
+    """Receives the values that a peer puts into an InPort.
 
     Args:
-        port: of ours.
-        end: what was agreed with the peer.
-        codec: makes values of what passes.
-        calls: those of the manager's thread.
-        post: has a call made in that thread before the next tick, in its own way; else it is
-            woken up for each.
+        port: the local port.
+        end: the settings agreed with the peer.
+        codec: decodes the values.
+        calls: runs calls in the manager's thread.
+        post: schedules a call in that thread before the next tick; if left out, each value wakes
+            up the thread.
 
     Raises:
-        RtcRefused: the port has a connector of this ID, or properties that cannot be.
+        RtcRefused: the port has a connector with this ID, or the properties are not possible.
     """
 
     buffer: _ArrivalBuffer[T]
@@ -306,14 +306,14 @@ class InPortPushConnector(_InPortConnector[T, P]):
         self.buffer, self._post = _ArrivalBuffer(end.options.inport), post or calls.post
 
     def put(self, payload: P) -> PortStatus:
-        """Put a value into the buffer, in any thread; it is there before the next tick.
+        """Put a value into the buffer, in any thread; it can be read before the next tick.
 
-        Nothing waits for the manager's thread: that would take twice as long as the call of an
-        ORB itself.
+        This method does not wait for the manager's thread, because that would take twice as long
+        as the call of an ORB itself.
 
         Returns:
-            PORT_OK, or what the buffer says; INVALID_ARGS if it is no value, CONNECTION_LOST
-            after the end.
+            PORT_OK, or the status of the buffer; INVALID_ARGS if the value cannot be decoded,
+            CONNECTION_LOST after the end of the connector.
         """
         if (value := self._decoded(payload)) is None:
             return PortStatus.INVALID_ARGS
@@ -361,19 +361,19 @@ class _PulledBuffer(RingBuffer[T]):
 class InPortPullConnector(_InPortConnector[T, P]):
     """Fetches values of a peer's OutPort, in the thread of that peer.
 
-    Nothing waits: reading the InPort, or looking whether it has something new, has the next
-    value fetched, one at a time. So a value is as old as the reading before it.
+    Reading the InPort, or checking it for new values, does not wait. It requests the next value;
+    one value is fetched at a time. So a value is as old as the previous reading.
 
     Args:
-        port: of ours.
-        end: what was agreed with the peer.
-        codec: makes values of what passes.
+        port: the local port.
+        end: the settings agreed with the peer.
+        codec: decodes the values.
         consumer: reaches the peer's OutPort.
         thread: makes the calls.
-        calls: those of the manager's thread.
+        calls: runs calls in the manager's thread.
 
     Raises:
-        RtcRefused: the port has a connector of this ID, or properties that cannot be.
+        RtcRefused: the port has a connector with this ID, or the properties are not possible.
     """
 
     def __init__(  # noqa: PLR0913, PLR0917 - as many as a connector has parts
@@ -432,9 +432,9 @@ class _InPortConsumer(Protocol[_P_contra]):
     """An InPort of a peer, as an engine reaches it (OpenRTM-aist 1.x, InPortConsumer)."""
 
     def put(self, payload: _P_contra, /) -> PortStatus:
-        """Put a value into the peer's port, and return what it says.
+        """Put a value into the peer's port, and return the status that the peer reports.
 
-        It may wait up to a time-out. Whatever it raises means that there was no answer.
+        The call may wait up to a time-out. Any exception means that there was no answer.
         """
         ...
 
@@ -442,8 +442,8 @@ class _InPortConsumer(Protocol[_P_contra]):
 class OutPortPushConnector(connector.Connector[Any], Generic[T, P]):
     """Pushes values from an OutPort to a peer, in the thread of that peer.
 
-    `write` encodes values and buffers them; it does not block. A value without an answer of the
-    peer is sent again after the thread's `retry_s`; until then the policy of the buffer applies.
+    `write` encodes values and buffers them; it does not block. A value that the peer did not answer
+    is sent again after the thread's `retry_s`; until then the policy of the buffer applies.
 
     Args:
         port: the local port.
@@ -487,9 +487,9 @@ class OutPortPushConnector(connector.Connector[Any], Generic[T, P]):
         """Take a value from the OutPort.
 
         Returns:
-            INVALID_ARGS if it cannot be encoded; what the buffer says, if that is not PORT_OK;
-            else what the peer said of the latest value that it was given: PORT_OK, such as
-            BUFFER_FULL, or CONNECTION_LOST if it gave no answer.
+            INVALID_ARGS if the value cannot be encoded; the status of the buffer, if that is not
+            PORT_OK; else the peer's status for the latest value sent to it: PORT_OK, an error such
+            as BUFFER_FULL, or CONNECTION_LOST if the peer did not answer.
         """
         try:
             payload = self._codec.encode(value)
@@ -520,12 +520,12 @@ class OutPortPullConnector(connector.Connector[Any], Generic[T, P]):
     """Holds values of an OutPort until a peer takes them.
 
     Args:
-        port: of ours.
-        end: what was agreed with the peer.
-        codec: makes what passes.
+        port: the local port.
+        end: the settings agreed with the peer.
+        codec: encodes the values.
 
     Raises:
-        RtcRefused: the port has a connector of this ID, or properties that cannot be.
+        RtcRefused: the port has a connector with this ID, or the properties are not possible.
     """
 
     buffer: _LockedBuffer[P]
@@ -547,8 +547,8 @@ class OutPortPullConnector(connector.Connector[Any], Generic[T, P]):
         """Take the next value, in any thread.
 
         Returns:
-            PORT_OK and what passes; else None with BUFFER_EMPTY, or with CONNECTION_LOST after
-            the end.
+            PORT_OK and the encoded value; else None with BUFFER_EMPTY, or with CONNECTION_LOST
+            after the end of the connector.
         """
         if not self.joined:
             return PortStatus.CONNECTION_LOST, None

@@ -24,11 +24,11 @@ from tickrig.wire.rtc_lite.frame import Framing
 
 
 class _DeviceWatcher:
-    """Asks for the state of a device each 100 ticks from now on, and waits for nothing.
+    """Requests the state of a device every 100 ticks, without waiting for the answers.
 
     Args:
         link: the line to the device.
-        settings: how often, and how long an answer may take.
+        settings: interval of the requests, and the time limit for an answer.
     """
 
     def __init__(self, link: Link[bytes], settings: ProxySettings) -> None:
@@ -62,12 +62,12 @@ _LOG: Final = log_of(__name__)
 class Attachment:
     """Sends the PINGs of a proxy, removes it if its device is lost, and searches for the device.
 
-    The manager ticks it. It ends if its proxy is deleted elsewhere.
+    The manager ticks it. It ends if other code deletes its proxy.
 
     Attributes:
-        manager: of the system.
+        manager: manager of the system.
         link: the line to the device; it stays open.
-        base_name: of the proxy, without its number.
+        base_name: name of the proxy, without its number.
         settings: time limits, and whether to search for the device.
         listener: called with events.
         context: execution context of the proxy; None for its own.
@@ -76,7 +76,7 @@ class Attachment:
 
     Raises:
         RtcRefused: the device does not start up.
-        ValueError: a rate that an execution context cannot have.
+        ValueError: an execution context cannot have this rate.
     """
 
     manager: Manager
@@ -168,17 +168,18 @@ def attach(  # noqa: PLR0913 - options, by keyword
     """Add a proxy to a system, named with the lowest number that is free: `LiteA0`.
 
     Args:
-        manager: of the system; it sends the PINGs, removes the proxy and finds the device again.
+        manager: manager of the system; it sends the PINGs, removes the proxy and finds the device
+            again.
         link: the line to the device.
-        base_name: of the proxy, without its number.
-        settings: waits, checksum, rediscovery.
+        base_name: name of the proxy, without its number.
+        settings: time limits, checksum, rediscovery.
         listener: called with events.
-        context: an execution context to take part in, in place of an own one.
-        rate_hz: of its own one.
+        context: execution context of the proxy; if left out, the proxy gets its own.
+        rate_hz: rate of its own execution context.
 
     Raises:
         RtcRefused: the device does not start up.
-        ValueError: a rate that no execution context can have.
+        ValueError: no execution context can have this rate.
     """
     attachment = Attachment(
         manager, link, base_name, settings or ProxySettings(), listener, context, rate_hz
@@ -186,8 +187,8 @@ def attach(  # noqa: PLR0913 - options, by keyword
     return attachment.proxy
 
 
-# `--lite NAME=URL[@BAUD][,rtno][,boot=TIME]`: devices as the command line of `tickrig rtc` names
-# them. An Arduino with RTno resets when its port is opened, so a line of RTno waits by itself.
+# `--lite NAME=URL[@BAUD][,rtno][,boot=TIME]`: how the command line of `tickrig rtc` names devices.
+# An Arduino with RTno resets when its port is opened, so RTno has a pause after opening by default.
 
 _BAUD: Final = 57_600
 _RTNO_BOOT_US: Final = 3_000_000
@@ -199,14 +200,14 @@ _WORD: Final = re.compile(r"([A-Za-z]\w*)=([^,]+?)(?:@(\d{1,8}))?((?:,[^,]*)*)",
 def attach_lite(
     manager: Manager, word: str, stack: ExitStack, boot_us: int, rate_hz: float | None
 ) -> None:
-    """Open a device's line and add its proxy, which comes back when the device does.
+    """Open a device's line and add its proxy, which returns when the device returns.
 
     Args:
-        manager: of the system.
+        manager: manager of the system.
         word: `NAME=URL[@BAUD][,rtno][,boot=TIME]`; the proxy is `NAME0`.
         stack: closes the line.
         boot_us: pause after the line is opened, unless the word has `boot`.
-        rate_hz: of the proxy; 10 Hz if None.
+        rate_hz: rate of the proxy; 10 Hz if None.
 
     Raises:
         Refused: the word or the line is invalid, or no device answers.
@@ -220,7 +221,7 @@ def attach_lite(
 
 
 def _parse_lite(word: str, boot_us: int = 0) -> tuple[str, str, int, ProxySettings]:
-    """Read name, URL, bit rate and settings; Refused if it is not so written.
+    """Read name, URL, bit rate and settings; Refused if the word has another form.
 
     >>> _parse_lite("LiteA=/dev/ttyUSB0")[:3], _parse_lite("B=socket://localhost:7000@9600")[:3]
     (('LiteA', '/dev/ttyUSB0', 57600), ('B', 'socket://localhost:7000', 9600))

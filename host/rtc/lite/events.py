@@ -20,14 +20,14 @@ _SEQUENCE: Final = range(1, 256)
 
 @dataclass(frozen=True, slots=True)
 class PingStatistics:
-    """How the PINGs of a proxy went.
+    """Statistics of the PINGs of a proxy.
 
     Attributes:
-        sent: how many were sent.
-        answered: how many of these were answered in time.
-        lost: how many were not; the rest is under way.
-        shortest_us: shortest round trip, 0 without one.
-        longest_us: longest round trip, 0 without one.
+        sent: number of PINGs sent.
+        answered: number of these that were answered in time.
+        lost: number of these that were not answered in time; the others are still under way.
+        shortest_us: shortest round trip; 0 without a round trip.
+        longest_us: longest round trip; 0 without a round trip.
         total_us: sum of all round trips.
     """
 
@@ -61,9 +61,9 @@ class PingStatistics:
 class PingMonitor:
     """Schedules and counts PINGs. It sends nothing, and has no clock.
 
-    A PING is due each `period_us` from `start` on, regardless of other traffic. A PING delayed by a
-    busy line does not shift the next one. Neither does a burst, and PINGs that fall due inside a
-    burst are part of it.
+    From `start` on a PING is due each `period_us`, regardless of other traffic. A PING delayed by a
+    busy line does not shift the next one, and a burst does not shift it either. PINGs that fall due
+    during a burst are part of the burst.
 
     Args:
         period_us: from one PING to the next.
@@ -72,7 +72,7 @@ class PingMonitor:
 
     Attributes:
         awaiting: whether a PING waits for its answer.
-        doubted: whether a reply is missing and no PING was answered since.
+        doubted: whether a reply is missing and no PING has been answered since then.
         lost: whether the device no longer answers; this is final.
     """
 
@@ -194,12 +194,12 @@ class ProxyEvent:
     """Something that happened to a proxy.
 
     Attributes:
-        at_us: when, on the clock of its link.
-        kind: what.
-        instance_name: to which proxy.
-        reason: why it went to Error, for people; empty for other events.
-        frames: the last ones before that, with their times on the clock of its link.
-        pings: how its PINGs went; None unless it was removed.
+        at_us: time of the event on the clock of the proxy's link.
+        kind: kind of the event.
+        instance_name: name of the proxy.
+        reason: why the proxy went to Error, for people; empty for other events.
+        frames: the last frames before the event, with their times on the clock of the link.
+        pings: statistics of its PINGs; None unless the proxy was removed.
     """
 
     at_us: int

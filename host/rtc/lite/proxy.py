@@ -27,13 +27,13 @@ from tickrig.wire.rtc_types.rtc import Time
 
 @dataclass(frozen=True, slots=True)
 class DeviceProfile:
-    """What a device says of itself.
+    """The profile that a device reports.
 
     Attributes:
         type_name: type of its component.
         in_ports: its in-ports.
         out_ports: its out-ports.
-        context: who makes it execute.
+        context: kind of the execution context that executes it.
     """
 
     type_name: str
@@ -48,12 +48,12 @@ class DeviceProfile:
 
 
 def _start_up(channel: RequestChannel, boot_us: int) -> DeviceProfile:
-    """Bring a device to Inactive, and ask what it is.
+    """Bring a device to Inactive, and read its profile.
 
     Raises:
-        LinkTimeout: no reply.
-        DeviceRefused: a reply that does not lead to Inactive.
-        WireError: a profile that cannot be read.
+        LinkTimeout: the device does not reply.
+        DeviceRefused: a reply does not lead to Inactive.
+        WireError: the profile cannot be read.
     """
     channel.listen(boot_us)
     _demand(LiteCommand.STATE, channel.request_again(LiteCommand.STATE))
@@ -102,9 +102,10 @@ def _demand(command: LiteCommand, reply: messages.LiteReply | None) -> messages.
     return reply
 
 
-# Ports of a proxy, made from the profile of its device, and what passes through (DECISION L10).
+# Ports of a proxy, made from the profile of its device, and the conversion of their values
+# (DECISION L10).
 #
-# The time of a value is not on the wire: it is stamped when it arrives.
+# The wire does not carry the time of a value. The proxy stamps a value when it arrives.
 
 _KINDS: Final[dict[str, type[Any]]] = {
     kind.__name__: kind
@@ -132,10 +133,10 @@ class _InPortBridge:
         return cls(InPort(name, _KINDS[port_type.name]), profile.name, port_type)
 
     def take(self) -> messages.LitePortData | None:
-        """Return the oldest value that was not read, if there is one.
+        """Return the oldest unread value, if there is one.
 
         Raises:
-            FieldError: its type does not have it, or it does not fit into a frame.
+            FieldError: the value is not in the range of its type, or does not fit into a frame.
         """
         value = self.port.read() if self.port.is_new else None
         if value is None:
@@ -268,9 +269,9 @@ _LOG: Final = log_of(__name__)
 class RtcLiteProxy(RtComponent):
     """Represents an RTC-Lite component (Suzuki et al., RSJ 2007).
 
-    Each callback sends the same request to the device, and waits for the reply within the period,
-    100 ms at most: input data affect the output of the same period. Call `tick` at `due_us`, so
-    that PINGs are sent; `attach` does so.
+    Each callback sends the request of the same name to the device, and waits for the reply within
+    the period, 100 ms at most. So input data affect the output of the same period. Call `tick` at
+    `due_us`, so that PINGs are sent; `attach` arranges this.
 
     Not emulated: service ports and configuration sets, which RTC-Lite does not have.
 

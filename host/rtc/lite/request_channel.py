@@ -41,7 +41,7 @@ class ProxySettings:
         search_period_us: interval of the search, 1 us or more.
 
     Raises:
-        ValueError: a number that is too small, or another sum for packets of RTno.
+        ValueError: a number is too small, or packets of RTno have a checksum other than `sum8`.
     """
 
     framing: Framing = Framing.LITE
@@ -100,10 +100,10 @@ class _ReplyDecoder(Protocol):
 
 
 class _FrameLink:
-    """A `Link[LiteFrame]`, one way requests, the other way replies.
+    """A `Link[LiteFrame]` that sends requests and receives replies.
 
-    A line that is gone behaves like a device without power. Bytes that are not a frame are skipped;
-    after an unknown command the search for the next header starts at once, because the checksum
+    A closed line behaves like a device without power. Bytes that are not a frame are skipped. After
+    an unknown command the search for the next header starts at once, because the checksum
     identifies a frame.
 
     Args:
@@ -112,7 +112,7 @@ class _FrameLink:
         decoder: reads the replies.
 
     Attributes:
-        latest: the last frames with their times, as `1.234 > CX`, `1.238 < CX@I`.
+        latest: the last frames with their times, such as `1.234 > CX`, `1.238 < CX@I`.
     """
 
     def __init__(
@@ -159,11 +159,11 @@ class _FrameLink:
 
 
 class _RtnoLink(_FrameLink):
-    """Sends what RTno has a letter for, and replaces the rest.
+    """Sends the requests for which RTno has a letter, and replaces the others.
 
     | request | replacement |
     |---|---|
-    | PING | `X`, the state; its answer is that to the PING, too |
+    | PING | `X`, which requests the state; its answer also counts as that to the PING |
     | abort | `D`, deactivate: the device is Inactive then, and only its proxy in Error |
     | initialize, finalize, on_startup, on_shutdown, rate, poll | nothing; the reply is `!` |
 
@@ -239,10 +239,9 @@ _LOG: Final = log_of(__name__)
 class RequestChannel:
     """The requests of a proxy, and their replies.
 
-    `request` waits for a reply, for `reply_us` at most. A missing reply starts a burst of PINGs,
-    which does not block: `tick` continues it. While it lasts, and after a device was lost, nothing
-    else is sent. The device answers in order, so an answered PING also means that no late reply can
-    follow.
+    `request` waits for a reply, for `reply_us` at most. A missing reply starts a burst of PINGs. It
+    does not block: `tick` continues it. During the burst, and after a device was lost, no requests
+    are sent. The device answers in order, so after an answered PING no late reply can follow.
 
     Args:
         link: the line to the device.
@@ -251,10 +250,10 @@ class RequestChannel:
     Attributes:
         ping_monitor: schedules and counts the PINGs.
         state: state of the device according to its replies; None if unknown.
-        pushed: data of out-ports, not yet taken, with the time at which they arrived.
+        pushed: data of out-ports that were not taken yet, with their time of arrival.
         in_ports: in-ports that the device described.
         out_ports: out-ports that it described.
-        trouble: why the last request failed, empty if it succeeded.
+        trouble: why the last request failed; empty if it succeeded.
     """
 
     def __init__(self, link: Link[bytes], settings: ProxySettings) -> None:
@@ -286,10 +285,10 @@ class RequestChannel:
         return min(due_us, self._polled_us + POLL_US) if self.ping_monitor.awaiting else due_us
 
     def tick(self) -> None:
-        """Take what has arrived, and send a PING if one is due.
+        """Read the received frames, and send a PING if one is due.
 
-        All that had arrived when a PING is overdue is read before that is judged: who looks
-        late takes no device for lost.
+        All received frames are read before a PING is judged overdue. So a late call of this method
+        does not make a device count as lost.
         """
         now_us = self.now_us
         self.poll()
@@ -297,9 +296,9 @@ class RequestChannel:
             self._ping(number)
 
     def request(self, command: codes.LiteCommand, data: bytes = b"") -> messages.LiteReply | None:
-        """Send a request and wait for its reply; None without one, or if nothing may be sent.
+        """Send a request and wait for its reply; None without a reply, or if it may not be sent.
 
-        A PING that has fallen due goes first.
+        If a PING is due, the PING is sent first.
         """
         if not self._free():
             return None
@@ -315,7 +314,7 @@ class RequestChannel:
     def request_again(self, command: codes.LiteCommand) -> messages.LiteReply | None:
         """Send a request until it is answered, 4 times at most; a missing reply has no effect.
 
-        A fault is no answer: what was on the line before has spoilt the request.
+        A fault reply is not an answer: earlier bytes on the line have corrupted the request.
         """
         reply = self._exchange(command)
         for _ in range(RETRIES):

@@ -28,12 +28,12 @@ def connect(
         first: a port.
         second: the other one.
         properties: `dataport.*` of data ports; see `ConnectorOptions.parse`.
-        name: of the connector; that of its ID if left out.
+        name: name of the connector; its ID if left out.
         connector_id: unique in a system; made of the names of the ports if left out.
 
     Raises:
-        RtcRefused: ports that do not fit, are joined already, an ID that one of them has
-            already, or properties that cannot be.
+        RtcRefused: the ports do not fit or are joined already, one of them has a connector with
+            this ID, or the properties are not possible.
     """
     if first is second:
         raise RtcRefused(f"{first.full_name} is one port; a connector joins two")

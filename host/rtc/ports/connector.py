@@ -79,7 +79,7 @@ class ConnectorOptions:
     def parse(cls, properties: Mapping[str, str]) -> ConnectorOptions:
         """Read properties; those left out have OpenRTM's defaults, and `direct`.
 
-        Other keys than those of this table are kept, and mean nothing here.
+        Keys that are not in this table are kept and have no effect.
 
         | key, behind `dataport.` | values |
         |---|---|
@@ -96,10 +96,10 @@ class ConnectorOptions:
         | `buffer.read.policy` | fifo, last, skip (not in OpenRTM) |
         | `buffer.read.skip_count` | 0 and more (not in OpenRTM) |
 
-        `inport.buffer.*` and `outport.buffer.*` hold for one end alone.
+        `inport.buffer.*` and `outport.buffer.*` apply to one end only.
 
         Raises:
-            RtcRefused: a value that is not in the table.
+            RtcRefused: a value is not in the table.
         """
         read = _Reader(properties)
         return cls(
@@ -174,9 +174,10 @@ _SECOND_US: Final = 1_000_000
 
 
 class _Publisher(Generic[T]):
-    """Holds values until a tick takes them: at once with `new`, at multiples of a period else.
+    """Holds values until a tick takes them.
 
-    With `new` the push policy `fifo` means `all`: OpenRTM pushes once a write.
+    With `new` the next tick takes them, else a tick at a multiple of a period. With `new` the push
+    policy `fifo` means `all`, because OpenRTM pushes once per write.
     """
 
     __slots__ = ("_period_us", "_planned_us", "_policy", "_skipped", "_stride", "_values")
@@ -235,9 +236,9 @@ class Connector(ConnectorBase, Generic[T]):
     is written. With `new` and `periodic` it waits until a tick pushes it.
 
     Args:
-        profile: how it is described.
+        profile: its profile.
         ports: OutPort and InPort.
-        options: what the properties of the profile say.
+        options: the settings in the properties of the profile.
 
     Attributes:
         buffer: the values that the InPort can read.
@@ -267,8 +268,8 @@ class Connector(ConnectorBase, Generic[T]):
         """Take a value from the OutPort.
 
         Returns:
-            PORT_OK, what the buffer it goes to says, or INVALID_ARGS if a number does not fit
-            its IDL type (with `corba_cdr`).
+            The status of the buffer that gets the value, such as PORT_OK; INVALID_ARGS if a number
+            does not fit its IDL type (with `corba_cdr`).
         """
         if self._encodes:
             try:

@@ -45,7 +45,7 @@ class DataPort(Port[Connector[T]], Generic[T]):
 class OutPort(DataPort[T]):
     """A data port that a component writes to (OpenRTM-aist 1.x, OutPort).
 
-    Each connector takes each value, and moves it as its `dataport.*` properties say
+    Each connector takes each value, and moves it according to its `dataport.*` properties
     (`ConnectorOptions.parse`).
 
     Not emulated: listeners of single steps, such as ON_BUFFER_WRITE.
@@ -61,19 +61,19 @@ class OutPort(DataPort[T]):
     port_type = "DataOutPort"
 
     def write(self, value: T) -> PortStatus:
-        """Write a value to each connector; nothing waits.
+        """Write a value to each connector, without waiting.
 
         Args:
             value: a struct of the port's `data_type`. Its numbers are checked only by connectors
                 with `corba_cdr`.
 
         Returns:
-            PORT_OK if all connectors took it, also if there is none; else the status of the
-            first that did not: BUFFER_FULL, BUFFER_TIMEOUT, INVALID_ARGS. PORT_ERROR where it is
-            beyond a limit of its node.
+            PORT_OK if all connectors took the value, or if there are no connectors; else the
+            status of the first that did not: BUFFER_FULL, BUFFER_TIMEOUT, INVALID_ARGS. PORT_ERROR
+            if the write exceeds a limit of the node.
 
         Raises:
-            TypeError: a value of another type.
+            TypeError: the value has another type.
         """
         if not isinstance(value, self.data_type):
             wanted = self.data_type.__name__
@@ -90,7 +90,8 @@ class OutPort(DataPort[T]):
 class InPort(DataPort[T]):
     """A data port that a component reads (OpenRTM-aist 1.x, InPort).
 
-    Each connector has a buffer of its own; those made first are read first.
+    Each connector has its own buffer. The buffer of the connector that was made first is read
+    first.
 
     Args:
         name: without that of its component, such as `in`.
@@ -115,11 +116,11 @@ class InPort(DataPort[T]):
         return False
 
     def read(self) -> T | None:
-        """Take the next value out of the first buffer that has one; nothing waits.
+        """Take the next value out of the first buffer that has one, without waiting.
 
         Returns:
-            The value; without a new one that of the last read again, or None if there was
-            none or the connector's `empty_policy` is not `readback`.
+            The value. If there is no new value, the value of the last read again; None if there
+            was no read yet, or the connector's `empty_policy` is not `readback`.
         """
         for connector in self.connectors:
             if connector.buffer.readable:

@@ -40,15 +40,15 @@ def literal(value: object) -> object:
 
 
 def read_literal(kind: type[S], given: object, now_us: int) -> S:
-    """Return the struct that was written so; fields left out keep their default.
+    """Return the struct that a JSON value represents; fields left out have their default.
 
     Args:
-        kind: the struct.
-        given: as `json.loads` returns it.
-        now_us: its time, if it has one that is left out.
+        kind: the type of the struct.
+        given: the value as `json.loads` returns it.
+        now_us: the time for a struct with a time, if the value has no time.
 
     Raises:
-        RtcRefused: it does not fit the struct.
+        RtcRefused: the value does not fit the struct.
     """
     names = kind.__match_args__
     if "data" in names and not (isinstance(given, dict) and "data" in given):

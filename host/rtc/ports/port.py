@@ -16,9 +16,9 @@ class ConnectorProfile:
     Attributes:
         name: for people.
         connector_id: unique in a system.
-        ports: full names of both ports, the one that provides first; a peer's as its engine
-            calls it.
-        properties: what holds for it, `dataport.*` of data ports.
+        ports: full names of both ports, the providing port first; a port of a peer has the name
+            that its engine uses.
+        properties: its properties, `dataport.*` for data ports.
     """
 
     name: str
@@ -38,7 +38,7 @@ class InterfaceProfile:
 
     Attributes:
         instance_name: its name on the port.
-        type_name: name of the interface type; a consumer takes providers of its own.
+        type_name: name of the interface type; a consumer accepts only providers of its type.
         polarity: `PROVIDED` or `REQUIRED`.
     """
 
@@ -53,7 +53,7 @@ class PortProfile:
 
     Attributes:
         name: full name, such as `ConsoleIn0.out`.
-        interfaces: those of a service port.
+        interfaces: the interfaces of a service port.
         connector_profiles: its connectors.
         properties: `port.port_type`, `dataport.data_type`, ...
     """
@@ -71,9 +71,9 @@ class ConnectorBase:
     """A connector between two ports, which have it until it is ended.
 
     Attributes:
-        profile: how it is described.
-        ports: those of `profile.ports` that are here: both, or one that is joined with a peer's.
-        joined: between begin and end.
+        profile: its profile.
+        ports: the local ports of `profile.ports`: both, or the one that is joined with a peer's.
+        joined: True between begin and end.
     """
 
     def __init__(self, profile: ConnectorProfile, ports: tuple[AnyPort, ...]) -> None:
@@ -90,10 +90,10 @@ class ConnectorBase:
         return len(self.ports) == 2 and all(port.owner for port in self.ports)
 
     def begin(self) -> None:
-        """Give it to both ports, then notify their listeners.
+        """Add the connector to both ports, then notify their listeners.
 
         Raises:
-            RtcRefused: who guards a port does not admit it.
+            RtcRefused: the guard of a port does not admit the connector.
         """
         for port in self.ports:
             if port.guard is not None:
@@ -135,10 +135,10 @@ class Port(Generic[C]):
 
     Attributes:
         name: without that of its component.
-        port_type: how OpenRTM calls its class, such as `DataInPort`.
-        owner: instance name of its component, empty without one.
-        guard: keeps it within the limits of its node, where there are any.
-        connectors: in the order in which they were made.
+        port_type: the name of its class in OpenRTM, such as `DataInPort`.
+        owner: instance name of its component; empty without a component.
+        guard: keeps the port within the limits of its node, if the node has limits.
+        connectors: its connectors in the order in which they were made.
         on_connect: called with its profile after a connector was made.
         on_disconnect: called with its profile after a connector ended.
     """
@@ -168,16 +168,16 @@ class Port(Generic[C]):
         """Look for a connector by its ID.
 
         Args:
-            connector_id: as its profile has it.
+            connector_id: the ID in its profile.
 
         Returns:
-            The connector, None if the port has no such one.
+            The connector; None if the port has no connector with this ID.
         """
         found = (own for own in self.connectors if own.profile.connector_id == connector_id)
         return next(found, None)
 
     def connector_to(self, other: AnyPort) -> C | None:
-        """Look for the connector that joins it with another port.
+        """Look for the connector that joins this port with another one.
 
         Args:
             other: the other port.

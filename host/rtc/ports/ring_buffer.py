@@ -48,14 +48,14 @@ class BufferOptions:
     """How a buffer behaves.
 
     Attributes:
-        length: how many values it holds, 1 to 1 000 000.
-        full: what writing does when it is full.
-        empty: what reading does when it is empty.
+        length: largest number of values in the buffer, 1 to 1 000 000.
+        full: effect of a write to the full buffer.
+        empty: effect of a read from the empty buffer.
         read: which value is read.
-        skip_count: how many are dropped before each one that is read, with `skip`.
+        skip_count: with `skip`, the number of values that are dropped before each read value.
 
     Raises:
-        ValueError: a length out of its range, or a skip_count that is not below the length.
+        ValueError: the length is out of range, or skip_count is not below the length.
     """
 
     length: int = DEFAULT_LENGTH
@@ -75,10 +75,10 @@ class BufferOptions:
 class RingBuffer(Generic[T]):
     """Values in the order of their arrival, up to a length.
 
-    Nothing waits: where OpenRTM would block, its time-out is over at once.
+    Calls do not wait: if OpenRTM would block, the call here ends as after a time-out.
 
     Attributes:
-        on_write: called after a value was put into it.
+        on_write: called after a value was put into the buffer.
     """
 
     __slots__ = ("_last", "_newest", "_options", "_skip", "_values", "on_write")
@@ -101,11 +101,11 @@ class RingBuffer(Generic[T]):
         return len(self._values) > self._skip
 
     def write(self, value: T) -> PortStatus:
-        """Put a value behind the others.
+        """Put a value after the others.
 
         Returns:
-            PORT_OK, also when the oldest was overwritten; if it is full BUFFER_FULL with
-            `do_nothing`, BUFFER_TIMEOUT with `block`.
+            PORT_OK, also when the oldest value was overwritten. If the buffer is full: BUFFER_FULL
+            with `do_nothing`, BUFFER_TIMEOUT with `block`.
         """
         values, options = self._values, self._options
         if len(values) == options.length and options.full is not FullPolicy.OVERWRITE:
@@ -120,7 +120,7 @@ class RingBuffer(Generic[T]):
         """Take a value.
 
         Returns:
-            If there is no new one: with `readback` the value read last, else None.
+            The value. If there is no new value: with `readback` the value read last, else None.
         """
         values, skip = self._values, self._skip
         if len(values) <= skip:

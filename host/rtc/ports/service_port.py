@@ -16,7 +16,7 @@ class Provider(Generic[T]):
     Args:
         instance_name: its name on the port.
         type_name: the name of its interface type; only consumers of the same type fit.
-        servant: what carries the calls out.
+        servant: the object that executes the calls.
     """
 
     def __init__(self, instance_name: str, type_name: str, servant: T) -> None:
@@ -27,8 +27,8 @@ class Provider(Generic[T]):
 class Consumer(Generic[T]):
     """An interface that a port calls: `Consumer[RefHard]("refhard", "RefHard")`.
 
-    Calls are plain method calls: they return before anything else happens, and
-    raise in the caller what the provider raises.
+    Calls are plain method calls. They return before anything else runs, and an exception of the
+    provider is raised in the caller.
     """
 
     def __init__(self, instance_name: str, type_name: str) -> None:

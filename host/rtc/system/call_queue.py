@@ -28,11 +28,11 @@ _Entry = tuple[Future[Any] | None, Callable[[], Any]]
 class CallQueue:
     """Takes calls from any thread; the one that runs the manager makes them between its ticks.
 
-    `serve` is what a `ServingClock` calls while it waits. Where a control socket is served
-    there, `LineServer.attach(queue, queue.make)` serves both.
+    A `ServingClock` calls `serve` while it waits. If this thread also serves a control socket,
+    `LineServer.attach(queue, queue.make)` serves both.
 
     Args:
-        timeout_us: how long a call waits for that thread, if its caller does not say.
+        timeout_us: how long a call waits for that thread, unless its caller sets a time.
     """
 
     def __init__(self, timeout_us: int = CALL_TIMEOUT_US) -> None:
@@ -47,21 +47,21 @@ class CallQueue:
         return self._reader.fileno()
 
     def call(self, function: Callable[[], _R], timeout_us: int | None = None) -> _R:
-        """Have a function called in the manager's thread, and wait for what it returns.
+        """Call a function in the manager's thread, and wait for its result.
 
-        In that thread itself it is called at once.
+        If the caller is in that thread, the function is called at once.
 
         Args:
-            function: what is called; it does not wait.
-            timeout_us: how long to wait until it begins; that of the queue if left out.
+            function: the function; it must not wait.
+            timeout_us: how long to wait until it begins; the time-out of the queue if left out.
 
         Returns:
-            What the function returned.
+            The result of the function.
 
         Raises:
-            TimeoutError: it did not begin in time, and will not.
+            TimeoutError: the function did not begin in time, and will not be called.
             RtcRefused: the system has ended.
-            Exception: what the function raised.
+            Exception: the exception that the function raised.
         """
         if threading.get_ident() == self._owner:
             return function()
@@ -76,7 +76,7 @@ class CallQueue:
         raise TimeoutError(f"the system did not begin the call within {wait_s:g} s")
 
     def post(self, function: Callable[[], object]) -> None:
-        """Have a function called in the manager's thread; what it raises is logged.
+        """Schedule a call of a function in the manager's thread; its exceptions are logged.
 
         Raises:
             RtcRefused: the system has ended.
@@ -151,11 +151,11 @@ def _fulfil(future: Future[_R], function: Callable[[], _R]) -> None:
 class Arrivals:
     """Calls executed at the beginning of the next tick; an item of a schedule.
 
-    No code reads a value before the next tick; waking the manager's thread for each would take
-    three times the processor time.
+    No code reads a value before the next tick, so values need not wake the manager's thread.
+    Waking it for each value would take three times the processor time.
 
     Attributes:
-        due_us: never; it does not make a tick earlier.
+        due_us: always `NEVER`: the calls do not make a tick earlier.
     """
 
     due_us: Final = NEVER

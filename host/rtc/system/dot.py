@@ -26,10 +26,10 @@ class Box:
     """A component.
 
     Attributes:
-        title: what stands below its name.
+        title: text below its name.
         ins: names of the ports at its left.
-        outs: names of the others.
-        state: of its life cycle, as `ACTIVE`.
+        outs: names of the other ports.
+        state: state of its life cycle, such as `ACTIVE`.
     """
 
     name: str
@@ -41,10 +41,10 @@ class Box:
 
 @dataclass(frozen=True, slots=True)
 class Edge:
-    """What joins two ports, by their full names.
+    """A connection of two ports, by their full names.
 
     Attributes:
-        dashed: it does not pass the PC.
+        dashed: whether the data bypass the PC.
     """
 
     source: str

@@ -109,15 +109,15 @@ class RemoteEntry:
 
 @dataclass(frozen=True, slots=True)
 class RemoteConnection:
-    """A connector of a port of ours with one of a component that runs elsewhere.
+    """A connector of a local port with a port of a component that runs elsewhere.
 
     Attributes:
-        port: full name of ours.
+        port: full name of the local port.
         remote: the component that runs elsewhere.
         remote_port: its port, without the name of the component.
         ports: both full names, in the order in which they were given.
         name: for people.
-        properties: what is to hold for it.
+        properties: properties of the connector.
         connector_id: its ID.
     """
 
@@ -144,7 +144,7 @@ class Remotes:
 class NameService:
     """Components by path, as rtshell writes them: `localhost/ConsoleIn0.rtc`.
 
-    In process: not emulated is the CORBA naming service, which others could ask.
+    These names exist only in this process. Not emulated: a CORBA naming service for other ones.
     """
 
     def __init__(self) -> None:
@@ -242,7 +242,7 @@ class Manager(Schedule):
         return tuple(profiles.values())
 
     def register(self, kind: type[RtComponent]) -> None:
-        """Let components of a class be created by `create`.
+        """Register a class, so that `create` can create components of it.
 
         Args:
             kind: the class, under the type name of its `spec`.
@@ -262,13 +262,13 @@ class Manager(Schedule):
             type_name: as registered, or as a package names it (docs/howto/extending.md).
             instance_name: the type name with the lowest number that is free, if left out.
             rate_hz: of its own execution context.
-            context: an execution context to take part in, in place of an own one.
+            context: execution context of the component; if left out, it gets its own.
 
         Returns:
             The component.
 
         Raises:
-            RtcRefused: no such type, one that cannot be loaded, and what `add` refuses.
+            RtcRefused: the type is unknown or cannot be loaded, or `add` refuses the component.
         """
         component = self._type(type_name)(instance_name or self.free_name(type_name))
         return self.add(component, rate_hz, context)
@@ -284,14 +284,14 @@ class Manager(Schedule):
         Args:
             component: a component of your own.
             rate_hz: of its own execution context, 1 uHz to 1 MHz.
-            context: an execution context to take part in, in place of an own one.
+            context: execution context of the component; if left out, it gets its own.
 
         Returns:
             The component itself.
 
         Raises:
             RtcRefused: its name is taken, or on_initialize failed.
-            ValueError: a rate that no execution context can have.
+            ValueError: no execution context can have this rate.
         """
         name = component.instance_name
         if name in self._components:
@@ -311,7 +311,7 @@ class Manager(Schedule):
         return component
 
     def delete(self, name: str) -> None:
-        """End a component; asked for in a callback, at the end of the tick.
+        """End a component; if a callback calls this method, at the end of the tick.
 
         Args:
             name: its instance name or path.
@@ -383,8 +383,8 @@ class Manager(Schedule):
             The connector as it was made.
 
         Raises:
-            RtcRefused: no such port, ports that do not fit, an ID that another connector has,
-                or properties that cannot be.
+            RtcRefused: there is no such port, the ports do not fit, another connector has this ID,
+                or the properties are not possible.
         """
         if connector_id and connector_id in (other.connector_id for other in self.connectors):
             message = f"a connector {connector_id!r} is there already"
@@ -454,35 +454,35 @@ class Manager(Schedule):
         return self.context_of(name).state_of(self.find(name))
 
     def activate(self, *names: str) -> None:
-        """Ask for Active.
+        """Request the move to Active.
 
         Args:
-            names: of the components, asked for one after the other.
+            names: names of the components; the requests are made one after the other.
 
         Raises:
-            RtcRefused: no such component, or one cannot from where it is; others stay asked for.
+            RtcRefused: a component is unknown or cannot make the move now; earlier requests stay.
         """
         self._request("activate", ExecutionContext.activate_component, names)
 
     def deactivate(self, *names: str) -> None:
-        """Ask for Inactive.
+        """Request the move to Inactive.
 
         Args:
-            names: of the components, asked for one after the other.
+            names: names of the components; the requests are made one after the other.
 
         Raises:
-            RtcRefused: no such component, or one cannot from where it is; others stay asked for.
+            RtcRefused: a component is unknown or cannot make the move now; earlier requests stay.
         """
         self._request("deactivate", ExecutionContext.deactivate_component, names)
 
     def reset(self, *names: str) -> None:
-        """Ask for Error to Inactive.
+        """Request the move from Error to Inactive.
 
         Args:
-            names: of the components, asked for one after the other.
+            names: names of the components; the requests are made one after the other.
 
         Raises:
-            RtcRefused: no such component, or one cannot from where it is; others stay asked for.
+            RtcRefused: a component is unknown or cannot make the move now; earlier requests stay.
         """
         self._request("reset", ExecutionContext.reset_component, names)
 
@@ -490,7 +490,7 @@ class Manager(Schedule):
         """Find an instance name that is free.
 
         Args:
-            type_name: what it begins with.
+            type_name: the beginning of the name.
 
         Returns:
             The type name with the lowest number that is free, such as `ConsoleIn0`.
@@ -500,7 +500,7 @@ class Manager(Schedule):
         )
 
     def path(self, name: str) -> str:
-        """Tell the path of a component in the name service.
+        """Return the path of a component in the name service.
 
         Args:
             name: its instance name.

@@ -46,12 +46,12 @@ def calls_run() -> bool:
 class PeerThread:
     """Makes calls into a peer, one after the other, in a thread of its own.
 
-    A call that hangs holds up those that follow it here; its time-out is the engine's (1 s for
-    a CORBA call). The thread does not keep the process alive.
+    A call that hangs delays the calls after it, up to the time-out of the engine (1 s for a CORBA
+    call). The thread does not keep the process alive.
 
     Args:
-        name: of the peer, for people.
-        retry_us: so long after a call that had no answer connectors call again.
+        name: name of the peer, for people.
+        retry_us: time after which connectors repeat a call that had no answer.
 
     Attributes:
         retry_s: the same, in seconds.
@@ -128,15 +128,15 @@ class PeerCaller(Protocol):
 
 
 class PeerThreads:
-    """Makes the calls of many connectors, each of which has one at a time.
+    """Makes the calls of many connectors, each of which makes one call at a time.
 
-    As long as peers answer at once there is one thread, which takes a third of the processor time
-    that a thread for each connector would. Where calls wait there is a second one, and another
-    one for each call that hangs.
+    As long as peers answer at once there is one thread. It takes a third of the processor time that
+    a thread for each connector would take. If calls wait, a second thread is started, and one more
+    for each call that hangs.
 
     Args:
         name: for people.
-        retry_us: so long after a call that had no answer connectors call again.
+        retry_us: time after which connectors repeat a call that had no answer.
 
     Attributes:
         retry_s: the same, in seconds.

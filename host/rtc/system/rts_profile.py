@@ -1,7 +1,7 @@
 """RTSProfile XML, version 0.2, as rtshell (rtcryo, rtresurrect) and RT System Editor have it.
 
-Not written: positions on a drawing, and the start-up and shut-down orders;
-read over: whatever is not in `System`. A restored system is Inactive.
+Positions on a drawing, and the start-up and shut-down orders, are not written. The reader ignores
+all data that `System` does not have. A restored system is Inactive.
 """
 
 from __future__ import annotations
@@ -49,11 +49,11 @@ def write_rts_profile(
     """Write the system of a manager.
 
     Args:
-        manager: whose system.
-        name: of the system.
-        vendor: of the system.
-        version: of the system.
-        date: of creation and update, as `2010-09-02T12:00:00`.
+        manager: manager of the system.
+        name: name of the system.
+        vendor: vendor of the system.
+        version: version of the system.
+        date: date of creation and update, such as `2010-09-02T12:00:00`.
     """
     for prefix, space in _PREFIXES.items():
         ET.register_namespace(prefix, space)
@@ -72,7 +72,7 @@ def parse_rts_profile(text: str) -> System:
     """Read a system.
 
     Raises:
-        RtcRefused: no XML, no RTSProfile, or one with something missing.
+        RtcRefused: the text is not XML, not an RTSProfile, or an incomplete RTSProfile.
     """
     try:
         root = ET.fromstring(text)

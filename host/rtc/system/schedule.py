@@ -24,9 +24,9 @@ class ScheduledItem(Protocol):
 class Schedule:
     """Executes due items. It has no clock: `tick` takes the time.
 
-    In one tick other items run first, then the execution contexts in the order in which they were
-    added, then connectors push, then deferred calls run. In virtual time `run_to` ticks; in real
-    time `RealTime` waits for `due_us` and ticks.
+    A tick has four steps: other items run, then the execution contexts in the order in which they
+    were added, then connectors push, then deferred calls run. In virtual time `run_to` ticks; in
+    real time `RealTime` waits for `due_us` and ticks.
 
     Attributes:
         now_us: the time of the latest tick, in us.
@@ -51,12 +51,12 @@ class Schedule:
         return max(due_us, self.now_us)
 
     def tick(self, now_us: int) -> None:
-        """Go on, and run what is due.
+        """Advance the time, and run all items that are due.
 
         Args:
-            now_us: the present; never less than before.
+            now_us: the current time; never less than before.
 
-        Who skips a `due_us` skips its periods: each execution context runs one at most.
+        A caller that skips a `due_us` skips its periods: each execution context runs one at most.
         """
         self.now_us, self._ticking = now_us, True
         for item in self._items:
@@ -69,7 +69,7 @@ class Schedule:
             self._deferred.pop(0)()
 
     def run_to(self, t_us: int) -> None:
-        """Run all that is due up to and at a time, without waiting.
+        """Run all items that are due until a time, including that time, without waiting.
 
         Args:
             t_us: the time.
@@ -81,18 +81,18 @@ class Schedule:
         self.tick(t_us)
 
     def run_for(self, duration_us: int) -> None:
-        """Run what is due in the time that follows, without waiting.
+        """Run all items that are due in the following time, without waiting.
 
         Args:
-            duration_us: for how long.
+            duration_us: length of this time.
         """
         self.run_to(self.now_us + duration_us)
 
     def defer(self, action: Callable[[], None]) -> None:
-        """Do something at once, or at the end of the tick if one is running.
+        """Call an action at once, or at the end of the tick if a tick is running.
 
         Args:
-            action: what is done.
+            action: the action.
         """
         if self._ticking:
             self._deferred.append(action)
@@ -108,10 +108,10 @@ class Schedule:
         self._contexts.remove(context)
 
     def add_item(self, item: ScheduledItem) -> None:
-        """Tick something else, too, from now on.
+        """Add an item that is ticked from now on.
 
         Args:
-            item: what has a time at which it is due, and a `tick`.
+            item: an object with a due time and a `tick`.
         """
         self._items += (item,)
 
@@ -146,9 +146,8 @@ class Clock(Protocol):
 class RealTime:
     """Runs a schedule by a clock; late periods are caught up, none is skipped.
 
-    Periods that are late run one after the other, each with the time at which
-    it was due. A system that always takes longer than its periods falls behind more and more, as
-    `worst_late_us` shows.
+    Late periods run one after the other, each with the time at which it was due. If a system always
+    takes longer than its periods, its delay grows, as `worst_late_us` shows.
 
     Args:
         schedule: the schedule, from its current time on.

@@ -26,13 +26,13 @@ class ComponentEntry:
 
     Attributes:
         name: its instance name.
-        type_name: what is created for it.
-        rate_hz: of its execution context.
-        context: a word that components in one execution context share; empty for an own one.
+        type_name: type name of the component that is created.
+        rate_hz: rate of its execution context.
+        context: a word that components in one execution context share; empty for its own context.
         active: whether it is activated.
-        configuration_set: the active one.
+        configuration_set: the active configuration set.
         configuration: values of each set.
-        path: where an RTSProfile says that it runs, empty if it says nothing.
+        path: path of the component in an RTSProfile; empty if there is none.
     """
 
     name: str
@@ -50,10 +50,10 @@ class ConnectionEntry:
     """A connector of a system, by the full names of its ports.
 
     Attributes:
-        ports: the one that provides first.
+        ports: both ports, the providing port first.
         name: for people.
-        properties: what holds for it.
-        connector_id: its ID, empty if it is that of its ports.
+        properties: its properties.
+        connector_id: its ID; empty if the ID is made of the names of the ports.
     """
 
     ports: tuple[str, str]
@@ -66,10 +66,10 @@ class ConnectionEntry:
 class System:
     """All components and connectors, in the order in which they are made.
 
-    Not saved: values in ports and buffers, and what a component keeps in itself.
+    Not saved: values in ports and buffers, and the internal state of components.
 
     Attributes:
-        components: those that are made.
+        components: the components that are made.
         connections: their connectors, with each other and with remote components.
         remotes: components that run elsewhere.
     """
@@ -93,12 +93,12 @@ def describe(manager: Manager) -> System:
 
 
 def restore(manager: Manager, system: System) -> None:
-    """Make the components and connectors of a system, and ask for Active where it says so.
+    """Make the components and connectors of a system, and activate components marked as active.
 
     Connectors with remote components are put into `manager.remotes`: an engine makes them.
 
     Raises:
-        RtcRefused: something cannot be made; then nothing is left of it.
+        RtcRefused: a part cannot be made; then all parts are removed again.
     """
     made: list[str] = []
     before = Remotes(list(manager.remotes.components), list(manager.remotes.connections))
@@ -112,13 +112,13 @@ def restore(manager: Manager, system: System) -> None:
 
 
 def with_remotes(system: System, types: Container[str]) -> System:
-    """Return a system whose components of unknown types run elsewhere, if it says where.
+    """Return a system whose components of unknown types are remote, if they have a path.
 
-    So is the RTSProfile of a system of which others run a part.
+    The RTSProfile of a system that several processes run has such components.
 
     Args:
-        system: as it was read.
-        types: names of those that can be created.
+        system: the system as it was read.
+        types: names of the types that can be created.
     """
     there = [one for one in system.components if one.path and one.type_name not in types]
     here = tuple(one for one in system.components if one not in there)

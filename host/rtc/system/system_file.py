@@ -88,7 +88,7 @@ def parse_toml(content: str) -> System:
     """Read a system file.
 
     Raises:
-        RtcRefused: no TOML, or a key or value that is not in the table above.
+        RtcRefused: the file is not TOML, or a key or value is not in the table above.
     """
     top = read_section(content)
     top.read(_TOP)
@@ -185,7 +185,7 @@ def read_system(path: Path) -> System:
 
 
 def lacking(path: Path, text: str) -> tuple[str, ...]:
-    """Return a line for all that a system lacks of a file.
+    """Return a line for each part of a file that a system lacks.
 
     Args:
         path: the file, TOML or XML.

@@ -57,13 +57,13 @@ _LEVELS: Final = {LifeCycleState.ACTIVE: 0, LifeCycleState.ERROR: 2}
 
 
 class _Diagnostics:
-    """Tells the states of all components each period; the manager ticks it.
+    """Publishes the states of all components each period; the manager ticks it.
 
     Args:
         manager: has the components.
-        stamps: the time of the machine.
-        period_us: how often.
-        send: takes each message.
+        stamps: converts times of the system to times of the machine.
+        period_us: interval of the messages.
+        send: called with each message.
     """
 
     def __init__(
@@ -107,12 +107,12 @@ _LOG: Final = log_of(__name__)
 
 @contextmanager
 def ros2_joined(options: Ros2Options, manager: Manager, calls: CallQueue) -> Iterator[None]:
-    """Join the ports of a system with topics, those of components that come later, too.
+    """Join the ports of a system with topics, including ports of components added later.
 
     Raises:
         OSError: the table cannot be read.
-        ValueError: the table, the domain or the interface cannot be; what the table says of
-            components that are there.
+        ValueError: the table, the domain or the interface is invalid, or the table does not fit
+            the present components.
     """
     table = _read_table(options)
     _refuse_mistakes(table, manager)
@@ -126,11 +126,11 @@ def ros2_joined(options: Ros2Options, manager: Manager, calls: CallQueue) -> Ite
 
 
 def _read_table(options: Ros2Options) -> TopicTable:
-    """Return the table that is given, else that of the command, else one of all ports.
+    """Return the given table, else the table of the command, else a table of all ports.
 
     Raises:
-        OSError: it cannot be read.
-        ValueError: it is none, a line for each mistake.
+        OSError: the table cannot be read.
+        ValueError: the table is invalid; the message has a line for each mistake.
     """
     if options.table is not None:
         return parse_table(options.table.read_text("utf-8"), str(options.table))
@@ -171,12 +171,12 @@ class _Ros2Engine:
 
     Args:
         options: domain and interface.
-        table: which ports.
-        manager: of the system.
-        calls: those of the manager's thread.
+        table: the ports and their topics.
+        manager: manager of the system.
+        calls: runs calls in the manager's thread.
 
     Raises:
-        ValueError: the domain or the interface cannot be.
+        ValueError: the domain or the interface is invalid.
     """
 
     def __init__(

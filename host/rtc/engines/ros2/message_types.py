@@ -1,4 +1,4 @@
-"""Messages of ROS 2 as types of Cyclone DDS, made of their fields when they are first asked for.
+"""Messages of ROS 2 as types of Cyclone DDS; each type is made of its fields at its first use.
 
 >>> list(message_type("geometry_msgs/msg/Twist").__dataclass_fields__)
 ['linear', 'angular']
@@ -27,9 +27,9 @@ _ASTRAY_NS: Final = 10_000_000_000
 class Stamps:
     """Converts between the time of a system and that of the machine.
 
-    Values of one time have one stamp, so a pose and its transform do. A value whose time differs by
-    more than 1 s from that of the system gets the current time. Values that a late system writes
-    have the time at which they were due.
+    Values with equal times get equal stamps, for example a pose and its transform. A value whose
+    time differs by more than 1 s from that of the system gets the current time. Values that a late
+    system writes have the time at which they were due.
 
     Args:
         now_us: returns the time of the system.
@@ -76,13 +76,13 @@ _FIELD: Final = re.compile(r"([\w/]+)(?:(\[)(\d*)\])? (\w+)")
 
 @cache
 def message_type(name: str) -> Any:
-    """Return the class of a message; it is made with its fields in their order.
+    """Return the class of a message, with its fields in the order of the message definition.
 
     Args:
         name: such as `geometry_msgs/msg/Twist`.
 
     Raises:
-        KeyError: no message of this name is known here.
+        KeyError: the message is unknown.
     """
     from cyclonedds.idl import make_idl_struct  # noqa: PLC0415 - an extra
 
@@ -91,7 +91,7 @@ def message_type(name: str) -> Any:
 
 
 def dds_name(name: str) -> str:
-    """Return how DDS calls a message (ROS 2, "Topic and Service name mapping to DDS").
+    """Return the DDS name of a message (ROS 2, "Topic and Service name mapping to DDS").
 
     >>> dds_name("std_msgs/msg/Bool")
     'std_msgs::msg::dds_::Bool_'
@@ -101,7 +101,7 @@ def dds_name(name: str) -> str:
 
 
 def ros_name(name: str) -> str:
-    """Return the message that DDS calls so; others as they are.
+    """Return the ROS name for the DDS name of a message; other names are returned unchanged.
 
     >>> ros_name("std_msgs::msg::dds_::Bool_"), ros_name("HelloWorld")
     ('std_msgs/msg/Bool', 'HelloWorld')

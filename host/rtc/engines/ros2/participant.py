@@ -44,12 +44,13 @@ _HEAD: Final = re.compile(r"^[\d.]+ \[[^]]*\] +\S* *")
 
 
 class _DdsLog:
-    """Reads its lines from a pipe until it is closed, and logs each kind once.
+    """Reads log lines of DDS from a pipe until it is closed, and logs each kind of line once.
 
-    Lines of a kind differ in numbers. What the pipe does not hold is lost: nothing waits.
+    Lines of a kind differ only in numbers. Writers do not wait: lines that do not fit into the pipe
+    are lost.
 
     Attributes:
-        configuration: has DDS write into the pipe; where pipes have no names, it says nothing.
+        configuration: makes DDS write into the pipe; empty on systems where pipes have no names.
     """
 
     def __init__(self) -> None:
@@ -109,10 +110,10 @@ class DdsParticipant:
 
     Args:
         domain: 0..232.
-        interface: of the machine, such as eth0; loopback if empty.
+        interface: network interface of the machine, such as eth0; loopback if empty.
 
     Raises:
-        ValueError: no such interface, or it cannot be used.
+        ValueError: the interface does not exist, or cannot be used.
     """
 
     def __init__(self, domain: int, interface: str = "") -> None:
@@ -202,7 +203,7 @@ _LOG: Final = log_of(__name__)
 
 
 class OwnEndpoint(Protocol):
-    """What writes or reads one of our topics.
+    """A writer or reader of a local topic.
 
     Attributes:
         entry: port and topic.
@@ -223,12 +224,12 @@ _Endpoints = Mapping[str, OwnEndpoint]
 
 
 class ForeignEndpoints:
-    """Says of each peer that cannot be joined with a topic of ours why, in a line.
+    """Logs a line with the reason for each peer that cannot be joined with a local topic.
 
     Args:
         participant: takes part in the domain.
-        writing: what we write; it may change.
-        reading: what we read.
+        writing: the topics written here; they may change.
+        reading: the topics read here.
     """
 
     def __init__(
@@ -295,10 +296,10 @@ class ForeignEndpoints:
 
 
 def _refused_policy(qos: Any, *, reads: bool) -> str:  # noqa: PLR0911 - a table
-    """Return which policy of a peer cannot be met, with its value; empty if all can.
+    """Return the first incompatible policy of a peer, with its value; empty if all are compatible.
 
-    Ours are the defaults of DDS: no deadline, automatic liveliness without a lease, shared
-    ownership, order by reception (DDS 1.4, 2.2.3: requested and offered must be compatible).
+    The local policies are the defaults of DDS: no deadline, automatic liveliness without a lease,
+    shared ownership, order by reception (DDS 1.4, 2.2.3: requested and offered must be compatible).
     """
     for policy in qos:
         match policy:

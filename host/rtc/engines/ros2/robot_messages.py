@@ -1,7 +1,7 @@
 """Poses, velocities, joints and ranges as messages of ROS 2, and back.
 
-Lengths are m, angles rad, in frames as REP 103 has them: x ahead, y to the left, z up. A pose in
-the plane has z = 0, a heading is a turn about z. Covariances stay 0, which means unknown.
+Lengths are in m and angles in rad. Frames follow REP 103: x ahead, y to the left, z up. A pose in
+the plane has z = 0, and a heading is a rotation about z. Covariances stay 0, which means unknown.
 """
 
 from __future__ import annotations

@@ -98,14 +98,15 @@ _DIAGNOSTICS: Final[Schema] = {
 
 
 def parse_table(text: str, name: str) -> topic_entry.TopicTable:
-    """Return what a file says.
+    """Return the table in the text of a file.
 
     Args:
-        text: the whole file.
-        name: of the file, for messages.
+        text: the text of the whole file.
+        name: name of the file, for messages.
 
     Raises:
-        ValueError: what is wrong, a line for each mistake, with file and line.
+        ValueError: the table is invalid; the message has a line for each mistake, with file and
+            line.
     """
     top = read_section(text)
     top.read(_TOP)

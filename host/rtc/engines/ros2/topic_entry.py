@@ -29,12 +29,12 @@ class TopicEntry:
         topic: without the first slash, such as `odom`.
         type: the message, such as `nav_msgs/msg/Odometry`.
         frame: `frame_id` of the header.
-        child_frame: whose pose it is.
+        child_frame: the frame whose pose the message has.
         joints: names of the joints, in the order of the values.
-        stop_after_us: so long after the last message the port gets a zero, such as standstill;
-            never with 0.
+        stop_after_us: time after the last message at which the port gets a zero value, such as
+            standstill; 0 for never.
         reliable: whether messages are sent again until they arrive.
-        place: file and line, for people; empty for what stands in no file.
+        place: file and line, for people; empty for an entry that is in no file.
     """
 
     port: str
@@ -65,8 +65,8 @@ class TopicTable:
     """The ports that have topics.
 
     Attributes:
-        entries: one per port of each topic; None joins every port with a matching message type to a
-            topic of its name.
+        entries: an entry for each port of each topic; None joins every port that has a matching
+            message type to a topic of its name.
         diagnostics: topic for the states of the components, empty for none.
         period_us: interval at which these are published.
     """

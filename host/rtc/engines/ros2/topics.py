@@ -23,9 +23,9 @@ _WRITER_LOG: Final = log_of(__name__)
 
 
 class TopicWriter:
-    """Writes to a topic; it is opened with the first message, or by `open`.
+    """Writes to a topic; the topic is opened by the first message, or by `open`.
 
-    All of it is called in one thread.
+    Call all methods in one thread.
 
     Args:
         participant: takes part in the domain.
@@ -52,11 +52,11 @@ class TopicWriter:
             )
 
     def put(self, message: Any) -> PortStatus:
-        """Write a message; nothing waits for those who read it.
+        """Write a message, without waiting for the readers of the topic.
 
         Returns:
-            INVALID_ARGS if a number of it does not fit, BUFFER_TIMEOUT if too much waits for
-            readers already, PORT_ERROR if the topic cannot be.
+            INVALID_ARGS if a number of the message does not fit, BUFFER_TIMEOUT if too many
+            messages wait for readers already, PORT_ERROR if the topic cannot be opened.
         """
         if self._writer is None:
             self.open()
@@ -102,15 +102,15 @@ class _Arrivals(Listener):
 
 
 class TopicReader:
-    """Reads a topic, and hands on what comes.
+    """Reads a topic, and passes on its messages.
 
-    All but the constructor is called in the thread.
+    All methods but the constructor are called in the thread.
 
     Args:
         participant: takes part in the domain.
         entry: port and topic.
         thread: reads.
-        put: takes each message, and None where they have stopped for too long.
+        put: called with each message, and with None if no message came for too long.
 
     Attributes:
         entry: as given.
