@@ -36,18 +36,18 @@ _WIDE: Final = {"dataport.buffer.length": "64"}
 class MotionChain:
     """The six components in one execution context, in the order in which data flow.
 
-    Any other order works and costs periods.
+    Any other order also works, but delays data by periods.
 
     Args:
-        manager: who runs them.
+        manager: runs the components.
         open_link: opens the line to the base.
-        number: behind each instance name, as OpenRTM numbers them; each cart has its own.
-        rate_hz: of the execution context.
+        number: number at the end of each instance name, as in OpenRTM; each cart has its own.
+        rate_hz: rate of the execution context.
 
     Attributes:
         manager: as given.
-        position_input: where goals are entered.
-        odometry: what the pose is.
+        position_input: the component at which goals are entered.
+        odometry: the component that has the pose.
         components: all six, in the order of execution.
         context: their execution context.
     """

@@ -24,7 +24,7 @@ _ETA: Final = 0.1
 
 @dataclass(frozen=True, slots=True)
 class VelocityLimits:
-    """What a command may be.
+    """The limits of a command.
 
     Attributes:
         v: m/s.
@@ -64,12 +64,12 @@ class Regulator:
     """Steers to a line: w' = -K3 (w - w_ff) - K2 q - K1 d.
 
     Attributes:
-        k1: rad/s2 for a metre beside the line.
-        k2: rad/s2 for a radian off its heading.
+        k1: rad/s2 per metre of distance d from the line.
+        k2: rad/s2 per radian of deviation q from its heading.
         k3: 1/s.
-        most_offset: metres that count at most.
-        c1: m/s taken off the speed for a rad/s; the explicit law has none.
-        step_s: time from one command to the next, as the law takes it.
+        most_offset: the largest distance from the line that counts, m.
+        c1: m/s by which the speed is reduced per rad/s; not used by the explicit law.
+        step_s: time from one command to the next in the law.
         law: implicit or explicit.
     """
 

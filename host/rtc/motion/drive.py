@@ -69,12 +69,12 @@ def drive(
 ) -> MotionRun:
     """Drive a cart to a goal, or along a path of several points.
 
-    It ends half a second after the goal is reached, when a component is in Error, or with
-    the time-out.
+    The drive ends half a second after the goal is reached, when a component is in Error, or at the
+    time-out.
 
     Args:
         connection: connection to the cart, with active components.
-        points: one is a goal.
+        points: points of the path; a single point is a goal.
         watch: called with each sample.
         timeout_us: time limit; by default three times the shortest time and half a minute.
 

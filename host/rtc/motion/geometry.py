@@ -74,7 +74,7 @@ def wheel_speeds(
 
 
 def moved(pose: Pose, left_m: float, right_m: float, tread: float) -> Pose:
-    """Return the pose after the wheels have rolled so far, on an exact arc.
+    """Return the pose after the wheels have rolled two given lengths, on an exact arc.
 
     >>> moved(Pose(), 1.0, 1.0, 0.4)
     Pose(x=1.0, y=0.0, heading=0.0)

@@ -14,17 +14,17 @@ from tickrig.wire.rtc_types import iis, rtc
 from tickrig.wire.rtc_types.idl import Struct
 from tickrig.wire.rtc_types.rtc import Path, Time, Velocity2D
 
-# Components between the phases of the common interfaces, and between their heading ranges.
+# Components that convert between the phases of the common interfaces, and their heading ranges.
 #
-# What a phase cannot say is left out: sideways speed, `id` and `error` in phase 1. Headings
-# are in 0..2 pi on IIS interfaces, as they recommend, and in -pi..pi on those of RH3.
+# Data that a phase cannot represent are left out: sideways speed, `id` and `error` in phase 1.
+# Headings are in 0..2 pi on IIS interfaces, as IIS recommends, and in -pi..pi on those of RH3.
 
 S = TypeVar("S", bound=Struct)
 T = TypeVar("T", bound=Struct)
 
 
 class _Adapter(RtComponent, Generic[S, T]):
-    """Converts each value at its port `in` and writes it to `out`; what it cannot is left out.
+    """Converts each value at its port `in` and writes it to `out`, unless it cannot be converted.
 
     A subclass names the types of both ports in brackets, and overrides `convert`.
     """
@@ -153,11 +153,10 @@ _LOG: Final = log_of(__name__)
 
 
 class RunningInformation(RtComponent):
-    """Makes velocities in the robot's frame out of its poses, and writes one each period.
+    """Calculates velocities in the robot's frame from its poses, and writes one each period.
 
-    A pose that is older than `timeout` says nothing any more: the velocity is then 0. Give
-    it an execution context of 100 Hz or more; slower ones are logged. `tm` is the
-    time of the later pose.
+    If the latest pose is older than `timeout`, the velocity is 0. Use an execution context of 100
+    Hz or more; a slower one is logged. `tm` is the time of the later pose.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("RunningInformation", "IIS running information")
@@ -269,15 +268,15 @@ class PathInterface(RtComponent):
     |---|---|
     | a new list replaces the old one | without a stop, from where the cart is |
     | no way point | the cart stops on the spot |
-    | the first is the start | one alone does not move: the cart stops |
-    | speeds | vx holds on the line to its way point; `max_vel` at most, and for none or 0 |
+    | the first is the start | with a single way point the cart stops |
+    | speeds | vx applies on the line to its way point, up to `max_vel`; 0 or none means that |
     | backing up | a negative vx |
     | running state | each way point when it is passed, the last once more with `STOPPED` |
 
-    Lines are straight, with turns on the spot between them. The headings of all but the last,
-    vy and va are not obeyed; IIS allows that. A list with an invalid number is ignored. It replaces
-    OmniTo2WD and Navigation: join `target_path` with PathFollower.target_path, whose set should be
-    `tuned`.
+    Lines are straight, with turns on the spot between them. The component ignores vy, va, and the
+    headings of all way points but the last; IIS allows this. A list with an invalid number is
+    ignored. The component replaces OmniTo2WD and Navigation: join `target_path` with
+    PathFollower.target_path. The configuration set of PathFollower should be `tuned`.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("PathInterface", "IIS paths for RH3")

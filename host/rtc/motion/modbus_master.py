@@ -18,12 +18,12 @@ _CODES: Final = {code.value: code for code in modbus.ExceptionCode}
 
 @dataclass(frozen=True, slots=True)
 class ModbusAnswer:
-    """What a slave answered.
+    """The answer of a slave.
 
     Attributes:
-        request: to what.
+        request: the answered request.
         values: the registers that were read.
-        refusal: why it did not do it, if it did not.
+        refusal: why the slave refused the request, if it did.
     """
 
     request: modbus.Request
@@ -32,24 +32,25 @@ class ModbusAnswer:
 
 
 class ModbusMaster:
-    """Asks one slave; one request is on its way at a time.
+    """Sends requests to one slave; one request is under way at a time.
 
-    On a line with echo it passes over what it said itself. A late answer is taken for that
-    to the next request, if it has its shape.
+    On a line with echo the master skips its own frames. A late answer is taken for the answer to
+    the next request, if it has the same form.
 
-    pymodbus and minimalmodbus wait on the machine's clock and cannot wait on a rig's; so
-    the master is ours, over the codec that the slave uses too, and they judge the slave.
+    pymodbus and minimalmodbus wait on the machine's clock and cannot wait on the clock of a rig. So
+    this master is an own implementation, over the codec of the slave; the tests of the slave use
+    those libraries.
 
     Args:
         link: the line.
-        address: of the slave, 1..247.
+        address: address of the slave, 1..247.
         timeout_us: how long an answer may take.
-        retries: how often a request is made again that had no answer.
+        retries: how often a request without an answer is repeated.
 
     Attributes:
-        pending: the request on its way.
-        misses: requests in a row that had no answer.
-        lost: all that had none, for statistics.
+        pending: the request under way.
+        misses: number of requests in a row without an answer.
+        lost: total number of requests without an answer, for statistics.
     """
 
     def __init__(
@@ -63,19 +64,19 @@ class ModbusMaster:
         self._tries = self._until_us = 0
 
     def begin(self, request: modbus.Request) -> None:
-        """Make a request; what was on its way is given up.
+        """Send a request; a request that is under way is dropped.
 
         Raises:
-            LinkClosed: the line is gone.
+            LinkClosed: the line is closed.
         """
         self.pending, self._tries = request, 0
         self._send(request)
 
     def poll(self) -> ModbusAnswer | None:
-        """Return the answer if it has come; make the request again if it is overdue.
+        """Return the answer if it has arrived; repeat the request if the answer is overdue.
 
         Raises:
-            LinkClosed: the line is gone.
+            LinkClosed: the line is closed.
         """
         received = self._link.receive(0)
         if (request := self.pending) is None:

@@ -23,9 +23,9 @@ class TrackSample(NamedTuple):
 
     Attributes:
         time_s: since the start of the run.
-        pose: where it is.
-        twist: the velocity that is commanded.
-        line: the line it follows towards this pose, None while it turns or stands.
+        pose: pose of the cart.
+        twist: the commanded velocity.
+        line: end of the line that the cart follows; None while it turns or stands.
     """
 
     time_s: float
@@ -46,9 +46,9 @@ class MotionRun:
     """A way from a pose to a goal.
 
     Attributes:
-        goal: where it was to end.
-        samples: one for each period.
-        reached_s: when the goal was reached, as the components say; None if it was not.
+        goal: the wanted end of the way.
+        samples: a sample for each period.
+        reached_s: when the components reported that the goal was reached; None without a report.
     """
 
     goal: Pose
@@ -160,10 +160,10 @@ _MARK: Final = ((0, 0), (1, 0), (-1, 0), (0, 1), (0, -1))
 
 
 class TrackMap:
-    """Goals and a track on as large a scale as they have room; x to the right, y up.
+    """Draws goals and a track on the largest scale that fits; x to the right, y up.
 
     Args:
-        points: what must be on it.
+        points: points that the map must contain.
 
     >>> track = TrackMap([Pose(), Pose(2.0, 1.0)], width=6, height=2)
     >>> for n in range(21):
@@ -209,8 +209,8 @@ class LiveMap:
     """Receives each sample; draws the map and a line of numbers below it.
 
     Args:
-        track: what is drawn.
-        paint: writes what moves the cursor of a terminal, too.
+        track: the map that is drawn.
+        paint: writes text that may contain cursor movements of a terminal.
     """
 
     def __init__(self, track: TrackMap, paint: Callable[[str], None]) -> None:

@@ -23,7 +23,8 @@ def read_path(path: Path) -> list[Pose]:
     """Return the points; `#` begins a comment, commas count as spaces.
 
     Raises:
-        ValueError: the file cannot be read, a line is no point, or there is none; it says which.
+        ValueError: the file cannot be read, a line is not a point (the message has the line), or
+            the file has no points.
     """
     try:
         text = path.read_text("utf-8", "replace")
@@ -45,7 +46,7 @@ def parse_points(text: str) -> list[Pose]:
     Pose(x=2.0, y=0.0, heading=0.0)
 
     Raises:
-        ValueError: one is no point; the text says which.
+        ValueError: a part is not a point; the message has this part.
     """
     points = [part.split() for part in text.split(",")]
     return [in_degrees(_numbers(words), " ".join(words)) for words in points]
@@ -55,11 +56,12 @@ def in_degrees(numbers: Sequence[float], text: str) -> Pose:
     """Return the pose of two or three numbers: metres, metres, degrees.
 
     Args:
-        numbers: as they came.
-        text: what a message calls them.
+        numbers: the numbers as text.
+        text: the text that represents them in a message.
 
     Raises:
-        ValueError: another count, no number of a cart, or a pose beyond `FARTHEST_M`.
+        ValueError: there are not two or three numbers, one is invalid, or the pose is beyond
+            `FARTHEST_M`.
     """
     if len(numbers) not in (2, 3) or not plausible(*numbers):
         raise ValueError(f"{text!r} is not X Y in metres, and a heading in degrees")

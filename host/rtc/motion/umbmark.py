@@ -25,8 +25,8 @@ class Umbmark:
     """The errors at the end of squares.
 
     Attributes:
-        clockwise: one for each run.
-        counter_clockwise: one for each run.
+        clockwise: an error for each run.
+        counter_clockwise: an error for each run.
         returns_m: how far from its start the cart stood at the end of each run.
     """
 
@@ -79,14 +79,14 @@ def run_umbmark(
     """Drive squares both ways, each from the origin.
 
     Args:
-        begin: starts run number n, from 0 on: a cart at the origin, components active.
+        begin: starts run number n, from 0 on, with a cart at the origin and active components.
         true_pose: measures where the cart is at the end of a run.
-        runs: how many each way.
-        side_m: of the squares; UMBmark has 4 m.
+        runs: number of runs in each direction.
+        side_m: side length of the squares; UMBmark has 4 m.
         watch: called with each sample.
 
     Raises:
-        TimeoutError: a square that did not end.
+        TimeoutError: a square did not end in time.
     """
     errors: dict[bool, list[Error]] = {True: [], False: []}
     returns = []

@@ -24,9 +24,9 @@ class Fetched:
     """The end of a request.
 
     Attributes:
-        address: what was asked for.
-        status: how it ended.
-        text: what is there; why not, where it failed.
+        address: the requested address.
+        status: how the request ended.
+        text: the text at this address; the reason if the request failed.
     """
 
     address: str
@@ -35,9 +35,9 @@ class Fetched:
 
 
 class Source(Protocol):
-    """Gets texts by their addresses. Nothing waits: each request ends some time, in time-outs too.
+    """Gets texts by their addresses, without waiting; each request ends, if only by a time-out.
 
-    In real time it is HTTP in a thread of its own; in virtual time a table with a delay.
+    In real time it is an HTTP client in its own thread; in virtual time a table with a delay.
     """
 
     def request(self, address: str, now_us: int) -> None:
@@ -79,15 +79,15 @@ class CacheLimits:
 
 @dataclass(slots=True)
 class _CacheCounts:
-    """What became of the questions to a cache.
+    """The numbers of look-ups in a cache by their results.
 
     Attributes:
-        hits: answered at once.
-        stale: of these, by an entry that is no longer fresh.
-        misses: not answered at once.
-        unknown: of these, because there is nothing under this address.
+        hits: look-ups answered at once.
+        stale: hits that were answered by an entry that is no longer fresh.
+        misses: look-ups not answered at once.
+        unknown: misses because the address is unknown.
         failures: requests to the source that failed.
-        age_us: of the entry that answered last.
+        age_us: age of the entry that answered last.
     """
 
     hits: int = 0
@@ -115,15 +115,15 @@ class _Entry(Generic[_V]):
 
 
 class LookupCache(Generic[_V]):
-    """Holds values by their addresses; while the source does not answer, old ones serve.
+    """Holds values by their addresses; while the source does not answer, old values are used.
 
     Args:
-        parse: makes a value of a text; ValueError if it is none: such an address is unknown.
+        parse: makes a value of a text; after a ValueError the address counts as unknown.
 
     Attributes:
-        counts: what became of the questions.
-        trouble: why the latest request failed; empty after one that did not.
-        invalid: what latest text was none, and why.
+        counts: the numbers of look-ups by their results.
+        trouble: why the latest request failed; empty if it succeeded.
+        invalid: the latest text that was not a value, and why.
     """
 
     def __init__(self, parse: Callable[[str], _V]) -> None:

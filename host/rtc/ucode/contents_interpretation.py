@@ -22,12 +22,12 @@ _MOST_CHARACTERS: Final = 200
 
 @dataclass(frozen=True, slots=True)
 class Contents:
-    """What is known of a place.
+    """The information about a place.
 
     Attributes:
-        x_m: where it is.
-        y_m: where it is, to the left of x.
-        properties: `name=value` each, in the order of the names.
+        x_m: x coordinate.
+        y_m: y coordinate, to the left of x.
+        properties: each as `name=value`, in the order of the names.
     """
 
     x_m: float
@@ -38,13 +38,17 @@ class Contents:
 class ContentsInterpretation(Lookup[Contents]):
     """Reads the information about places: position and properties.
 
-    Ports: `addresses` in, as `UcodeSettlement` writes them; out `position`, a point for each
-    ucode, in m, and `place`: its ucode, then `name=value` of each property. The information
-    is a JSON object with the numbers `x_m` and `y_m`; its other members are properties. The report
-    (Fig. 123) names the component and its cache; the rest is an addition.
+    Ports:
+
+    - `addresses` in, as `UcodeSettlement` writes them;
+    - `position` out: a point for each ucode, in m;
+    - `place` out: the ucode, then `name=value` of each property.
+
+    The information is a JSON object with the numbers `x_m` and `y_m`; its other members are
+    properties. The report (Fig. 123) names the component and its cache; the rest is an addition.
 
     Args:
-        instance_name: of the component.
+        instance_name: name of the component.
         open_source: creates the source of the information; HTTP by default.
     """
 
@@ -75,7 +79,7 @@ def parse_contents(text: str) -> Contents:
     """Read the information of a place.
 
     Raises:
-        ValueError: it is none.
+        ValueError: the text is not such information.
 
     >>> parse_contents('{"x_m": 1, "y_m": 2.5, "name": "door"}')
     Contents(x_m=1.0, y_m=2.5, properties=('name=door',))

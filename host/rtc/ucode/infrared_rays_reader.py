@@ -29,9 +29,9 @@ class Round:
     """What a reader received in one round.
 
     Attributes:
-        number: counted by the reader, 0..65535.
+        number: number of the round that the reader counts, 0..65535.
         ucodes: the nearest marker first, each with the level of its signal in per cent.
-        blinded: too much light left nothing to be received.
+        blinded: whether too much light prevented reception.
     """
 
     number: int
@@ -40,22 +40,22 @@ class Round:
 
 
 class UcodeReaderClient:
-    """Lets a reader listen, and takes its rounds.
+    """Starts a reader, and receives its rounds.
 
-    A round of which a line was lost or garbled is left out. After a second without a good line
-    it begins again, and so again and again. What waited on the line before it began is dropped:
-    the robot was elsewhere then.
+    A round with a lost or garbled line is left out. After each second without a valid line the
+    reader is started again. Data that were on the line before the start are dropped, because the
+    robot was at another place then.
 
     Args:
         link: the line.
 
     Raises:
-        LinkClosed: the line is gone.
+        LinkClosed: the line is closed.
 
     Attributes:
-        garbled: lines that were none.
-        incomplete: rounds that were left out.
-        restarts: how often it began again.
+        garbled: number of invalid lines.
+        incomplete: number of rounds that were left out.
+        restarts: how often the reader was started again.
     """
 
     def __init__(self, link: Link[bytes]) -> None:
@@ -65,10 +65,10 @@ class UcodeReaderClient:
         self._begin()
 
     def poll(self) -> list[Round]:
-        """Return the rounds that have come.
+        """Return the rounds that have arrived.
 
         Raises:
-            LinkClosed: the line is gone.
+            LinkClosed: the line is closed.
         """
         rounds: list[Round] = []
         for raw in self._lines.push(self._link.receive(0)):
@@ -126,15 +126,15 @@ OPEN_SERIAL: Final[_OpenReader] = partial(SerialLink, baud=BAUD)
 
 
 class InfraredRaysReader(DeviceComponent[UcodeReaderClient]):
-    """Lets a reader listen while it is Active, and writes what it receives in each round.
+    """Runs a reader while the component is Active, and writes the received ucodes of each round.
 
-    Ports: `ucodes` (32 hex digits each, the nearest marker first, none where none was received)
-    and `levels` of their signals in per cent. The report (Fig. 123) only names it; ports and
-    parameters are ours. A reader that is silent is called each second; one whose line is gone
-    is an Error.
+    Ports: `ucodes` (32 hex digits each, the nearest marker first, empty if no ucode was received)
+    and `levels` of their signals in per cent. A reader that does not send is started again each
+    second. If the line is closed, the component goes to Error. The report (Fig. 123) has only its
+    name; ports and parameters are additions.
 
     Args:
-        instance_name: of the component.
+        instance_name: name of the component.
         open_link: opens the line; by pyserial unless given.
     """
 

@@ -33,17 +33,17 @@ class WantedUcode(NamedTuple):
 class Lookup(RtComponent, Generic[_V]):
     """Looks up each ucode that arrives: in its cache, else in a service.
 
-    No period waits for the service. A later result is written later, with the time at which the
-    ucode arrived. An entry older than `fresh` is requested again and remains in use, up to `keep`
-    while the service does not answer. The cache is in memory: it survives Inactive and Error, not
-    the component.
+    Periods do not wait for the service. A result that arrives in a later period is written in that
+    period, with the time at which the ucode arrived. An entry older than `fresh` is requested
+    again. It remains in use until the service answers, up to `keep`. The cache is in memory: it is
+    kept in Inactive and Error, and lost when the component ends.
 
-    After each look-up and each answer the port `cache` gives hits, hits that were not fresh,
-    misses, misses of what is unknown to the service, requests that failed, entries, and the age
-    in ms of the entry that answered last.
+    After each look-up and each answer the port `cache` gives these numbers: hits, hits that were
+    not fresh, misses, misses of ucodes that the service does not know, failed requests, entries,
+    and the age in ms of the entry that answered last.
 
     Args:
-        instance_name: of the component.
+        instance_name: name of the component.
         in_port: name of its InPort.
         cache: settings of the cache.
         open_source: creates the client of the service.

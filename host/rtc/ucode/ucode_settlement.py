@@ -22,13 +22,13 @@ _MOST_CHARACTERS: Final = 1_000
 class UcodeSettlement(Lookup[str]):
     """Resolves ucodes to the addresses of their information, at a resolution service.
 
-    Ports: `ucodes` in; `addresses` out: a ucode, its address, a ucode, its address, ... Under
-    `SERVICE/ucodes/UCODE` the service has the address as text. Invalid ucodes are counted in
+    Ports: `ucodes` in; `addresses` out, which alternates a ucode and its address. The service has
+    the address as text under `SERVICE/ucodes/UCODE`. Invalid ucodes are counted in
     `invalid_ucodes`. The report (Fig. 123) names the component and its cache; the rest is an
     addition.
 
     Args:
-        instance_name: of the component.
+        instance_name: name of the component.
         open_source: creates the client of the service; HTTP by default.
 
     Attributes:
@@ -63,7 +63,7 @@ def parse_address(text: str) -> str:
     """Return the address that a service gave.
 
     Raises:
-        ValueError: it is none.
+        ValueError: the text is not an address.
     """
     address = text.strip()
     if not address.startswith("http://") or len(address) > _MOST_CHARACTERS:

@@ -19,8 +19,8 @@ _CONF_LINE: Final = re.compile(r"conf\.([^.\s:=]+)\.([^\s:=]+)\s*[:=]\s*(.*)")
 class Odometry(RtComponent):
     """Integrates the movement of both wheels on exact arcs, for the middle of the drive axle.
 
-    The port LocalizedPosition exists and is unused, as in the specification. Angles that are not
-    numbers, or fewer than the ids of the wheels, are ignored.
+    The port LocalizedPosition exists and is unused, as in the specification. A message is ignored
+    if its angles are not numbers, or if it has fewer angles than there are ids of wheels.
 
     Attributes:
         pose: the estimated pose of the cart.
@@ -50,11 +50,11 @@ class Odometry(RtComponent):
         self._before: tuple[float, float] | None = None
 
     def load(self, path: Path) -> None:
-        """Let the values of a file such as Odometry.conf take the place of those in its sets.
+        """Replace values in the configuration sets by those of a file such as Odometry.conf.
 
         Raises:
-            OSError: it cannot be read.
-            RtcRefused: a line, a parameter or a value that cannot be.
+            OSError: the file cannot be read.
+            RtcRefused: a line, a parameter or a value is invalid.
         """
         for set_id, values in read_conf(path).items():
             held = self.configuration.sets.get(set_id, {})
@@ -105,11 +105,11 @@ class Odometry(RtComponent):
 def read_conf(path: Path) -> dict[str, dict[str, str]]:
     """Return the values of each configuration set of a file: `conf.default.lengthOfAxle: 0.464`.
 
-    Other lines are OpenRTM's own.
+    Other lines are settings of OpenRTM and are ignored.
 
     Raises:
         OSError: the file cannot be read.
-        RtcRefused: a line with `conf.` that is no such line; it says which.
+        RtcRefused: a line begins with `conf.` but has another form; the message has the line.
     """
     sets: dict[str, dict[str, str]] = {}
     for number, line in enumerate(path.read_text("utf-8").splitlines(), 1):

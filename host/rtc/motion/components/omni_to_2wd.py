@@ -22,9 +22,9 @@ _LOG: Final = log_of(__name__)
 class OmniTo2WD(RtComponent):
     """Plans for a cart that cannot go sideways; it never goes backward.
 
-    A step of zero length is left out. A goal or a path with an invalid number is ignored with a
-    line in the log. FINISH is written once when it is reached, so that the end of an earlier
-    command does not answer a later one.
+    A step of zero length is left out. A goal or a path with an invalid number is ignored, and a
+    line is logged. FINISH is written only once, when the goal is reached, so that the end of an
+    earlier command is not taken for that of a later one.
 
     Attributes:
         refused: number of ignored goals and paths.
@@ -101,8 +101,9 @@ class OmniTo2WD(RtComponent):
 def plan(start: Pose, points: Sequence[Pose]) -> list[Pose]:
     """Return where to turn and where to go straight to (RH3 specification, path calculation).
 
-    The first is the start; then for each point the place before it, with the heading to
-    it, and the point with that heading; then the last point as it is to be reached.
+    The list begins with the start. For each point it has two poses: the previous place with the
+    heading to the point, and the point with that heading. It ends with the last point in its
+    wanted heading.
 
     >>> [tuple(round(n, 2) for n in p) for p in plan(Pose(), [Pose(0.0, 2.0, 0.0)])]
     [(0.0, 0.0, 0.0), (0.0, 0.0, 1.57), (0.0, 2.0, 1.57), (0.0, 2.0, 0.0)]

@@ -21,13 +21,20 @@ _TUNED = {"line_K3": "40", "spin": "time-optimal", "latency": "0.08"}
 class PathFollower(RtComponent):
     """Runs one mode until the next message (rh3-control, control laws).
 
-    Modes: free and stop (both towards standstill), line, to-point, circle (centre x, y,
-    radius r, to the left if positive), spin, velocity (v, w), wheel velocity (v left, w
-    right, rad/s, by `tread` and `radius`). A message with an invalid number means stop. The
-    parameters after `max_w` are additions: `acc_cycle` is the time for which `max_acc_*` are given,
-    `law` the way the regulator steps, `spin` the way it turns, `latency` the time from a pose to
-    the effect of the command. Without a pose for `pose_timeout` the cart stops, because its
-    position is unknown.
+    Modes:
+
+    - free and stop, both towards standstill;
+    - line, to-point, and circle (centre x, y, radius r, to the left if positive);
+    - spin, and velocity (v, w);
+    - wheel velocity (v left, w right, rad/s, by `tread` and `radius`).
+
+    A message with an invalid number means stop. Without a pose for `pose_timeout` the cart stops,
+    because its position is unknown. The parameters after `max_w` are additions:
+
+    - `acc_cycle` is the time for which `max_acc_*` are given;
+    - `law` is the way the regulator steps;
+    - `spin` is the way the cart turns;
+    - `latency` is the time from a pose to the effect of the command.
 
     Attributes:
         twist: the command of the latest period.
@@ -116,7 +123,7 @@ class PathFollower(RtComponent):
         return control_laws.VelocityLimits(self.max_v.value, self.max_w.value, dv, dw)
 
     def _update_pose(self, ec: ExecutionContext) -> Pose | None:
-        """Read new poses. Returns: the latest, None if there was none for `pose_timeout`."""
+        """Read new poses; return the latest, or None if no pose came for `pose_timeout`."""
         if (pose := read_newest_pose(self.position)) is not None:
             self._pose, self._received_us = pose, ec.now_us
         elif ec.now_us - self._received_us > self.pose_timeout.value * 1e6:

@@ -29,9 +29,9 @@ USAGE: Final = "goal X Y DEG; path FILE; path X Y, X Y DEG; path; end"
 class PositionInput(RtComponent):
     """Sends one command after the other, each after the previous one has finished.
 
-    The original waits at its console in on_execute; here nothing blocks: the owner of the console
-    calls `typed` with each line, and a program calls `goal`, `path` and `end`. Its configuration is
-    declared and unused, as in the original.
+    The original waits at its console in on_execute. This component does not block: the owner of the
+    console calls `typed` with each line, and a program calls `goal`, `path` and `end`. Its
+    configuration is declared and unused, as in the original.
 
     Attributes:
         finished: number of finished commands.
@@ -93,11 +93,11 @@ class PositionInput(RtComponent):
         self._commands.append(command)
 
     def typed(self, line: str) -> None:
-        """Enter a command as a person types it, see `USAGE`; it waits for those before it.
+        """Enter a command as a person types it, see `USAGE`; it runs after the earlier commands.
 
         Raises:
-            ValueError: no such command, a pose or path that cannot be, a file that cannot be
-                read, or `end` was typed before; nothing is changed.
+            ValueError: the command is unknown, a pose or path is invalid, a file cannot be read,
+                or `end` was typed before; the commands do not change then.
         """
         self.require_open()
         word, _, rest = line.strip().partition(" ")

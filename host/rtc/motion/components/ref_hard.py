@@ -29,9 +29,9 @@ from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.rtc import Time, TimedDoubleSeq
 
 _MAX_MISSES: Final = 5
-"""Requests in a row, unanswered or refused, that are an error.
+"""Number of requests in a row, unanswered or refused, that bring the component to Error.
 
-rh3-control proposes 3; with a fifth of all exchanges lost they come once in ten minutes.
+rh3-control proposes 3. If a fifth of all exchanges is lost, this happens once in ten minutes.
 """
 
 _GAINS: Final[Mapping[str, int]] = {"P": 10, "I": 0, "D": 0, "VP": 10, "VI": 0, "VD": 1}
@@ -63,29 +63,33 @@ class RefHard(Protocol):
 
 
 class RefHardRh3(RtComponent):
-    """Talks with the base: wheel angles out, speeds in, one exchange each period.
+    """Exchanges data with the base once a period: sends speeds and receives wheel angles.
 
-    In on_execute it takes the answer of the period before and gives the wheel angles; in
-    on_state_update, when all others have executed, it sends the speeds of this period. So
-    nothing waits, and a command is on the line in the period in which it was made.
+    In on_execute it reads the answer of the previous period and writes the wheel angles. In
+    on_state_update, after all components have executed, it sends the speeds of this period. So it
+    does not wait, and a command is on the line in the period in which it was made.
 
-    It goes into Error when the base has a fault, refuses or leaves unanswered `_MAX_MISSES`
-    requests in a row, or the line is gone; the base then stops by its own watchdog. While the
-    bumper is pressed or after `Stop` it commands standstill. Where a wheel would have to be
-    faster than Velocity_limit, both are slowed down alike.
+    It goes into Error in these cases; the base then stops by its own watchdog:
 
-    First it asks the device who it is, and writes nothing before it has answered as a base
-    does; with `AnyDevice` set to 1 it does not ask.
+    - the base has a fault;
+    - the base refuses, or does not answer, `_MAX_MISSES` requests in a row;
+    - the line is closed.
 
-    Not there: the library libsvm and its protocol, whose texts are not public.
+    While the bumper is pressed, and after `Stop`, it commands standstill. If a wheel would be
+    faster than Velocity_limit, both wheels are slowed down by the same factor.
+
+    First it requests the identification of the device, and writes nothing before the device has
+    answered as a base does. With `AnyDevice` set to 1 it does not request it.
+
+    Not emulated: the library libsvm and its protocol, whose texts are not public.
 
     Args:
-        instance_name: of the component.
+        instance_name: name of the component.
         open_link: opens the line; by pyserial unless given.
 
     Attributes:
-        report: what the base said last.
-        error_reason: why it went into Error last.
+        report: the latest report of the base.
+        error_reason: the reason of the latest Error.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("RefHardRh3", "Base of Reference Hardware 3")

@@ -14,12 +14,12 @@ from tickrig.wire.rtc_types import iis
 class Follower(RtComponent):
     """Keeps a distance to the robot whose self-position arrives at `leader`.
 
-    Both positions are in one map frame. Nearer than `gap` it stands; it never goes back. A
-    base on two wheels turns to the leader and goes; with `sideways` it goes straight to
-    where it should be and takes over the leader's heading. Without a position of either for
-    `pose_timeout` it stands. Which robot leads is a matter of the connector.
+    Both positions are in one map frame. If the leader is nearer than `gap`, the robot stands; it
+    never goes back. A base on two wheels turns to the leader and goes. With `sideways` the robot
+    goes straight to its wanted position and takes over the leader's heading. If either position is
+    missing for `pose_timeout`, the robot stands. The connector decides which robot leads.
 
-    The report gives no law: this one, its gains and its limits are ours.
+    The report gives no control law; this law, its gains and its limits are additions.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Follower", "Follows another robot")

@@ -51,13 +51,13 @@ class KeyboardPad:
     """Reads keys of a terminal: w s forward and back, a d turn, q e sideways, space stop.
 
     Args:
-        fd: of the terminal, standard input unless given.
+        fd: file descriptor of the terminal; standard input unless given.
 
     Attributes:
-        close: lets the terminal be as it was.
+        close: restores the settings of the terminal.
 
     Raises:
-        LinkClosed: it is no terminal.
+        LinkClosed: the file is not a terminal.
     """
 
     def __init__(self, fd: int | None = None) -> None:
@@ -87,10 +87,10 @@ def open_pad(name: str) -> _GamePadDevice:
 class GamePad(DeviceComponent[_GamePadDevice]):
     """Writes a velocity each period while a stick is deflected, and one of 0 when it is released.
 
-    The specification only names it; ports and parameters are additions.
+    The specification has only its name; ports and parameters are additions.
 
     Args:
-        instance_name: of the component.
+        instance_name: name of the component.
         opener: opens the pad.
     """
 

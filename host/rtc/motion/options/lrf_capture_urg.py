@@ -14,13 +14,13 @@ from tickrig.wire.rtc_types.rtc import RangeData, RangerConfig, Time
 
 
 class LrfCaptureUrg(DeviceComponent[UrgClient]):
-    """Lets a sensor measure while it is Active, and writes each scan.
+    """Makes a sensor measure while the component is Active, and writes each scan.
 
-    A range of 0 means that there was no distance. The specification only names it
-    (LRFCapture_URG); ports and parameters are ours.
+    A range of 0 means that there was no distance. The specification has only the name of the
+    component (LRFCapture_URG); ports and parameters are additions.
 
     Args:
-        instance_name: of the component.
+        instance_name: name of the component.
         open_link: opens the line; by pyserial unless given.
     """
 

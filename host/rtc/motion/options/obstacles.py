@@ -35,9 +35,9 @@ _LOG: Final = log_of(__name__)
 
 
 class UrgToObstacles(RtComponent):
-    """Writes where things are, in the frame of the robot: x ahead of the axle, y to the left.
+    """Writes the places of obstacles in the frame of the robot: x ahead of the axle, y to the left.
 
-    The specification only names it (Urg_to_Obstacles); ports and parameters are ours.
+    The specification has only its name (Urg_to_Obstacles); ports and parameters are additions.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Urg_to_Obstacles", "Points out of range data")
@@ -71,10 +71,10 @@ def _directions(first: float, step: float, count: int) -> Sequence[tuple[float, 
 
 
 class ObstacleMonitor(RtComponent):
-    """Looks along the lane that the robot is about to drive through, straight ahead.
+    """Measures the free distance in the lane straight ahead of the robot.
 
-    `distance` is counted from its front; `range` stands for nothing in the way. The
-    specification only names it; ports and parameters are ours.
+    `distance` is measured from the front of the robot; the value `range` means a free lane.
+    The specification has only its name; ports and parameters are additions.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("ObstacleMonitor", "Distance to what is in the way")
@@ -102,13 +102,13 @@ class ObstacleMonitor(RtComponent):
 
 
 class _WatchedDistance:
-    """Blocked below one distance, free above another, and blocked without a distance.
+    """The way is blocked below one distance, free above another, and blocked without a distance.
 
     Args:
-        port: where distances arrive.
+        port: port at which distances arrive.
 
     Attributes:
-        free: whether the way is free; not before the first distance.
+        free: whether the way is free; False before the first distance.
     """
 
     def __init__(self, port: InPort[TimedDouble]) -> None:
@@ -131,12 +131,12 @@ class _WatchedDistance:
 
 
 class ObstaclesAvoidance(RtComponent):
-    """Stands between PathFollower and base: stop and go, no way around.
+    """Stops the cart before obstacles; works between PathFollower and base, plans no way around.
 
-    Forward motion ends while something is nearer than `stop_distance`, and goes on when it
-    is farther than `go_distance`; both with `max_acc_v`. Turning on the spot and going back
-    always pass, and without a velocity for `timeout` it says nothing, so that the base's own
-    watchdog acts. The specification only names it; ports and parameters are ours.
+    Forward motion ends when an obstacle is nearer than `stop_distance`, and continues when it is
+    farther than `go_distance`; both with `max_acc_v`. Commands to turn on the spot and to go back
+    always pass. Without a velocity for `timeout` the component writes nothing, so that the base's
+    own watchdog acts. The specification has only its name; ports and parameters are additions.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("ObstaclesAvoidance", "Stop and go")
@@ -185,7 +185,7 @@ class CollisionDetection(RtComponent):
 
     Without a distance for `timeout` it calls Stop, because there may be an obstacle. When it is
     deactivated it calls Go, if it had called Stop. Join `BumpRefHard` with RefHardRh3.BumpRefHard.
-    The specification only names it; ports and parameters are additions.
+    The specification has only its name; ports and parameters are additions.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("CollisionDetection", "Stops the base at once")
@@ -244,12 +244,12 @@ class CollisionGuard:
     PathFollower is joined to ObstaclesAvoidance in the place of RefHardRh3.
 
     Args:
-        manager: who runs the chain.
-        chain: of a cart.
+        manager: runs the chain.
+        chain: the chain of a cart.
         open_urg: opens the line to its range finder.
 
     Attributes:
-        monitor: its `distance` is what the others act on.
+        monitor: the component whose `distance` the others use.
     """
 
     def __init__(self, manager: Manager, chain: MotionChain, open_urg: Opener) -> None:

@@ -16,9 +16,9 @@ _LOG: Final = log_of(__name__)
 class SwitchInput(RtComponent):
     """The joystick has priority; the planner resumes `hold` after the stick is released.
 
-    In between the cart stands. A deflected joystick without a message for `stale` counts as
-    released, and a velocity with an invalid number as 0. The specification only names it
-    (SwitchInputRTC); ports and parameters are additions.
+    During `hold` the cart stands. A deflected joystick without a message for `stale` counts as
+    released. A velocity with an invalid number counts as 0. The specification has only the name of
+    the component (SwitchInputRTC); ports and parameters are additions.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("SwitchInputRTC", "Joystick or planner")
