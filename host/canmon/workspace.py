@@ -1,8 +1,8 @@
 """The workspace: one TOML file for the settings of all panels.
 
-It is read and written as a whole, by way of a temporary file, so a partial file
-never exists. Unknown settings and comments stay in it. A file that another
-program has changed is not overwritten.
+It is read and written as a whole. Writing uses a temporary file, so that a partial file never
+exists. Unknown settings and comments are kept. A file that another program has changed is not
+overwritten.
 
 Settings of a panel in a workspace, checked one by one.
 
@@ -57,11 +57,12 @@ class Workspace:
     """Settings by section.
 
     Args:
-        text: as it stands in the file.
-        path: the file; None for settings that are kept nowhere.
+        text: content of the file.
+        path: the file; None for settings that are not stored.
 
     Raises:
-        WorkspaceError: no TOML; says the line. Or tomlkit is not there.
+        WorkspaceError: the text is not TOML, and the message names the line; or tomlkit is not
+            installed.
     """
 
     def __init__(self, text: str = "", path: Path | None = None) -> None:
@@ -83,10 +84,10 @@ class Workspace:
 
     @classmethod
     def read(cls, path: Path) -> Workspace:
-        """Read a file; one that is not there yet is an empty workspace.
+        """Read a file; a file that does not exist yet is an empty workspace.
 
         Raises:
-            WorkspaceError: it cannot be read, or is no TOML.
+            WorkspaceError: it cannot be read, or is not TOML.
         """
         try:
             return cls(path.read_text("utf-8"), path)
@@ -133,10 +134,10 @@ class Workspace:
         """Write the file if anything has changed; return whether it has.
 
         Args:
-            over: whatever is in the file now.
+            over: whether to overwrite the file regardless of its present content.
 
         Raises:
-            WorkspaceError: it cannot be written, or is not as it was last read or written.
+            WorkspaceError: it cannot be written, or has changed since it was last read or written.
         """
         text, path = self.text, self.path
         if path is None or (text == self._text and not over):
@@ -221,10 +222,10 @@ class MonitorSetup:
 
     Attributes:
         source: SOURCE words.
-        options: of the buses.
-        eds: files by node-ID.
-        dbc: files.
-        eds_dir: folders of EDS files for nodes that have none of their own.
+        options: options of the buses.
+        eds: EDS files by node-ID.
+        dbc: DBC files.
+        eds_dir: folders of EDS files for nodes that are not in `eds`.
     """
 
     source: tuple[str, ...] = ()
@@ -374,12 +375,12 @@ class _Kept(Protocol):
 
 
 class PanelSettings:
-    """Recalls settings, and keeps them.
+    """Restores settings, and stores them.
 
     Args:
-        workspace: where they are kept.
-        setup: buses and files, as they are used.
-        panels: whose settings they are.
+        workspace: where settings are stored.
+        setup: the buses and files in use.
+        panels: the panels with these settings.
     """
 
     def __init__(self, workspace: Workspace, setup: MonitorSetup, panels: Sequence[_Kept]) -> None:
@@ -407,9 +408,10 @@ class PanelSettings:
         return words
 
     def save(self) -> str:
-        """Write what has changed; return an error once.
+        """Write changed settings; return an error only once.
 
-        A file that another program has changed is not written until it is exported.
+        If another program has changed the file, it is not written until the user exports the
+        settings.
         """
         self._put()
         try:
@@ -496,9 +498,9 @@ def below(*path: str | int) -> Iterator[None]:
 
 
 def checked_bus(buses: Collection[str], settings: Mapping[str, Any]) -> str:
-    """Return the bus that settings name, empty for the first; SettingError if it is not there.
+    """Return the bus that settings name, empty for the first; SettingError if it does not exist.
 
-    A log has no buses: then any name may stand there.
+    A log has no buses; any name is then valid.
     """
     bus = text_of(settings, "bus", "")
     if bus and buses and bus not in buses:

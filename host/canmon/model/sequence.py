@@ -62,8 +62,7 @@ def fill_in(text: str, variables: Mapping[str, int]) -> str:
 
     A text with a `#` is a frame: there a field becomes two hex digits. In other texts it becomes a
     decimal number. `:3` in a field means three hex digits, `:i16` two bytes with the low byte
-    first, `:d` a decimal number. `:3` is three hex digits, `:i16` two bytes, the lowest first, `:d`
-    a decimal number.
+    first, `:d` a decimal number.
 
     Raises:
         ValueError: an unknown variable, a value that is not a whole number, or a number that does

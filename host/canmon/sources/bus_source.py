@@ -1,9 +1,9 @@
 """Buses of python-can as a source.
 
-The kernel counts frames for which a socket's queue had no room, and passes the
-count with each frame that is read (socket(7), SO_RXQ_OVFL). It passes frames of CAN FD
-and CAN XL only to sockets that enable them (linux, networking/can). This source enables
-both; it reads CAN FD and counts CAN XL.
+The kernel counts the frames that it drops because the queue of a socket is full. It passes this
+count with each frame that is read (socket(7), SO_RXQ_OVFL). It passes CAN FD and CAN XL frames only
+to sockets that enable them (linux, networking/can). This source enables both. It reads CAN FD
+frames, and only counts CAN XL frames.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ class SocketReader:
     Attributes:
         lost: frames that the kernel dropped because its queue was full.
         tally: counts what was not a frame.
-        stepped: never.
+        stepped: always False.
     """
 
     stepped = False
@@ -156,10 +156,10 @@ def open_bus(options: BusOptions) -> tuple[can.BusABC, str, str]:
     """Open a bus of the interface that the options, the configuration or the default name.
 
     Returns:
-        The bus, its interface, and what its channel is called.
+        The bus, its interface, and the name of its channel.
 
     Raises:
-        Refused: options that python-can does not know.
+        Refused: options that are unknown to python-can.
         SourceFailed: the bus cannot be opened.
     """
     bus, interface, channel = open_raw(_with_interface(options))
@@ -233,18 +233,18 @@ def _reader_of(bus: can.BusABC, interface: str, name: str) -> Reader[Record]:
 
 
 class OpenBus:
-    """A bus that a SOURCE word and options name; it can be opened again.
+    """A bus named by a SOURCE word and options; it can be opened again.
 
     Args:
-        word: of the bus.
-        options: what the command line says of it.
+        word: the SOURCE word.
+        options: its options on the command line.
 
     Attributes:
-        bus: as it was opened last.
-        name: what it is called.
+        bus: the bus as opened last.
+        name: name of the bus.
 
     Raises:
-        Refused: options that python-can does not know.
+        Refused: options that are unknown to python-can.
         SourceFailed: it cannot be opened.
     """
 
@@ -268,9 +268,9 @@ class OpenBus:
 
 
 def merged(word: BusSpec, options: BusOptions) -> BusOptions:
-    """Return the options of a bus: what its word says goes before them.
+    """Return the options of a bus; options in its SOURCE word override the others.
 
-    Beside -i the word is the channel, colons and all, unless it begins with that interface.
+    With -i, the whole word is the channel, including colons, unless it begins with that interface.
 
     Raises:
         Refused: the word and -c name two channels.
@@ -310,12 +310,12 @@ class Transmitter:
     """An open bus.
 
     Args:
-        word: SOURCE word of a bus; None where the options name it.
-        options: what the command line says of it.
-        receives: read what comes in; else nothing is kept of it.
+        word: SOURCE word of a bus; None if the options name it.
+        options: its options on the command line.
+        receives: whether to read received frames; otherwise they are discarded.
 
     Attributes:
-        name: what the bus is called.
+        name: name of the bus.
 
     Raises:
         Refused: the word names no bus.
@@ -371,7 +371,7 @@ class Transmitter:
 
 
 def send_on(bus: can.BusABC, name: str, frame: CanFrame | FdFrame) -> None:
-    """Send a frame on a bus that is called so; SourceFailed if it is gone or takes none for 1 s."""
+    """Send a frame on the named bus; SourceFailed if it is gone, or accepts no frame for 1 s."""
     try:
         bus.send(to_message(frame), _SEND_TIMEOUT_S)
     except Exception as error:  # drivers raise what they like

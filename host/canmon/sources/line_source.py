@@ -1,7 +1,7 @@
-"""Serial ports as a source, beside buses: the lines of the devices on them.
+"""Serial ports as a source, like buses: the lines of the devices on them.
 
-A port has one reader. Who wants to hear a host and its device hangs the receive
-line of an adapter of its own on each of their wires.
+A port can have only one reader. To listen to a host and its device, use two adapters, and connect
+the receive line of one to each of the two wires.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class RtcLiteLine:
 
     Args:
         channel: name of the line.
-        checksum: how frames are summed up.
+        checksum: checksum of the frames.
     """
 
     def __init__(self, channel: str, checksum: Checksum = Checksum.SUM8) -> None:
@@ -171,7 +171,7 @@ class RrcLines:
 
 
 def _decode_command(line: bytes) -> Decoded:
-    """Decode a line to the RRC, with CHECK at its end or without.
+    """Decode a line to the RRC, with or without CHECK at its end.
 
     >>> _decode_command(b"output1eff").text, _decode_command(b"output1e007").text
     ('output v_pct=30 w_pct=-1', 'output v_pct=30 w_pct=0')
@@ -241,7 +241,7 @@ class LineReader:
         word: its port, protocol and direction.
 
     Attributes:
-        name: of its port.
+        name: name of its port.
         lost: 0, because a serial port does not report it.
         tally: empty; invalid bytes are reported as lines.
         stepped: False: its time is real time.

@@ -33,12 +33,13 @@ _Read_co = TypeVar("_Read_co", bound="Record | LineRecord", covariant=True)
 
 
 class Reader(Protocol[_Read_co]):
-    """One bus, or one serial port, that is open.
+    """An open bus or serial port.
 
     Attributes:
-        name: what it is called.
-        tally: what was no frame.
-        stepped: its time passes while it is read, and it belongs to the thread that opened it.
+        name: name of the bus or port.
+        tally: counts items that are not frames.
+        stepped: whether its time passes while it is read; it then belongs to the thread that opened
+            it.
     """
 
     name: str
@@ -52,7 +53,7 @@ class Reader(Protocol[_Read_co]):
     def read(self, timeout_us: int, /) -> Sequence[_Read_co | Mark]:
         """Wait for a first frame; LinkClosed if the bus is gone.
 
-        A mark in front of all that it returns says that the bus went away or is back.
+        A mark at the beginning of the result means that the bus went away or is back.
         """
 
     def close(self) -> None:
@@ -62,14 +63,13 @@ class Reader(Protocol[_Read_co]):
 class LiveSource(AnySource[_Item]):
     """One or more buses or serial ports, read by a thread each.
 
-    What the caller does not fetch is kept up to a limit; frames beyond it are
-    lost, and counted. A bus in virtual time is read by the caller itself: time
-    passes while it polls.
+    Frames that the caller has not fetched are kept up to a limit. Further frames are lost, and
+    counted. The caller itself reads a bus in virtual time: time passes while it polls.
 
     Args:
         readers: open buses and ports.
-        chosen: which frames of each are wanted; None for all.
-        queue_frames: frames that are kept.
+        chosen: filter for the frames of each; None for all frames.
+        queue_frames: largest number of frames that are kept.
 
     Attributes:
         failed: why a bus is gone.
@@ -220,21 +220,22 @@ def _monotonic_us() -> int:
 
 
 class ReopeningReader(Generic[_Item]):
-    """A reader over readers, each of which is used until its bus is gone.
+    """A reader that opens a bus again: it uses one reader after the other, until the bus is gone.
 
-    Until `wanted` is set, it acts like the first reader. A bus is back when it was opened and
-    read without an error: one of SocketCAN that is down can be opened.
+    Until `wanted` is set, it acts like the first reader. A bus is back when it was opened and then
+    read without an error. Opening alone is not enough, because a SocketCAN bus that is down can be
+    opened.
 
     Args:
-        reader: the first; it is open.
-        open_reader: opens the next.
-        clock: microseconds, of any origin.
+        reader: the first reader; it is open.
+        open_reader: opens the next reader.
+        clock: returns microseconds, with any origin.
         wait: sleeps for a number of seconds.
 
     Attributes:
-        name: that of the first.
+        name: name of the first reader.
         tally: counts what was not a frame in any of them.
-        stepped: never.
+        stepped: always False.
         wanted: whether to open the bus again.
         gaps: number of times that it went away.
     """
@@ -265,7 +266,7 @@ class ReopeningReader(Generic[_Item]):
         return self._gone_us is not None
 
     def read(self, timeout_us: int, /) -> Sequence[_Item | Mark]:
-        """Wait for a first frame; mark the times at which the bus goes away and is back.
+        """Wait for a first frame; add marks when the bus goes away and when it is back.
 
         Raises:
             LinkClosed: the bus is gone, and `wanted` is not set.

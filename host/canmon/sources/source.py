@@ -1,6 +1,6 @@
-"""Where frames come from, under one face, and what a SOURCE word names.
+"""Sources of frames with a common interface, and the meaning of SOURCE words.
 
-What a SOURCE word names.
+Examples of SOURCE words:
 
 >>> parse_source("slcan:/dev/ttyACM0@500k")
 BusSpec(interface='slcan', channel='/dev/ttyACM0', bitrate=500000, chosen=None, data_bitrate=None)
@@ -54,13 +54,13 @@ _Taken_co = TypeVar("_Taken_co", covariant=True)
 
 
 class AnySource(Generic[_Taken_co]):
-    """Frames, or lines of a serial port, as they come in.
+    """Frames, or lines of a serial port, as they arrive.
 
     Attributes:
-        live: it goes on by itself; False where all of it is there already.
-        failed: why it ended before its time; empty if it did not.
-        marks: what happened behind the frames that `poll` returned last.
-        recorded: a recorder wrote these marks, and has said them.
+        live: whether new data arrive with time; False if all data exist already.
+        failed: why the source ended early; empty if it did not.
+        marks: events after the frames that `poll` returned last.
+        recorded: whether a recorder wrote these marks, and has already reported them.
     """
 
     live = recorded = False
@@ -165,12 +165,12 @@ class FileSpec:
 
 @dataclass(frozen=True, slots=True)
 class BusSpec:
-    """A bus, and which frames of it are wanted; what is None the options say.
+    """A bus, and a filter for its frames; the options define the attributes that are None.
 
-    One with a data bit rate is one of CAN FD.
+    A bus with a data bit rate is a CAN FD bus.
 
     Attributes:
-        prefix: what stood before the first colon: part of the channel where -i names the interface.
+        prefix: text before the first colon; it is part of the channel if -i names the interface.
     """
 
     interface: str | None = None
@@ -187,9 +187,9 @@ class LineSpec:
 
     Attributes:
         port: a device or pyserial URL.
-        baud: bit/s, None for what is usual with the protocol.
+        baud: bit/s; None for the usual rate of the protocol.
         protocol: one of `_PROTOCOLS`.
-        from_host: what comes in is what the host sends.
+        from_host: whether the received data are those that the host sends.
     """
 
     port: str
@@ -261,12 +261,12 @@ def _chosen(filters: str) -> CandumpFilter | None:
 
 @dataclass(frozen=True, slots=True)
 class LogCut:
-    """Which part of a log is wanted; by default all of it.
+    """The wanted part of a log; by default the whole log.
 
     Attributes:
-        begin: of the part; None for the first frame of the log.
-        end: of it, likewise for the last frame.
-        earlier: takes each frame in front of the part, as a decoder that learns from it.
+        begin: beginning of the part; None for the first frame of the log.
+        end: end of the part; None for the last frame of the log.
+        earlier: called with each frame before the part, so that a decoder can learn from it.
     """
 
     begin: LogTime | None = None
@@ -287,13 +287,15 @@ class LogCut:
 
 
 class _CutLog:
-    """Lets that part of a log pass which is wanted. Time may go back: each frame counts by itself.
+    """Passes on the wanted part of a log.
+
+    Time may go back: each frame is compared with the limits by itself.
 
     Args:
-        cut: what is wanted.
+        cut: the wanted part.
 
     Attributes:
-        over: something came that is later than the part.
+        over: whether an item later than the part has arrived.
     """
 
     def __init__(self, cut: LogCut) -> None:
@@ -557,10 +559,10 @@ SMALL_BYTES: Final = 1 << 20
 
 
 class BlockLog(AnySource["Columns"]):
-    """A log file as columns, a block at each poll; it holds no more than that.
+    """A log file as columns, one block for each poll; it holds only one block in memory.
 
     Attributes:
-        no_columns: it ends before its time, for it is to be read frame by frame.
+        no_columns: whether it ended early because the file must be read frame by frame.
 
     Raises:
         SourceFailed: the file cannot be read.
@@ -606,7 +608,7 @@ class BlockLog(AnySource["Columns"]):
 
 
 class PieceLog(_LoggedSource):
-    """A log file in pieces: columns where it has them, else frames up to the next marks.
+    """A log file in pieces: columns if possible, otherwise frames up to the next marks.
 
     Raises:
         SourceFailed: the file cannot be read.
@@ -656,14 +658,15 @@ class PieceLog(_LoggedSource):
 
 
 def block_log(words: Sequence[str], cut: LogCut = _WHOLE) -> BlockLog | None:
-    """Open the log that SOURCE words name; None if it is better read frame by frame.
+    """Open the log that SOURCE words name; return None if it should be read frame by frame.
 
     Args:
         words: SOURCE words.
-        cut: which part of it is wanted; where frames in front of it are taken, the answer is None.
+        cut: the wanted part of the log. If its `earlier` takes frames before the part, the result
+            is None.
 
     Raises:
-        Refused: words that name nothing.
+        Refused: words that do not name a source.
         SourceFailed: a file that cannot be read.
     """
     path = None if cut.earlier else _large_log(words)
@@ -692,17 +695,17 @@ def _large_log(words: Sequence[str]) -> Path | None:
 def open_source(
     words: Sequence[str], options: BusOptions | None = None, cut: LogCut = _WHOLE
 ) -> Source:
-    """Open what SOURCE words name: one or more buses, or files, or standard input.
+    """Open the source that SOURCE words name: one or more buses, files, or standard input.
 
-    Files are merged by time; buses are read as frames come in.
+    Files are merged by time. Buses are read as frames arrive.
 
     Args:
-        words: SOURCE words; without any the options name a bus.
-        options: interface, bit rate and such of the buses.
-        cut: which part of the files or of standard input is wanted; a bus is refused then.
+        words: SOURCE words; without words the options name a bus.
+        options: interface, bit rate and other options of the buses.
+        cut: the wanted part of the files or of standard input; a bus is then refused.
 
     Raises:
-        Refused: words that name nothing, or things that do not go together.
+        Refused: words that do not name a source, or sources that cannot be combined.
         SourceFailed: a bus or file that cannot be opened.
     """
     options = options or BusOptions()
@@ -746,10 +749,10 @@ def open_live(
     """Open buses and serial ports, so that they can be opened again.
 
     Returns:
-        The source, and the buses by name, to send on.
+        The source, and the buses to send on, by name.
 
     Raises:
-        Refused: options that python-can does not know.
+        Refused: options that are unknown to python-can.
         SourceFailed: a bus or port that cannot be opened.
     """
     opened: dict[str, bus_source.OpenBus] = {}

@@ -103,10 +103,10 @@ class RecorderTask(Task):
         return "" if self.recorder is None else self.recorder.failed
 
     def start(self, words: str) -> None:
-        """Begin a recording; buses that go away are opened again from now on.
+        """Begin a recording; from now on, buses that go away are opened again.
 
         Raises:
-            ValueError: words that name none, or it cannot be written there.
+            ValueError: the words do not name a recording, or it cannot be written.
         """
         session = self._session
         self.end()
@@ -188,8 +188,8 @@ class StatusLine(Widget):
     """Shows a status; a click on its first word arms or disarms.
 
     Args:
-        session: what it is about.
-        recorder: what records.
+        session: the session whose status it shows.
+        recorder: the recorder.
     """
 
     DEFAULT_CSS = "StatusLine { height: 1; background: $boost; }"
@@ -245,9 +245,9 @@ class _ExportScreen(ModalScreen[str]):
     """A field for the name of a file; Escape leaves without one.
 
     Args:
-        name: what stands in the field.
-        title: what it is for.
-        example: what is shown in an empty one.
+        name: initial content of the field.
+        title: purpose of the name.
+        example: text shown in an empty field.
     """
 
     DEFAULT_CSS = """
@@ -387,14 +387,14 @@ class MonitorApp(FramedApp):
     """Tabs, keys, help and the status line.
 
     Args:
-        session: the traffic, and how to send; the caller of the app starts it.
+        session: the traffic, and the means to send; the caller of the app starts it.
         panels: the tabs.
         panel_settings: stores their settings; None stores them only on export.
         recorder: the recorder; by default a new one.
 
     Attributes:
         reopens: whether buses that go away are opened again.
-        asks: whether it begins with the settings, as no source is named.
+        asks: whether the app begins with the settings, because no source was named.
     """
 
     TITLE = "canmon"
@@ -580,10 +580,11 @@ class MonitorApp(FramedApp):
         after: workspace.MonitorSetup,
         changes: Mapping[str, dict[str, Any]],
     ) -> _Work:
-        """Open other buses or read other files, and end what ran; InputError if that fails.
+        """Open other buses or read other files, and end the present ones; InputError if that fails.
 
-        A bus that is in both is closed first, for most adapters are opened once; if it cannot be
-        opened as it is wanted, it is opened as it was.
+        A bus that is among the old and the new ones is closed first, because most adapters can be
+        opened only once. If it cannot be opened with the new settings, it is opened with the old
+        ones.
         """
         old, files = self.session, _read_files(after)
         with fields.of_field("dbc"):

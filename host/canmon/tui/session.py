@@ -81,19 +81,19 @@ class Model:
     Args:
         eds: contents of EDS files, by node-ID.
         dbc: DBC files.
-        bit_rate: of the buses, None if it is not known.
-        data_bit_rate: of data of CAN FD frames with BRS, likewise.
+        bit_rate: bit rate of the buses; None if unknown.
+        data_bit_rate: bit rate of the data phase of CAN FD frames with BRS; None if unknown.
 
     Attributes:
-        eds: what files say, by node-ID.
+        eds: contents of EDS files, by node-ID.
         decoder: decodes all frames.
         board: the nodes.
-        top: the traffic, and how the statistics show it.
+        top: the traffic, and the settings of its display in the statistics.
         trace: the latest frames.
         frames: number of frames, including error frames.
         now_us: the time at the source.
         lost: frames that were lost before they were read.
-        unread: what was not a frame of CAN or CAN FD.
+        unread: items that were not frames of CAN or CAN FD.
         failed: why the source ended early; empty if it did not.
         ended: whether the source has ended.
         away: buses that went away and are not back.
@@ -143,10 +143,10 @@ _Send = Callable[[CanFrame | FdFrame], None]
 
 
 class Task(Protocol):
-    """Something that hears all frames, and may send some. It is called in the session's thread.
+    """A task that receives all frames, and may send frames; called in the session's thread.
 
     Attributes:
-        channel: the bus it sends on; empty for the first.
+        channel: the bus on which it sends; empty for the first bus.
     """
 
     channel: str = ""
@@ -172,11 +172,11 @@ class Task(Protocol):
 class Session:
     """Reads a source, feeds the model and the tasks, and sends the frames of the tasks.
 
-    Nothing is sent while it is not armed: such frames are withheld, and counted. Hold `lock` to
-    read the model or to use a task.
+    While the session is not armed, nothing is sent: frames of tasks are withheld, and counted. Hold
+    `lock` to read the model or to use a task.
 
     Args:
-        source: where frames come from.
+        source: source of the frames.
         model: processes them.
         buses: the buses to send on, by channel; empty for a log.
         clock: the session's time in microseconds.
@@ -365,10 +365,10 @@ _TERMINAL: Final = "/dev/tty"
 
 
 def open_session(words: Sequence[str], options: BusOptions, model: Model) -> Session:
-    """Open what SOURCE words name; nothing is sent until the session is armed.
+    """Open the source that SOURCE words name; nothing is sent until the session is armed.
 
     Raises:
-        Refused: words that name nothing, or things that do not go together.
+        Refused: words that do not name a source, or sources that cannot be combined.
         SourceFailed: a bus or file that cannot be opened.
     """
     parsed = [parse_source(word) for word in words]

@@ -135,14 +135,14 @@ def setting_texts(settings: MonitorSettings) -> dict[str, str]:
 
 
 def parse_settings(texts: Mapping[str, str], before: MonitorSetup | None = None) -> MonitorSettings:
-    """Read the fields.
+    """Parse the texts of the fields.
 
     Args:
-        texts: of all fields.
-        before: what is used now; options that have no field stay.
+        texts: texts of all fields.
+        before: the present settings; options that have no field are kept.
 
     Raises:
-        InputError: one is wrong.
+        InputError: a field is invalid.
     """
     words = {name: _words(name, texts[name]) for name in (*_PATHS, "bus_kwargs")}
     with of_field("source"):
@@ -204,11 +204,11 @@ class _FileSuggester(Suggester):
 
 
 class SettingsScreen(ModalScreen[None]):
-    """All fields, and below each what is wrong with it.
+    """All fields, with an error message below each invalid one.
 
     Args:
-        settings: as they are.
-        apply: takes those that were written; InputError if they cannot be used.
+        settings: the present settings.
+        apply: called with the entered settings; raises InputError if they cannot be used.
     """
 
     HELP = """

@@ -64,17 +64,17 @@ else:  # numpy; decoders
 
 
 class _FindingPrinter:
-    """Findings, shown as they come.
+    """Findings, shown as they occur.
 
     Args:
-        jsonl: whether to show them as JSON.
-        stamp: how times are shown as text; None for seconds of the epoch.
-        kept: whether a report needs them.
+        jsonl: whether to show the findings as JSON.
+        stamp: format of times in text; None for seconds since the epoch.
+        kept: whether to keep the findings for a report.
         rules: the names of all rules.
 
     Attributes:
         counts: number of findings, by rule.
-        findings: all of them, if they are kept.
+        findings: all findings, if `kept`.
         frames: number of checked frames.
         unjudged: what the rules could not judge, known at the end.
     """
@@ -93,11 +93,11 @@ class _FindingPrinter:
         self._kept = kept
 
     def count(self, frames: int, first_us: int) -> None:
-        """Count frames; the first of all is where times may begin.
+        """Count frames; displayed times may begin at the first of all frames.
 
         Args:
             frames: at least one.
-            first_us: when the first of them was.
+            first_us: time of the first of these frames.
         """
         if self._lines is not None and not self.frames:
             self._lines.stamp(first_us)
@@ -230,10 +230,10 @@ def _read_rules(files: Sequence[Path], options: Mapping[str, object]) -> Rules:
 def _read_learnt(
     files: Sequence[Path], options: Mapping[str, object], *, init: bool
 ) -> learnt.Learnt | None:
-    """Return what was learnt from a good log; None if the files have other rules.
+    """Return the rules learnt from a good log; None if the files have other rules.
 
     Raises:
-        Refused: it is wrong, or not alone.
+        Refused: the file of learnt rules is invalid, or is not the only file.
     """
     others = [
         f"--{name.replace('_', '-')}"
@@ -427,17 +427,17 @@ _SHOWN_FRAMES: Final = 3
 
 
 class _Usual:
-    """Holds what comes against what is usual.
+    """Compares frames with what is usual.
 
     Args:
         words: SOURCE words.
         bus: options of buses.
-        make: makes what judges the frames.
-        cut: which part of a log is taken.
-        reopen: wait for a bus that goes away.
+        make: makes the object that judges the frames.
+        cut: the part of a log to read.
+        reopen: whether to wait for a bus that goes away.
 
     Attributes:
-        source: where the frames came from.
+        source: source of the frames.
     """
 
     def __init__(

@@ -1,6 +1,6 @@
 """The options of verbs that decode: EDS, DBC and filter.
 
-The decoder is imported when it is wanted: a verb that does without starts faster.
+The decoder is imported only when a verb needs it, so that other verbs start faster.
 """
 
 from __future__ import annotations
@@ -184,10 +184,10 @@ def log_time_option(option: str, name: str, **attributes: Any) -> Decorator:
 
 
 def source_command(*options: Decorator) -> Callable[[Callable[..., Any]], click.Command]:
-    """Return a decorator that makes a verb with SOURCE words, `--strict`, and those of a bus.
+    """Return a decorator that makes a verb with SOURCE words, `--strict` and the bus options.
 
     Args:
-        options: what else the verb has, in the order of its help.
+        options: further options of the verb, in the order of its help.
     """
     source = click.argument("source", nargs=-1)
     add = add_options(source, *options, strict_option, bus_options, fd_options)

@@ -79,11 +79,11 @@ class _GraphRequest:
         begin: beginning of the view, None for all.
         end: end of the view, None for all.
         at: the time of the cursor, None for none.
-        ranges: of axes.
-        size: of a picture in pixels.
+        ranges: ranges of axes.
+        size: size of a picture in pixels.
         window_us: length of the window of a bus.
-        span_us: how long to listen to a bus, None if not given.
-        title: of a picture.
+        span_us: time to listen to a bus; None if not given.
+        title: title of a picture.
     """
 
     files: tuple[Path, ...]

@@ -26,18 +26,18 @@ _UNREAD: Final = "not read, nor whether the log was ended: canmon stats does"
 
 @dataclass(frozen=True, slots=True)
 class _LogHead:
-    """The beginning of a log, and its end where that is found at once.
+    """The beginning of a log, and its end if that can be found without a scan.
 
     Attributes:
         kind: its format.
-        compressed: it is compressed with gzip.
+        compressed: whether it is compressed with gzip.
         size_bytes: size of the file.
-        frames: how many there are; None where only a scan would tell.
-        head_frames: how many were read of its beginning.
-        channels: names of the buses among these.
+        frames: number of frames; None if only a scan would find it.
+        head_frames: number of frames read from its beginning.
+        channels: names of the buses in these frames.
         first_us: time of the first frame, None if there is none.
-        last_us: time of the last frame, None where only a scan would tell.
-        tally: what was no frame at the beginning.
+        last_us: time of the last frame; None if only a scan would find it.
+        tally: counts items at the beginning that are not frames.
     """
 
     kind: log_file.LogFormat
@@ -66,12 +66,12 @@ _TEXT: Final = (LogFormat.CANDUMP, LogFormat.JSONL, LogFormat.CSV, LogFormat.GVR
 
 
 def read_head(path: Path) -> _LogHead:
-    """Read the first thousand frames, and the end of a log in text.
+    """Read the first thousand frames of a log, and the end of a text log.
 
     Raises:
-        LogFormatError: the file's name tells no format.
+        LogFormatError: the file's name has no known format.
         OSError: the file cannot be read.
-        LogError: it is not what its name says.
+        LogError: the content does not match the file's name.
     """
     kind, compressed = log_file.log_format(path), path.suffix.lower() == log_file.COMPRESSED
     reader = read_log(path)

@@ -90,13 +90,13 @@ def command(  # noqa: PLR0913 - options
 
 
 class _NodesView:
-    """A node board, fed and shown.
+    """A node board with its decoder and its display.
 
     Args:
-        eds: what files say, by node-ID; these nodes are on the board from the beginning.
+        eds: contents of EDS files, by node-ID; these nodes are on the board from the beginning.
 
     Attributes:
-        decoder: of what is taken.
+        decoder: decodes the frames for the board.
     """
 
     def __init__(self, eds: dict[int, EdsObjects]) -> None:

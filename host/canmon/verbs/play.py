@@ -43,12 +43,12 @@ _LEAST_LOOP_US: Final = 1_000
 
 
 class _Due(NamedTuple):
-    """A frame that is to be sent.
+    """A frame to send.
 
     Attributes:
-        at_us: when, counted from the start of the replay.
-        channel: on which bus.
-        frame: what.
+        at_us: time of sending, from the start of the replay.
+        channel: bus to send on.
+        frame: the frame.
     """
 
     at_us: int
@@ -58,19 +58,20 @@ class _Due(NamedTuple):
 
 @dataclass(slots=True)
 class ReplayPlan:
-    """Frames of a log in the order of the log; time in it never goes back.
+    """Frames of a log in the order of the log; their times never go back.
 
     Args:
         log: the frames; read again for each loop.
-        route: tells where the frames of a bus of the log go, None if nowhere.
-        speed: how many times faster, 0 without any pause.
-        from_us: what is earlier than this after the first frame is left out,
-        to_us: what is later likewise; None for the end.
-        loops: how often, `_FOREVER` until it is stopped. A loop begins where the one before
-            ends: at `to_us`, else with the last frame, and at least 1 ms after it began.
+        route: returns the bus on which to send the frames of a bus of the log; None to omit them.
+        speed: factor of the speed; 0 for no pauses.
+        from_us: beginning of the span to send, from the first frame.
+        to_us: end of this span, from the first frame; None for the end of the log.
+        loops: number of loops; `_FOREVER` to repeat until the replay is stopped. A loop begins
+            where the previous one ends: at `to_us`, or else with the last frame. It begins at least
+            1 ms after the beginning of the previous one.
 
     Attributes:
-        left_out: frames of other buses, and error frames, that were in the span.
+        left_out: number of frames of other buses, and of error frames, in the span.
 
     Raises:
         ValueError: a span that is empty, or a speed below 0.
@@ -130,12 +131,12 @@ _EXACT_US: Final = 100_000
 
 
 class Lateness:
-    """Counts latenesses.
+    """Statistics of delays.
 
     Attributes:
-        count: how many.
-        max_us: the greatest.
-        last_us: the latest one: at the end of a replay, its drift.
+        count: number of delays.
+        max_us: the longest delay.
+        last_us: the latest delay; at the end of a replay, this is its drift.
     """
 
     def __init__(self) -> None:

@@ -192,13 +192,13 @@ def _verdict(seen: _Seen, read: _Reading, around: int) -> report_page.Verdict:
 
 
 class _Seen:
-    """What is made of a log: a survey, and what is wrong.
+    """The results for a log: a survey, and a diagnosis.
 
     Attributes:
-        survey: of it.
-        decoder: of the survey.
-        diagnosis: what is wrong by all rules that need no parameter, and those that were learnt.
-        in_columns: it was read in blocks.
+        survey: survey of the log.
+        decoder: decoder of the survey.
+        diagnosis: faults, found by all rules that need no parameter, and by learnt rules.
+        in_columns: whether the log was read in blocks.
     """
 
     def __init__(
@@ -258,14 +258,14 @@ class _Seen:
 class _Reading:
     """A source that is read to its end; a bus is recorded into a file first.
 
-    It is read a second time, frame by frame, for the frames around findings.
+    The log is read a second time, frame by frame, for the frames around findings.
 
     Args:
         words: its SOURCE words.
         bus: the options of buses.
         folder: folder for the recording.
-        span_us: how long to listen to a bus; None until the user interrupts.
-        cut: which part of a log is read.
+        span_us: time to listen to a bus; None to listen until the user interrupts.
+        cut: the part of a log to read.
 
     Attributes:
         source: the source of the first reading, closed at its end.

@@ -43,14 +43,14 @@ _LEFT: Final = 2
 
 
 class _NodeRow(NamedTuple):
-    """What the identifiers of one node did together.
+    """The total traffic of the identifiers of one node.
 
     Attributes:
         channel: the bus.
         node: its node-ID, None for identifiers without one.
         idents: see `ident_of`.
-        frames: of all of them.
-        bits: of all of them on the bus.
+        frames: number of frames of all these identifiers.
+        bits: number of bits of these frames on the bus.
     """
 
     channel: str

@@ -88,12 +88,13 @@ def command(  # noqa: PLR0913 - options
 
 
 def _monitor(path: Path | None, said: MonitorSetup, *, asks: bool) -> app.MonitorApp:
-    """Make the program, its panels with the settings of the workspace.
+    """Make the program, with the settings of the workspace in its panels.
 
     Args:
-        path: of the workspace.
-        said: what the command line says.
-        asks: without a source the screen of settings is shown, which takes one.
+        path: path of the workspace.
+        said: settings on the command line.
+        asks: whether to show the screen of settings if no source is named, so that the user enters
+            one.
     """
     try:
         with loading():

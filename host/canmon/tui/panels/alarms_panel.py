@@ -29,13 +29,13 @@ _LOOK_US: Final = 100_000
 
 
 class AlarmTask(Task):
-    """Takes frames, and looks for what is missing; it sends nothing.
+    """Checks frames, and detects missing ones; it sends nothing.
 
     Args:
-        model: tells the time of the source, and what was lost.
+        model: has the time of the source, and the number of lost frames.
 
     Attributes:
-        alarms: how the rules stand.
+        alarms: state of the rules.
     """
 
     def __init__(self, model: Model) -> None:

@@ -46,12 +46,12 @@ class DictionaryTask(Task):
     The displayed values come from the traffic alone, including answers to other clients.
 
     Args:
-        decoder: has the nodes.
+        decoder: knows the objects of the nodes.
 
     Attributes:
-        channel: the bus on which it sends; empty for the first.
-        result: how the latest transfer ended, in words.
-        left: pending transfers.
+        channel: the bus on which it sends; empty for the first bus.
+        result: result of the latest transfer, in words.
+        left: the pending transfers.
         watched: objects that are read repeatedly.
     """
 

@@ -51,7 +51,7 @@ class _BoardColumn(NamedTuple):
 
     Attributes:
         title: its head.
-        cell: its text for a node at a time, in a board of this width.
+        cell: returns its text for a node at a time, in a board of a given width.
         least: the smallest screen width that shows it, in columns.
         most: its width in characters; longer texts are cut.
         kept: whether it is shown even if it is empty for all nodes.
@@ -214,13 +214,13 @@ def card_lines(
     stamp: Stamp = Stamp.ABSOLUTE,
     origin_us: int = 0,
 ) -> list[Line]:
-    """Return what is known of one node, and the EMCYs of all, the latest first.
+    """Return the known data of one node, and the EMCYs of all nodes, the latest first.
 
     Args:
         row: the node.
         rows: all nodes.
-        width: columns of the screen; what is longer goes on in the next line.
-        stamp: how times are written.
+        width: columns of the screen; a longer text continues on the next line.
+        stamp: format of times.
         origin_us: the time of the first frame.
     """
     name = node_board.name_text(row)

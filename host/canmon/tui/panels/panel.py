@@ -198,11 +198,11 @@ def read_help(module: str) -> str:
 
 
 class FrameWanted(Message):
-    """A frame is to be shown in the trace.
+    """A request to show a frame in the trace.
 
     Args:
         at_us: its time.
-        record: the frame; None for the latest one until that time.
+        record: the frame; None for the latest frame up to that time.
     """
 
     def __init__(self, at_us: int, record: AnyRecord | None) -> None:
@@ -220,7 +220,7 @@ class Panel(Vertical):
     A panel that needs every frame, or sends, adds a `Task` to `session.tasks` when it is created.
 
     Args:
-        session: the traffic, and how to send.
+        session: the traffic, and the means to send.
 
     Attributes:
         title: of the tab.
@@ -276,9 +276,9 @@ class Panel(Vertical):
         """
 
     def save(self) -> dict[str, Any]:
-        """Return all its settings as TOML values: tables, arrays, text, numbers, truth.
+        """Return all its settings as TOML values: tables, arrays, strings, numbers, booleans.
 
-        It is asked also while the panel is on no screen: do not look at widgets.
+        It is also called while the panel is not on a screen: do not read values from widgets.
         """
         return {}
 
@@ -287,7 +287,7 @@ class SendingPanel(Panel):
     """A tab that sends on one bus at a time.
 
     Args:
-        session: the traffic, and how to send.
+        session: the traffic, and the means to send.
         sender: the task that sends.
     """
 
@@ -336,11 +336,11 @@ TABS: Final = ExtensionGroup[type[Panel]](
 
 
 def make_panels(session: Session, notify: Callable[[str], None]) -> list[Panel]:
-    """Return all tabs; a foreign one that cannot be made is left out.
+    """Return all tabs; tabs of other packages that cannot be created are left out.
 
     Args:
-        session: what they show.
-        notify: takes a line for people about each that is left out.
+        session: the session that they show.
+        notify: called with a line of text about each tab that is left out.
     """
     return list(_panels(session, notify))
 

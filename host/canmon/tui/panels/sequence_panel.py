@@ -1,4 +1,4 @@
-"""The tab of the sequences: an editor, and what a sequence does when it runs.
+"""The tab of the sequences: an editor, and the events of a running sequence.
 
 >>> sequence_name('name = "start"', 1), sequence_name("# sync" + chr(10) + "+10 080#", 2)
 ('start', 'sync')
@@ -98,14 +98,14 @@ _LINES: Final = ("+", "loop")
 
 
 class SequenceTask(Task):
-    """Carries out one sequence at a time.
+    """Executes one sequence at a time.
 
     Args:
-        eds: what files say, by node-ID.
-        channel: the bus it sends on; empty for the first.
+        eds: contents of EDS files, by node-ID.
+        channel: the bus on which it sends; empty for the first bus.
 
     Attributes:
-        events: what happened, the latest last; times count from the beginning.
+        events: events of the execution, the latest last; times count from the beginning.
     """
 
     def __init__(self, eds: Mapping[int, EdsObjects], channel: str = "") -> None:

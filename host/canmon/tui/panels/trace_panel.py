@@ -1,4 +1,4 @@
-"""The tab of the trace: frames one below the other, or the latest of each identifier.
+"""The tab of the trace: a list of all frames, or the latest frame of each identifier.
 
 >>> from tickrig.host.canmon.model.frames import Record
 >>> from tickrig.wire.can import CanFrame
@@ -65,16 +65,16 @@ _STAMP_WIDTH: Final = 13
 
 @dataclass(frozen=True, slots=True)
 class TraceLines:
-    """How rows are written.
+    """Settings of the text of rows.
 
     Attributes:
         stamp: the time at the beginning of a line.
         origin_us: the time that is 0.
-        bits: bits instead of bytes.
-        meaning: what a frame means stands behind it.
-        channel_width: characters of the bus; 0 for none.
-        counts: how often an identifier came stands before it.
-        gaps: the time since the frame before it with the same identifier.
+        bits: whether to show bits instead of bytes.
+        meaning: whether to show the meaning of a frame after it.
+        channel_width: width of the bus name in characters; 0 for no name.
+        counts: whether to show the number of frames of an identifier before it.
+        gaps: whether to show the time since the previous frame with the same identifier.
     """
 
     stamp: frames.Stamp = frames.Stamp.ZERO

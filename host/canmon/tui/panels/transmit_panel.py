@@ -51,11 +51,11 @@ class TransmitTask(Task):
     """Sends rows of a list: cyclically, or by hand.
 
     Args:
-        eds: what files say, by node-ID.
-        channel: the bus it sends on; empty for the first.
+        eds: contents of EDS files, by node-ID.
+        channel: the bus on which it sends; empty for the first bus.
 
     Attributes:
-        words: what each row says.
+        words: text of each row.
         list: the rows.
     """
 
