@@ -220,7 +220,7 @@ def _monotonic_us() -> int:
 
 
 class ReopeningReader(Generic[_Item]):
-    """A reader that opens a bus again: it uses one reader after the other, until the bus is gone.
+    """A reader over several readers: it uses each one until its bus is gone.
 
     Until `wanted` is set, it acts like the first reader. A bus is back when it was opened and then
     read without an error. Opening alone is not enough, because a SocketCAN bus that is down can be

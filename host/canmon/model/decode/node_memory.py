@@ -523,7 +523,7 @@ class TwoBeats(NamedTuple):
 
 
 def two_beats(times: Sequence[int]) -> TwoBeats | None:
-    """Find two interleaved heartbeats in the times of one CAN-ID; return None if there are not.
+    """Find two interleaved heartbeats in the times of one CAN-ID; return None without them.
 
     >>> two_beats([0, 30, 100, 130, 200, 230, 300, 330]).period_us
     100
