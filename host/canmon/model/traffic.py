@@ -561,8 +561,8 @@ class BusRow(NamedTuple):
         errors: its error frames.
         went_back: number of frames with an earlier time than the one before.
         fd: number of CAN FD frames.
-        unrated: number of CAN FD frames with data at an unknown bit rate; if not 0, the load is lower
-            than reported.
+        unrated: number of CAN FD frames with data at an unknown bit rate; if not 0, the load is
+            lower than reported.
     """
 
     channel: str
