@@ -412,7 +412,7 @@ class HostRuns:
         return None
 
     def _settle(self) -> None:
-        """Give the devices time to react to the last request, before the run is checked."""
+        """Wait so that the devices react to the last request, before the run is checked."""
         bench = self.machine.bench
         bench.run_for(bench._mode.act(lambda rig: rig.settling_us))
 
