@@ -171,7 +171,7 @@ def _spoilt_bytes(word: bytes, rest: Iterator[int]) -> bytes:
 # A device that bytes of chance are thrown at, each time from the same snapshot.
 
 _LOOKS: Final = 60
-"""How often the search looks for an answer of the device, at increasing intervals: 92 s in total."""
+"""How often the search looks for an answer of the device, at increasing intervals: 92 s in all."""
 
 _LOOK_US: Final = 10_000
 
