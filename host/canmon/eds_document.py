@@ -80,7 +80,7 @@ _IDENTITY: Final = 0x1018
 
 
 def read_identity(bus: NodeBus, node_id: int) -> eds_folder.EdsIdentity | None:
-    """Read who a node is (1018h); None if it does not tell vendor or product."""
+    """Read who a node is (1018h); None if it does not send vendor or product."""
     return eds_folder.node_identity([_number(bus, node_id, sub) for sub in (1, 2, 3)])
 
 
@@ -104,7 +104,7 @@ def chosen_eds(eds: Path | eds_folder.EdsFolder | None, bus: NodeBus, node_id: i
         return eds
     identity = read_identity(bus, node_id)
     if identity is None:
-        say(f"node {node_id}: no EDS is chosen: the node does not tell vendor and product (1018h)")
+        say(f"node {node_id}: no EDS is chosen: the node does not send vendor and product (1018h)")
         return None
     choice = eds.choose(node_id, identity)
     say(choice.said(node_id) if choice else f"node {node_id}: no EDS in {eds} for {identity}")

@@ -174,7 +174,9 @@ def _writing(
     if "--write" in wanted and not folders:
         raise Refused("--write: a bus.yml needs the EDS of each node: give --eds-dir DIR")
     if len({path.resolve() for path in wanted.values()}) < len(wanted):
-        raise Refused(f"{', '.join(wanted)}: one file for two: choose another name")
+        raise Refused(
+            f"{', '.join(wanted)}: the same file for several options: choose another name"
+        )
     for option, path in wanted.items():
         if path.is_dir() or not path.parent.is_dir():
             wrong, why = (path, EISDIR) if path.is_dir() else (path.parent, ENOENT)
@@ -195,7 +197,7 @@ def _write_workspace(
     """Write a workspace with the bus, the EDS of each node and the folders for others."""
     is_rig = call.word is not None and call.word.lower().endswith(RIG_FILE)
     if is_rig:
-        say(one_line(f"{path}: {call.word} is no bus that canmon tui could open: written without"))
+        say(one_line(f"{path}: canmon tui cannot open {call.word}: the workspace has no source"))
     source = () if call.word is None or is_rig else (call.word,)
     eds = {node: file for node, file in files.items() if file is not None}
     setup = workspace_file.MonitorSetup(source=source, options=call.bus, eds=eds, eds_dir=folders)
@@ -212,8 +214,8 @@ def _write_rules(path: Path, call: NetCall, found: list[NodeFound]) -> None:
     """Write which nodes there are, their identities and heartbeats, as rules."""
     nodes = {node.node_id: (node.identity, node.heartbeat_ms) for node in found}
     head = [
-        "Written by canmon net scan. To hold them: canmon check LOG FILE",
-        "A log tells the identity of a node only where it is read (1018h).",
+        "Written by canmon net scan. Check a log against these rules: canmon check LOG FILE",
+        "The identity of a node is judged only if the log contains a read of 1018h.",
     ]
     name = call.word or str(call.bus.channel or call.bus.interface or "bus")
     with refusing("--rules"):
@@ -260,7 +262,7 @@ def _eds_of(node: NodeFound, folder: EdsFolder, without: str) -> Path | None:
     """Return the EDS of a node; a line says which, or why there is none."""
     identity = node_identity(node.identity[:3]) if node.answers else None
     if identity is None:
-        say(f"node {node.node_id}: {without}it does not tell vendor and product (1018h)")
+        say(f"node {node.node_id}: {without}it does not send vendor and product (1018h)")
         return None
     choice = folder.choose(node.node_id, identity)
     if choice is None:

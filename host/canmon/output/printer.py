@@ -95,7 +95,7 @@ class FilteredDecoder:
         said = [] if self._missing is None else self._missing.messages()
         if not said and self.nothing_passed and self._wanted is not None:
             frames = counted(self.taken, "frame")
-            said.append(f"-F {self._wanted.text!r} lets none of {frames} pass")
+            said.append(f"-F {self._wanted.text!r}: none of {frames} passes")
         return said
 
 

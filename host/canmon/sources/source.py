@@ -362,7 +362,7 @@ class _CutLog:
             return []
         span_s = (self._last_us - self._first_us) / 1e6
         dates = f"{date_text(self._first_us)} to {date_text(self._last_us)}"
-        return [f"{self._cut}: no frame is there; the log has {span_s:g} s, {dates}"]
+        return [f"{self._cut}: no frame in this part; the log has {span_s:g} s, {dates}"]
 
 
 _NEVER_US: Final = 1 << 62
@@ -501,7 +501,7 @@ class FileSource(_LoggedSource):
         silent = [name for name in self._names if self._no_more and name in self._silent]
         return [
             *super().messages(),
-            *(f"{name}: the filter behind its name lets no frame pass" for name in silent),
+            *(f"{name}: no frame passes the filter after its name" for name in silent),
         ]
 
     def close(self) -> None:
@@ -721,7 +721,7 @@ def open_source(
     if len(files) == len(parsed) > 0:
         return FileSource(files, cut)
     if cut:
-        raise Refused(f"{cut} cuts a part out of a log, and {' '.join(words) or 'a bus'} is none")
+        raise Refused(f"{cut} is for a log; {' '.join(words) or 'a bus'} is not a log")
     if any(isinstance(word, LineSpec) for word in parsed):
         raise Refused("serial lines are shown by dump, top and tui: " + " ".join(words))
     if len(buses) < len(parsed):

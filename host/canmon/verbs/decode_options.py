@@ -212,7 +212,7 @@ def refuse_idle_of_bus(source: Sequence[str]) -> None:
     if all(isinstance(word, FileSpec) for word in parsed):
         refuse_idle("a log does not go away", "reopen")
     if not any(isinstance(word, BusSpec) for word in parsed):
-        refuse_idle(f"{words[0]} is no bus", "reopen" if parsed == [None] else "", *_OPENS)
+        refuse_idle(f"{words[0]} is not a bus", "reopen" if parsed == [None] else "", *_OPENS)
 
 
 _OPENS: Final = ("interface", "channel", "timing", "bus_kwargs", "fd")

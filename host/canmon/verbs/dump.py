@@ -260,9 +260,9 @@ def _refuse_idle(
         option = "-L" if output == printer.DumpFormat.LOG else f"--{output}"
         refuse_idle(f"{option} writes all of a frame, with its time", *_TEXT_ONLY)
         if output == printer.DumpFormat.LOG:
-            refuse_idle("-L writes bytes alone", "errors", "raw")
+            refuse_idle("-L writes only bytes", "errors", "raw")
     if not filtered and file is None and (raw or output == printer.DumpFormat.LOG):
-        refuse_idle("bytes alone are shown, and no -F asks what they mean", *_DECODES)
+        refuse_idle("only bytes are shown, and no -F needs their meaning", *_DECODES)
     if source and not any(map(is_live, source)):
         refuse_idle("a log ends by itself", "quiet_ms")
 
@@ -360,7 +360,7 @@ def conv(  # noqa: PLR0913 - options
     if not source:  # click takes the last word as LOG
         raise click.UsageError("Missing argument 'LOG'.")
     if wanted is None:
-        refuse_idle("a log holds bytes alone, and no -F asks what they mean", *_DECODES)
+        refuse_idle("a log holds only bytes, and no -F needs their meaning", *_DECODES)
     chosen = decode_options.read_filter(wanted)
     decoder = None if chosen is None else decode_options.make_decoder(eds, dbc)
     meaning = FilteredDecoder(decoder, chosen)

@@ -240,11 +240,11 @@ def _refuse_idle(source: str, request: _GraphRequest, *, listed: bool) -> None:
     if listed:
         refuse_idle("without a SIGNAL the signals are listed", *_OF_VIEWS)
     if not request.files:
-        refuse_idle("it is of a picture, so it wants -o FILE", "title", "size")
+        refuse_idle("it is for a picture: give -o FILE", "title", "size")
     elif all(file.suffix.lower() == ".csv" for file in request.files):
-        refuse_idle("a CSV is no picture", *_OF_PICTURES)
+        refuse_idle("a CSV is not a picture", *_OF_PICTURES)
     if not is_live(source):
-        refuse_idle("it is of a bus; a log has --from and --to", "window_us")
+        refuse_idle("it is for a bus; for a log use --from and --to", "window_us")
 
 
 def _refuse_missing(source: str, collector: Collector) -> None:
@@ -368,7 +368,7 @@ def _missed(series: Sequence[Series], view: View) -> str:
         f"{one.seconds(one.from_us):g} to {one.seconds(one.to_us):g} s"
         for one in (view, replace(whole, origin_us=view.origin_us))
     ]
-    return f"no sample from {spans[0]}: they go from {spans[1]}"
+    return f"no sample from {spans[0]}; the samples are from {spans[1]}"
 
 
 def _title(source: str, view: View, title: str) -> str:

@@ -115,7 +115,7 @@ def _read_nodes(bus: str | None, options: BusOptions, files: EdsFiles, nodes: se
         for node in sorted(nodes):
             identity = read_identity(bus_of_nodes, node)
             if identity is None:
-                said = f"node {node} does not tell vendor and product (1018h)"
+                said = f"node {node} does not send vendor and product (1018h)"
                 raise Refused(f"{said}; give --eds {node}=FILE")
             files.find(source.name, node, identity)
     except LinkClosed as error:

@@ -75,7 +75,7 @@ def command(  # noqa: PLR0913 - options
         take = lambda records: model.take_decoded(meaning.take(records))  # noqa: E731
     cut = meaning.learning(cut)
     if not decode and wanted is None and source and not any(map(is_live, source)):
-        refuse_idle("only -d and -F ask what frames mean", "eds", "eds_folders", "dbc")
+        refuse_idle("only -d and -F decode frames", "eds", "eds_folders", "dbc")
     log = block_log(source, cut) if plain else None
     snapshot = listening.count_blocks(log, span_us)
     model.press("d" if decode else "")

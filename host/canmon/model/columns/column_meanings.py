@@ -19,7 +19,7 @@ from tickrig.host.canmon.model.decode.decoder import (
     Decoder,
     Effect,
     Route,
-    told_by_none,
+    decodes_all_alike,
 )
 from tickrig.host.canmon.model.decode.node_board import NodeBoard
 from tickrig.host.canmon.model.decode.pdos import Field, PdoDecoder
@@ -179,7 +179,7 @@ class ColumnMeanings:
             made[1](texts, places, frames.payload, lengths)
             return
         payloads = frames.payload
-        if told_by_none(route):
+        if decodes_all_alike(route):
             lengths, payloads = lengths & 0, payloads & np.uint64(0)
         for rows in _alike(lengths | remote.astype(np.int64) << 4):
             _, firsts, which = np.unique(payloads[rows], True, True)

@@ -403,7 +403,7 @@ def _raw(at_us: int, frame: CanFrame) -> Decoded:
     return Decoded("raw")
 
 
-def told_by_none(route: Route) -> bool:
+def decodes_all_alike(route: Route) -> bool:
     """Return whether a route decodes all data the same way."""
     return (route.func if isinstance(route, partial) else route) in (_unmapped, _raw)
 

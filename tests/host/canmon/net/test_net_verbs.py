@@ -141,7 +141,7 @@ def test_a_scan_is_written_as_a_workspace(rig: str, tmp_path: Path) -> None:
     result = net(rig, "scan", "--workspace", str(path), "--eds-dir", str(folder))
     assert result.exit_code == 0, result.output
     assert "node 16: no EDS in " in result.stderr
-    assert "is no bus that canmon tui could open: written without" in result.stderr
+    assert "the workspace has no source" in result.stderr
     setup = MonitorSetup.read(Workspace.read(path))
     assert setup.source == ()
     assert [(node, file.resolve()) for node, file in setup.eds.items()] == [
@@ -490,7 +490,11 @@ def test_an_eds_of_another_device_is_told(rig: str, tmp_path: Path) -> None:
         (("scan", "--rules", "r", "--eds-dir", "."), 2, "--eds-dir is for --write FILE, or"),
         (("scan", "--force"), 2, "--force is for --write FILE, --workspace FILE or --rules FILE"),
         (("scan", "--rules", "no/r"), 2, "--rules no: No such file"),
-        (("scan", "--rules", "r", "--workspace", "./r"), 2, "one file for two: choose another"),
+        (
+            ("scan", "--rules", "r", "--workspace", "./r"),
+            2,
+            "the same file for several options: choose another",
+        ),
         (("scan", "--wait", "x"), 2, "--wait 'x' is not a time"),
         (("scan", "--wait", "5"), 2, "--wait '5' has no unit: write 5s, 5ms or 5us"),
     ],

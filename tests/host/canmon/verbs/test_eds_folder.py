@@ -218,7 +218,7 @@ def test_send_asks_the_node_who_it_is(folder: Path, wire: Wire) -> None:
     with wire.answering(lambda frame: ""):
         result = canmon("send", wire.word, *words)
     assert result.exit_code == 2
-    assert "node 5 does not tell vendor and product (1018h); give --eds 5=FILE" in result.stderr
+    assert "node 5 does not send vendor and product (1018h); give --eds 5=FILE" in result.stderr
 
 
 def test_a_name_that_commands_a_terminal_is_inert(folder: Path, log: str) -> None:

@@ -99,7 +99,7 @@ def test_a_graph_without_any_sample_ends_with_1(log: str) -> None:
         result = canmon(log, "185[2:6]s", *words)
         assert result.exit_code == 1
         assert "no sample from 9 to " in result.stderr
-        assert result.stderr.endswith("they go from 0 to 0.04 s\n")
+        assert result.stderr.endswith("the samples are from 0 to 0.04 s\n")
 
 
 def test_times_of_a_graph_count_from_the_first_frame_or_are_dates(log: str, tmp_path: Path) -> None:

@@ -86,10 +86,10 @@ def test_a_part_is_checked_and_reported(log: str, tmp_path: Path) -> None:
     told = canmon("report", log, "-o", page, "--from", "4.2", "--to", "6")
     assert (told.exit_code, "3 frames" in told.stdout) == (0, True)
     told = canmon("report", log, "-o", page, "--from", "9")
-    assert (told.exit_code, told.stderr.partition(";")[0]) == (1, "--from 9: no frame is there")
+    assert (told.exit_code, told.stderr.partition(";")[0]) == (1, "--from 9: no frame in this part")
     for verb in (["check"], ["check", "--no-emcy"]):
         none = canmon(*verb, log, "--from", "9")
-        assert (none.exit_code, "--from 9: no frame is there" in none.stderr) == (5, True)
+        assert (none.exit_code, "--from 9: no frame in this part" in none.stderr) == (5, True)
 
 
 @pytest.mark.parametrize("ending", ["log", "log.gz"])
@@ -158,7 +158,7 @@ def test_a_part_that_is_none_is_refused(words: tuple[str, ...], said: str, log: 
 def test_a_part_of_a_bus_is_refused(verb: str) -> None:
     result = canmon(verb, "vcan0", "--from", "3s")
     assert result.exit_code == 2
-    assert "--from 3s cuts a part out of a log, and vcan0 is none" in result.stderr
+    assert "--from 3s is for a log; vcan0 is not a log" in result.stderr
 
 
 # Nothing passes.
@@ -170,15 +170,15 @@ def test_a_filter_that_lets_nothing_pass_says_so_and_ends_with_1(
 ) -> None:
     out = [tmp_path / "out.log"] * (verb == "conv")
     result = canmon(verb, log, *out, "-F", "emcy")
-    assert (result.exit_code, result.stderr) == (1, "-F 'emcy' lets none of 10 frames pass\n")
+    assert (result.exit_code, result.stderr) == (1, "-F 'emcy': none of 10 frames passes\n")
     result = canmon(verb, f"{log},7FF:7FF", *out)
     assert result.exit_code == 1
-    assert result.stderr == f"{log}: the filter behind its name lets no frame pass\n"
+    assert result.stderr == f"{log}: no frame passes the filter after its name\n"
 
 
 def test_a_recording_of_which_the_filter_keeps_nothing_says_so(log: str, tmp_path: Path) -> None:
     result = canmon("dump", log, "-l", tmp_path / "out.log", "-F", "emcy")
-    assert (result.exit_code, result.stderr) == (1, "-F 'emcy' lets none of 10 frames pass\n")
+    assert (result.exit_code, result.stderr) == (1, "-F 'emcy': none of 10 frames passes\n")
 
 
 @pytest.mark.parametrize("verb", ["dump", "top", "conv", "stats", "nodes"])
@@ -187,7 +187,7 @@ def test_a_part_that_is_empty_says_where_the_log_lies(verb: str, log: str, tmp_p
     result = canmon(verb, log, *out, "--from", "2")
     assert result.exit_code == 1
     span = f"the log has 0.009 s, {DATE}.000000 to {DATE}.009000"
-    assert result.stderr == f"--from 2: no frame is there; {span}\n"
+    assert result.stderr == f"--from 2: no frame in this part; {span}\n"
 
 
 def test_a_log_without_any_frame_is_no_fault_of_its_filter(tmp_path: Path) -> None:
