@@ -173,7 +173,7 @@ def _frame(record: Record) -> dict[str, str]:
 
 
 _TEXTS: Final = {
-    "no_emcy": "No EMCY but error reset.",
+    "no_emcy": "No EMCY except error reset.",
     "no_sdo_abort": "No aborted SDO transfer.",
     "no_error_frames": "No error frame.",
     "no_reboot": "No node boots again without an NMT reset.",
@@ -256,7 +256,7 @@ def _read_learnt(
             raise Refused(f"rules {path}: {error}") from None
     if found is not None and (others or len(files) > 1):
         rest = others[0] if others else "another file"
-        beside = "learnt rules stand beside those that need no parameter, and no others"
+        beside = "learnt rules are checked only with those that need no parameter"
         raise Refused(f"{beside}: leave {rest} out, or check twice")
     return found
 
@@ -343,10 +343,9 @@ def command(  # noqa: PLR0913 - options
     are grouped by rule and node, each with its frames. The checked rules are
     listed on standard error. Exit status 5 if nothing could be judged.
 
-    --init learns what is usual in a good log: nodes, identities, CAN-IDs,
-    lengths, periods, load, order of boot-ups, EMCYs. If you pass its file to the
-    next check, these rules are checked besides those that need no parameter, with
-    -b, --eds and no other rule.
+    --init learns what is usual in a good log: nodes, identities, CAN-IDs, lengths, periods, load,
+    order of boot-ups, EMCYs. Pass its file to the next check: canmon checks its rules and those
+    that need no parameter. Other rules need a check of their own.
 
     With other rules, only these are checked. They are options, or a TOML file with the
     same names: no_emcy = true, heartbeat = ["3=100ms±20%"].

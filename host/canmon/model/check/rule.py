@@ -573,7 +573,7 @@ class CanopenRule(Rule):
 
 
 class NoEmcy(CanopenRule):
-    """No EMCY but error reset, on the default COB-IDs; one that is cut short is one, too."""
+    """No EMCY except error reset, on the default COB-IDs; one that is too short counts too."""
 
     name = "no-emcy"
 

@@ -139,8 +139,8 @@ def test_what_a_good_log_has_is_told_to_be_usual(tmp_path: Path) -> None:
     ("words", "reason"),
     [
         (("--init", "--no-emcy"), "--init learns all rules: leave --no-emcy out"),
-        (("learnt.toml", "--no-emcy"), "and no others: leave --no-emcy out"),
-        (("learnt.toml", "other.toml"), "and no others: leave another file out"),
+        (("learnt.toml", "--no-emcy"), "need no parameter: leave --no-emcy out"),
+        (("learnt.toml", "other.toml"), "need no parameter: leave another file out"),
         (("bad.toml",), "rules bad.toml: learnt.can0: 'nodes' is not one of"),
     ],
 )
