@@ -197,6 +197,7 @@ class DriveDriver:
         self.name = settings.channel.name
         self.statusword = self.controlword = self.mode = self.cycles = 0
         self.refusals: list[SdoAborted] = []
+        self._unseen = False  # a command, by `init` or `halt`, whose effect may not be read yet
         self._missing: set[Key] = set()
         self._chosen, self._mode = drive_mode.ModeNumber.NONE, drive_mode.DriveMode()
         self._reset_fault = self._known = False
@@ -284,7 +285,7 @@ class DriveDriver:
             DriveFailed: it does not complete in time.
         """
         await Until(lambda: self.cycles > 0, _SWITCH_US, f"{self.name}: the node has not booted")
-        self.controlword, self._reset_fault = 0, True
+        self.controlword, self._reset_fault, self._unseen = 0, True, True
         await self.switch_to(DriveState.OPERATION_ENABLED)
         if await self._supports(drive_mode.ModeNumber.HOMING):
             await self.choose(drive_mode.ModeNumber.HOMING)
@@ -308,7 +309,7 @@ class DriveDriver:
         if (
             word := drive_state.lead(self.controlword, state, DriveState.QUICK_STOP_ACTIVE)
         ) is not None:
-            self.controlword = word
+            self.controlword, self._unseen = word, True
 
     async def switch_to(self, goal: DriveState | str) -> None:
         """Bring the drive to a state: to Operation enabled step by step, to other states directly.
@@ -323,6 +324,9 @@ class DriveDriver:
         goal = drive_state.state_named(goal)
         silent = f"{self.name}: no statusword since the node was lost, or booted"
         await Until(lambda: self._known, _SWITCH_US, silent)
+        if self._unseen and self._key(_STATUSWORD) not in self._missing:
+            await self._catch_up()  # the state read so far may be the one before the command
+        self._unseen = False
         while (state := self.state) is not goal:
             following = drive_state.next_state(state, goal)
             word = drive_state.lead(self.controlword, state, following)

@@ -111,6 +111,34 @@ def test_a_drive_that_has_homed_homes_again(tmp_path: Path, method: int, late_us
         assert drives.joint.position == pytest.approx(0.0, abs=0.01)
 
 
+LATE = [(PDOS, 0), (PDOS, 300_000), (NO_PDOS, 0)]
+
+
+@pytest.mark.parametrize(("pdos", "late_us"), LATE, ids=["by PDO", "late", "by SDO"])
+def test_a_joint_that_is_still_in_homing_mode_homes_again(
+    tmp_path: Path, pdos: str, late_us: int
+) -> None:
+    with cell(tmp_path, HOMING_35, pdos=pdos, late_us=late_us) as drives:
+        for _ in range(3):
+            drives.master.perform(drives.joint.init())
+            assert drives.joint.state is DriveState.OPERATION_ENABLED
+
+
+@pytest.mark.parametrize(("pdos", "late_us"), LATE, ids=["by PDO", "late", "by SDO"])
+@pytest.mark.parametrize("then", ["recover", "choose"])
+def test_a_halt_is_seen_before_the_drive_is_enabled_again(
+    tmp_path: Path, pdos: str, then: str, late_us: int
+) -> None:
+    with cell(tmp_path, HOMING_35, pdos=pdos, late_us=late_us) as drives:
+        ready(drives, "pv")
+        drives.joint.halt()
+        drives.master.perform(
+            drives.joint.recover() if then == "recover" else drives.joint.choose("pv")
+        )
+        drives.master.run_for("2s")
+        assert drives.joint.state is DriveState.OPERATION_ENABLED
+
+
 def test_homing_that_finds_nothing_is_given_up_in_its_time(tmp_path: Path) -> None:
     more = "  homing_timeout_seconds: 2\n  sdo: [{index: 0x6098, value: 17}]\n"
     with cell(tmp_path, more) as drives:
