@@ -331,7 +331,7 @@ class _BusJudge:
             for ident, found in self._rows.items()
             if (node_events.is_event(ident) if self._canopen else ident & ERROR and ident < FD)
         ]
-        for row in _merged(parts) if but is None else np.setdiff1d(np.concatenate(parts), but):
+        for row in _merged(parts) if but is None else _rows_but(parts, but):
             events.take(int(row))
         return events
 
@@ -879,6 +879,11 @@ def _merged(parts: Iterable[Sequence[int]]) -> list[int]:
         rows += _plain(part)
     rows.sort()
     return rows
+
+
+def _rows_but(parts: Iterable[Any], but: Any) -> Any:
+    """Return the rows of all parts, sorted, as an array; the rows `but` are left out."""
+    return np.setdiff1d(np.concatenate((np.empty(0, np.int64), *parts)), but)
 
 
 def _counted(values: Any) -> Counter[int]:

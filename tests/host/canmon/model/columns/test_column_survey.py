@@ -129,6 +129,13 @@ def test_the_page_of_a_log_in_blocks_is_as_frame_by_frame(seed: int, size: int) 
         assert page_of_blocks(blocks(records, size)) == page
 
 
+def test_a_large_log_of_sync_and_pdos_alone_is_judged(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bus_frames, "_MANY", 0)
+    texts = ("080#", "181#0100") * 3
+    records = [Record(at, "can0", CanFrame.parse(text)) for at, text in enumerate(texts)]
+    assert page_of_blocks(blocks(records, 4)) == page_of_records(records)
+
+
 def test_a_client_that_polls_costs_no_more_frames(monkeypatch: pytest.MonkeyPatch) -> None:
     decoded, take = list[str](), Decoder.take
 
