@@ -213,7 +213,8 @@ def test_what_worked_is_remembered_until_a_program_changes(
     starts = tmp_path / "starts"
     status, worked, _ = run("--guest", "--where", **elsewhere)
     # On a processor with Intel AMX the kernel is tried twice, and works with the preload.
-    assert status == 0 and re.fullmatch("User-Mode Linux( with a preload)?: vcan0 vcan1\n", worked)
+    assert status == 0
+    assert re.fullmatch("User-Mode Linux( with a preload)?: vcan0 vcan1\n", worked)
     tried = starts.read_text()
     assert tried == ("\n\n" if "preload" in worked else "\n")
     assert run("--guest", "--where", **elsewhere)[:2] == (0, worked)

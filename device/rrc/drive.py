@@ -159,7 +159,7 @@ def _fade(value_pct: int, angle: float, start_deg: int) -> int:
 
 
 @lru_cache(maxsize=256)
-def shape_table(low_pct: int, high_pct: int, exponent: int) -> tuple[int, ...]:
+def _shape_table(low_pct: int, high_pct: int, exponent: int) -> tuple[int, ...]:
     """Return the output magnitude for each input magnitude from 0 to 100 %.
 
     The exponent acts on the stick position between the dead zones, and the
@@ -183,7 +183,7 @@ def shape(value_pct: int, low_pct: int, high_pct: int, exponent: int) -> int:
     >>> shape(-50, 0, 100, 5)
     -35
     """
-    table = shape_table(low_pct, high_pct, exponent)
+    table = _shape_table(low_pct, high_pct, exponent)
     return table[value_pct] if value_pct >= 0 else -table[-value_pct]
 
 

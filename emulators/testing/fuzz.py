@@ -26,7 +26,7 @@ Word = bytes | str
 """Bytes of a serial line, or a frame in candump's notation."""
 
 
-def check_words(name: str, words: object, on_can: bool) -> None:
+def _check_words(name: str, words: object, on_can: bool) -> None:
     """Check that words are a list of what a device on this wire can receive.
 
     Args:
@@ -278,13 +278,13 @@ class DeviceFuzz:
     ) -> None:
         """Raise ValueError unless all are of the wire of the device."""
         for name, given in (("words", words), ("start", start), ("request", request)):
-            check_words(name, given, self._on_can)
+            _check_words(name, given, self._on_can)
         if answer and not request:
             raise ValueError("answer without request: nothing is asked")
         if request and not answer:
             raise ValueError("request without answer: what is in the bytes that come then?")
         if answer:
-            check_words("answer", [answer], self._on_can)
+            _check_words("answer", [answer], self._on_can)
 
     def acts(self, data: bytes) -> list[FuzzAct]:
         """Return the acts that bytes encode.

@@ -9,9 +9,10 @@ Emcy(code=33072, register=17, text=b'\x07\x00\x00\x00\x00')
 from __future__ import annotations
 
 import struct
-from enum import IntEnum, IntFlag
+from enum import IntFlag
 from typing import Final, NamedTuple
 
+from tickrig.wire.canopen.described_code import DescribedCode
 from tickrig.wire.errors import FramingError
 
 TEXT_BYTES: Final = 5
@@ -33,83 +34,47 @@ class ErrorRegister(IntFlag):
     MANUFACTURER = 0x80
 
 
-class EmcyCode(IntEnum):
+class EmcyCode(DescribedCode):
     """Emergency error codes; those that end in 00h denote a class."""
 
-    NO_ERROR = 0x0000
-    GENERIC = 0x1000
-    CURRENT = 0x2000
-    CURRENT_INPUT = 0x2100
-    CURRENT_INSIDE = 0x2200
-    CURRENT_OUTPUT = 0x2300
-    VOLTAGE = 0x3000
-    VOLTAGE_MAINS = 0x3100
-    VOLTAGE_INSIDE = 0x3200
-    VOLTAGE_OUTPUT = 0x3300
-    TEMPERATURE = 0x4000
-    TEMPERATURE_AMBIENT = 0x4100
-    TEMPERATURE_DEVICE = 0x4200
-    HARDWARE = 0x5000
-    SOFTWARE = 0x6000
-    SOFTWARE_INTERNAL = 0x6100
-    SOFTWARE_USER = 0x6200
-    SOFTWARE_DATA = 0x6300
-    MODULES = 0x7000
-    MONITORING = 0x8000
-    COMMUNICATION = 0x8100
-    CAN_OVERRUN = 0x8110
-    CAN_PASSIVE = 0x8120
-    HEARTBEAT = 0x8130
-    BUS_OFF_RECOVERED = 0x8140
-    CAN_ID_COLLISION = 0x8150
-    PROTOCOL = 0x8200
-    PDO_TOO_SHORT = 0x8210
-    PDO_TOO_LONG = 0x8220
-    MPDO_NO_OBJECT = 0x8230
-    SYNC_LENGTH = 0x8240
-    RPDO_TIMEOUT = 0x8250
-    EXTERNAL = 0x9000
-    ADDITIONAL = 0xF000
-    DEVICE_SPECIFIC = 0xFF00
+    NO_ERROR = 0x0000, "error reset or no error"
+    GENERIC = 0x1000, "generic error"
+    CURRENT = 0x2000, "current, generic error"
+    CURRENT_INPUT = 0x2100, "current, CANopen device input side"
+    CURRENT_INSIDE = 0x2200, "current inside the CANopen device"
+    CURRENT_OUTPUT = 0x2300, "current, CANopen device output side"
+    VOLTAGE = 0x3000, "voltage, generic error"
+    VOLTAGE_MAINS = 0x3100, "mains voltage"
+    VOLTAGE_INSIDE = 0x3200, "voltage inside the CANopen device"
+    VOLTAGE_OUTPUT = 0x3300, "output voltage"
+    TEMPERATURE = 0x4000, "temperature, generic error"
+    TEMPERATURE_AMBIENT = 0x4100, "ambient temperature"
+    TEMPERATURE_DEVICE = 0x4200, "CANopen device temperature"
+    HARDWARE = 0x5000, "CANopen device hardware, generic error"
+    SOFTWARE = 0x6000, "CANopen device software, generic error"
+    SOFTWARE_INTERNAL = 0x6100, "internal software"
+    SOFTWARE_USER = 0x6200, "user software"
+    SOFTWARE_DATA = 0x6300, "data set"
+    MODULES = 0x7000, "additional modules, generic error"
+    MONITORING = 0x8000, "monitoring, generic error"
+    COMMUNICATION = 0x8100, "communication, generic error"
+    CAN_OVERRUN = 0x8110, "CAN overrun, objects lost"
+    CAN_PASSIVE = 0x8120, "CAN in error passive mode"
+    HEARTBEAT = 0x8130, "life guard error or heartbeat error"
+    BUS_OFF_RECOVERED = 0x8140, "recovered from bus off"
+    CAN_ID_COLLISION = 0x8150, "CAN-ID collision"
+    PROTOCOL = 0x8200, "protocol error, generic error"
+    PDO_TOO_SHORT = 0x8210, "PDO not processed due to length error"
+    PDO_TOO_LONG = 0x8220, "PDO length exceeded"
+    MPDO_NO_OBJECT = 0x8230, "DAM MPDO not processed, destination object not available"
+    SYNC_LENGTH = 0x8240, "unexpected SYNC data length"
+    RPDO_TIMEOUT = 0x8250, "RPDO timeout"
+    EXTERNAL = 0x9000, "external error, generic error"
+    ADDITIONAL = 0xF000, "additional functions, generic error"
+    DEVICE_SPECIFIC = 0xFF00, "CANopen device specific, generic error"
 
 
-_TEXTS: Final[dict[int, str]] = {
-    EmcyCode.NO_ERROR: "error reset or no error",
-    EmcyCode.GENERIC: "generic error",
-    EmcyCode.CURRENT: "current, generic error",
-    EmcyCode.CURRENT_INPUT: "current, CANopen device input side",
-    EmcyCode.CURRENT_INSIDE: "current inside the CANopen device",
-    EmcyCode.CURRENT_OUTPUT: "current, CANopen device output side",
-    EmcyCode.VOLTAGE: "voltage, generic error",
-    EmcyCode.VOLTAGE_MAINS: "mains voltage",
-    EmcyCode.VOLTAGE_INSIDE: "voltage inside the CANopen device",
-    EmcyCode.VOLTAGE_OUTPUT: "output voltage",
-    EmcyCode.TEMPERATURE: "temperature, generic error",
-    EmcyCode.TEMPERATURE_AMBIENT: "ambient temperature",
-    EmcyCode.TEMPERATURE_DEVICE: "CANopen device temperature",
-    EmcyCode.HARDWARE: "CANopen device hardware, generic error",
-    EmcyCode.SOFTWARE: "CANopen device software, generic error",
-    EmcyCode.SOFTWARE_INTERNAL: "internal software",
-    EmcyCode.SOFTWARE_USER: "user software",
-    EmcyCode.SOFTWARE_DATA: "data set",
-    EmcyCode.MODULES: "additional modules, generic error",
-    EmcyCode.MONITORING: "monitoring, generic error",
-    EmcyCode.COMMUNICATION: "communication, generic error",
-    EmcyCode.CAN_OVERRUN: "CAN overrun, objects lost",
-    EmcyCode.CAN_PASSIVE: "CAN in error passive mode",
-    EmcyCode.HEARTBEAT: "life guard error or heartbeat error",
-    EmcyCode.BUS_OFF_RECOVERED: "recovered from bus off",
-    EmcyCode.CAN_ID_COLLISION: "CAN-ID collision",
-    EmcyCode.PROTOCOL: "protocol error, generic error",
-    EmcyCode.PDO_TOO_SHORT: "PDO not processed due to length error",
-    EmcyCode.PDO_TOO_LONG: "PDO length exceeded",
-    EmcyCode.MPDO_NO_OBJECT: "DAM MPDO not processed, destination object not available",
-    EmcyCode.SYNC_LENGTH: "unexpected SYNC data length",
-    EmcyCode.RPDO_TIMEOUT: "RPDO timeout",
-    EmcyCode.EXTERNAL: "external error, generic error",
-    EmcyCode.ADDITIONAL: "additional functions, generic error",
-    EmcyCode.DEVICE_SPECIFIC: "CANopen device specific, generic error",
-}
+_TEXTS: Final = {int(code): code.text for code in EmcyCode}
 
 
 def describe(code: int) -> str:

@@ -54,78 +54,47 @@ from typing import Final, Self
 
 import crcmod
 
+from tickrig.wire.canopen.described_code import DescribedCode
 from tickrig.wire.errors import FieldError, FramingError
 
 
-class AbortCode(IntEnum):
+class AbortCode(DescribedCode):
     """Reason for the abort of an SDO transfer."""
 
-    TOGGLE_BIT = 0x0503_0000
-    TIMEOUT = 0x0504_0000
-    COMMAND_SPECIFIER = 0x0504_0001
-    BLOCK_SIZE = 0x0504_0002
-    SEQUENCE_NUMBER = 0x0504_0003
-    CRC = 0x0504_0004
-    OUT_OF_MEMORY = 0x0504_0005
-    UNSUPPORTED_ACCESS = 0x0601_0000
-    WRITE_ONLY = 0x0601_0001
-    READ_ONLY = 0x0601_0002
-    NO_OBJECT = 0x0602_0000
-    NOT_MAPPABLE = 0x0604_0041
-    PDO_LENGTH = 0x0604_0042
-    PARAMETER_INCOMPATIBLE = 0x0604_0043
-    INTERNAL_INCOMPATIBLE = 0x0604_0047
-    HARDWARE = 0x0606_0000
-    LENGTH = 0x0607_0010
-    TOO_LONG = 0x0607_0012
-    TOO_SHORT = 0x0607_0013
-    NO_SUBINDEX = 0x0609_0011
-    VALUE_RANGE = 0x0609_0030
-    VALUE_TOO_HIGH = 0x0609_0031
-    VALUE_TOO_LOW = 0x0609_0032
-    MAXIMUM_BELOW_MINIMUM = 0x0609_0036
-    NO_RESOURCE = 0x060A_0023
-    GENERAL = 0x0800_0000
-    NOT_STORED = 0x0800_0020
-    LOCAL_CONTROL = 0x0800_0021
-    DEVICE_STATE = 0x0800_0022
-    NO_DICTIONARY = 0x0800_0023
-    NO_DATA = 0x0800_0024
+    TOGGLE_BIT = 0x0503_0000, "toggle bit not alternated"
+    TIMEOUT = 0x0504_0000, "SDO protocol timed out"
+    COMMAND_SPECIFIER = 0x0504_0001, "command specifier not valid"
+    BLOCK_SIZE = 0x0504_0002, "invalid block size"
+    SEQUENCE_NUMBER = 0x0504_0003, "invalid sequence number"
+    CRC = 0x0504_0004, "CRC error"
+    OUT_OF_MEMORY = 0x0504_0005, "out of memory"
+    UNSUPPORTED_ACCESS = 0x0601_0000, "unsupported access"
+    WRITE_ONLY = 0x0601_0001, "object is write only"
+    READ_ONLY = 0x0601_0002, "object is read only"
+    NO_OBJECT = 0x0602_0000, "object does not exist"
+    NOT_MAPPABLE = 0x0604_0041, "object cannot be mapped"
+    PDO_LENGTH = 0x0604_0042, "mapped objects exceed the PDO length"
+    PARAMETER_INCOMPATIBLE = 0x0604_0043, "parameters are incompatible"
+    INTERNAL_INCOMPATIBLE = 0x0604_0047, "internal incompatibility"
+    HARDWARE = 0x0606_0000, "hardware error"
+    LENGTH = 0x0607_0010, "length does not match"
+    TOO_LONG = 0x0607_0012, "too long"
+    TOO_SHORT = 0x0607_0013, "too short"
+    NO_SUBINDEX = 0x0609_0011, "sub-index does not exist"
+    VALUE_RANGE = 0x0609_0030, "invalid value"
+    VALUE_TOO_HIGH = 0x0609_0031, "value too high"
+    VALUE_TOO_LOW = 0x0609_0032, "value too low"
+    MAXIMUM_BELOW_MINIMUM = 0x0609_0036, "maximum below minimum"
+    NO_RESOURCE = 0x060A_0023, "resource not available"
+    GENERAL = 0x0800_0000, "general error"
+    NOT_STORED = 0x0800_0020, "cannot be transferred or stored"
+    LOCAL_CONTROL = 0x0800_0021, "not possible under local control"
+    DEVICE_STATE = 0x0800_0022, "not possible in this device state"
+    NO_DICTIONARY = 0x0800_0023, "no object dictionary"
+    NO_DATA = 0x0800_0024, "no data available"
 
 
-_TEXTS: Final[dict[int, str]] = {
-    AbortCode.TOGGLE_BIT: "toggle bit not alternated",
-    AbortCode.TIMEOUT: "SDO protocol timed out",
-    AbortCode.COMMAND_SPECIFIER: "command specifier not valid",
-    AbortCode.BLOCK_SIZE: "invalid block size",
-    AbortCode.SEQUENCE_NUMBER: "invalid sequence number",
-    AbortCode.CRC: "CRC error",
-    AbortCode.OUT_OF_MEMORY: "out of memory",
-    AbortCode.UNSUPPORTED_ACCESS: "unsupported access",
-    AbortCode.WRITE_ONLY: "object is write only",
-    AbortCode.READ_ONLY: "object is read only",
-    AbortCode.NO_OBJECT: "object does not exist",
-    AbortCode.NOT_MAPPABLE: "object cannot be mapped",
-    AbortCode.PDO_LENGTH: "mapped objects exceed the PDO length",
-    AbortCode.PARAMETER_INCOMPATIBLE: "parameters are incompatible",
-    AbortCode.INTERNAL_INCOMPATIBLE: "internal incompatibility",
-    AbortCode.HARDWARE: "hardware error",
-    AbortCode.LENGTH: "length does not match",
-    AbortCode.TOO_LONG: "too long",
-    AbortCode.TOO_SHORT: "too short",
-    AbortCode.NO_SUBINDEX: "sub-index does not exist",
-    AbortCode.VALUE_RANGE: "invalid value",
-    AbortCode.VALUE_TOO_HIGH: "value too high",
-    AbortCode.VALUE_TOO_LOW: "value too low",
-    AbortCode.MAXIMUM_BELOW_MINIMUM: "maximum below minimum",
-    AbortCode.NO_RESOURCE: "resource not available",
-    AbortCode.GENERAL: "general error",
-    AbortCode.NOT_STORED: "cannot be transferred or stored",
-    AbortCode.LOCAL_CONTROL: "not possible under local control",
-    AbortCode.DEVICE_STATE: "not possible in this device state",
-    AbortCode.NO_DICTIONARY: "no object dictionary",
-    AbortCode.NO_DATA: "no data available",
-}
+_TEXTS: Final = {int(code): code.text for code in AbortCode}
 
 
 def describe_abort(code: int) -> str:

@@ -1,0 +1,22 @@
+"""Codes of CANopen errors with their texts."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import Self
+
+
+class DescribedCode(IntEnum):
+    """A code that has a text; a member is written `NAME = code, text`.
+
+    Attributes:
+        text: what the code means.
+    """
+
+    text: str
+
+    def __new__(cls, code: int, text: str) -> Self:
+        """Make the member of a code."""
+        self = int.__new__(cls, code)
+        self._value_, self.text = code, text
+        return self
