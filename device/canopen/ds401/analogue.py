@@ -87,11 +87,19 @@ def _factor(entry: Entry | None) -> float:
     return _quantity(entry, 1) or 1
 
 
+def _limited(value: float, limits: tuple[int, int]) -> int:
+    """Return a value as an integer within limits; if it is not a number, the upper limit."""
+    low, high = limits
+    # Compiled, `min` of an int and a float is a float: 2**63 - 1 becomes 2**63.
+    if not value < high:
+        return high
+    return int(value) if value > low else low
+
+
 def _show(entry: Entry, value: float) -> None:
     """Put a number into an object, limited to what its data type holds."""
     if entry.data_type.is_integer:
-        low, high = entry.data_type.limits
-        entry.value = int(max(low, min(high, value)))
+        entry.value = _limited(value, entry.data_type.limits)
     else:
         entry.value = copysign(inf, value) if abs(value) > _REAL32_MAX else value
 
@@ -431,7 +439,7 @@ class AnalogueOutput(Part):
         entry, converter = self._latest, self.channel.converter
         low, high = entry.data_type.limits
         value = _quantity(self._error) if error else entry.number
-        counts = int(max(low, min(high, self.channel.scaled(max(low, min(high, value))))))
+        counts = _limited(self.channel.scaled(max(low, min(high, value))), (low, high))
         if converter is None:
             return counts
         return converter.quantity(counts * 2**converter.width >> entry.data_type.bits)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from tests.device.canopen.ds401.board import BOOL, NODE_ID, REAL, U8, Row, make_dictionary
@@ -133,6 +133,7 @@ rows = st.lists(
 
 @settings(max_examples=examples(60))
 @given(rows, events)
+@example([(0x6403, 1, DataType.INTEGER56, 0)], [(1, ("channels", 3500))])  # beyond 2**53
 def test_any_board_of_any_types_works(board: list[Row], story: list[Event]) -> None:
     sent = run(make_dictionary(board), story, dense=False)
     assert sent[0] == "0 705#00"
