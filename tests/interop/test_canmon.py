@@ -36,7 +36,13 @@ class Listener:
         self._before = listeners()
         with self._out.open("wb") as out, self._err.open("wb") as err:
             self.process = subprocess.Popen(words, stdout=out, stderr=err)
-        wait(lambda: listeners() > self._before)
+        try:
+            wait(lambda: listeners() > self._before or self.process.poll() is not None)
+            assert self.process.poll() is None, self.said
+        except BaseException:
+            self.process.kill()
+            self.process.wait()
+            raise
 
     @property
     def lines(self) -> list[str]:
@@ -80,7 +86,7 @@ def run(*words: str) -> None:
 def test_its_lines_are_those_of_candump(vcan: Bus, tmp_path: Path) -> None:
     for options in ("-t a", "-x -t a", "-L"):
         theirs = ["candump", *options.split(), vcan.channel]
-        ours = [*CANMON, "dump", *options.split(), vcan.channel, "--raw"]
+        ours = [*CANMON, "dump", *options.split(), vcan.channel, *raw(options)]
         with (
             listening(theirs, tmp_path, "theirs") as candump,
             listening(ours, tmp_path, "ours") as canmon,
@@ -90,6 +96,11 @@ def test_its_lines_are_those_of_candump(vcan: Bus, tmp_path: Path) -> None:
             wait(lambda: len(candump.lines) == len(canmon.lines) == 120)
             lines = canmon.lines
             assert [without_tx(line) for line in candump.lines] == lines
+
+
+def raw(options: str) -> list[str]:
+    """`-L` writes only bytes, and refuses the option."""
+    return [] if options == "-L" else ["--raw"]
 
 
 def without_tx(line: str) -> str:
@@ -136,7 +147,7 @@ def test_a_reader_that_is_stopped_counts_what_the_kernel_dropped(vcan: Bus, tmp_
 @pytest.mark.parametrize("options", ["-t a", "-x -t a", "-L"])
 def test_can_fd_frames_are_those_of_candump(vcan: Bus, options: str, tmp_path: Path) -> None:
     theirs = ["candump", *options.split(), vcan.channel]
-    ours = [*CANMON, "dump", *options.split(), vcan.channel, "--raw"]
+    ours = [*CANMON, "dump", *options.split(), vcan.channel, *raw(options)]
     with (
         listening(theirs, tmp_path, "theirs") as candump,
         listening(ours, tmp_path, "ours") as canmon,
