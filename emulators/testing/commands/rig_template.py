@@ -102,17 +102,21 @@ def _free(node_id: int, taken: set[int]) -> int:
     return node_id
 
 
+def _beside(line: str, comment: str) -> str:
+    return f"{line:<30}  # {comment}"
+
+
 def _device_lines(plan: DevicePlan, found: Probe) -> Iterator[str]:
     yield f"[device.{plan.name}]"
-    yield f"type = {json.dumps(plan.type)}".ljust(32) + f"# {found.title}"
+    yield _beside(f"type = {json.dumps(plan.type)}", found.title)
     if plan.node_id is not None:
         yield f"node_id = {plan.node_id}"
     elif plan.kind is DeviceKind.SERIAL and (options := option_names(plan.type)):
-        yield "# config = { }".ljust(32) + f"# options: {', '.join(options)}"
+        yield _beside("# config = { }", f"options: {', '.join(options)}")
     yield ""
     inputs = [item for item in _inputs(found) if item.type is not SignalType.FAULT]
     if inputs:
-        yield f"[device.{plan.name}.start]".ljust(32) + "# its inputs, and signals that drive them"
+        yield _beside(f"[device.{plan.name}.start]", "its inputs, and signals that drive them")
         yield from map(_input_line, inputs)
         yield ""
 
@@ -128,7 +132,7 @@ def _input_line(item: InputSignal) -> str:
     value = '""' if item.type is SignalType.TEXT else value
     unit = f" {item.unit}" if item.unit else ""
     span = "" if item.type is SignalType.TEXT else f" ({item.low:g}..{item.high:g}{unit})"
-    return f"# {item.name} = {value}".ljust(32) + f"# {item.text}{span}"
+    return _beside(f"# {item.name} = {value}", f"{item.text}{span}")
 
 
 def _fault_lines(made: Iterable[tuple[DevicePlan, Probe]]) -> Iterator[str]:
@@ -137,7 +141,7 @@ def _fault_lines(made: Iterable[tuple[DevicePlan, Probe]]) -> Iterator[str]:
         names = [*found.physical.inputs.names(SignalType.FAULT), *found.wire_faults]
         plain = next(each for each in names if _is_plain(found, each))
         shown = ", ".join(names[:SHOWN]) + (", ..." if len(names) > SHOWN else "")
-        yield f'# {plan.name} = "{plain}@2s-3s"'.ljust(32) + f"# {shown}"
+        yield _beside(f'# {plan.name} = "{plain}@2s-3s"', shown)
     yield ""
 
 
@@ -147,7 +151,7 @@ def _safe_lines(made: Iterable[tuple[DevicePlan, Probe]]) -> Iterator[str]:
         for item in list(found.physical.outputs.values())[:1]:
             value = json.dumps(found.physical.read(item.name))
             others = ", ".join(list(found.physical.outputs)[1:SHOWN])
-            yield f"# {plan.name}.{item.name} = {value}".ljust(32) + f"# {others}"
+            yield _beside(f"# {plan.name}.{item.name} = {value}", others)
     yield ""
 
 

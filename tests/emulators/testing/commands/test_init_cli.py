@@ -56,6 +56,15 @@ def test_what_it_writes_checks_with_and_without_its_proposals(
     assert any(device.start for device in plan.devices.values())
 
 
+def test_two_blanks_stand_before_each_comment(folder: Path) -> None:
+    shutil.copy(folder / "io_module.eds", folder / "input_and_output_module.eds")
+    types = [*EVERY, "input_and_output_module.eds", "motor-core-unit"]
+    run(*(word for each in types for word in ("--device", each)))
+    lines = (folder / "rig.toml").read_text("utf-8").splitlines()
+    close = [line for line in lines if re.match(r"(# )?(\S+ = |\[)[^#]*(?<!  )#", line)]
+    assert close == []
+
+
 def test_a_file_that_is_there_is_left_alone(folder: Path) -> None:
     (folder / "rig.toml").write_text("mine")
     told = "file rig.toml is there already, and is left alone: -o FILE writes another one"
