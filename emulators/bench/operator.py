@@ -12,7 +12,7 @@ from tickrig.device.physical import InputSignal, OutputSignal, SignalType
 from tickrig.device.twin import Copyable
 from tickrig.emulators.rig.emulated import HasSignals, Inputs
 from tickrig.emulators.rig.event_queue import EventQueue
-from tickrig.emulators.rig.faults import FaultForm, bind_arguments, spelled
+from tickrig.emulators.rig.faults import FaultForm, bind_arguments, near_fault, spelled
 from tickrig.host.text.names import near
 from tickrig.host.text.values import Setting, parse_time_us
 from tickrig.wire.instant import NEVER
@@ -592,7 +592,7 @@ class Operator(Copyable):
     def check_clear(self, name: str) -> None:
         """Raise ValueError unless a fault of this name exists."""
         if self.full_name_of(name) not in self.faults:
-            raise ValueError(f"no fault {name!r}; {near(name, self.faults)}")
+            raise ValueError(f"no fault {name!r}; {near_fault(name, self.faults)}")
 
     def full_name_of(self, name: str) -> str:
         """Return the full name of a fault; the name of a single node may be omitted."""

@@ -22,7 +22,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Final, Generic
 
@@ -30,7 +30,7 @@ from tickrig.device.chance import Chance, check_rate, threshold_of
 from tickrig.device.core import W
 from tickrig.device.twin import Copyable, Immutable, Listeners
 from tickrig.emulators.rig.port import Port
-from tickrig.host.text.names import near
+from tickrig.host.text.names import closest, near
 from tickrig.host.text.trace import Mark
 from tickrig.host.text.values import parse_time_with_unit_us
 from tickrig.wire.instant import NEVER
@@ -220,6 +220,104 @@ def spelled(name: str, form: FaultForm, words: Sequence[str]) -> dict[str, str]:
             raise ValueError(f"{name} has {key} twice")
         given[key] = value
     return given
+
+
+SYNONYMS: Final = (
+    # of a CANopen node
+    (
+        ("heartbeat_mute",),
+        "heartbeat_lost heartbeat_missing heartbeat_timeout heartbeat_loss heartbeat_drop"
+        " heartbeat_stop heartbeat_off lost_heartbeat missing_heartbeat no_heartbeat",
+    ),
+    (
+        ("sdo_mute", "cut", "bus_unplugged"),
+        "sdo_timeout sdo_lost sdo_loss sdo_drop sdo_missing sdo_silent no_sdo sdo_no_answer"
+        " sdo_no_response no_answer no_response timeout mute silent",
+    ),
+    (("sdo_slow", "slow_answer", "delay"), "sdo_late sdo_delay late_answer late latency lag slow"),
+    (("sdo_abort",), "sdo_error sdo_refuse sdo_refused sdo_fail sdo_failure abort"),
+    (("sdo_toggle",), "toggle toggle_bit toggle_error"),
+    (
+        ("pdo_mute",),
+        "pdo_lost pdo_loss pdo_missing pdo_timeout pdo_drop no_pdo tpdo_lost tpdo_missing",
+    ),
+    (("pdo_stale",), "pdo_frozen pdo_freeze pdo_stuck frozen stuck"),
+    (("pdo_short",), "pdo_length pdo_dlc dlc dlc_error"),
+    (("sync_lost",), "no_sync sync_mute sync_missing sync_timeout sync_loss sync_drop"),
+    (("boot_late",), "bootup_late boot_up_late boot_slow slow_boot late_boot"),
+    (("boots_again",), "reset reboot restart crash watchdog_reset reset_node node_reset"),
+    (("emcy_storm",), "emcy emergency emergency_storm"),
+    (("id_doubled",), "duplicate_id duplicate_node_id node_id_conflict same_node_id id_conflict"),
+    (("bus_off",), "busoff error_passive controller_off"),
+    # of a bus or a line
+    (
+        ("corrupt", "flip", "bus_noise"),
+        "bus_error error_frame can_error bit_error bit_flip stuff_error crc_error noise",
+    ),
+    (
+        ("drop",),
+        "lost loss lose missing frame_lost frame_loss message_lost packet_loss byte_lost",
+    ),
+    (("duplicate", "dup"), "double doubled twice"),
+    (("babble",), "babbling babbling_idiot flood bus_load"),
+    (("framing",), "framing_error frame_error"),
+    (("truncate",), "short_answer partial incomplete cut_off"),
+    (("garbage",), "junk rubbish"),
+    # of a device
+    (
+        ("power_off", "power_cut"),
+        "node_lost lost_node node_off node_offline node_dead node_missing offline dead no_power"
+        " power_lost power_loss lost_power power_fail power_failure power_down brownout blackout"
+        " supply_off supply_lost",
+    ),
+    (("power_off",), "power_cut"),
+    (("power_cut",), "power_off"),
+    (
+        ("unplugged", "bus_unplugged", "cut"),
+        "unplug cable_cut cable_unplugged can_unplugged disconnect disconnected connection_lost"
+        " plug_pulled wire_break",
+    ),
+    (
+        ("shaft_blocked", "jam_left", "motor_jammed"),
+        "wheel_blocked motor_blocked blocked stall stalled motor_stalled jam jammed wheel_jammed"
+        " rotor_locked locked_rotor",
+    ),
+    (
+        ("encoder_unplugged", "encoder_unplugged_left"),
+        "encoder_lost encoder_broken encoder_error encoder_fault encoder_missing no_encoder",
+    ),
+    (
+        ("motor_phase_open",),
+        "open_phase phase_open phase_lost phase_loss motor_unplugged winding_open",
+    ),
+    (("short_circuit", "short_circuit_left", "short"), "overcurrent over_current shorted"),
+)
+"""Faults with the words for which a device suggests the first of them that it has."""
+
+
+def closest_fault(name: str, names: Iterable[str]) -> list[str]:
+    """Return the probable fault: one that the field calls so, or one with a similar name.
+
+    >>> closest_fault("heartbeat_lost", ["heartbeat_late", "heartbeat_mute"])
+    ['heartbeat_mute']
+    """
+    names, (device, slash, word) = list(names), name.rpartition("/")
+    there = dict[str, str]()
+    for each in names:
+        owner, _, bare = each.rpartition("/")
+        if not slash or owner == device:
+            there.setdefault(bare, each)
+    same = (faults for faults, words in SYNONYMS if word.casefold() in words.split())
+    meant = (fault for faults in same for fault in faults)
+    found = next((there[fault] for fault in meant if fault in there), "")
+    return [found] if found else closest(name, names)
+
+
+def near_fault(name: str, names: Iterable[str]) -> str:
+    """Return a suggestion of the probable fault, or the list of the known faults."""
+    names = list(names)
+    close = closest_fault(name, names)
+    return f"did you mean {close[0]!r}?" if close else near(name, names)
 
 
 def _parse_rate(name: str, text: str) -> float:

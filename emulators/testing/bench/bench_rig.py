@@ -22,7 +22,7 @@ from tickrig.emulators.record.wire_log import Splitter, WireLine, WireLog
 from tickrig.emulators.rig.clock import Clock
 from tickrig.emulators.rig.emulated import HasSignals
 from tickrig.emulators.rig.event_queue import EventQueue
-from tickrig.emulators.rig.faults import FaultForm, FaultyPort, usage
+from tickrig.emulators.rig.faults import FaultForm, FaultyPort, near_fault, usage
 from tickrig.emulators.rig.port import OutsideBridge
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
@@ -347,7 +347,7 @@ class RigState(Copyable):
         full = hands.full_name_of(fault)
         if full not in hands.faults:
             of_owner = f" of {owner}" if owner else ""
-            raise ValueError(f"no fault {fault!r}{of_owner}; {near(fault, faults)}")
+            raise ValueError(f"no fault {fault!r}{of_owner}; {near_fault(fault, faults)}")
         return full
 
     def faults_of(self, owner: str) -> dict[str, str]:

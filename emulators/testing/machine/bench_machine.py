@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, ClassVar, Final, NamedTuple, TypeVar
 
-from tickrig.emulators.rig.faults import FaultForm, bind_arguments
+from tickrig.emulators.rig.faults import FaultForm, bind_arguments, near_fault
 from tickrig.emulators.testing.bench.bench import Bench
 from tickrig.host.text.names import near
 from tickrig.host.text.values import Setting
@@ -110,7 +110,8 @@ def _known(
                     f"{noun} {name!r}: the search draws rates, so name {bare!r}; for a rate of"
                     f" yours write a host_rule with self.bench.fault({name!r}, for_='1s')"
                 )
-            raise ValueError(f"no {noun} {name!r}; {near(name, known)}")
+            hint = (near_fault if noun == "fault" else near)(name, known)
+            raise ValueError(f"no {noun} {name!r}; {hint}")
     return list(wanted)
 
 

@@ -21,6 +21,7 @@ from tickrig.device.physical import SignalType
 from tickrig.device.twin import twin
 from tickrig.emulators.canopen.choices import MODELS
 from tickrig.emulators.commands.device_type import DEVICES, DeviceType
+from tickrig.emulators.rig.faults import closest_fault
 from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.emulators.testing.bench.bench import HARDWARE, VIRTUAL, Bench
 from tickrig.emulators.testing.bench.bench_rig import BenchRig, RigState
@@ -268,7 +269,8 @@ def _lack(choice: str, bench: Bench) -> str:
     if name in there or name in KINDS[kind](bench):
         return ""
     others = [each for each in there if _DIGIT.sub("", each) != _DIGIT.sub("", name)]
-    hint = f"{_MEANT} {close[0]!r}?" if (close := closest(name, others)) else ""
+    close = (closest_fault if kind == "fault" else closest)(name, others)
+    hint = f"{_MEANT} {close[0]!r}?" if close else ""
     return f"no {kind} {name!r}; {hint or f'known: {known(dict.fromkeys(there))}'}"
 
 

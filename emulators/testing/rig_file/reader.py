@@ -18,7 +18,7 @@ from tickrig.emulators.canopen import late
 from tickrig.emulators.canopen.body import SHAFTS, BodyPlan
 from tickrig.emulators.canopen.choices import is_bus_node
 from tickrig.emulators.rig.emulated import HasSignals
-from tickrig.emulators.rig.faults import FaultForm, bind_arguments
+from tickrig.emulators.rig.faults import FaultForm, bind_arguments, near_fault
 from tickrig.emulators.testing.rig_file.devices import (
     DeviceReader,
     DoorReader,
@@ -265,7 +265,7 @@ def _read(
 
 def _check_name(faults: _Faults, name: str) -> None:
     if name not in faults:
-        raise ValueError(f"no fault {name!r}; {near(name, faults)}")
+        raise ValueError(f"no fault {name!r}; {near_fault(name, faults)}")
 
 
 # `[body]`: what the shafts of drives move.

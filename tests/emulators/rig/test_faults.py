@@ -9,16 +9,22 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.emulators.lamp import Lamp
+from tickrig import Bench
 from tickrig.device.chance import Chance, threshold_of
 from tickrig.emulators.bench.operator import parse_fault_spec
 from tickrig.emulators.can.faults import CAN_FAULTS
+from tickrig.emulators.canopen.choices import MODELS
 from tickrig.emulators.canopen.faults import NODE_FAULTS
+from tickrig.emulators.commands.device_type import DEVICES
 from tickrig.emulators.rig.faults import (
+    SYNONYMS,
     FaultArgument,
     FaultArguments,
     FaultForm,
     FaultyPort,
     bind_arguments,
+    closest_fault,
+    near_fault,
     usage,
 )
 from tickrig.emulators.rig.rig import Rig
@@ -279,3 +285,49 @@ def table_of(faults: Mapping[str, FaultForm]) -> str:
 def test_the_page_has_the_table_of_the_declarations(title: str) -> None:
     page = (Path(__file__).parents[3] / "docs/reference/bench/faults.md").read_text("utf-8")
     assert table_of(TABLES[title]) in page.partition(f"## {title}\n")[2].partition("\n## ")[0]
+
+
+def faults_anywhere() -> set[str]:
+    """Return the faults of all lines, buses, nodes and devices of ours."""
+    benches = map(Bench, [*DEVICES.built_in, *MODELS])
+    physical = {name.rpartition("/")[2] for bench in benches for name in bench.describe().faults}
+    return {*BYTE_FAULTS, *CAN_FAULTS, *NODE_FAULTS, *physical}
+
+
+def test_each_synonym_suggests_a_fault_that_there_is() -> None:
+    there = faults_anywhere()
+    for faults, words in SYNONYMS:
+        assert {*faults} <= there, faults
+        for word in words.split():
+            assert word not in faults
+            for fault in faults:
+                assert closest_fault(word, ["x", fault]) == [fault]
+
+
+@pytest.mark.parametrize(
+    ("word", "fault"),
+    [
+        ("heartbeat_lost", "heartbeat_mute"),
+        ("no_heartbeat", "heartbeat_mute"),
+        ("node_lost", "power_off"),
+        ("sdo_timeout", "sdo_mute"),
+        ("bus_error", "corrupt"),
+        ("Bus_Error", "corrupt"),
+        ("power_cut", "power_off"),
+        ("wheel_blocked", "shaft_blocked"),
+        ("heartbeat_lat", "heartbeat_late"),
+    ],
+)
+def test_a_word_of_the_field_suggests_the_fault_of_a_drive(word: str, fault: str) -> None:
+    with Bench("epos") as bench:
+        with pytest.raises(ValueError, match=f"no fault '{word}'; did you mean '{fault}'"):
+            bench.fault(word)
+        with pytest.raises(ValueError, match=f"no fault '{word}'; did you mean '{fault}'"):
+            bench.clear(word)
+
+
+def test_a_word_of_the_field_suggests_the_fault_of_the_first_device_or_of_the_one_named() -> None:
+    names = ["left/power_off", "left/sdo_mute", "right/power_cut", "right/cut"]
+    assert near_fault("no_power", names) == "did you mean 'left/power_off'?"
+    assert near_fault("right/no_power", names) == "did you mean 'right/power_cut'?"
+    assert near_fault("no_sync", names).startswith("known: left/power_off")
