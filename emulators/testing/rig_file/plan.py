@@ -346,7 +346,8 @@ def summary(plan: RigPlan) -> Iterator[str]:
         "hardware" if plan.hardware else "",
     ]
     yield ", ".join(filter(None, counts))
-    width = max((len(name) for name in plan.wires), default=0)
+    ideal = _ideal_motors(plan)
+    width = max(map(len, [*plan.wires, *([_BODY] if ideal else [])]), default=0)
     on_wires: dict[str, list[str]] = {name: [] for name in plan.wires}
     for device in plan.devices.values():
         on_wires[device.wire].append(device_text(device))
@@ -355,6 +356,24 @@ def summary(plan: RigPlan) -> Iterator[str]:
         yield f"  {wire.name:{width}}  {_wire_text(wire)}: {devices or 'nothing'}"
         if places := "; ".join(_places(plan, wire.name)):
             yield f"  {'':{width}}  {places}"
+    if ideal:
+        yield f"  {_BODY:{width}}  {ideal}"
+
+
+_BODY: Final = "body"
+_IDEAL_COUNTS: Final = 2_000
+"""`IdealMotor.counts_per_turn`, for a check that needs no drive."""
+
+
+def _ideal_motors(plan: RigPlan) -> str:
+    """Return which drives of the body have an ideal motor, and its limits; empty if none has."""
+    drives = plan.body.drives.values() if plan.body else ()
+    ideal = [name for name in drives if plan.devices[name].kind is DeviceKind.EDS]
+    if not ideal:
+        return ""
+    motors = "ideal motor" if len(ideal) == 1 else "ideal motors"
+    limits = f"no load, no gear, {_IDEAL_COUNTS} counts in a turn of the wheel"
+    return f"{motors} of {', '.join(ideal)}: {limits}"
 
 
 def _wire_text(wire: WirePlan) -> str:

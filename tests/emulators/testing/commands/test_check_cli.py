@@ -1,14 +1,17 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 from click.testing import CliRunner
 
+from tickrig.device.canopen.ds402.axis import IdealMotor
 from tickrig.emulators.testing.commands.check_cli import check
 
+ROOT = Path(__file__).parents[4]
 GOOD = '[device.rrc]\ntype = "rrc"\n[wire.can0]\ntype = "can"\nbitrate = 500000\n'
 GOOD += '[device.left]\ntype = "epos"\nnode_id = "lss"\n[device.base]\ntype = "rh3-base"\n'
 
@@ -45,6 +48,39 @@ def test_where_wires_are_is_summed_up(folder: Path) -> None:
         "  base  serial line: base (rh3-base)",
         "        hardware: not said where",
     ]
+
+
+BODY = """
+[device.left]
+type = "drive.eds"
+node_id = 1
+[device.right]
+type = "epos"
+node_id = 2
+[body]
+kind = "differential"
+left = "left"
+right = "right"
+wheel_radius_m = 0.08
+tread_m = 0.33
+"""
+
+
+def test_ideal_motors_of_a_body_are_named(folder: Path) -> None:
+    shutil.copy(ROOT / "examples/eds/epos.eds", folder / "drive.eds")
+    (folder / "a.toml").write_text(BODY)
+    assert run("a.toml") == (
+        0,
+        "a.toml: ok: 2 devices, 1 wire, 1 body\n"
+        "  can   CAN: left (drive.eds, node-ID 1), right (epos, node-ID 2)\n"
+        f"  body  ideal motor of left: no load, no gear, {IdealMotor.counts_per_turn} counts in a"
+        " turn of the wheel\n",
+        "",
+    )
+    (folder / "a.toml").write_text(BODY.replace('"epos"', '"drive.eds"'))
+    assert "  body  ideal motors of left, right: no load" in run("a.toml")[1]
+    (folder / "a.toml").write_text(BODY.replace('"drive.eds"', '"epos"'))
+    assert "ideal" not in run("a.toml")[1]
 
 
 def test_all_mistakes_of_all_files_are_told(folder: Path) -> None:
