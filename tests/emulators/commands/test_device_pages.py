@@ -1,0 +1,62 @@
+"""The tables of inputs, faults and outputs on the pages of devices are those of the code."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tickrig import Bench
+from tickrig.device.physical import InputSignal, SignalType
+from tickrig.wire.canopen.drive import DriveState
+
+PAGES = Path(__file__).parents[3] / "docs/reference/devices"
+DEVICES = ["epos", "rh3-base"]
+FAR = 1e9
+"""An angle that no shaft reaches: the switch at it is never pressed."""
+
+
+def tables(device: str) -> Iterator[str]:
+    """Yield the tables of a page, made from the code."""
+    with Bench(device) as bench:
+        known = bench.describe()
+    inputs = [item for name, item in known.inputs.items() if not name.startswith("0x")]
+    levels = [item for item in inputs if item.type is not SignalType.FAULT]
+    faults = [item for item in inputs if item.type is SignalType.FAULT]
+    yield "| input | range | at the start | meaning |\n|---|---|---|---|\n" + "".join(
+        f"| `{item.name}` | {range_of(item)} | {start_of(item)} | {item.text} |\n"
+        for item in levels
+    )
+    yield "| fault | meaning |\n|---|---|\n" + "".join(
+        f"| `{item.name}` | {item.text} |\n" for item in faults
+    )
+    yield "| output | unit | meaning |\n|---|---|---|\n" + "".join(
+        f"| `{item.name}` | {item.unit} | {item.text} |\n".replace("|  |", "| |")
+        for item in known.outputs.values()
+    )
+
+
+def range_of(item: InputSignal) -> str:
+    if item.high == FAR:
+        return f"any angle in {item.unit}"
+    if (item.low, item.high, item.real) == (0, 1, False):
+        return "0, 1"
+    return f"{item.low:g}..{item.high:g} {item.unit}".rstrip()
+
+
+def start_of(item: InputSignal) -> str:
+    return "never pressed" if abs(item.initial) == FAR else f"{item.initial:g}"
+
+
+@pytest.mark.parametrize("device", DEVICES)
+def test_a_page_has_the_tables_of_the_code(device: str) -> None:
+    page = (PAGES / f"{device}.md").read_text("utf-8")
+    for table in tables(device):
+        assert f"\n{table}\n" in page
+
+
+def test_the_page_of_the_drive_has_the_names_of_its_states() -> None:
+    page = " ".join((PAGES / "epos.md").read_text("utf-8").split())
+    names = [f"`{state.words}`" for state in DriveState]
+    assert f"`drive_state` is {', '.join(names[:-1])} or {names[-1]}" in page
