@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from itertools import groupby
+from operator import methodcaller
 from pathlib import Path
 
 from tickrig import Bench
 from tickrig.host import RrcClient
 from tickrig.wire.rrc.commands import COMMANDS, Command, Parameter, parse_command
 from tickrig.wire.rrc.message import PACE_WITHOUT_VR2, check_digit, pace_lines_s
+from tickrig.wire.rrc.replies import Event, RrcEvent
 
 PAGE = Path(__file__).parents[3] / "docs" / "reference" / "devices" / "rrc.md"
 
@@ -112,3 +115,61 @@ def test_the_supply_and_its_warning_stand_there() -> None:
     page = " ".join(PAGE.read_text("utf-8").split())
     assert "24 V, 6.5 mA from the VR2 battery, or 5 V, 20 mA from USB" in page
     assert "Do not plug an RRC that is fed from the VR2 battery into a USB port" in page
+
+
+FAULTS = {
+    "PowerOnError1": "bus_noise joystick_fault",
+    "PowerOnError2": "power_module_fault vr2_fault",
+    "PowerOnTimeout": "bus_unplugged",
+    "PowerOffWaitByCommunicationError": "bus_noise",
+    "PowerOffWaitByJoystickModuleError": "joystick_fault",
+    "PowerOffWaitByPowerModuleError": "power_module_fault",
+    "PowerOffWaitBySystemError": "vr2_fault",
+    "PowerOffWaitByNoCommunication": "bus_unplugged",
+}
+"""Events that the page explains by faults alone, with these faults."""
+
+
+def event_rows() -> dict[str, tuple[str, str]]:
+    """Return what the page says of each event: its cause, and the state after it."""
+    table = PAGE.read_text("utf-8").partition("| event | when |")[2].partition("\n\n")[0]
+    cells = [line.strip("| ").split(" | ") for line in table.splitlines()[2:]]
+    return {name.strip("`"): (when, state) for name, when, state in cells}
+
+
+def press(bench: Bench) -> None:
+    bench.press("power_button")
+
+
+def play(*acts: Callable[[Bench], object]) -> dict[str, str]:
+    """Do one act after the other, and return the events, each with the state of its tick."""
+    found = dict[str, str]()
+    with Bench("rrc") as bench:
+        bench.run_for("5ms")  # between two ticks
+        for act in (None, *acts):
+            if act is not None:
+                act(bench)
+            for _ in range(400):
+                bench.run_for("10ms")
+                for line in bench.link.receive(0).decode().splitlines():
+                    if line.startswith("EV:"):
+                        found[line.removeprefix("EV:")] = str(bench.get("state"))
+    return found
+
+
+def test_the_table_of_events_is_that_of_the_device() -> None:
+    found = play(press, press)
+    found |= play(press, lambda bench: bench.link.send(b"poweroff\n"))
+    found |= play(press, lambda bench: bench.link.send(b"watchdog03\n"))
+    found |= play(press, lambda bench: bench.link.send(b"device\n" * 60))
+    for name, faults in FAULTS.items():
+        for fault in faults.split():
+            act = methodcaller("fault", fault)
+            events = play(act, press) if "PowerOn" in name else play(press, act)
+            assert name in events, fault
+            found |= events
+    page = event_rows()
+    assert {name: state for name, (_, state) in page.items()} == found
+    assert {Event(name).kind for name in page} == {*RrcEvent}
+    for name, faults in FAULTS.items():
+        assert re.findall(r"`(\w+)`", page[name][0]) == faults.split()
