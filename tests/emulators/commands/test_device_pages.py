@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from tickrig import Bench
+from tickrig import Bench, open_bench
 from tickrig.device.physical import InputSignal, SignalType
 from tickrig.wire.canopen.drive import DriveState
 
 PAGES = Path(__file__).parents[3] / "docs/reference/devices"
-DEVICES = ["epos", "rh3-base"]
+GENERATED = ["epos", "rh3-base"]
+NAMED = ["rrc", "urg", "rtc-lite", "motor-core-unit", "f-palette"]
 FAR = 1e9
 """An angle that no shaft reaches: the switch at it is never pressed."""
 
@@ -49,11 +51,37 @@ def start_of(item: InputSignal) -> str:
     return "never pressed" if abs(item.initial) == FAR else f"{item.initial:g}"
 
 
-@pytest.mark.parametrize("device", DEVICES)
+@pytest.mark.parametrize("device", GENERATED)
 def test_a_page_has_the_tables_of_the_code(device: str) -> None:
     page = (PAGES / f"{device}.md").read_text("utf-8")
     for table in tables(device):
         assert f"\n{table}\n" in page
+
+
+def names(bench: Bench) -> set[str]:
+    """Return the names of inputs, faults and outputs; of a row as `di1` to `di8` the first one."""
+    known = bench.describe()
+    inputs = {name for name in known.inputs if "0x" not in name}
+    return {re.sub(r"^([ad][io])\d", r"\g<1>1", name) for name in {*inputs, *known.outputs}}
+
+
+def named_on(*pages: str) -> set[str]:
+    texts = "".join((PAGES / f"{page}.md").read_text("utf-8") for page in pages)
+    return set(re.findall(r"`([\w/]+)`", texts))
+
+
+@pytest.mark.parametrize("device", NAMED)
+def test_a_page_names_each_input_fault_and_output(device: str) -> None:
+    with Bench(device) as bench:
+        found = {name for name in names(bench) if "." not in name}  # the ports of a component
+    assert found - named_on(device, "canopen-slave-emu") == set()
+
+
+def test_the_page_of_bodies_names_each_input_and_output() -> None:
+    with open_bench(PAGES.parents[2] / "examples/rigs/beego.toml") as bench:
+        found = {name for name in names(bench) if name.startswith("body/")}
+    assert found
+    assert found - named_on("bodies") == set()
 
 
 def test_the_page_of_the_drive_has_the_names_of_its_states() -> None:

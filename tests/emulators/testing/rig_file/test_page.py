@@ -15,7 +15,7 @@ from tickrig.emulators.testing.rig_file.reader import parse_rig_file
 from tickrig.host.text.section import rows
 
 FILE = Path(__file__).parents[4] / "docs" / "reference/bench/rig-file.md"
-RIGS = sorted(FILE.parents[1].glob("examples/rigs/*.toml"))
+RIGS = sorted(FILE.parents[3].glob("examples/rigs/*.toml"))
 TEXT = FILE.read_text("utf-8")
 
 
