@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import copy
+import re
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from tests.emulators.lamp import Lamp
 from tickrig import Bench
 from tickrig.device.chance import Chance, threshold_of
 from tickrig.emulators.bench.operator import parse_fault_spec
-from tickrig.emulators.can.faults import CAN_FAULTS
+from tickrig.emulators.can.faults import CAN_FAULTS, NARROWED
 from tickrig.emulators.canopen.choices import MODELS
 from tickrig.emulators.canopen.faults import NODE_FAULTS
 from tickrig.emulators.commands.device_type import DEVICES
@@ -279,6 +280,12 @@ def table_of(faults: Mapping[str, FaultForm]) -> str:
         arguments += f"rate [{usual}]" if usual != "1" else ""
         rows.append(f"| `{usage(name, form)}` | {form.text} | {arguments} |".replace("  ", " "))
     return "\n".join(rows)
+
+
+def test_the_page_names_the_bus_faults_that_a_device_can_have() -> None:
+    page = (Path(__file__).parents[3] / "docs/reference/bench/faults.md").read_text("utf-8")
+    (line,) = re.findall(r"^(`drop`.*) of a device affect the frames", page, re.MULTILINE)
+    assert re.findall(r"`(\w+)`", line) == list(NARROWED)
 
 
 @pytest.mark.parametrize("title", TABLES)

@@ -9,8 +9,10 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
+from tickrig.device.body import SIDES
+from tickrig.emulators.canopen.choices import MODELS
 from tickrig.emulators.commands.cli import main
-from tickrig.emulators.testing.rig_file.plan import PAGE
+from tickrig.emulators.testing.rig_file.plan import BODY, PAGE
 from tickrig.emulators.testing.rig_file.reader import parse_rig_file
 from tickrig.host.text.section import rows
 
@@ -26,6 +28,19 @@ def blocks(kind: str) -> list[str]:
 @pytest.mark.parametrize("name", PAGE)
 def test_a_table_of_the_page_is_the_schema(name: str) -> None:
     assert "\n".join(["", *rows(PAGE[name]), ""]) in TEXT
+
+
+def test_the_models_are_those_that_there_are() -> None:
+    (line,) = re.findall(r"^- the name of a CANopen model: (.*);$", TEXT, re.MULTILINE)
+    assert sorted(re.findall(r"`([\w-]+)`", line)) == sorted(MODELS)
+
+
+def test_the_page_of_bodies_has_the_keys_of_a_body() -> None:
+    page = (FILE.parents[1] / "devices/bodies.md").read_text("utf-8")
+    table = page.partition("| key | meaning |")[2].partition("\n\n")[0]
+    wheels = {wheel for sides in SIDES.values() for side in sides for wheel in side}
+    named = [cell.split(" | ")[0] for cell in table.splitlines()[2:]]
+    assert {*re.findall(r"`(\w+)`", " ".join(named))} == {*BODY, *wheels}
 
 
 @pytest.mark.parametrize("block", blocks("toml"))
