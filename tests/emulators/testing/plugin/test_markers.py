@@ -169,6 +169,7 @@ def write_test_that_needs(need: str, pytester: pytest.Pytester) -> None:
     ("need", "told"),
     [
         ("fault:cutt", "needs('fault:cutt'): no fault 'cutt'; did you mean 'cut'?"),
+        ("fault:no_answer", "needs('fault:no_answer'): no fault 'no_answer'; did you mean 'cut'?"),
         ("input:Stick", "needs('input:Stick'): no input 'Stick'; did you mean 'stick'?"),
         ("output:stete", "needs('output:stete'): no output 'stete'; did you mean 'state'?"),
         ("device:rcr", "needs('device:rcr'): no device 'rcr'; did you mean 'rrc'?"),
