@@ -222,7 +222,7 @@ def spelled(name: str, form: FaultForm, words: Sequence[str]) -> dict[str, str]:
     return given
 
 
-SYNONYMS: Final = (
+_SYNONYMS: Final = (
     # of a CANopen node
     (
         ("heartbeat_mute",),
@@ -295,10 +295,10 @@ SYNONYMS: Final = (
 """Faults with the words for which a device suggests the first of them that it has."""
 
 
-def closest_fault(name: str, names: Iterable[str]) -> list[str]:
+def _closest_fault(name: str, names: Iterable[str]) -> list[str]:
     """Return the probable fault: one that the field calls so, or one with a similar name.
 
-    >>> closest_fault("heartbeat_lost", ["heartbeat_late", "heartbeat_mute"])
+    >>> _closest_fault("heartbeat_lost", ["heartbeat_late", "heartbeat_mute"])
     ['heartbeat_mute']
     """
     names, (device, slash, word) = list(names), name.rpartition("/")
@@ -307,7 +307,7 @@ def closest_fault(name: str, names: Iterable[str]) -> list[str]:
         owner, _, bare = each.rpartition("/")
         if not slash or owner == device:
             there.setdefault(bare, each)
-    same = (faults for faults, words in SYNONYMS if word.casefold() in words.split())
+    same = (faults for faults, words in _SYNONYMS if word.casefold() in words.split())
     meant = (fault for faults in same for fault in faults)
     found = next((there[fault] for fault in meant if fault in there), "")
     return [found] if found else closest(name, names)
@@ -316,7 +316,7 @@ def closest_fault(name: str, names: Iterable[str]) -> list[str]:
 def near_fault(name: str, names: Iterable[str]) -> str:
     """Return a suggestion of the probable fault, or the list of the known faults."""
     names = list(names)
-    close = closest_fault(name, names)
+    close = _closest_fault(name, names)
     return f"did you mean {close[0]!r}?" if close else near(name, names)
 
 

@@ -21,7 +21,7 @@ from tickrig.device.physical import SignalType
 from tickrig.device.twin import twin
 from tickrig.emulators.canopen.choices import MODELS
 from tickrig.emulators.commands.device_type import DEVICES, DeviceType
-from tickrig.emulators.rig.faults import closest_fault
+from tickrig.emulators.rig.faults import near_fault
 from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.emulators.testing.bench.bench import HARDWARE, VIRTUAL, Bench
 from tickrig.emulators.testing.bench.bench_rig import BenchRig, RigState
@@ -33,7 +33,7 @@ from tickrig.emulators.testing.rig_file.devices import EDS_SUFFIXES, RIG_SUFFIXE
 from tickrig.emulators.testing.rig_file.plan import DevicePlan, RigPlan
 from tickrig.emulators.testing.rig_file.probe import Probe, probe
 from tickrig.emulators.testing.rig_file.reader import read_rig_file
-from tickrig.host.text.names import closest, known, near
+from tickrig.host.text.names import known, near
 from tickrig.host.text.values import Setting
 
 _Source = BenchedDevice | Mapping[str, Any] | Path
@@ -269,9 +269,10 @@ def _lack(choice: str, bench: Bench) -> str:
     if name in there or name in KINDS[kind](bench):
         return ""
     others = [each for each in there if _DIGIT.sub("", each) != _DIGIT.sub("", name)]
-    close = (closest_fault if kind == "fault" else closest)(name, others)
-    hint = f"{_MEANT} {close[0]!r}?" if close else ""
-    return f"no {kind} {name!r}; {hint or f'known: {known(dict.fromkeys(there))}'}"
+    hint = (near_fault if kind == "fault" else near)(name, others)
+    if not hint.startswith(_MEANT):
+        hint = f"known: {known(dict.fromkeys(there))}"
+    return f"no {kind} {name!r}; {hint}"
 
 
 def _is_elsewhere(choice: str) -> bool:

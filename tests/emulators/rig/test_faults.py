@@ -17,14 +17,13 @@ from tickrig.emulators.can.faults import CAN_FAULTS, NARROWED
 from tickrig.emulators.canopen.choices import MODELS
 from tickrig.emulators.canopen.faults import NODE_FAULTS
 from tickrig.emulators.commands.device_type import DEVICES
+from tickrig.emulators.rig.faults import _SYNONYMS as SYNONYMS
 from tickrig.emulators.rig.faults import (
-    SYNONYMS,
     FaultArgument,
     FaultArguments,
     FaultForm,
     FaultyPort,
     bind_arguments,
-    closest_fault,
     near_fault,
     usage,
 )
@@ -308,7 +307,7 @@ def test_each_synonym_suggests_a_fault_that_there_is() -> None:
         for word in words.split():
             assert word not in faults
             for fault in faults:
-                assert closest_fault(word, ["x", fault]) == [fault]
+                assert near_fault(word, ["x", fault]) == f"did you mean {fault!r}?"
 
 
 @pytest.mark.parametrize(
