@@ -27,15 +27,15 @@ Word = bytes | str
 
 
 def _check_words(name: str, words: object, on_can: bool) -> None:
-    """Check that words are a list of what a device on this wire can receive.
+    """Check that words are a list of items that a device on a wire can receive.
 
     Args:
-        name: what messages call the words.
+        name: name of the words in messages.
         words: the value that the user passed.
         on_can: whether the device is on a CAN bus.
 
     Raises:
-        ValueError: they are not such a list.
+        ValueError: the words are not such a list.
     """
     if isinstance(words, str | bytes) or not isinstance(words, list | tuple):
         example = "'705#7F'" if on_can else "b'ON\\\\n'"
@@ -54,20 +54,21 @@ _SENDS: Final = 160
 _SPOILS: Final = 200
 _NOISES: Final = 224
 _SETS: Final = 252
-"""Limits of the first byte of an act. A byte below the first limit sends a word; below the second,
-a corrupted word; then noise; then an input change. From the last limit on, the act is a reset."""
+"""Limits of the first byte of an act. A byte below the first limit sends a word. A byte below the
+second limit sends a corrupted word. A byte below the third limit sends noise. A byte below the last
+limit changes an input. From the last limit on, the act is a reset."""
 
 _MOST_NOISE: Final = 24
 _MOST_ACTS: Final = 40
 
 
 class FuzzAct(NamedTuple):
-    """One action of a fuzzing run.
+    """An action of a fuzzing run.
 
     Attributes:
-        verb: `send`, `set` or `reset`.
-        what: for `send`, bytes or a frame; for `set`, the name of an input and its value; for
-            `reset`, None.
+        verb: kind of the action: `send`, `set` or `reset`.
+        what: bytes or a frame for `send`, the name of an input and its value for `set`, or None for
+            `reset`.
         wait_us: pause after the action.
     """
 
@@ -76,7 +77,7 @@ class FuzzAct(NamedTuple):
     wait_us: int
 
     def __str__(self) -> str:
-        """Return it as text.
+        """Return the action as text.
 
         >>> str(FuzzAct("send", b"on", 500)), str(FuzzAct("set", ("stick", 3), 0))
         ('send on, wait 500 us', 'set stick 3, wait 0 us')
@@ -94,7 +95,7 @@ class _InputReader:
     A small change that a fuzzer makes to the bytes changes the acts only a little.
 
     Args:
-        words: what the device understands: bytes, or frames.
+        words: words that the device understands: bytes, or frames.
         inputs: the inputs of the device that may change.
         tick_us: period of the device.
         on_can: whether words are frames.
@@ -159,7 +160,7 @@ class _InputReader:
 
 
 def _spoilt_bytes(word: bytes, rest: Iterator[int]) -> bytes:
-    """Return bytes of which one is another, one more, one less, or that end early."""
+    """Return a corrupted word: a byte is changed, added or removed, or the word ends early."""
     at, value, how = next(rest) % (len(word) + 1), next(rest), next(rest) % 4
     if how == 0:
         return word[:at] + bytes([value]) + word[at + 1 :]
@@ -171,7 +172,7 @@ def _spoilt_bytes(word: bytes, rest: Iterator[int]) -> bytes:
 # A device that bytes of chance are thrown at, each time from the same snapshot.
 
 _LOOKS: Final = 60
-"""How often the search looks for an answer of the device, at increasing intervals: 92 s in all."""
+"""Number of checks for an answer of the device, at increasing intervals that are 92 s in all."""
 
 _LOOK_US: Final = 10_000
 
@@ -189,22 +190,24 @@ class DeviceFuzz:
     a random generator.
 
     Args:
-        device: its type or the name of the type, or a callable that makes the device.
-        words: what the device understands, as whole lines or frames (`605#40...`). They are sent
-            unchanged or corrupted, in any order, with noise between them.
-        start: traffic that the device receives first, one item each 10 ms, to bring it into
-            operation.
-        request: sent after each run until the device answers, one word after the other. The first
-            word begins with LF if it has to end a line of noise. If empty, no answer is expected.
-        answer: text that the bytes of the answer contain; for a frame, the beginning of the frame.
-        wire: makes the wire of the device; by default the wire of its type, or `CanWire` for a
-            slave.
-        warm_us: how long the device runs before `start`, in microseconds.
+        device: device type or the name of a type, or a callable that makes the device.
+        words: words that the device understands, as whole lines or frames (`605#40...`). The words
+            are sent unchanged or corrupted, in any order, with noise between them.
+        start: traffic that the device receives first, one item every 10 ms, to bring the device
+            into operation.
+        request: words that are sent after each run, one after the other, until the device answers.
+            The first word begins with LF if it has to end a line of noise. If `request` is empty,
+            no answer is expected.
+        answer: text that the bytes of the answer contain, or the beginning of a frame of the
+            answer.
+        wire: function that makes the wire of the device. The default is the wire of the device
+            type, or `CanWire` for a slave.
+        warm_us: time for which the device runs before `start`, in microseconds.
 
     Raises:
-        ValueError: words are not a list of bytes or frames, or there is an answer without a
+        ValueError: the words are not a list of bytes or frames, or there is an answer without a
             request.
-        SilentDeviceError: raised by a call: the device does not answer.
+        SilentDeviceError: the device does not answer. A call of the object raises this exception.
 
     >>> fuzz = DeviceFuzz("rrc", [b"hello\n"], request=[b"\ndevice\n"], answer=b"RRC\n")
     >>> fuzz(bytes(range(200)))
@@ -248,7 +251,7 @@ class DeviceFuzz:
         """Execute the acts that bytes encode; raise the exception of the device.
 
         Raises:
-            SilentDeviceError: it does not answer.
+            SilentDeviceError: the device does not answer.
         """
         acts = self.acts(data)
         try:
@@ -266,7 +269,7 @@ class DeviceFuzz:
         self._check_answer()
 
     def _fails_so(self, acts: list[FuzzAct], wanted: type[Exception]) -> bool:
-        """Return whether acts end with an error of this type."""
+        """Return whether acts end with an error of the wanted type."""
         try:
             self._run(acts)
         except Exception as error:
@@ -276,7 +279,7 @@ class DeviceFuzz:
     def _check_words(
         self, words: object, start: object, request: Sequence[Word], answer: Word
     ) -> None:
-        """Raise ValueError unless all are of the wire of the device."""
+        """Raise ValueError unless the wire of the device can carry all words."""
         for name, given in (("words", words), ("start", start), ("request", request)):
             _check_words(name, given, self._on_can)
         if answer and not request:
@@ -311,7 +314,7 @@ class DeviceFuzz:
         self._end.poll(self.rig.now_us)
 
     def _check_answer(self) -> None:
-        """Put all inputs back and ask, until it answers."""
+        """Restore all inputs, and send the request until the device answers."""
         if self._inputs:
             _put_back(self._inputs.table, self._inputs)
         if not self._request:
@@ -330,7 +333,7 @@ class DeviceFuzz:
         raise SilentDeviceError(f"asked {asked} it says {said}, without {self._answer!r}")
 
     def _received(self, step_us: int) -> Any:
-        """Return what comes within five steps, at the latest what has the answer in it."""
+        """Return the data received within five steps; stop early after the answer."""
         received: Any = () if self._on_can else b""
         for _ in range(5):
             self.rig.run_for(step_us)
@@ -366,7 +369,7 @@ def _ends(wire: ByteLine | CanWire) -> tuple[Any, Any]:
 
 
 def _inputs_of(device: Any) -> Any:
-    """Return the inputs of a device that fuzzing may change; None if there are none."""
+    """Return the inputs of a device that fuzzing may change, or None if there are none."""
     if isinstance(device, CanopenSlave):
         return Application.of(device).inputs
     return getattr(device, "inputs", None)

@@ -15,7 +15,7 @@ def lazy(
     """Make a package export names of modules that are not imported yet.
 
     Args:
-        package: its name, for the message about an unknown name.
+        package: name of the package, for the message about an unknown name.
         names: the exported names of each module.
 
     Returns:
@@ -50,7 +50,7 @@ class LazyModule:
             slow = LazyModule("package.slow")
 
     Args:
-        name: of the module, in full.
+        name: full name of the module.
     """
 
     def __init__(self, name: str) -> None:

@@ -1,7 +1,7 @@
 """The console commands; each command imports its modules when it is called.
 
-Ctrl-C must end a command from the first moment. This module therefore imports nothing before it has
-set up the handling of Ctrl-C.
+Ctrl-C must end a command from the first moment. This module therefore imports nothing before the
+handling of Ctrl-C is set up the handling of Ctrl-C.
 """
 
 from _signal import SIG_DFL, SIG_IGN, SIGINT, default_int_handler, getsignal, signal  # type: ignore[import-not-found] # signal itself takes milliseconds

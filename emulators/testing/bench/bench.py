@@ -67,11 +67,11 @@ class BenchDevice:
 
     Args:
         mode: the mode of the bench.
-        name: name of the device. If empty, the object stands for all devices, with signals named
-            `NAME/signal`.
+        name: name of the device. If the name is empty, the object stands for all devices, and the
+            names of signals are `NAME/signal`.
 
     Attributes:
-        name: of the device.
+        name: name of the device.
     """
 
     def __init__(self, mode: BenchMode, name: str = "") -> None:
@@ -89,7 +89,7 @@ class BenchDevice:
         return self._mode.describe(self.name)
 
     def _repr_html_(self) -> str:
-        """Return signals with their values, and faults, for Jupyter."""
+        """Return a table of the signals with their values, and of the faults, for Jupyter."""
         return notebook.heading(self.name, self._mode.wire_of(self.name)) + self._signals_html()
 
     def _signals_html(self) -> str:
@@ -103,11 +103,12 @@ class BenchDevice:
 
         Args:
             name: name of the input or group, such as `stick`.
-            values: one value, or one value for each input of the group, also as a list.
+            values: one value for an input, or one value for each input of a group. A list of values
+                is accepted, too.
 
         Raises:
-            ValueError: unknown input, or values that the input does not accept.
-            NotOnThisBench: not possible on this bench.
+            ValueError: the input is unknown, or does not accept the values.
+            NotOnThisBench: the bench cannot set the input.
         """
         each = values[0] if len(values) == 1 and isinstance(values[0], list | tuple) else values
         self._mode.request("set", name=self._full(name), value=list(each))
@@ -119,7 +120,7 @@ class BenchDevice:
             name: name of the input or output, such as `state`.
 
         Raises:
-            ValueError: unknown name.
+            ValueError: the name is unknown.
         """
         full = self._full(name)
         values = self._mode.request("get", names=[full])["values"]
@@ -132,7 +133,7 @@ class BenchDevice:
 
         Args:
             name: name of the button.
-            for_: duration, from the tick in which the device sees the button pressed.
+            for_: duration of the press, from the tick in which the device sees the button pressed.
         """
         self._mode.request("press", name=self._full(name), duration_us=us_of(for_))
 
@@ -142,15 +143,15 @@ class BenchDevice:
         """Start a fault: now, at a time, or when a condition becomes true.
 
         Args:
-            spec: the fault, such as `cut`, `cut@2s-3s`, `flip=0.001`; a fault of the device or of
-                its wire.
-            when: condition that starts the fault, such as `on_line("OK:output", nth=3)`; `spec`
-                then has no time.
-            for_: duration from the start of the fault; by default the fault stays.
+            spec: the fault of the device or of its wire, such as `cut`, `cut@2s-3s` or
+                `flip=0.001`.
+            when: condition that starts the fault, such as `on_line("OK:output", nth=3)`. With a
+                condition, `spec` must not have a time.
+            for_: duration from the start of the fault. By default the fault stays.
 
         Raises:
-            ValueError: unknown fault, or invalid arguments.
-            NotOnThisBench: not possible on this bench.
+            ValueError: the fault is unknown, or its arguments are invalid.
+            NotOnThisBench: the bench cannot make the fault.
         """
         wanted = parse_fault_spec(spec, partial(self._mode.check_fault, self.name))
         for_us = None if for_ is None else us_of(for_)
@@ -161,18 +162,18 @@ class BenchDevice:
         self._mode.fault(self.name, wanted, when, for_us)
 
     def clear(self, name: str) -> None:
-        """Clear a fault, or cancel a scheduled one.
+        """Clear a fault, or cancel a scheduled fault.
 
         Args:
             name: name of the fault.
 
         Raises:
-            ValueError: unknown fault.
+            ValueError: the fault is unknown.
         """
         self._mode.clear(self.name, name)
 
     def switch_off(self) -> None:
-        """Switch the supply of the device off, or of all devices of the bench.
+        """Switch off the supply of the device, or of all devices of the bench.
 
         Raises:
             NotOnThisBench: the bench cannot switch the supply.
@@ -191,14 +192,14 @@ class BenchDevice:
         """Run an action of several steps, such as switching the device off.
 
         Args:
-            text: description, such as `switch VR2 off, unless it is off`, which a human operator
-                sees.
-            do: executes the action with an emulator; it is not called if a human executes the
-                action.
+            text: description of the action for a human operator, such as `switch VR2 off, unless it
+                is off`.
+            do: function that executes the action with an emulator. If a human executes the action,
+                `do` is not called.
 
         Raises:
             OperatorRefused: the human did not execute the action.
-            NotOnThisBench: not possible on this bench.
+            NotOnThisBench: the bench cannot run the action.
         """
         self._mode.perform(self.name, text, do)
 
@@ -206,10 +207,11 @@ class BenchDevice:
         """Check an observation at the device: in an emulator, or by a human operator.
 
         Args:
-            text: description, such as `the motors drive forward at 30 %`; a human answers yes or
-                no.
-            seen: returns the answer for an emulator; it is not called if a human answers.
-            within: longest wait; the tolerance of the bench is added.
+            text: description of the observation, such as `the motors drive forward at 30 %`. A
+                human answers yes or no.
+            seen: function that returns the answer for an emulator. If a human answers, `seen` is
+                not called.
+            within: longest wait, to which the tolerance of the bench is added.
         """
         return self._mode.observe(self.name, text, seen, us_of(within))
 
@@ -217,9 +219,10 @@ class BenchDevice:
         """Return a condition that is true after a line, or a frame as in candump, has passed.
 
         Args:
-            pattern: the whole line without its end, such as `OK:output`, or the frame, such as
-                `701#05`; `*` matches anything.
-            nth: number of the occurrence, counted from this call; the first one is 1.
+            pattern: the whole line without its end, such as `OK:output`, or the whole frame, such
+                as `701#05`. A `*` in the pattern matches anything.
+            nth: number of the occurrence, counted from this call. The first occurrence has the
+                number 1.
         """
         source = self._mode.wire_of(self.name) if self.name else ""
         trigger = tasks.LineTrigger(pattern, nth, source)
@@ -228,14 +231,14 @@ class BenchDevice:
 
     @property
     def link(self) -> Link[Any]:
-        """A new link for a client: bytes on a serial line, frames on a CAN bus."""
+        """New link for a client; it carries bytes on a serial line, or frames on a CAN bus."""
         return self._mode.doors.link(self._wire())
 
     def serial(self, **options: Any) -> serial.Serial:
         """Open the serial line as a pyserial object, typed as the result of `serial_for_url`.
 
         Args:
-            options: options of `serial.Serial`; `timeout` is in the time of the bench.
+            options: options of `serial.Serial`. The `timeout` counts in the time of the bench.
         """
         return cast("serial.Serial", self._mode.doors.serial(self._wire(), options))
 
@@ -243,7 +246,7 @@ class BenchDevice:
     def url(self) -> str:
         """URL of the serial line, for a program that opens the line itself while the bench is open.
 
-        The URL is one for `serial.serial_for_url`: `tickrig://rrc`, `/dev/pts/7`, `COM3`.
+        `serial.serial_for_url` opens the URL: `tickrig://rrc`, `/dev/pts/7`, `COM3`.
         """
         address = self._mode.doors.address(self._wire())
         if not isinstance(address, str):
@@ -252,7 +255,7 @@ class BenchDevice:
 
     @property
     def bus_options(self) -> dict[str, Any]:
-        """Options for a program to open the CAN bus itself: `can.Bus(**bench.bus_options)`."""
+        """Options for a program that opens the CAN bus itself: `can.Bus(**bench.bus_options)`."""
         address = self._mode.doors.address(self._wire())
         if isinstance(address, str):
             raise ValueError(f"{self._wire()} is a serial line, which has no bus: see url")
@@ -301,17 +304,17 @@ class Bench(BenchDevice, Closing):
     same rig. They all stop for scheduled releases of buttons and for scheduled faults.
 
     Args:
-        device: the only device: an object, or the name of its type.
-        seed: the seed of all random numbers.
+        device: the only device, as an object or as the name of a device type.
+        seed: seed of all random numbers.
         line: parameters of the serial lines, if they differ from those of the device type.
-        mode: `virtual` time, or `real` time with hosts at ptys and buses.
-        sdo_timeout: time after which CANopen nodes abort a transfer if the SDO client is silent; by
-            default 5 s, or the time of the given slave.
-        devices: several devices by name; CANopen slaves share a bus.
+        mode: `virtual` for virtual time, or `real` for real time with ptys and buses for the hosts.
+        sdo_timeout: time after which CANopen nodes abort a transfer if the SDO client is silent.
+            The default is 5 s, or the time-out of the given slave.
+        devices: several devices by name. CANopen slaves share a bus.
 
     Raises:
-        ValueError: no device, or an unknown name; an SDO time-out of 0, or an SDO time-out without
-            a node.
+        ValueError: there is no device, or a name is unknown. The SDO time-out is 0, or there is an
+            SDO time-out but no node.
 
     >>> from tickrig.device.rrc.machine import Rrc
     >>> with Bench(Rrc(), seed=1) as bench:
@@ -349,17 +352,17 @@ class Bench(BenchDevice, Closing):
         """Return the bench of a rig file.
 
         Args:
-            plan: content of the file.
-            mode: `virtual`; `real`, with the ports for hosts in the plan; or `hardware`, with the
+            plan: content of the rig file.
+            mode: `virtual`, or `real` with the ports for hosts in the plan, or `hardware` with the
                 ports of devices in the plan.
-            terminal: terminal of the operator of real devices; by default standard input and
+            terminal: terminal of the operator of real devices. The default is standard input and
                 output.
 
         Raises:
-            ValueError: a device cannot be made.
-            ValueError: an unknown option, input, fault or mode.
+            ValueError: a device cannot be made, or an option, an input, a fault or the mode is
+                unknown.
             PortGone: a bus cannot be opened, or an emulator in place of a device is missing.
-            OSError: no free port, or a link or socket cannot be made.
+            OSError: no port is free, or a link or socket cannot be made.
         """
         if mode == HARDWARE:
             return cls.of_mode(hardware_mode.HardwareMode(plan, terminal))
@@ -406,7 +409,7 @@ class Bench(BenchDevice, Closing):
         """Advance the time.
 
         Args:
-            duration: a number of microseconds, or a text such as `"100ms"`.
+            duration: duration in microseconds, or a text such as `"100ms"`.
         """
         self._mode.run_for(us_of(duration))
 
@@ -414,11 +417,12 @@ class Bench(BenchDevice, Closing):
         """Advance the time until a condition is true.
 
         Args:
-            done: returns whether the condition is true; it must have no side effects.
+            done: function that returns whether the condition is true. The function must have no
+                side effects.
             within: longest wait.
 
         Returns:
-            True, or False after the time-out.
+            True if the condition is true, or False after the time-out.
         """
         tasks.check_condition(done)
         return self._mode.wait_until(done, us_of(within))
@@ -427,7 +431,7 @@ class Bench(BenchDevice, Closing):
         """Wait in an async body; other tasks run during the wait.
 
         Args:
-            duration: a number of microseconds, or a text such as `"100ms"`.
+            duration: duration in microseconds, or a text such as `"100ms"`.
         """
         await tasks.Wait(_never, self.now_us + us_of(duration))
 
@@ -435,12 +439,13 @@ class Bench(BenchDevice, Closing):
         """Wait in an async body until a condition is true.
 
         Args:
-            done: returns whether the condition is true, such as `on_line("OK:beep")`; it must have
-                no side effects.
-            within: longest wait; by default one day in virtual time, otherwise unlimited.
+            done: function that returns whether the condition is true, such as `on_line("OK:beep")`.
+                The function must have no side effects.
+            within: longest wait. The default is one day in virtual time, otherwise there is no
+                limit.
 
         Returns:
-            True, or False after the time-out.
+            True if the condition is true, or False after the time-out.
         """
         return await tasks.Wait(done, NEVER if within is None else self.now_us + us_of(within))
 
@@ -449,10 +454,11 @@ class Bench(BenchDevice, Closing):
 
         Args:
             name: name of the input or output.
-            within: longest wait; by default one day in virtual time, otherwise unlimited.
+            within: longest wait. The default is one day in virtual time, otherwise there is no
+                limit.
 
         Returns:
-            The new value; after the time-out, the unchanged value.
+            The new value, or the unchanged value after the time-out.
         """
         before = self.get(name)
         await self.until(lambda: self.get(name) != before, within)
@@ -466,7 +472,7 @@ class Bench(BenchDevice, Closing):
                 the time itself.
 
         Returns:
-            The task; `await` it, or call its `result()`.
+            The task. Use `await` or the method `result` of the task to get the result of the body.
 
         Raises:
             NotOnThisBench: the devices are real; use `run` for a single body.
@@ -510,7 +516,8 @@ class Bench(BenchDevice, Closing):
         """Keep a host running while a human answers, so that watchdogs do not expire.
 
         Args:
-            host: called repeatedly with microseconds, such as `client.run_for`.
+            host: function of the host that is called repeatedly with a duration in microseconds,
+                such as `client.run_for`.
         """
         self._mode.meanwhile(host)
 
@@ -523,8 +530,8 @@ class Bench(BenchDevice, Closing):
         - `wait` of threading's events and conditions
         - `get` and `put` of queues
 
-        This holds wherever host code has stored the functions (docs/reference/bench/hosts.md). In
-        real time nothing changes.
+        The functions are replaced wherever host code has stored them
+        (docs/reference/bench/hosts.md). In real time nothing changes.
 
         Returns:
             A context manager that returns the clock, with the functions of `time`.
@@ -534,12 +541,12 @@ class Bench(BenchDevice, Closing):
         return nullcontext(time)
 
     def transcript(self) -> BenchTranscript:
-        """Return the latest lines, frames and actions: time, place, direction, text.
+        """Return the latest lines, frames and actions, each with time, place, direction and text.
 
         The latest 10,000 lines are kept. A line above them has the number of earlier lines.
 
         Returns:
-            A text; Jupyter shows it line by line.
+            The transcript as a text, which Jupyter shows line by line.
         """
         return BenchTranscript(text_of(self._mode.journal()))
 
@@ -569,11 +576,11 @@ class Bench(BenchDevice, Closing):
     def save_trace(self, path: Path | str) -> None:
         """Save traffic, inputs and faults of all devices, for `tickrig replay`.
 
-        With real devices the file has the traffic of their ports and the operator's actions, for
-        `tickrig compare`.
+        With real devices the file has the traffic of their ports and the operator's actions, which
+        `tickrig compare` reads.
 
         Args:
-            path: the file; an existing file is replaced.
+            path: path of the file; an existing file is replaced.
 
         Raises:
             OSError: the file cannot be written.
@@ -601,7 +608,7 @@ class Bench(BenchDevice, Closing):
             hosts: hosts and other objects of a test, which are restored together with the bench.
 
         Returns:
-            The snapshot; `restore()` restores everything.
+            The snapshot, whose method `restore()` restores everything.
 
         Raises:
             NotOnThisBench: the bench is not in virtual time.
@@ -632,9 +639,9 @@ def open_bench(path: Path | str, *, mode: str = VIRTUAL, seed: int | None = None
     """Open the bench described by a rig file.
 
     Args:
-        path: the rig file.
+        path: path of the rig file.
         mode: `virtual`, `real` or `hardware`.
-        seed: the seed of all random numbers; it replaces the seed in the file.
+        seed: seed of all random numbers, which replaces the seed in the file.
 
     Raises:
         OSError: the file cannot be read, or a port is not available.

@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 # Journal of a bench: lines and frames of all wires, and actions on the devices.
 
 _KEPT: Final = 10_000
-"""Number of lines kept; earlier ones are only counted."""
+"""Number of lines kept; earlier lines are only counted."""
 
 _MAPPINGS_KEPT: Final = 4_000
 """Number of additional frames kept that define the contents of PDOs."""
@@ -54,7 +54,7 @@ _MAPPINGS_KEPT: Final = 4_000
 _SDO_IDS: Final = range(0x581, 0x680)
 _ERROR_CONTROL_IDS: Final = range(0x701, 0x780)
 _PDO_OBJECTS: Final = range(0x1400, 0x1C00)
-"""Indices that define the contents of PDOs; a boot-up resets them."""
+"""Indices of objects that define the contents of PDOs; a boot-up resets these objects."""
 
 _ENDS: Final = (b"host", b"device")
 
@@ -62,7 +62,7 @@ _ENDS: Final = (b"host", b"device")
 class Journal(WireLog):
     """The latest lines, frames and actions of all wires, in order of time.
 
-    A line counts as passed when the device receives its end or sends it. A serial line shows the
+    A line has passed when the device receives or sends the end of the line. A serial line shows the
     data that the host sent or received. Data that a fault has changed are shown as the device
     receives or sends them, with the mark `~`.
     """
@@ -90,9 +90,10 @@ class Journal(WireLog):
         """Return functions for the traffic as sent and as received.
 
         Args:
-            source: the line, or the node.
+            source: name of the line or node.
             ends: marks of the far and the near end.
-            splitter: of the line; bytes of a line without a delimiter are shown in hex.
+            splitter: splitter of the line into entries of the journal. The bytes of a line without
+                a delimiter are shown in hex.
         """
         is_binary = isinstance(splitter, FrameFormat) and not splitter.delimiter
 
@@ -114,7 +115,7 @@ class Journal(WireLog):
         return hear
 
     def of_settings(self, source: str) -> Callable[[int, str], None]:
-        """Return what takes that a host and its device have other settings of their line."""
+        """Return a function that records that host and device have different line settings."""
 
         def hear(at_us: int, text: str) -> None:
             self.add(at_us, Mark.WIRE, text.encode(), source)
@@ -147,7 +148,7 @@ class Journal(WireLog):
             log.follow(rig, source)
 
     def end_silent(self, at_us: int) -> None:
-        """Take frames that a silence has ended."""
+        """Record frames that a silence has ended."""
         super().end_silent(at_us)
         for _, log in self._logs:
             log.end_silent(at_us)
@@ -162,7 +163,7 @@ class Journal(WireLog):
         return tuple(sorted(found, key=lambda line: line.at_us))
 
     def lines(self) -> tuple[WireLine, ...]:
-        """Return what is kept, with the frames that silence alone will end."""
+        """Return the kept lines, with the frames that only a silence will end."""
         begun = enumerate(self.unfinished(by_gap=True), start=self._count + 1)
         return (*self.since(0), *(replace(line, number=number) for number, line in begun))
 
@@ -200,7 +201,7 @@ def line_text(line: WireLine) -> str:
 
 
 def missing_of(lines: Sequence[WireLine]) -> str:
-    """Return a note with the number of earlier lines, no longer kept; empty without them."""
+    """Return a note with the number of earlier lines no longer kept, or "" if none is missing."""
     before = lines[0].number - 1 if lines else 0
     came = f"{before} {'line' if before == 1 else 'lines'} came before"
     return f"{came}; the last {len(lines)} are kept" if before else ""
@@ -210,9 +211,9 @@ class BenchOperator(Operator):
     """The operator of several devices.
 
     Args:
-        assembly: the devices.
-        queue: receives scheduled actions.
-        faults: of their wires and nodes.
+        assembly: the devices on the physical side.
+        queue: queue for scheduled actions.
+        faults: faults of the wires and nodes.
     """
 
     def __init__(self, assembly: Assembly, queue: EventQueue, faults: AssemblyFaults) -> None:
@@ -235,11 +236,11 @@ class Parts:
 
     Attributes:
         mounts: the devices on their wires.
-        bodies: bodies moved by drives, also available as devices `body`.
-        start: initial inputs, by device and name.
-        signals: values that change with time: `DEVICE/INPUT`, or a name for formulas.
-        stores: store files of nodes, saved while time passes.
-        seed: of all random numbers.
+        bodies: bodies moved by drives; each body is also a device `body`.
+        start: initial inputs by device and name.
+        signals: values that change with time, by `DEVICE/INPUT` or by the name that formulas use.
+        stores: store files of nodes, which are saved while time passes.
+        seed: seed of all random numbers.
     """
 
     mounts: Sequence[Mount]
@@ -272,10 +273,9 @@ class RigState(Copyable):
     Args:
         parts: the parts of the bench.
         bridges: connections with the outside world.
-        clock: by default a `VirtualClock`.
-        trace: the file of the recording. Without a file the run is recorded in memory, if `keeps`
-            is true.
-        keeps: whether to record the run without a file.
+        clock: clock of the rig, or None to use a `VirtualClock`.
+        trace: file of the recording, or None to record in memory if `keeps` is true.
+        keeps: whether the run is recorded in memory if there is no file.
 
     Raises:
         ValueError: an invalid input or signal.
@@ -326,7 +326,7 @@ class RigState(Copyable):
         return [chance for mount in self.mounts.values() for chance in mount.chances]
 
     def draw_by(self, seed: int) -> None:
-        """Set another seed for faults that start from now on, different for each wire."""
+        """Set another seed, different for each wire, for faults that start from now on."""
         for number, chance in enumerate(self.chances):
             chance.seed = seed * len(self.chances) + number
 
@@ -334,12 +334,12 @@ class RigState(Copyable):
         """Return the full name of a fault.
 
         Args:
-            owner: the device with the fault, the device whose wire has the fault, or the wire;
-                empty for any.
+            owner: the device with the fault, the device whose wire has the fault, or the wire
+                itself. An empty name stands for any of these.
             fault: name of the fault at the owner.
 
         Raises:
-            ValueError: unknown fault.
+            ValueError: the fault is unknown.
         """
         faults, hands = self.faults_of(owner), self.operator
         if fault in faults:
@@ -354,10 +354,10 @@ class RigState(Copyable):
         """Return the full names of all faults of a device and its wire, or of a wire, or of all.
 
         Args:
-            owner: the device or wire; empty for all.
+            owner: name of the device or wire, or empty for all.
 
         Returns:
-            Full names of the faults, by their names at the owner.
+            Full names of the faults by the short names that the faults have at the owner.
         """
         everything = self.operator.faults
         if not owner:
@@ -387,14 +387,14 @@ def _header_of(mounts: Iterable[Mount], seed: int) -> BenchHeader:
 class BenchDescription:
     """Inputs, outputs and faults of a device, or of all devices of a bench.
 
-    Names are those of the device or the bench.
+    Signals and faults have the names that the device or the bench uses.
 
     Attributes:
-        name: of the device, or of the bench.
-        inputs: inputs, including buttons and physical faults.
+        name: name of the device or bench.
+        inputs: all inputs, including buttons and physical faults.
         groups: inputs that are set together.
-        outputs: outputs, besides the inputs.
-        faults: physical faults, and those of the wire.
+        outputs: outputs that are not inputs.
+        faults: physical faults, and faults of the wire.
     """
 
     name: str
@@ -410,7 +410,7 @@ class BenchDescription:
 
     @property
     def named(self) -> list[str]:
-        """The names of inputs and outputs, without the objects of CANopen nodes: these are many."""
+        """Names of inputs and outputs, but not of the many objects of CANopen nodes."""
         names = dict.fromkeys((*self.inputs, *self.outputs))
         return [name for name in names if not name.rpartition("/")[2].startswith(_OBJECT)]
 
@@ -422,7 +422,7 @@ class BenchDescription:
         """Return tables of inputs, outputs, faults and groups, as HTML for Jupyter.
 
         Args:
-            values: present values, by the name of the input or output.
+            values: present values by name of the input or output.
         """
         named = self.named
         columns = ["name", *["value"] * bool(values), "unit", "what"]
@@ -455,7 +455,7 @@ class BenchDescription:
         )
 
     def __str__(self) -> str:
-        """Return a readable list without the objects of CANopen nodes, which are many."""
+        """Return a readable list, without the many objects of CANopen nodes."""
         inputs = {
             name: f"{one.type.value} {one.low:g}..{one.high:g} {one.unit}".rstrip()
             for name, one in self.inputs.items()
@@ -486,15 +486,13 @@ class BenchRig(RunningEmulator):
     """A rig with all devices of a bench; `EmulatorControl` answers requests about it.
 
     Args:
-        name: of the bench.
-        state: its state.
-        link: address for hosts, as text.
+        name: name of the bench.
+        state: state of the bench. link: address for hosts, as text.
 
     Attributes:
-        state: its state.
-        journal: the journal.
+        state: state of the bench. journal: journal of the traffic and the actions.
         orders: scheduled faults, except those of a control socket.
-        ports: ports of hosts in real time, by the name of the line.
+        ports: ports of hosts in real time, by name of the line.
     """
 
     ports: Mapping[str, Sequence[PtyPort | NetworkPort]]
@@ -535,7 +533,7 @@ class BenchRig(RunningEmulator):
         self.journal.add(self.effective_us, Mark.PHYSICAL, what.encode(), source)
 
     def describe(self, owner: str) -> BenchDescription:
-        """Return inputs, outputs and faults of a device, or of all devices if the name is empty."""
+        """Return inputs, outputs and faults of a device, or of all devices if `owner` is empty."""
         part: HasSignals = self.device
         if owner:
             part = self.state.assembly.parts[owner]
@@ -560,7 +558,7 @@ class BenchRig(RunningEmulator):
 
     @property
     def settling_us(self) -> int:
-        """Time until the data of hosts have arrived and each device has had two ticks."""
+        """Time after which the data of hosts have arrived and each device has had two ticks."""
         now_us = self.rig.now_us
         lines = [one.line for one in self.state.mounts.values() if isinstance(one, LineMount)]
         sent_us = [line.b.sent_us for line in lines if line.b.sent_us < NEVER]
@@ -581,5 +579,5 @@ class BenchRig(RunningEmulator):
 
     @property
     def lost(self) -> dict[str, int]:
-        """Data lost because of full buffers, by wire."""
+        """Amount of data lost because of full buffers, by wire."""
         return {f"lost_{name}": mount.lost for name, mount in self.state.mounts.items()}

@@ -2,9 +2,9 @@
 
 `BenchError` is the base class.
 
-- `NotOnThisBench`: this mode cannot do that; the plug-in skips the test.
-- `BenchBlocked`: no verdict about the device; the plug-in reports an error. Its subclasses are the
-  next three.
+- `NotOnThisBench`: this mode cannot do the operation. The plug-in skips the test.
+- `BenchBlocked`: there is no verdict about the device. The plug-in reports an error. The next three
+  classes are subclasses.
 - `MachineTooSlow`: real time was not kept.
 - `PortGone`: a port, a bus or an emulator's socket is gone.
 - `OperatorRefused`: a human at the terminal did not execute a request.
@@ -14,11 +14,11 @@ from __future__ import annotations
 
 
 class BenchError(Exception):
-    """A bench that cannot do what a test asks of it."""
+    """A bench cannot do the operation that a test needs."""
 
 
 class NotOnThisBench(BenchError):  # noqa: N818 - no error of the test
-    """The mode of this bench does not support this; the message has the reason."""
+    """The mode of this bench does not support the operation; the message has the reason."""
 
 
 class BenchBlocked(BenchError):  # noqa: N818 - no error of the device

@@ -69,14 +69,14 @@ def make_recorded(
     """Make the recorded device in its state at the start of the recording.
 
     Args:
-        header: of the trace.
-        name: of the device.
-        folder: of the trace, searched for its files.
-        cache: of EDS files.
+        header: header of the trace.
+        name: name of the device.
+        folder: folder of the trace, which is searched for the files that the trace names.
+        cache: cache of EDS files.
         run_code: whether to run a Python file that the trace names.
 
     Raises:
-        ValueError: it cannot be made.
+        ValueError: the device cannot be made.
     """
     entry, on_can = header.devices[name], header.on_can(name)
     try:
@@ -148,6 +148,6 @@ def _check_same(file: Path, recorded: object) -> None:
 
 
 def _file_of(device: str) -> Path | None:
-    """Return the file of `FILE.py:Class` or `FILE.yml:NODE`, None for a model."""
+    """Return the file of `FILE.py:Class` or `FILE.yml:NODE`, or None for a model."""
     file, _, _ = device.rpartition(":")
     return Path(file) if file.endswith(SUFFIX) or is_bus_node(device) else None

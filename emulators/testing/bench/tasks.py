@@ -21,7 +21,7 @@ from tickrig.wire.instant import NEVER
 # Conditions: a line or frame, or any function about the bench.
 
 Condition = Callable[[], bool]
-"""Returns whether a condition is true, without side effects."""
+"""Function without side effects that returns whether a condition is true."""
 
 _ANY: Final = ""
 
@@ -29,12 +29,13 @@ _ORDINALS: Final = {1: "st", 2: "nd", 3: "rd"}
 
 
 class LineTrigger:
-    """True after a line or frame has passed a number of times.
+    """Condition that is true after a line or frame has passed a number of times.
 
     Args:
         pattern: the whole line, or the frame in candump's notation; `*` stands for anything.
-        nth: number of the occurrence, counted from the creation; the first one is 1.
-        source: the wire or device; empty for any.
+        nth: number of the occurrence, counted from the creation of the trigger. The first
+            occurrence has the number 1.
+        source: name of the wire or device, or empty for any.
 
     Attributes:
         count: number of occurrences.
@@ -51,7 +52,7 @@ class LineTrigger:
         self._nth, self._source, self.count = nth, source, 0
 
     def __call__(self) -> bool:
-        """Return whether it has passed that many times."""
+        """Return whether the line or frame has passed that many times."""
         return self.count >= self._nth
 
     def __str__(self) -> str:
@@ -126,7 +127,7 @@ class Wait:
     """A wait of a body.
 
     Attributes:
-        done: returns the condition.
+        done: function that returns whether the condition is true.
         until_us: time at which the body continues even if the condition is false.
     """
 
@@ -159,7 +160,8 @@ def run_body(waiting: _TaskWait, body: Coroutine[Any, Any, _T]) -> _T:
         TypeError: the body awaits something else, such as `asyncio.sleep`.
         RuntimeError: the condition of the body does not become true within a day of virtual time,
             or can never become true.
-        KeyboardInterrupt: Ctrl-C; the message has the condition and the waiting time.
+        KeyboardInterrupt: the user has pressed Ctrl-C. The message has the condition and the
+            waiting time.
     """
     came: bool | None = None
     while True:
@@ -192,7 +194,7 @@ class Task(Generic[_T]):
 
     Args:
         rig: the rig with its time.
-        body: the body; it must not advance the time itself.
+        body: the body, which must not advance the time itself.
     """
 
     def __init__(self, rig: BenchRig, body: Coroutine[Any, Any, _T]) -> None:
@@ -206,7 +208,7 @@ class Task(Generic[_T]):
 
     @property
     def done(self) -> bool:
-        """Whether it has ended, with or without an exception."""
+        """Whether the body has ended, with or without an exception."""
         return self._wait is None
 
     def result(self) -> _T:
@@ -223,17 +225,17 @@ class Task(Generic[_T]):
         return self._result[0]
 
     def check(self) -> None:
-        """Raise its exception, unless its result was read."""
+        """Raise the exception of the body, unless the result of the task was read."""
         if self._error is not None and not self._raised:
             self.result()
 
     def __await__(self) -> Generator[Wait, bool, _T]:
-        """Wait for its end."""
+        """Wait for the end of the body."""
         yield Wait(lambda: self.done)
         return self.result()
 
     def cancel(self) -> None:
-        """Cancel the body at its wait; no effect if it has ended."""
+        """Cancel the body at its present wait; do nothing if the body has ended."""
         if self._wait is not None:
             self._end()
             self._body.close()
@@ -263,7 +265,7 @@ class Task(Generic[_T]):
 
 
 def _step(body: Coroutine[Any, Any, Any], came: bool | None) -> Wait:
-    """Run a body to its next wait; explain the error if the body needs the asyncio loop."""
+    """Run a body to its next wait; if the body needs the asyncio loop, explain the error."""
     try:
         return _wait_of(body.send(came))
     except RuntimeError as error:

@@ -52,7 +52,7 @@ class _WorkerProcess:
         order: the tests to collect.
 
     Raises:
-        Refusal: pytest refuses it.
+        Refusal: pytest refuses the order.
         _WorkerDied: the process has ended before its first answer.
     """
 
@@ -89,7 +89,7 @@ class _WorkerProcess:
                 self.end()
 
     def request(self, runs: Sequence[Run]) -> None:
-        """Request runs; _WorkerDied if the process has ended."""
+        """Request runs; raise _WorkerDied if the process has ended."""
         try:
             self._conn.send(list(runs))
         except OSError:
@@ -99,8 +99,8 @@ class _WorkerProcess:
         """Wait for the verdict of a run.
 
         Raises:
-            _RunHung: no verdict in time.
-            _WorkerDied: the process has ended, or sent something else.
+            _RunHung: no verdict has arrived in time.
+            _WorkerDied: the process has ended, or has sent something that is not a verdict.
         """
         answer = self._receive(timeout_s)
         try:
@@ -157,13 +157,13 @@ _ATTEMPTS: Final = 3
 
 
 class Crew:
-    """Starts workers if none is idle; usable by several threads.
+    """Starts a worker if no worker is idle; several threads can use a crew.
 
     Args:
         order: the tests to collect.
 
     Attributes:
-        order: the same.
+        order: the tests to collect, as given.
     """
 
     def __init__(self, order: CampaignOrder) -> None:
@@ -182,11 +182,12 @@ class Crew:
         """Do runs one after the other.
 
         Args:
-            runs: of collected tests.
-            digest: of the files of the tests; other files are refused.
+            runs: runs of collected tests.
+            digest: hash of the files of the tests. If the files here have another hash, the runs
+                are refused.
 
         Raises:
-            Refusal: the files differ here.
+            Refusal: the files of the tests differ here.
         """
         left, verdicts = deque(runs), list[RunVerdict]()
         deaths = Counter[int]()
@@ -267,8 +268,8 @@ class LocalWorkers:
     """Processes of this machine, each with a thread that waits for it.
 
     Args:
-        crew: the crew that has collected.
-        digest: of the files of the tests.
+        crew: crew that has collected the tests.
+        digest: hash of the files of the tests.
         count: number of processes.
     """
 

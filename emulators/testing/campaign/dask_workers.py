@@ -30,10 +30,10 @@ from tickrig.host.text.page_text import one_line
 
 _CONNECT_S: Final = 10.0
 _SCHEDULER: Final = "Scheduler"
-"""Type name of a scheduler, in place of a worker's `Worker`."""
+"""Type name of a scheduler; a worker has `Worker`."""
 
 _WAIT_S: Final = 60.0
-"""How long a scheduler may be without workers."""
+"""Longest time that a scheduler may be without workers."""
 
 _CLOSE_S: Final = 5.0
 """Time-out for removing a campaign from the cluster."""
@@ -58,7 +58,7 @@ class _CrewPlugin(WorkerPlugin):
         self.name = f"tickrig-campaign-{uuid4().hex}"
 
     def setup(self, worker: Worker) -> None:
-        """Start; processes are started with the first runs."""
+        """Start a crew; the first runs start its processes."""
         self.crew = Crew(self._order)
 
     def teardown(self, worker: Worker) -> None:
@@ -67,14 +67,14 @@ class _CrewPlugin(WorkerPlugin):
 
 
 class DaskWorkers:
-    """All threads of a cluster; the batch of a lost worker goes to another one.
+    """All threads of a cluster; the batch of a lost worker goes to another worker.
 
     Args:
-        url: of the scheduler.
+        url: address of the scheduler.
         plan: the campaign.
 
     Raises:
-        Refusal: no scheduler, or no worker.
+        Refusal: there is no scheduler, or no worker.
     """
 
     def __init__(self, url: str, plan: CampaignPlan) -> None:
@@ -146,7 +146,7 @@ class DaskWorkers:
         return CampaignRefusal(f"--scheduler {self._url} is gone; what was done is kept")
 
     def close(self) -> None:
-        """Remove the campaign from the cluster, if it still answers."""
+        """Remove the campaign from the cluster, if the cluster still answers."""
         with suppress(*_GONE):
             self._executor.shutdown(wait=False)
         forgetting = Thread(target=self._forget, daemon=True)
@@ -176,7 +176,7 @@ def be_quiet() -> None:
 
 
 def _do(name: str, runs: Sequence[Run], digest: str, version: str) -> list[RunVerdict] | str:
-    """Do runs on this worker; a result that is a text is a refusal."""
+    """Do runs on this worker; return the verdicts, or a text if the worker refuses."""
     worker = get_worker()
     if __version__ != version:
         return f"{worker.address}: there is tickrig {__version__}, here {version}"

@@ -20,21 +20,21 @@ class JournalFullError(OSError):
 
 
 class CampaignJournal:
-    """Verdicts in a file, one per run; a new process continues after the last one.
+    """Verdicts in a file, one per run; a new process continues after the last verdict.
 
     A line has a checksum and a JSON array. Incomplete lines are ignored, and their runs are
     repeated.
 
     Args:
-        path: the file.
+        path: path of the file.
         head: properties of the campaign, by name.
 
     Attributes:
-        verdicts: by the number of the run, the verdicts read from the file and those added later.
+        verdicts: verdicts read from the file and added later, by number of the run.
 
     Raises:
         Refusal: the file belongs to another campaign, or to a campaign that is running.
-        OSError: it cannot be read or written.
+        OSError: the file cannot be read or written.
     """
 
     def __init__(self, path: Path, head: Mapping[str, Any]) -> None:
@@ -54,7 +54,7 @@ class CampaignJournal:
             raise
 
     def _read(self, head: Mapping[str, Any]) -> None:
-        """Load the file; cut off or rewrite invalid lines."""
+        """Load the file, and cut off or rewrite invalid lines."""
         data = self.path.read_bytes()
         entries = list(_entries(data))
         first = entries[0] if entries else None
@@ -90,7 +90,7 @@ class CampaignJournal:
         """Write new verdicts to the disk, and return them.
 
         Raises:
-            JournalFullError: some verdicts could not be written; these are not kept.
+            JournalFullError: some verdicts could not be written. These verdicts are not kept.
         """
         new = [verdict for verdict in verdicts if self._keep(verdict)]
         data = b"".join(_line(list(verdict)) for verdict in new)

@@ -26,13 +26,13 @@ class CampaignOrder:
     """Tests that a worker collects, and the time-out of a run.
 
     Attributes:
-        tests: files, folders and node IDs, as in pytest's command line.
-        parameters: as in `--bench-param`.
-        bench: rig file, empty for that of the tests.
-        keyword: as in `-k`; empty for all.
+        tests: files, folders and node IDs, as in the command line of pytest.
+        parameters: parameters, as in `--bench-param`.
+        bench: path of the rig file, or empty to use the rig file of the tests.
+        keyword: expression, as in `-k`, or empty for all tests.
         timeout_s: time-out of a run.
         folder: absolute path of the folder in which the tests are searched.
-        version: of tickrig.
+        version: version of tickrig.
     """
 
     tests: tuple[str, ...]
@@ -57,9 +57,9 @@ class CollectedTest(NamedTuple):
     """A test that runs with many seeds.
 
     Attributes:
-        nodeid: as in pytest.
-        values: of its parameters, as written.
-        place: its node ID relative to the folder of the campaign.
+        nodeid: node ID, as in pytest.
+        values: values of the parameters, as written in the command line.
+        place: node ID relative to the folder of the campaign.
     """
 
     nodeid: str
@@ -86,9 +86,9 @@ class Run(NamedTuple):
     """A test with a seed.
 
     Attributes:
-        number: its number in the campaign.
-        nodeid: of the test.
-        seed: of all random numbers.
+        number: number of the run in the campaign.
+        nodeid: node ID of the test.
+        seed: seed of all random numbers.
     """
 
     number: int
@@ -100,12 +100,12 @@ class RunVerdict(NamedTuple):
     """How a run ended.
 
     Attributes:
-        number: its number in the campaign.
-        outcome: `passed`, `failed`, `error`, `blocked` or `skipped`; `hung` if it took too long,
-            `died` if its process ended three times.
-        virtual_us: age of its bench.
-        where: file and line; empty if it passed, or if unknown.
-        reason: the reason, in one line; empty if it passed.
+        number: number of the run in the campaign.
+        outcome: `passed`, `failed`, `error`, `blocked`, `skipped`, `hung` or `died`. The outcome is
+            `hung` if the run took too long, and `died` if its process ended three times.
+        virtual_us: age of the bench in virtual time.
+        where: file and line of the failure, or empty if the run passed or the place is unknown.
+        reason: reason of the outcome in one line, or empty if the run passed.
     """
 
     number: int
@@ -128,7 +128,7 @@ def verdicts_of(answer: object, runs: Sequence[Run]) -> list[RunVerdict]:
         runs: the requested runs.
 
     Raises:
-        ValueError: the answer is not one verdict for each run, in their order.
+        ValueError: the answer does not have one verdict for each run, in the order of the runs.
     """
     if not isinstance(answer, list) or len(answer) != len(runs):
         came = counted(len(answer), "item") if isinstance(answer, list) else type(answer).__name__

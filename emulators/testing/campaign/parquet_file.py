@@ -16,7 +16,7 @@ _NUMBERS: Final = ("seed", "virtual_us")
 
 
 def parquet_of(names: Sequence[str], rows: Sequence[Sequence[str | int]]) -> bytes:
-    """Return the bytes of the file; all columns but two are texts."""
+    """Return the bytes of the file; all columns except two are texts."""
     types = [(name, pyarrow.int64() if name in _NUMBERS else pyarrow.string()) for name in names]
     columns = [
         pyarrow.array([cells[at] for cells in rows], kind) for at, (_, kind) in enumerate(types)
@@ -30,8 +30,8 @@ def read_parquet(path: Path) -> Iterator[Sequence[str]]:
     """Yield the names of the columns, then each row as texts.
 
     Raises:
-        Refusal: it is not a Parquet file.
-        OSError: it cannot be read.
+        Refusal: the file is not a Parquet file.
+        OSError: the file cannot be read.
     """
     data = path.read_bytes()
     try:

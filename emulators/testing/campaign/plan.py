@@ -22,7 +22,7 @@ class Seeds:
     """Seeds in ascending order, each once.
 
     Attributes:
-        ranges: first and last seed of each range; ranges do not touch or overlap.
+        ranges: first and last seed of each range. The ranges do not touch or overlap.
 
     >>> seeds = Seeds.parse("7,0-3,2-4")
     >>> str(seeds), len(seeds), seeds[5]
@@ -33,16 +33,16 @@ class Seeds:
 
     @classmethod
     def parse(cls, text: str) -> Seeds:
-        """Read seeds.
+        """Return the seeds that a text lists.
 
         Raises:
-            ValueError: invalid seeds.
+            ValueError: the text is not a valid list of seeds.
         """
         return cls.of_ranges([_range(part.strip()) for part in text.split(",")])
 
     @classmethod
     def of_ranges(cls, ranges: list[tuple[int, int]]) -> Seeds:
-        """Return those of ranges, which may overlap."""
+        """Return the seeds of ranges, which may overlap."""
         joined: list[tuple[int, int]] = []
         for first, last in sorted(ranges):
             if joined and first <= joined[-1][1] + 1:
@@ -119,8 +119,8 @@ class CampaignPlan:
     Attributes:
         order: options of the runs.
         collected: the tests.
-        seeds: of the runs.
-        shard: the part of all runs done here.
+        seeds: seeds of the runs.
+        shard: part of all runs that this campaign does.
     """
 
     order: CampaignOrder
@@ -142,7 +142,7 @@ class CampaignPlan:
     def numbers(self) -> Iterator[int]:
         """Yield the numbers of the runs of this shard, in ascending order.
 
-        Each shard has runs of each test.
+        Every shard has runs of every test.
         """
         tests, (part, parts) = len(self.collected.tests), self.shard
         for index in range(len(self.seeds)):
@@ -159,7 +159,7 @@ class CampaignPlan:
         return Run(number, self.collected.tests[test].nodeid, self.seeds[index])
 
     def values(self, number: int) -> tuple[str, ...]:
-        """Return the values of the parameters of a run, empty for those that its test lacks."""
+        """Return the values of all parameters for a run, "" for a parameter its test lacks."""
         test = self.collected.tests[number % len(self.collected.tests)]
         return tuple(test.values.get(name, "") for name in self.parameters)
 
@@ -176,7 +176,7 @@ class CampaignPlan:
 
     @property
     def head(self) -> dict[str, str | list[str]]:
-        """Properties that must be equal to continue a campaign, by name."""
+        """Properties, by name, that must be equal to continue a campaign."""
         return {
             "tests": [test.nodeid for test in self.collected.tests],
             "seeds": str(self.seeds),

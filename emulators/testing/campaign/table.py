@@ -1,4 +1,4 @@
-"""The table of a campaign: a row for each run, independent of their order."""
+"""The table of a campaign: a row for each run, independent of the order of the runs."""
 
 from __future__ import annotations
 
@@ -29,17 +29,18 @@ WELL: Final = ("passed", "skipped")
 
 
 class CampaignRow(NamedTuple):
-    """A run.
+    """A row of the table, for one run.
 
     Attributes:
-        test: node ID.
-        seed: of all random numbers.
-        values: of the parameters, as written; empty if the test lacks them.
-        outcome: how it ended.
-        virtual_us: age of the bench.
-        where: file and line; empty if it passed.
-        reason: the reason, in one line; empty if it passed.
-        replay: the command that replays it with a trace; empty if it passed.
+        test: node ID of the test.
+        seed: seed of all random numbers.
+        values: values of the parameters, as written in the command line. A value is empty if the
+            test lacks the parameter.
+        outcome: outcome of the run, such as `passed`.
+        virtual_us: age of the bench in virtual time.
+        where: file and line of the failure, or empty if the run passed.
+        reason: reason of the outcome in one line, or empty if the run passed.
+        replay: command that replays the run with a trace, or empty if the run passed.
     """
 
     test: str
@@ -52,15 +53,15 @@ class CampaignRow(NamedTuple):
     replay: str
 
     def cells(self) -> tuple[str | int, ...]:
-        """Return the values of its columns."""
+        """Return the values of the columns."""
         return (self.test, self.seed, *self.values, *self[3:])
 
 
 class CampaignTable(NamedTuple):
-    """All runs, by test and seed.
+    """All runs, sorted by test and seed.
 
     Attributes:
-        parameters: the names of their columns.
+        parameters: names of the parameters, which are the names of columns.
         rows: the runs.
     """
 
@@ -104,10 +105,10 @@ def _by_value(values: str) -> list[tuple[float, str]]:
 
 
 def write_table(table: CampaignTable, path: Path) -> None:
-    """Write it atomically, as Parquet or CSV by the suffix.
+    """Write a table atomically, as Parquet or CSV according to the suffix of the path.
 
     Raises:
-        OSError: it cannot be written.
+        OSError: the file cannot be written.
     """
     if path.suffix == PARQUET:
         rows = [row.cells() for row in table.rows]
@@ -121,11 +122,11 @@ def write_table(table: CampaignTable, path: Path) -> None:
 
 
 def read_table(path: Path) -> CampaignTable:
-    """Read a table of `write_table`.
+    """Read a table that `write_table` has written.
 
     Raises:
-        Refusal: it is not a table of a campaign.
-        OSError: it cannot be read.
+        Refusal: the file is not a table of a campaign.
+        OSError: the file cannot be read.
     """
     if path.suffix == PARQUET:
         return _table(path, parquet_file.read_parquet(path))
@@ -161,7 +162,7 @@ def merge_tables(tables: Sequence[tuple[Path, CampaignTable]]) -> CampaignTable:
     """Join the tables of shards; a run in several tables counts once.
 
     Raises:
-        Refusal: their columns differ, or a run ended differently in two tables.
+        Refusal: the columns of the tables differ, or a run ended differently in two tables.
     """
     first, table = tables[0]
     rows: dict[tuple[str, int], tuple[CampaignRow, Path]] = {}
@@ -182,7 +183,7 @@ def merge_tables(tables: Sequence[tuple[Path, CampaignTable]]) -> CampaignTable:
 
 _ORDER: Final = ("passed", "failed", "error", "blocked", "hung", "died", "skipped")
 _COMMANDS: Final = 10
-"""Number of commands shown for each failure; the table has them all."""
+"""Number of commands shown for each failure; the table has all commands."""
 
 _MOST: Final = 120
 """Largest number of characters of a reason."""
@@ -192,7 +193,7 @@ _LISTED: Final = 200
 
 
 def summary(table: CampaignTable, file: str) -> Iterator[str]:
-    """Yield the lines of the summary: counts by outcome; reason, place and commands of failures.
+    """Yield the lines of the summary: counts by outcome, and details of the failures.
 
     Args:
         table: the runs.
@@ -214,7 +215,7 @@ def summary(table: CampaignTable, file: str) -> Iterator[str]:
 
 
 def _alike(rows: Sequence[CampaignRow]) -> dict[tuple[str, str, str], list[CampaignRow]]:
-    """Return the runs that did not pass, by test, outcome and place."""
+    """Return the runs that did not pass, grouped by test, outcome and place."""
     alike: dict[tuple[str, str, str], list[CampaignRow]] = {}
     for row in rows:
         if row.outcome not in WELL:

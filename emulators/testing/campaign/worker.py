@@ -2,8 +2,8 @@
 
     python -m tickrig.emulators.testing.campaign.worker CONNECTION ALIVE
 
-CONNECTION is the file descriptor of the pipe to the parent, ALIVE that of a pipe which closes when
-the parent ends.
+CONNECTION is the file descriptor of the pipe to the parent. ALIVE is the file descriptor of a pipe
+that closes when the parent ends.
 """
 
 from __future__ import annotations
@@ -134,7 +134,7 @@ def _where(item: pytest.Item, reports: list[pytest.TestReport]) -> str:
 
 
 def _one_line(reason: str) -> str:
-    """Return a reason that is the same in each process: without addresses and line ends.
+    """Return a reason without addresses and line ends, so that it is the same in each process.
 
     >>> _one_line("<Lamp object at 0x7f3d9cdb2d10> is dark")
     '<Lamp object at 0x...> is dark'

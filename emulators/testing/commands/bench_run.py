@@ -32,7 +32,7 @@ _ALONE: Final = "{wire}: no bus outside; [real.{wire}] with interface and channe
 _NOWHERE: Final = "-"
 _MISTAKES: Final = 2
 _INTERRUPTED: Final = 130
-"""Exit status after Ctrl-C in virtual time, where the run had an end of its own."""
+"""Exit status after Ctrl-C in virtual time, if the run had a duration."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,10 +41,10 @@ class _BenchOptions(RunOptions):
 
     Attributes:
         virtual: whether to run in virtual time, as fast as possible.
-        for_us: duration; None until it is ended.
-        plots: signals to draw, one diagram each.
-        files: files to draw to; empty for the terminal.
-        report: the page of the run.
+        for_us: duration of the run in microseconds, or None to run until Ctrl-C.
+        plots: signals to draw, one text for each diagram.
+        files: files to draw to, or empty for the terminal.
+        report: page of the run.
         command: the command that repeats the run.
     """
 
@@ -57,7 +57,7 @@ class _BenchOptions(RunOptions):
 
     @property
     def in_real_time(self) -> bool:
-        """The default, without virtual time."""
+        """Whether the run is in real time, which is the default."""
         return not self.virtual
 
     @property
@@ -72,11 +72,11 @@ def run_bench(
     """Run the bench of a rig file, and return the exit status.
 
     Args:
-        file: the rig file.
+        file: path of the rig file.
         virtual: whether to run in virtual time.
-        control: place of the control socket; None for the place in the file.
-        seed: of all random numbers; None for the seed in the file.
-        others: the other options, named as in `_BenchOptions`.
+        control: path of the control socket, or None to use the path in the file.
+        seed: seed of all random numbers, or None to use the seed in the file.
+        others: other options, named as in `_BenchOptions`.
 
     Raises:
         Refused: the command line requests something impossible.
@@ -117,7 +117,7 @@ def _command(
 
 
 def _span(us: int) -> str:
-    """Write a duration as `--for` takes it.
+    """Return a duration as text for the option `--for`.
 
     >>> _span(3_000_000), _span(1_500)
     ('3s', '1500us')
@@ -126,11 +126,11 @@ def _span(us: int) -> str:
 
 
 class _BenchRun(EmulatorRun[_BenchOptions]):
-    """One run.
+    """A run of the bench.
 
     Args:
         plan: content of the rig file.
-        options: the command line.
+        options: options of the command line.
     """
 
     def __init__(self, plan: RigPlan, options: _BenchOptions) -> None:
@@ -243,7 +243,7 @@ class _BenchRun(EmulatorRun[_BenchOptions]):
                 say(_ALONE.format(wire=mount.name))
 
     def _row(self, mount: Mount) -> tuple[str, ...]:
-        """Return the name of a wire, where it is, what it is, and which devices are on it."""
+        """Return the name, the place and the kind of a wire, and the devices on it."""
         devices = ", ".join(map(device_text, self._plan.devices_on(mount.name)))
         if isinstance(mount, BusMount):
             rate = f"{mount.wire.bit_rate} bit/s"
@@ -285,6 +285,6 @@ def _setting_shown(mount: LineMount) -> Callable[[str], None]:
 
 
 def _show(line: WireLine, *, everything: bool) -> None:
-    """Show what was done, and what passed if that is wanted too."""
+    """Print a line of the journal: an action, or with `everything` also traffic."""
     if everything or line.mark is Mark.PHYSICAL:
         click.echo(line_text(line))

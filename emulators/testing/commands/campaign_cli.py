@@ -1,4 +1,4 @@
-"""The command `tickrig campaign`: a test with thousands of seeds; its shards joined."""
+"""The command `tickrig campaign`: run a test with thousands of seeds, and join its shards."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class _CampaignGroup(click.Group):
     """A group with a default command: `tickrig campaign tests --seeds 0-9`."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Read the words after the command; without a command name they are for `run`."""
+        """Read the words after the command; words without a command name are for `run`."""
         if args and args[0] not in (*self.commands, *ctx.help_option_names):
             args = [_RUN, *args]
         return super().parse_args(ctx, args)
@@ -75,7 +75,7 @@ def campaign() -> None:
 def run(**options: Any) -> None:
     """Run TESTS (files, folders or node IDs) with each seed and each value, in virtual time.
 
-    Exit status 1 if a run did not pass, 3 if the disk is full.
+    The exit status is 1 if a run did not pass, and 3 if the disk is full.
 
     \b
     tickrig campaign tests/test_stop.py --seeds 0-9999 --param flip=0.0001,0.001

@@ -1,4 +1,4 @@
-"""A campaign from its options to its table."""
+"""The commands `tickrig campaign run` and `merge`: from the options to the table."""
 
 from __future__ import annotations
 
@@ -79,14 +79,14 @@ else:
 # A running campaign: runs are submitted, and verdicts returned, until all are done.
 
 _BATCH_S: Final = 1.0
-"""Target duration of a batch: a balance of the loss after a kill and the cost of submission."""
+"""Target duration of a batch: a kill loses a whole batch, and each batch costs time."""
 
 _MOST: Final = 500
 """Limits of the number of runs in a batch."""
 
 
 class _Workers(Protocol):
-    """Workers: on this machine, or on a cluster."""
+    """Workers on this machine or on a cluster."""
 
     @property
     def count(self) -> int:
@@ -94,7 +94,7 @@ class _Workers(Protocol):
         ...
 
     def submit(self, runs: Sequence[Run]) -> Future[list[RunVerdict]]:
-        """Submit runs; the future may raise CampaignRefusal."""
+        """Submit runs; the returned future may raise CampaignRefusal."""
         ...
 
     def close(self) -> None:
@@ -107,7 +107,7 @@ class Campaign:
 
     Args:
         plan: all runs.
-        journal: storage of verdicts; its runs are not repeated.
+        journal: journal that stores the verdicts. The runs in the journal are not repeated.
         workers: the workers.
     """
 
@@ -135,7 +135,7 @@ class Campaign:
                 yield self._journal.add(verdicts)
 
     def _submit(self) -> bool:
-        """Keep all workers busy, with one batch each in reserve; return False when all is done."""
+        """Keep all workers busy, with a batch in reserve for each; return False after the last."""
         workers = self._workers.count
         while len(self._under_way) < 2 * workers:
             numbers = list(islice(self._left, self._batch(workers)))
@@ -146,11 +146,11 @@ class Campaign:
         return bool(self._under_way)
 
     def _batch(self, workers: int) -> int:
-        """Return the size of the next batch: smaller towards the end, so that all end together."""
+        """Return the size of the next batch; last batches are small, so workers end together."""
         return max(1, min(self._size, self._count // (4 * workers)))
 
     def _learn(self, took_s: float) -> None:
-        """Adapt the size of batches to their duration, including waits."""
+        """Adapt the size of batches to the duration of a batch, including waits."""
         if took_s < _BATCH_S:
             self._size = min(_MOST, 2 * self._size)
         elif took_s > 4 * _BATCH_S:
@@ -167,17 +167,17 @@ class _CampaignOptions:
 
     Attributes:
         tests: files, folders and node IDs.
-        seeds: such as `0-9999`.
-        parameters: such as `flip=0.0001,0.001`.
-        shard: such as `3/8`.
+        seeds: seeds, such as `0-9999`.
+        parameters: parameters with their values, such as `flip=0.0001,0.001`.
+        shard: part of the campaign, such as `3/8`.
         outputs: tables to write.
-        workers: processes; None for one per core.
+        workers: number of processes, or None for one process per core.
         timeout_us: time-out of a run.
-        bench: rig file, empty for that of the tests.
-        keyword: as pytest's `-k`.
-        scheduler: of a Dask cluster, empty for this machine.
+        bench: path of the rig file, or empty to use the rig file of the tests.
+        keyword: expression, as in pytest's `-k`.
+        scheduler: address of the scheduler of a Dask cluster, or empty to use this machine.
         fresh: whether to replace earlier results.
-        version: of tickrig.
+        version: version of tickrig.
     """
 
     tests: tuple[str, ...]
@@ -195,14 +195,14 @@ class _CampaignOptions:
 
     @property
     def output_paths(self) -> tuple[Path, ...]:
-        """Paths of the tables; default names for a shard contain its numbers."""
+        """Paths of the tables; the default name for a shard contains the numbers of the shard."""
         shard = Shard.parse(self.shard)
         part = f"-{shard.part}-of-{shard.parts}" if shard.parts > 1 else ""
         return self.outputs or (Path(f"campaign{part}{_CSV}"),)
 
     @property
     def order(self) -> CampaignOrder:
-        """The request to workers."""
+        """The order to the workers."""
         return CampaignOrder(
             tests=self.tests,
             parameters=self.parameters,
@@ -228,10 +228,10 @@ class _CampaignRun:
     """The run of a campaign.
 
     Args:
-        options: of the command line.
+        options: options of the command line.
 
     Raises:
-        CampaignRefusal: invalid options.
+        CampaignRefusal: the options are invalid.
     """
 
     def __init__(self, options: _CampaignOptions) -> None:
@@ -262,7 +262,7 @@ class _CampaignRun:
         """Do the remaining runs, and write the tables.
 
         Raises:
-            CampaignRefusal: it is impossible; finished runs are kept.
+            CampaignRefusal: the campaign cannot run or continue. Finished runs are kept.
         """
         crew = Crew(self._options.order)
         try:
@@ -312,7 +312,7 @@ class _CampaignRun:
             ) from None
 
     def _do(self, plan: CampaignPlan, workers: _Workers) -> None:
-        """Do all runs, with a bar on a terminal."""
+        """Do all runs; show a progress bar on a terminal."""
         kept = self._journal.verdicts
         if kept:
             say(f"{self._journal_path}: {len(kept)} of {counted(plan.size(), 'run')} are done")
@@ -367,7 +367,7 @@ def _check_arrow(paths: Sequence[Path]) -> None:
 
 
 def _write_outputs(table: CampaignTable, paths: Sequence[Path]) -> None:
-    """Write a table in each form; OSError if it cannot be."""
+    """Write a table to each path; raise OSError if a file cannot be written."""
     for path in paths:
         write_table(table, path)
 

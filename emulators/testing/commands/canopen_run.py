@@ -54,11 +54,12 @@ _NO_NODE: Final = (
 
 
 class _BusYml(NamedTuple):
-    """A bus.yml with the nodes.
+    """Files that define the nodes: a bus.yml, and a URDF file.
 
     Attributes:
-        file: the file, None for none.
-        urdf: the robot with its joints, None for none, or the one named in the file.
+        file: path of the bus.yml, or None without one.
+        urdf: path of the URDF file of the robot with the joints. None stands for no file, or for
+            the file that the bus.yml names.
     """
 
     file: Path | None = None
@@ -72,7 +73,7 @@ def open_bus(options: BusOptions, stack: ExitStack) -> tuple[CountingPort, str, 
         The bus, its name for messages, and its name in logs.
 
     Raises:
-        Refused: no bus is given, or it cannot be opened.
+        Refused: no bus is given, or the bus cannot be opened.
     """
     instead = "give --scenario FILE, which runs in virtual time"
     bus, interface, channel = open_raw(options, instead)
@@ -86,8 +87,8 @@ class _RigNodes(NamedTuple):
     """Content of a rig file.
 
     Attributes:
-        nodes: its nodes, by their names in it.
-        body: the body they move, None without one.
+        nodes: nodes by their names in the rig file.
+        body: body that the nodes move, or None without a body.
     """
 
     nodes: tuple[build.Described, ...] = ()
@@ -100,11 +101,11 @@ class _CanopenOptions(RunOptions):
 
     Attributes:
         specs: the nodes.
-        rig: nodes of a rig file, beside `specs`, and the body that they move.
-        bus_yml: source of the nodes instead of both.
-        profile: of nodes of files; see `choices.PROFILES`.
-        bus: the bus outside.
-        store: file in which nodes keep what 1010h and LSS store.
+        rig: nodes of a rig file, in addition to `specs`, and the body that the nodes move.
+        bus_yml: files that define the nodes, instead of `specs` and `rig`.
+        profile: profile of nodes that files describe; see `choices.PROFILES`.
+        bus: the outside bus.
+        store: file in which nodes keep the values stored by object 1010h and by LSS.
         sdo: limits of the SDO servers of all nodes.
     """
 
@@ -118,7 +119,7 @@ class _CanopenOptions(RunOptions):
 
     @property
     def in_real_time(self) -> bool:
-        """A scenario alone runs in virtual time."""
+        """Whether the run is in real time; a scenario without a bus runs in virtual time."""
         return not self.scenario or bool(self.bus or self.control)
 
 
@@ -127,14 +128,14 @@ class _FrameTranscript(Transcript):
 
     Args:
         emulator: the emulator to watch.
-        write: receives the lines.
+        write: function that receives the lines.
     """
 
     def __init__(self, emulator: RunningEmulator, write: Callable[[str], None]) -> None:
         super().__init__(emulator, write, lambda line: False)
 
     def send(self, now_us: int, data: bytes, shown: bytes) -> None:
-        """Send a frame; the log shows it when it has passed."""
+        """Send a frame; the log shows the frame when it has passed."""
         self._emulator.send(now_us, data)
 
 
@@ -169,7 +170,7 @@ class _CanopenRun(EmulatorRun[_CanopenOptions]):
         return operator, ScenarioParser(device, operator, senders={"send": parse_send})
 
     def _describe(self) -> list[build.Described]:
-        """Read the files of the nodes; ValueError with all errors."""
+        """Read the files of the nodes; raise ValueError with all errors."""
         options, (file, urdf) = self._options, self._options.bus_yml
         if file is None:
             given = build.describe_nodes(options.specs, options.profile)
@@ -261,7 +262,7 @@ class _CanopenRun(EmulatorRun[_CanopenOptions]):
         self._say_how(_HOW)
 
     def _greet_bus(self, bench: RunningEmulator, file: Path) -> None:
-        """Print the nodes, one line each."""
+        """Print a line for each node."""
         say(f"{counted(len(self._described), 'CANopen slave')} of {file} on {bench.link}:")
         for item in self._described:
             what = item.about or _PROFILE_TEXTS[profile_name(item.description.application)]
@@ -280,7 +281,7 @@ def parse_send(rest: str) -> Send:
 _PROFILE_TEXTS: Final = {"401": "CiA 401", "402": "CiA 402", "none": "its objects alone"}
 _BUS_FIELDS: Final = ("interface", "channel", "bitrate", "timing", "bus_kwargs")
 _DEVICES: Final = ("eds", "dcf", "model", "rtc")
-"""Options that name the device of a node, one of them at a time."""
+"""Options that name the device of a node; only one of them may be given."""
 
 _STANDARD_OUTPUT: Final = Path("-")
 
@@ -321,7 +322,7 @@ def read_rig(path: Path) -> _RigNodes:
     """Read the nodes of a rig file, and the body that they move.
 
     Raises:
-        Refused: it cannot be read, has errors, or has more than nodes on one bus.
+        Refused: the file cannot be read, has errors, or has more than nodes on one bus.
     """
     try:
         if is_bus_file(path.read_bytes()):
@@ -337,7 +338,7 @@ def read_rig(path: Path) -> _RigNodes:
 
 
 def _beyond_nodes(plan: RigPlan) -> str:
-    """Return the part of a rig file that this command does not support, empty if none."""
+    """Return the part of a rig file that this command does not support, or ""."""
     for device in plan.devices.values():
         if device.kind is DeviceKind.SERIAL:
             return f"device {device.name}"

@@ -24,7 +24,7 @@ _MISTAKES: Final = 1
 _UNREADABLE: Final = 2
 _EDS_ENDINGS: Final = (".eds", ".dcf", ".xdd", ".xdc")
 _LOOKED_AT: Final = 65_536
-"""Number of bytes at its start for recognising a bus.yml."""
+"""Number of bytes at the start of a file by which a bus.yml is recognised."""
 
 
 def check_files(files: tuple[Path, ...], strict: bool) -> int:
@@ -53,7 +53,7 @@ def _check(file: Path, strict: bool) -> int:
 
 
 def _kind(file: Path) -> str:
-    """Return the kind of a YAML file, empty for others and for pipes, which are read once."""
+    """Return the kind of a YAML file, or "" for other files and for pipes (read only once)."""
     with suppress(OSError):
         if file.is_file():
             with file.open("rb") as opened:
@@ -75,11 +75,11 @@ def _check_bus(file: Path, *, strict: bool) -> int:
     """Check a bus.yml, and return the exit status.
 
     Args:
-        file: with its name for messages.
-        strict: warnings count, too.
+        file: path of the file, which messages contain.
+        strict: whether warnings count as errors.
 
     Raises:
-        OSError: it cannot be read.
+        OSError: the file cannot be read.
         ImportError: PyYAML is not installed.
     """
     bus = read_bus_file(file)

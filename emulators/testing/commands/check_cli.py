@@ -16,10 +16,10 @@ from tickrig.host.cli.options import PATH, works_in
 def check(**options: Any) -> None:
     """Check rig files and bus.yml: list the devices on the bench, or all errors.
 
-    Each error is a line FILE:LINE: REASON. Devices are made once to check their options, inputs and
-    faults, so a FILE.py in the rig file is run; nothing is opened. The bus.yml of dcfgen and
-    ros2_canopen is recognised by its content, and checked against its EDS files. Exit status 0: no
-    errors; 1: errors; 2: a file cannot be read.
+    Each error is a line FILE:LINE: REASON. Each device is made once to check its options, inputs
+    and faults. Therefore a FILE.py in the rig file is run. No port or bus is opened. The bus.yml of
+    dcfgen and ros2_canopen is recognised by its content, and checked against its EDS files. The
+    exit status is 0 without errors, 1 with errors, and 2 if a file cannot be read.
 
     \b
     tickrig check rig.toml

@@ -1,4 +1,4 @@
-"""The command `tickrig compare`: both runs of a device or a bus, and its output."""
+"""The work of `tickrig compare`: make the two runs of a device or a bus, and print differences."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ _SEARCHED_US: Final = 10_000_000
 """Time after power-on within which an emulator may send the first recorded line."""
 
 _PHASES: Final = 8
-"""Number of tick phases to try; a port does not show where ticks start."""
+"""Number of tick phases to try, because a port does not show where ticks start."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,9 +64,9 @@ def _compare_ticks(
     """Replay the recorded ticks on the emulator.
 
     Args:
-        recording: recorded at the device.
-        name: of the device.
-        configured: a new one.
+        recording: the recording, made at the device.
+        name: name of the device.
+        configured: a new device.
     """
     split = configured.type.line.splitter or line_splitter
     said = replay.traffic_of(recording.of(name), Mark.FROM_DEVICE)
@@ -86,13 +86,14 @@ def _compare_port(
     """Replay the recorded host on a line with the emulator, at its times.
 
     Args:
-        recording: recorded at the host's port.
-        name: of the device.
-        make: makes the device.
-        tolerance: time after the end in which the emulator may still answer.
-        settle_us: how long the emulator is on before the recording starts. If the first recorded
-            output is the greeting after power-on, a start at power-on is tried too. If an input was
-            set for less than a tick, other tick phases are tried. The closest run counts.
+        recording: the recording, made at the port of the host.
+        name: name of the device.
+        make: function that makes the device.
+        tolerance: tolerances. They include a time after the end in which the emulator may still
+            answer.
+        settle_us: time for which the emulator is on before the recording starts. If the first
+            recorded output is the greeting after power-on, a start at power-on is tried too. If an
+            input was set for less than a tick, other tick phases are tried. The closest run counts.
     """
     records, device = recording.of(name), make().device
     until_us = recording.until_us + tolerance.allowed_us(recording.until_us)
@@ -125,7 +126,7 @@ def _begin_with(first: Said, alone: Iterable[Said], tolerance: Tolerance) -> lis
     """Return the start of a recording relative to power-on, if its first output is a greeting.
 
     Args:
-        first: its first output.
+        first: first output of the recording.
         alone: output of the emulator after power-on without input.
         tolerance: the tolerances.
     """
@@ -134,7 +135,7 @@ def _begin_with(first: Said, alone: Iterable[Said], tolerance: Tolerance) -> lis
 
 
 def _closest(runs: Iterable[_ComparedRun], until_us: int, tolerance: Tolerance) -> _ComparedRun:
-    """Return the run with the fewest differences, the first of them."""
+    """Return the run with the fewest differences, or the first of several such runs."""
 
     def differences(run: _ComparedRun) -> int:
         pairs = compare(run.recorded, run.emulated, until_us, tolerance)
@@ -197,9 +198,9 @@ def _compare_node_ticks(recording: replay.BenchRecording, name: str, node: Node)
     """Replay the recorded ticks on a node.
 
     Args:
-        recording: recorded at the device.
-        name: of the node.
-        node: a new one.
+        recording: the recording, made at the device.
+        name: name of the node.
+        node: a new node.
     """
     recorded = [
         Said(at_us, str(frame), line)
@@ -221,17 +222,18 @@ def _compare_bus(
     settle_us: int,
     bit_rate: int,
 ) -> _ComparedRun:
-    """Replay the recorded frames of all others on a bus with emulated nodes, at their times.
+    """Replay the recorded frames of all other nodes on a bus with emulated nodes, at their times.
 
     The frames of a node are identified by the CAN-IDs that its dictionary has at that time.
 
     Args:
-        recording: recorded at a port of the bus.
-        make: makes the nodes on a bus.
-        tolerance: time after the end in which they may still answer.
-        settle_us: how long the nodes are on before the recording starts. If the first frame is one
-            after power-on, a start at power-on is tried too, and the closer run counts.
-        bit_rate: of the bus in bit/s.
+        recording: the recording, made at a port of the bus.
+        make: function that makes the nodes on a bus.
+        tolerance: tolerances. They include a time after the end in which the nodes may still
+            answer.
+        settle_us: time for which the nodes are on before the recording starts. If the first frame
+            is a frame after power-on, a start at power-on is tried too, and the closer run counts.
+        bit_rate: bit rate of the bus in bit/s.
     """
     records = [x for x in recording.records if isinstance(x.traffic, CanFrame) or x.text]
     until_us = recording.until_us + tolerance.allowed_us(recording.until_us)
@@ -250,7 +252,7 @@ def _compare_bus(
 
 
 class _Bus:
-    """Emulated nodes, and recorded frames of all others."""
+    """Emulated nodes, and recorded frames of all other nodes."""
 
     def __init__(
         self, make: Callable[[CanWire], Sequence[Node]], bit_rate: int, begin_us: int
@@ -276,7 +278,7 @@ class _Bus:
         return self._said
 
     def owns(self, traffic: object) -> bool:
-        """Return whether an emulated node sends such a frame."""
+        """Return whether an emulated node sends frames like the given frame."""
         return isinstance(traffic, CanFrame) and any(x.has(traffic) for x in self._ids.values())
 
     def _act(self, record: BenchRecord, early: bool, now_us: int) -> None:
@@ -293,7 +295,7 @@ class _Bus:
             self._host.send(now_us, (frame,))
 
     def _do(self, record: BenchRecord) -> None:
-        """Repeat a manual action on a node: `5/power_off=1`; without an ID, on the only node."""
+        """Repeat a manual action, such as `5/power_off=1`; the ID of an only node may be absent."""
         prefix, slash, text = record.text.partition("/")
         node = self._nodes.get(prefix) if slash else next(iter(self._nodes.values()))
         if node is None:
@@ -338,9 +340,9 @@ def report(
 
     Args:
         file: name of the trace.
-        pairs: output pairs, by device.
-        tolerance_us: of the times.
-        everything: also list equal lines.
+        pairs: output pairs by device.
+        tolerance_us: tolerance of the times in microseconds.
+        everything: whether equal lines are listed too.
     """
     rows = sorted(
         ((name, pair) for name, said in pairs.items() for pair in said),
@@ -440,7 +442,7 @@ def run_compare(file: Path, *, verbose: bool, **options: Any) -> int:
 
 
 _OF_DEVICES: Final = ("type_name", "config", "nodes", "settle_us")
-"""Options of how devices are made, and when their power comes on."""
+"""Options that define how devices are made, and when their power comes on."""
 
 
 def _refuse_idle(recording: replay.BenchRecording, options: Mapping[str, Any]) -> None:
@@ -473,7 +475,7 @@ def _read_tolerance(options: Mapping[str, Any]) -> Tolerance:
 def _runs(
     file: Path, recording: replay.BenchRecording, tolerance: Tolerance, options: Mapping[str, Any]
 ) -> Iterator[tuple[str, _ComparedRun]]:
-    """Yield the two runs of each device, of a recorded bus those of all nodes together."""
+    """Yield the two runs of each device; the nodes of a recorded bus have two runs together."""
     for name in recording.header.devices:
         if not recording.at_port:
             yield name, _ticked(file, recording, name, options)

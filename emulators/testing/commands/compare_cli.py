@@ -45,8 +45,8 @@ _tolerance: Final = add_options(
 def compare_command(**options: Any) -> None:
     """Replay the host of a recorded run against an emulator; report different answers.
 
-    FILE is a trace of 'tickrig record', of an emulator or of a bench. Exit status 0 if the emulator
-    answers the same, 1 if not, 2 if they cannot be compared.
+    FILE is a trace of 'tickrig record', of an emulator or of a bench. The exit status is 0 if the
+    emulator gives the same answers, 1 if not, and 2 if the runs cannot be compared.
 
     \b
     tickrig record /dev/ttyUSB0 --out run.trace --type rrc --link /tmp/rrc

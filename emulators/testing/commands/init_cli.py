@@ -33,8 +33,8 @@ def _complete_type(context: click.Context, parameter: click.Parameter, begun: st
 def init(types: tuple[str, ...], file: Path) -> None:
     """Write an initial rig file: devices with all their options.
 
-    It is valid and runs unchanged; comments propose inputs, faults, ports. An existing file is not
-    changed; - is standard output.
+    The file is valid and runs unchanged. Comments in the file propose inputs, faults and ports. An
+    existing file is not changed. FILE - is standard output.
 
     \b
     tickrig init

@@ -1,4 +1,4 @@
-"""A tap between a host and a real port: records the traffic and forwards it at once."""
+"""A tap between a host and a real port, which records the traffic and forwards it at once."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _LOOK_S: Final = 0.05
 """Period at which the tap checks whether to stop."""
 
 _STOPPED_S: Final = 0.5
-"""Delay from which a check counts as late: the process was stopped, or got no processor time."""
+"""Delay from which a check counts as late, because the process was stopped or had no processor."""
 
 _READ_BYTES: Final = 4_096
 
@@ -50,15 +50,15 @@ class _PortTap:
     types. A host may close the pty and open it again.
 
     Args:
-        link: the port, recorded.
+        link: link to the port, which is recorded.
         pty: the host's terminal.
-        typed: called with each line that an operator types.
-        late: called with the number of seconds in which the tap was not running.
+        typed: function that is called with each line that an operator types.
+        late: function that is called with the number of seconds in which the tap was not running.
 
     Attributes:
         sent: number of bytes that went to the device.
         received: number of bytes that came from the device.
-        gone: reason of a lost port, empty while it exists.
+        gone: reason for the loss of the port, or empty while the port exists.
     """
 
     def __init__(
@@ -78,7 +78,7 @@ class _PortTap:
         """Pass bytes until `stop` is called or the port is gone.
 
         Args:
-            terminal: descriptor of the operator's terminal, None without one.
+            terminal: descriptor of the operator's terminal, or None without a terminal.
         """
         reader = threading.Thread(target=self._read_port, daemon=True)
         reader.start()
@@ -114,7 +114,7 @@ class _PortTap:
             self.gone = self.gone or str(error)
 
     def _read_pty(self) -> None:
-        """Forward data of the host, and send it buffered data."""
+        """Forward data of the host, and send buffered data to the host."""
         try:
             with self._lock:
                 data = self._pty.poll(self._link.now_us)
@@ -240,7 +240,7 @@ def _typing(link: RecordingLink[bytes], inputs: Inputs | None) -> Callable[[str]
 
 
 def _changes(line: str, inputs: Inputs | None) -> Iterator[tuple[str, int | float | str]]:
-    """Read `NAME=VALUE`, of a group `NAME=VALUE,VALUE`; ValueError for another form."""
+    """Read `NAME=VALUE`, or `NAME=VALUE,VALUE` for a group; raise ValueError for another form."""
     name, equals, rest = (word.strip() for word in line.partition("="))
     if not equals or not rest or not NAME.fullmatch(name):
         raise ValueError(f"{line!r:.60} is not NAME=VALUE, and not reset")

@@ -20,12 +20,12 @@ from tickrig.host.cli.options import PATH, works_in
 def record_command(**options: Any) -> None:
     """Record the traffic between a host and the device at PORT, for `tickrig compare`.
 
-    The host opens the terminal that is printed, or --link, instead of PORT: a device path or a URL
-    of pyserial. Bytes pass unchanged and at once. Type manual actions on the device here to record
-    them: NAME=VALUE for an input, such as power_button=1; reset for switching it off and on. Ctrl-C
-    ends.
+    The host opens the terminal that is printed, or --link, instead of PORT. PORT is a device path
+    or a URL of pyserial. Bytes pass unchanged and at once. Type manual actions on the device here
+    to record them: NAME=VALUE for an input, such as power_button=1, or reset if you switch the
+    device off and on. Ctrl-C ends the recording.
 
-    Exit status 3 if the port is lost, or the recording is incomplete.
+    The exit status is 3 if the port is lost, or the recording is incomplete.
 
     \b
     tickrig record /dev/ttyUSB0 --out run.trace --type rrc --link /tmp/rrc

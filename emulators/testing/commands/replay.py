@@ -83,7 +83,7 @@ def _replay_with_host(file: Path, host: str) -> int:
 
 
 class _Played(NamedTuple):
-    """A replayed device; it has no name if it is the only one."""
+    """A replayed device; the only device of a trace has no name."""
 
     name: str
     type: str
@@ -146,7 +146,7 @@ def _describe(name: str, difference: replay.ReplayDifference[Any], file: Path) -
 
 
 def _text(traffic: Any) -> str:
-    """Return bytes or frames as a trace has them."""
+    """Return bytes or frames as text, in the notation of a trace."""
     if not traffic:
         return "(nothing)"
     return escape(traffic) if isinstance(traffic, bytes) else " ".join(map(str, traffic))

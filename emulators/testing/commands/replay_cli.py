@@ -20,10 +20,10 @@ from tickrig.host.cli.options import PATH, run_code_option, works_in
 @run_code_option
 @works_in("tickrig.emulators.testing.commands.replay:run_replay")
 def replay_command(**options: Any) -> None:
-    """Replay the trace FILE on fresh devices; exit status 1 if one says anything else.
+    """Replay the trace FILE on fresh devices; the exit status is 1 if an output differs.
 
-    With --host a scenario of check_host is done again, with a fresh bench and host; exit status 1
-    if something is still wrong.
+    With --host, FILE is a scenario of check_host, which runs again with a fresh bench and host. The
+    exit status is 1 if the run still fails.
 
     \b
     rrc-emu --link /tmp/rrc --trace run.trace

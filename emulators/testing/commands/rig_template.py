@@ -39,7 +39,7 @@ _NO_NAME: Final = re.compile(r"\W+", re.ASCII)
 
 
 class _TypeRefusedError(ValueError):
-    """A type of which no device can be made; the message has the reason."""
+    """No device of a type can be made; the message has the reason."""
 
 
 def rig_template(types: Iterable[str], file: str, folder: Path) -> str:
@@ -48,7 +48,7 @@ def rig_template(types: Iterable[str], file: str, folder: Path) -> str:
     Args:
         types: types of the devices, as in a rig file.
         file: name of the new file.
-        folder: folder of the new file; other files are relative to it.
+        folder: folder of the new file. Paths of other files are relative to this folder.
 
     Raises:
         _TypeRefusedError: a device cannot be made.
@@ -67,7 +67,7 @@ def rig_template(types: Iterable[str], file: str, folder: Path) -> str:
 
 
 def _make(types: Iterable[str], folder: Path) -> Iterator[tuple[DevicePlan, Probe]]:
-    """Yield each device with a name and a node-ID of its own."""
+    """Yield the devices, each with a different name and node-ID."""
     names, node_ids = set[str](), set[int]()
     for given in types:
         try:
@@ -83,7 +83,7 @@ def _make(types: Iterable[str], folder: Path) -> Iterator[tuple[DevicePlan, Prob
 
 
 def _name(given: str, taken: set[str]) -> str:
-    """Return a name that no other device has."""
+    """Return a name that no other device uses."""
     base = given.rpartition(":")[2] if ":" in given else Path(given).stem
     base = _NO_NAME.sub("_", base.lower()).strip("_") or "device"
     if not base[0].isalpha() or base in RESERVED:
@@ -156,7 +156,7 @@ def _safe_lines(made: Iterable[tuple[DevicePlan, Probe]]) -> Iterator[str]:
 
 
 def _is_plain(found: Probe, name: str) -> bool:
-    """Return whether a fault wants no rate."""
+    """Return whether a fault needs no rate."""
     return name not in found.wire_faults or not found.wire_faults[name].rated
 
 
@@ -185,7 +185,7 @@ _STANDARD_OUTPUT: Final = "-"
 
 
 def init(types: tuple[str, ...], file: Path) -> None:
-    """Write the template into a file, or to standard output where that is `-`."""
+    """Write the template to a file, or to standard output if the file is `-`."""
     on_output = str(file) == _STANDARD_OUTPUT
     folder = Path() if on_output else file.parent
     try:

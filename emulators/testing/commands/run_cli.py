@@ -42,15 +42,15 @@ from tickrig.host.cli.options import PATH, time_option, works_in
 def run(**options: Any) -> None:
     """Run the bench of a rig file: all its devices on one rig.
 
-    In real time each serial line is at a pseudo-terminal, and at the links, network
-    doors and CAN buses of the section [real]; a table says where. Real devices of the section
-    [hardware] are not touched. Exit status 2 if the file has mistakes, 3 if the recording
-    is not whole, 130 if Ctrl-C ended a run in virtual time.
+    In real time each serial line is at a pseudo-terminal, and at the links, network doors and CAN
+    buses of the section [real]. A table shows the places. Real devices of the section [hardware]
+    are not touched. The exit status is 2 if the file has errors, 3 if the recording is incomplete,
+    and 130 if Ctrl-C ended a run in virtual time.
 
-    A signal is an input or output as `tickrig ctl ... describe` lists it, as
-    left/shaft_deg or left.shaft_deg, shaft_deg if one device alone has it; or a
-    signal of the section [signal]. Ctrl-C ends the run, and the curves and the page show it
-    so far.
+    A signal is an input or output that `tickrig ctl ... describe` lists, such as left/shaft_deg or
+    left.shaft_deg, or shaft_deg if only one device has a signal of this name. A signal of the
+    section [signal] has the name in the file. Ctrl-C ends the run; the curves and the page then
+    show the run up to this time.
 
     \b
     tickrig run rig.toml --control /tmp/rig.ctl

@@ -1,4 +1,4 @@
-"""What `tickrig run` shows after a run: curves of signals, and a page of the whole run."""
+"""Output of `tickrig run` after a run: curves of signals, and a page of the whole run."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ _PAGES: Final = (".html", ".htm")
 
 
 class _Signals:
-    """All that can be drawn of a bench: inputs, outputs, and the signals of its rig file.
+    """All signals of a bench that can be drawn: inputs, outputs, and signals of its rig file.
 
     Args:
         rig: the bench.
@@ -71,7 +71,7 @@ class _Signals:
         self.outputs = {**self._assembly.outputs, **named}
 
     def read(self, name: str, /) -> Setting:
-        """Return the present value of an output; KeyError if there is none."""
+        """Return the present value of an output; raise KeyError if the name is unknown."""
         driver = self._drivers.get(name)
         return self._assembly.read(name) if driver is None else driver.value(name)
 
@@ -79,11 +79,12 @@ class _Signals:
         """Return the full name of the signal that a word names.
 
         Args:
-            word: `left/shaft_deg`, `left.shaft_deg`, or `shaft_deg` if only one device has this
-                signal.
+            word: text such as `left/shaft_deg` or `left.shaft_deg`, or `shaft_deg` if only one
+                device has this signal.
 
         Raises:
-            ValueError: no signal or several signals have this name, or its value is a text.
+            ValueError: no signal or several signals have the name, or the value of the signal is a
+                text.
         """
         names = dict.fromkeys((*self.outputs, *self.inputs.table))
         lone = next(iter(self._assembly.parts)) if len(self._assembly.parts) == 1 else ""
@@ -109,11 +110,11 @@ class _Signals:
 
 
 class _Diagram(NamedTuple):
-    """One `--plot`: curves over time, or a path.
+    """Diagram of an option `--plot`: curves over time, or a path.
 
     Attributes:
-        names: the signals; for a path, x and y.
-        is_path: whether y is drawn over x.
+        names: names of the signals; the names of a path are x and y.
+        is_path: whether the diagram shows y over x.
     """
 
     names: tuple[str, ...]
@@ -121,7 +122,7 @@ class _Diagram(NamedTuple):
 
 
 def _diagram_of(text: str, signals: _Signals) -> _Diagram:
-    """Read `NAME[,NAME...]` or `X:Y`; ValueError if it names no signals.
+    """Read `NAME[,NAME...]` or `X:Y`; raise ValueError if a name is unknown.
 
     Objects of CANopen nodes have a colon in their names, so each colon is tried.
     """
@@ -153,7 +154,7 @@ def _is_path(word: str) -> bool:
 # What is kept of them while the run goes on.
 
 _MOST: Final = 50_000
-"""Samples of a curve, and points of a path."""
+"""Largest number of samples of a curve, and of points of a path."""
 
 
 @dataclass(slots=True)
@@ -161,14 +162,14 @@ class _PathSampler:
     """Records pairs of values; if there are too many, every other pair is dropped.
 
     Args:
-        take_pair: returns the present pair.
+        take_pair: function that returns the present pair of values.
     """
 
     take_pair: Callable[[], tuple[float, float]]
     points: list[tuple[float, float]] = field(default_factory=list)
 
     def take(self, now_us: int) -> None:
-        """Look at both signals."""
+        """Record the present pair."""
         pair = self.take_pair()
         if all(map(isfinite, pair)) and (not self.points or self.points[-1] != pair):
             self.points.append(pair)
@@ -177,11 +178,11 @@ class _PathSampler:
 
 
 class RunPlots:
-    """Curves of a run: `--plot SIGNALS`, and `-o FILE`.
+    """Curves of a run, for the options `--plot SIGNALS` and `-o FILE`.
 
     Args:
-        words: the diagrams; one word is one diagram.
-        files: files for the curves; empty for the terminal.
+        words: the diagrams, one word for each diagram.
+        files: files for the curves, or empty for the terminal.
         inputs: files that the run reads.
 
     Raises:
@@ -205,7 +206,7 @@ class RunPlots:
         self._paths: dict[_Diagram, _PathSampler] = {}
 
     def watch(self, rig: BenchRig) -> None:
-        """Record the signals from now on; Refused if a name is unknown."""
+        """Record the signals from now on; raise Refused if a name is unknown."""
         self._signals = signals = _Signals(rig)
         with refused_at("--plot"):
             self._diagrams = [_diagram_of(word, signals) for word in self._words]
@@ -227,7 +228,7 @@ class RunPlots:
 
     @property
     def paths(self) -> list[page.PagePath]:
-        """The paths, for a page."""
+        """The recorded paths, for a page."""
         if not self._paths:
             return []
         unit = self._signals.unit
@@ -237,7 +238,7 @@ class RunPlots:
         ]
 
     def finish(self, now_us: int, title: str) -> None:
-        """Write the files, else draw the curves in the terminal.
+        """Write the files, or draw the curves in the terminal if there are no files.
 
         Raises:
             Refused: a file cannot be written.
@@ -373,12 +374,12 @@ def _draw_curves(first: Axes, taken: Sequence[bench_report.SignalSeries]) -> Non
 
 @dataclass(slots=True)
 class RunPage:
-    """The page of a run: `--report FILE`.
+    """The page of a run, for the option `--report FILE`.
 
     Args:
-        path: of the page.
+        path: path of the page.
         plan: content of the rig file.
-        words: the words of the command line that repeats the run.
+        words: words of the command line that repeats the run.
         inputs: files that the run reads.
 
     Raises:
@@ -402,7 +403,7 @@ class RunPage:
             check_report(self.path)
 
     def watch(self, rig: BenchRig) -> None:
-        """Look at the bench from now on."""
+        """Record the bench from now on."""
         self._rig, self._begun = rig, datetime.now().astimezone()
         self._witness = BenchWitness(Bench.of_mode(VirtualMode(rig)))
 
@@ -413,11 +414,11 @@ class RunPage:
 
         Args:
             virtual: whether the run was in virtual time.
-            rows: a row for each wire: name, place, rate, devices.
+            rows: rows of the table of wires, each with name, place, rate and devices.
             paths: the paths to draw.
 
         Raises:
-            Refused: it cannot be written.
+            Refused: the page cannot be written.
         """
         seen, rig, file = self._witness.evidence(), self._rig, self.plan.path
         record = bench_report.TestRecord(

@@ -30,7 +30,7 @@ from tickrig.wire.errors import FieldError
 # Stimuli of the tester for our slaves, set from the inside.
 
 _LINES: Final = 8
-"""Lines per group: `di1` is lines 1 to 8, `di2` the next ones."""
+"""Number of lines per group: `di1` has lines 1 to 8, and `di2` the next 8 lines."""
 
 _ANALOGUE: Final = 0x6401
 _INPUTS: Final = {0x6000: "di", _ANALOGUE: "ai"}
@@ -41,14 +41,14 @@ class SlaveStimulus:
     """Stimuli of a slave.
 
     Args:
-        slave: the slave; its supply is switched elsewhere.
+        slave: the slave, whose supply is switched elsewhere.
     """
 
     def __init__(self, slave: CanopenSlave) -> None:
         self._slave, self._application = slave, Application.of(slave)
 
     def __call__(self, *words: str) -> str:
-        """Execute a stimulus, and return the read value; NotAllowed if it is not supported."""
+        """Execute a stimulus, and return the read value; raise NotAllowed if not supported."""
         slave, application = self._slave, self._application
         match words:
             case ("input", name, data) if ":" in name:
@@ -134,7 +134,7 @@ class _BenchStimulus:
 
     Args:
         device: a CANopen node.
-        slave: its slave.
+        slave: slave of the CANopen node.
     """
 
     def __init__(self, device: BenchDevice, slave: CanopenSlave) -> None:
@@ -156,7 +156,7 @@ _BOOT_US = 100_000
 """Time after which all nodes have booted."""
 
 _Buses = dict[str, dict[str, CanopenSlave]]
-"""The slaves on each CAN bus, by their names."""
+"""The slaves by name, for each CAN bus."""
 
 
 def bench_source(
@@ -166,13 +166,13 @@ def bench_source(
 
     Args:
         mode: the mode of the bench, in virtual time.
-        node_id: selects the bus with this node; None for the bus of the first node.
+        node_id: node-ID of a node on the wanted bus, or None for the bus of the first node.
         name: name of the bench for messages.
-        device: name of the device whose bus is used; empty for any.
+        device: name of the device whose bus is used, or empty for any.
 
     Raises:
-        ValueError: the bench is not in virtual time, has no CANopen node or none with this node-ID,
-            or has several such nodes on different buses; or the device is not a node.
+        ValueError: the bench is not in virtual time, or has no CANopen node with the node-ID, or
+            has several such nodes on different buses. The device is not a CANopen node.
     """
     if not isinstance(mode, VirtualMode):
         raise ValueError("the bench is not in virtual time: canmon conform judges what is there")
@@ -202,7 +202,7 @@ def bench_source(
 
 
 def _bus_of(buses: _Buses, node_id: int | None, name: str) -> str:
-    """Return the bus of a node; by default that of the lowest node-ID."""
+    """Return the bus of a node; by default the bus of the node with the lowest node-ID."""
     nodes = sorted((slave.node_id, bus) for bus, on in buses.items() for slave in on.values())
     if not nodes:
         raise ValueError(f"{name} has no CANopen node")
@@ -216,13 +216,13 @@ def _bus_of(buses: _Buses, node_id: int | None, name: str) -> str:
 
 
 def describe_slave(slave: CanopenSlave) -> NodeDescription:
-    """Return the EDS of one of our slaves."""
+    """Return the EDS of a slave of tickrig."""
     description = slave.dictionary.description
     return NodeDescription.of_table(description, description.objects)
 
 
 def _slaves(rig: BenchRig) -> _Buses:
-    """Return the slaves on each CAN bus, by their names."""
+    """Return the slaves by name, for each CAN bus."""
     return {
         mount.name: {name: node.slave for name, node in mount.nodes.items()}
         for mount in rig.state.mounts.values()
@@ -244,7 +244,7 @@ def _watch_no_more(mount: BusMount) -> None:
 
 
 def _watch(crashes: dict[str, Crashes], name: str, run: ConformRun) -> None:
-    """Count a crash as a failure of the node under test; report one of another node."""
+    """Count a crash of the node under test as a failure; report a crash of another node."""
     for each, crash in crashes.items():
         crash.watch(run.crash if each == name else lambda reason, where: run.disturb(reason))
 
@@ -262,11 +262,11 @@ def open_rig(path: Path, node_id: int | None = None) -> ConformSource:
     """Open a rig file in virtual time, ignoring its settings for real time.
 
     Args:
-        path: of the file.
-        node_id: selects the bus with this node; None for the bus of the first node.
+        path: path of the rig file.
+        node_id: node-ID of a node on the wanted bus, or None for the bus of the first node.
 
     Raises:
-        OSError: it cannot be read.
+        OSError: the file cannot be read.
         ValueError: the file has errors, a device cannot be made, or no node has this node-ID.
     """
     plan = read_rig_file(path)
@@ -284,7 +284,7 @@ def open_rig(path: Path, node_id: int | None = None) -> ConformSource:
 
 
 def _eds_files(plan: RigPlan, nodes: dict[int, str]) -> Iterator[tuple[int, Path]]:
-    """Yield the files of the nodes, which are checked too."""
+    """Yield the EDS files of the nodes; the tester checks these files too."""
     for node_id, name in nodes.items():
         device = plan.devices[name]
         if device.kind is DeviceKind.EDS:

@@ -1,4 +1,4 @@
-"""The conformance tester as a function: takes a slave in virtual time, returns a report."""
+"""The conformance tester as a function, which takes a slave and returns a report."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class PoweredSlave:
         slave: the slave under test, switched on.
 
     Attributes:
-        on_crash: called with the exceptions of the slave.
+        on_crash: function that is called with each exception of the slave.
     """
 
     def __init__(self, slave: Slave) -> None:
@@ -76,7 +76,7 @@ class PoweredSlave:
 
     @property
     def due_us(self) -> int:
-        """When the slave is due, `NEVER` while it is off."""
+        """Time at which the slave is due, or `NEVER` while the slave is off."""
         if not self._on or self._dead:
             return NEVER
         return 0 if self._woken else self.slave.due_us
@@ -98,7 +98,7 @@ class PoweredSlave:
             return ()
 
     def switch(self, *, on: bool) -> None:
-        """Switch the power; no effect if already in this state."""
+        """Switch the power; do nothing if the power is already in this state."""
         if on and not self._on:
             self._reset()
         self._on = on
@@ -127,12 +127,12 @@ class SlaveBench:
 
     Args:
         slave: the slave under test.
-        bit_rate: of the bus, 10 000 to 1 000 000 bit/s.
-        stimulus: sets the inputs of the slave. It is not called with `power`, because the bench
-            switches the supply itself.
+        bit_rate: bit rate of the bus, 10 000 to 1 000 000 bit/s.
+        stimulus: function that sets the inputs of the slave. The function is not called with
+            `power`, because the bench switches the supply itself.
 
     Attributes:
-        source: its source for the tester.
+        source: source for the tester.
     """
 
     def __init__(self, slave: Slave, bit_rate: int, stimulus: Stimulus | None = None) -> None:
@@ -152,7 +152,7 @@ class SlaveBench:
         rig.run_for(_BOOT_US)
 
     def stimulate(self, *words: str) -> str:
-        """Set an input, or switch the supply; NotAllowed if not supported."""
+        """Set an input, or switch the supply; raise NotAllowed if this is not supported."""
         if words[0] == "power":
             self._slave.switch(on=words[1] == "on")
             return ""
@@ -186,29 +186,31 @@ def conformance(  # noqa: PLR0913 - by keyword
     """Test a CANopen slave in virtual time; the same slave gives the same report.
 
     Args:
-        node: one of three: a slave that gets the time as an argument (`Slave`), such as those of
-            `tickrig.device`; a device of a bench in virtual time; or a callable that is called at
-            each power-on. That callable returns another one, which takes the time in microseconds
-            and frames, and returns frames.
-        node_id: 1..127; by default that of the slave, if it has one.
-        eds: its EDS, DCF or XDD. Without a file, slaves of tickrig describe themselves, and others
-            are queried.
-        level: `read-only`, `communication` or `intrusive`. The default is `intrusive`, because
-            nothing real can move in virtual time. (`canmon conform` only reads.)
-        only: groups or ids of checks, with * and ?, as `"NMT,HB"` or a sequence; by default all.
+        node: a slave, a device or a callable. The slave (`Slave`), such as a slave of
+            `tickrig.device`, gets the time as an argument. The device is on a bench in virtual
+            time. The callable is called at each power-on; it returns a function that takes the time
+            in microseconds and frames, and returns frames.
+        node_id: node-ID, 1..127. The default is the node-ID of the slave, if the slave has one.
+        eds: EDS, DCF or XDD of the slave. Without a file, slaves of tickrig describe themselves,
+            and the tester queries other slaves.
+        level: level of the test: `read-only`, `communication` or `intrusive`. The default is
+            `intrusive`, because nothing real can move in virtual time. (`canmon conform` only
+            reads.)
+        only: groups or ids of checks, with * and ?, as `"NMT,HB"` or as a sequence. By default all
+            checks run.
         allow: indices of profile objects, 6000h..9FFFh, that may be written.
         never: indices of objects that are never written, with priority over `allow`.
-        stimulus: sets inputs. It is called with `"input", "6000:01", "01"`, `"emergency", "5000",
-            "01"` and similar, and returns the value for `"output", NAME`. The power of a `Slave` is
-            switched without it.
-        seed: of random choices.
-        bit_rate: of the bus, 10 000..1 000 000 bit/s.
+        stimulus: function that sets inputs. It is called with `"input", "6000:01", "01"`,
+            `"emergency", "5000", "01"` and similar words, and returns the value for `"output",
+            NAME`. The function is not called to switch the power of a `Slave`.
+        seed: seed of random choices.
+        bit_rate: bit rate of the bus, 10 000..1 000 000 bit/s.
 
     Returns:
         The report; `tickrig.testing.conformance(node).exit_status` is 0 if all checks passed.
 
     Raises:
-        ValueError: a missing or invalid node-ID, level or check.
+        ValueError: the node-ID, the level or a check is missing or invalid.
         OSError: the EDS cannot be read.
 
     >>> from tickrig.device import make_epos
@@ -261,14 +263,14 @@ def _source(
 
 
 def level_of(word: str) -> Level:
-    """Return a level; ValueError if it is unknown."""
+    """Return the level of a name; raise ValueError if the name is unknown."""
     if word not in _LEVELS:
         raise ValueError(f"level {word!r} is not one of {', '.join(_LEVELS)}")
     return Level(_LEVELS.index(word))
 
 
 def names_of(only: str | Iterable[str]) -> tuple[str, ...]:
-    """Return separate groups and ids; ValueError if one matches no check."""
+    """Return separate groups and ids; raise ValueError if a group or id matches no check."""
     names = patterns(only)
     for text in unknown(names):
         raise ValueError(f"only {text}")
@@ -276,7 +278,7 @@ def names_of(only: str | Iterable[str]) -> tuple[str, ...]:
 
 
 def node_id_of(node: Node, node_id: int | None) -> int:
-    """Return the given node-ID, or that of the slave; ValueError if there is none."""
+    """Return the given node-ID, or the slave's; raise ValueError if there is no node-ID."""
     if node_id is None and isinstance(node, BenchDevice):
         node_id = int(node.get("node_id"))
     if node_id is None:
@@ -299,15 +301,15 @@ _JSON: Final = ".json"
 
 
 def conformance_text(report: Report, *, baseline: Path | str | None = None) -> str:
-    """Return a report as printed by `canmon conform`.
+    """Return a report as text, as `canmon conform` prints it.
 
     Args:
-        report: of `conformance`.
-        baseline: a file of known failures, which are listed without details.
+        report: report that `conformance` has returned.
+        baseline: path of a file with known failures, which the text lists without details.
 
     Raises:
         OSError: the baseline cannot be read.
-        ValueError: invalid baseline.
+        ValueError: the baseline is invalid.
     """
     return text_report(report, known_failures(baseline), decoded_frames({}))
 
@@ -318,16 +320,16 @@ def write_conformance(
     """Write a report to a file atomically.
 
     Args:
-        report: of `conformance`.
-        path: the file. Its suffix selects the format: `.html` a page with all frames, `.xml` JUnit,
-            `.svg` a badge, `.md` the failures to file as issues, `.json`, or `.txt` the failures as
-            a baseline.
-        baseline: a file of known failures.
+        report: report that `conformance` has returned.
+        path: path of the file. The suffix selects the format: `.html` is a page with all frames,
+            `.xml` is JUnit, `.svg` is a badge, `.md` has the failures as texts for issues, `.json`
+            is JSON, and `.txt` has the failures as a baseline.
+        baseline: path of a file with known failures.
 
     Raises:
         OSError: a file cannot be written or read.
-        ValueError: unknown suffix, or invalid baseline.
-        ImportError: Jinja2 for a page is missing (extra `report`).
+        ValueError: the suffix is unknown, or the baseline is invalid.
+        ImportError: Jinja2 is needed for a page, but is not installed (extra `report`).
     """
     known, ending = known_failures(baseline), Path(path).suffix
     if ending == _JSON:
@@ -341,11 +343,11 @@ def write_conformance(
 
 
 def known_failures(path: Path | str | None) -> Baseline:
-    """Read a baseline, empty without a file; warn about ids that are not checks.
+    """Read a baseline, which is empty without a file; warn about ids that are not checks.
 
     Raises:
-        OSError: it cannot be read.
-        ValueError: invalid baseline.
+        OSError: the file cannot be read.
+        ValueError: the baseline is invalid.
     """
     if path is None:
         return NONE_KNOWN

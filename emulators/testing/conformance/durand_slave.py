@@ -30,10 +30,10 @@ class DurandSlave:
     called, and then restored.
 
     Args:
-        make: makes the node on a network; called again at each power-on.
+        make: function that makes the node on a network. It is called again at each power-on.
 
     Attributes:
-        node: the node; it boots in its first tick.
+        node: the node, which boots in its first tick.
     """
 
     tick_us: int = TICK_US
@@ -45,17 +45,17 @@ class DurandSlave:
 
     @property
     def due_us(self) -> int:
-        """When it boots, or its scheduler is due."""
+        """Time at which the node boots, or at which its scheduler is due."""
         return 0 if self.node is None or self._actions else self._scheduler.due_us
 
     def reset(self) -> None:
-        """Drop the node; another one is made in the next tick."""
+        """Drop the node; the next tick makes a new node."""
         self.node = None
         self._scheduler, self._network = _Scheduler(), _Network()
         self._actions: list[Callable[[Node], object]] = []
 
     def act(self, action: Callable[[Node], object]) -> None:
-        """Schedule a call of its application for the start of the next tick, after booting."""
+        """Schedule an application call for the start of the next tick, after booting."""
         self._actions.append(action)
 
     def tick(self, now_us: int, rx: Frames, /) -> Frames:
@@ -84,7 +84,7 @@ class _Network(NetworkABC):  # type: ignore[misc]  # durand has no types
         self._subscriptions[cob_id] = callback
 
     def remove_subscription(self, cob_id: int) -> None:
-        """Unsubscribe from a COB-ID; KeyError if not subscribed, as on its bus."""
+        """Unsubscribe from a COB-ID; raise KeyError if not subscribed, as a bus of durand does."""
         self._subscriptions.pop(cob_id)
 
     def send(self, cob_id: int, msg: bytes) -> None:
@@ -92,7 +92,7 @@ class _Network(NetworkABC):  # type: ignore[misc]  # durand has no types
         self._sent.append(CanFrame(cob_id & 0x7FF, bytes(msg)))
 
     def take(self, frame: CanFrame) -> None:
-        """Deliver a frame to its subscribers, as durand's listener does."""
+        """Deliver a frame to the subscribers, as durand's listener does."""
         callback = self._subscriptions.get(frame.can_id)
         if frame.remote or frame.extended or callback is None:
             return
@@ -108,7 +108,7 @@ class _Network(NetworkABC):  # type: ignore[misc]  # durand has no types
 
 
 class _Scheduler(AbstractScheduler):  # type: ignore[misc]  # durand has no types
-    """Calls back at the times of a rig."""
+    """Scheduler that calls functions at times of a rig."""
 
     def __init__(self) -> None:
         self._now_us, self._numbers = 0, count()
@@ -117,7 +117,7 @@ class _Scheduler(AbstractScheduler):  # type: ignore[misc]  # durand has no type
 
     @property
     def due_us(self) -> int:
-        """When the next call is due."""
+        """Time at which the next call is due."""
         return self._entries[0][0] if self._entries else NEVER
 
     @property
@@ -132,14 +132,14 @@ class _Scheduler(AbstractScheduler):  # type: ignore[misc]  # durand has no type
         args: tuple[Any, ...] = (),
         kwargs: Mapping[str, Any] | None = None,
     ) -> _Entry:
-        """Call back after a delay in seconds."""
+        """Call a function after a delay in seconds."""
         at_us = self._now_us + round(delay * 1e6)
         entry = (at_us, next(self._numbers), lambda: callback(*args, **(kwargs or {})))
         heappush(self._entries, entry)
         return entry
 
     def cancel(self, entry: _Entry) -> None:
-        """Cancel a callback that has not been called."""
+        """Cancel a callback that was not called yet."""
         if entry in self._entries:
             self._entries.remove(entry)
             self._entries.sort()

@@ -1,4 +1,4 @@
-"""LocalNode of the canopen library as a slave in virtual time."""
+"""A LocalNode of the canopen library as a slave in virtual time."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class LocalNodeSlave:
     Other work of an application is not done, such as restoring values at a reset or sending TPDOs.
 
     Args:
-        make: makes the node with its dictionary; called again at each power-on.
+        make: function that makes the node with its dictionary. It is called again at each power-on.
 
     Attributes:
         node: the node.
@@ -38,7 +38,7 @@ class LocalNodeSlave:
 
     @property
     def due_us(self) -> int:
-        """When it boots, or its next periodic frame is due."""
+        """Time at which the node boots, or at which its next periodic frame is due."""
         if not self._booted or self._network.has_sent:
             return 0
         return min((task.due_us for task in self._network.tasks), default=NEVER)
@@ -50,7 +50,7 @@ class LocalNodeSlave:
         self.node = self._make()
 
     def tick(self, now_us: int, rx: Frames, /) -> Frames:
-        """Deliver received frames, then send due ones."""
+        """Deliver received frames, then send the frames that are due."""
         self.now_us = now_us
         if not self._booted:
             self._boot()
@@ -66,7 +66,7 @@ class LocalNodeSlave:
 
 
 class _Network(canopen.Network):
-    """A network that collects sent frames; its periodic frames follow the slave's time."""
+    """A network that collects sent frames; periodic frames are sent in the slave's time."""
 
     def __init__(self, slave: LocalNodeSlave) -> None:
         super().__init__()
@@ -79,7 +79,7 @@ class _Network(canopen.Network):
         return bool(self._sent)
 
     def take(self, frame: CanFrame) -> None:
-        """Deliver a frame to its subscribers, as the library's listener does."""
+        """Deliver a frame to the subscribers, as the library's listener does."""
         if frame.remote or frame.extended:
             return
         try:
@@ -119,10 +119,10 @@ class _Periodic(canopen.network.PeriodicMessageTask):
         self.period_us, self.due_us = max(TICK_US, period_us), due_us
 
     def stop(self) -> None:
-        """Stop sending it."""
+        """Stop sending the frame."""
         if self in self._tasks:
             self._tasks.remove(self)
 
     def update(self, data: _Data) -> None:
-        """Send other data from the next time on."""
+        """Send other data from the next frame on."""
         self.data = bytes(data or b"")

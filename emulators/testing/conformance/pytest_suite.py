@@ -35,7 +35,7 @@ from tickrig.wire.canopen.eds.eds_device import read_device
 
 _MOST_LINES: Final = 60
 _ANY_NODE_ID: Final = 1
-"""Node-ID for the names of checks, which do not depend on it."""
+"""Node-ID for the names of checks; the names do not depend on the node-ID."""
 
 Test = Callable[..., None]
 
@@ -57,17 +57,18 @@ def conformance_tests(
 
     Args:
         node: a callable or a name. A callable makes the slave for `conformance`, or is the callable
-            that `conformance` calls at each power-on. A name is that of a device of the fixture
-            `bench`; each check then runs on a new bench.
-        eds: its EDS, DCF or XDD; each object in the file has its own tests.
-        level: `read-only`, `communication` or `intrusive`, as for `conformance`.
-        only: groups or ids of checks, with * and ?, as `"NMT,HB"` or a sequence; by default all.
-        baseline: a file of known failures, one id per line. These checks are expected to fail. Ids
-            that are not checks cause a warning.
+            that `conformance` calls at each power-on. A name is the name of a device of the fixture
+            `bench`, and each check then runs on a new bench.
+        eds: EDS, DCF or XDD of the slave. Each object in the file has its own tests.
+        level: level of the test: `read-only`, `communication` or `intrusive`, as for `conformance`.
+        only: groups or ids of checks, with * and ?, as `"NMT,HB"` or as a sequence. By default all
+            checks run.
+        baseline: path of a file with known failures, one id per line. These checks are expected to
+            fail. Ids that are not checks cause a warning.
         options: further arguments of `conformance`.
 
     Raises:
-        ValueError: unknown level, a word of `only` that matches no check, or no node-ID.
+        ValueError: the level is unknown, a word of `only` matches no check, or there is no node-ID.
         OSError: the EDS or the baseline cannot be read.
 
     >>> from tickrig.device import make_epos
@@ -94,7 +95,7 @@ def conformance_tests(
 
 
 def _judged_of(make: Callable[[], Node]) -> Node:
-    """Return the argument of `conformance`: the made object, or a factory for each power-on."""
+    """Return the argument of `conformance`: the object made by `make`, or a factory."""
     made = make()
     return cast("Node", make) if is_step(made) else made
 
@@ -110,14 +111,14 @@ def _test_on_bench(name: str, options: dict[str, Any], baseline: Baseline) -> Te
 
 @dataclass
 class _Unmade:
-    """A failed run; its exception is raised only once, because each raise extends the traceback."""
+    """A failed run. Its exception is raised only once, because each raise extends the traceback."""
 
     error: Exception
     raised: bool = False
 
 
 class _Run:
-    """The run of the selected checks, started by the first of them."""
+    """The run of the selected checks, started by the first selected check."""
 
     def __init__(
         self, make: Callable[[], Node], options: dict[str, Any], baseline: Baseline
@@ -148,7 +149,7 @@ class _Run:
         return report
 
     def _judged(self, wanted: Iterable[str]) -> Report | _Unmade:
-        """Run once; a failure is not repeated for each test."""
+        """Run the checks once; a failed run is not repeated for each test."""
         try:
             return conformance(_judged_of(self._make), only=sorted(wanted), **self._options)
         except Exception as error:
@@ -163,7 +164,7 @@ def _selected(item: pytest.Function) -> Iterable[str]:
 
 
 def _judge(report: Report, check_id: str, baseline: Baseline) -> None:
-    """Report the verdict of a check: pass, fail, skip or blocked."""
+    """Report the verdict of a check: passed, failed, skipped or blocked."""
     result = next((one for one in report.results if one.check.id == check_id), None)
     if result is None:
         raise BenchBlocked(report.aborted or f"{check_id} was not judged")

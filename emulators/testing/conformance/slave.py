@@ -21,22 +21,22 @@ TICK_US: Final = 1_000
 class Slave(Protocol):
     """A CANopen slave as a state machine: time and frames in, frames out.
 
-    The slaves of `tickrig.device` are of this kind. Your slave is one, too, if it takes the time as
-    an argument and reports when it must be called next. It may wrap a C library.
+    The slaves of `tickrig.device` have this interface. Your slave has the interface, too, if it
+    takes the time as an argument and reports when it must be called next. It may wrap a C library.
     """
 
     @property
     def tick_us(self) -> int:
-        """Period in microseconds; the slave is called at multiples of it. 1000 is usual."""
+        """Period in microseconds, usually 1000; the slave is called at multiples of the period."""
         ...
 
     @property
     def due_us(self) -> int:
         """Time of the next action without a received frame, in microseconds.
 
-        A time in the past means the next tick. `tickrig.wire.instant.NEVER` means that the slave
-        does not act without a frame. The slave is not called before this time, unless a frame
-        arrives.
+        A time in the past means that the slave is due in the next tick.
+        `tickrig.wire.instant.NEVER` means that the slave does not act without a frame. The slave is
+        not called before this time, unless a frame arrives.
         """
         ...
 
@@ -51,16 +51,16 @@ class Slave(Protocol):
 
         Args:
             now_us: time since the start in microseconds, a multiple of `tick_us`.
-            rx: frames that arrived since the last call, in their order.
+            rx: frames that have arrived since the last call, in their order.
 
         Returns:
-            The frames that it sends, in their order.
+            The frames that the slave sends, in their order.
         """
         ...
 
 
 SlaveCall = Callable[[int, Frames], Frames]
-"""A bare `tick` of a slave, called each millisecond."""
+"""Function `tick` of a slave, which is called each millisecond."""
 
 _MEMBERS: Final = ("tick", "due_us", "tick_us", "reset")
 """Members of a `Slave`."""
@@ -74,7 +74,7 @@ def is_slave(node: object) -> TypeGuard[Slave]:
 # A slave from a callable: its factory for each power-on, and error messages.
 
 _STEP: Final = (0, ())
-"""A time and frames."""
+"""Example arguments: a time and frames."""
 _EXAMPLE: Final = "what makes the slave at each power-on, as `lambda: Mini(5).step`"
 
 
@@ -118,7 +118,7 @@ class CalledSlave:
 
 
 def is_step(node: object) -> bool:
-    """Return whether it is the callable for each millisecond, not its factory."""
+    """Return whether a node is the callable for each millisecond, not its factory."""
     return not is_slave(node) and _takes(node, *_STEP) and not _takes(node)
 
 
@@ -126,7 +126,7 @@ def checked_frames(sent: object) -> Frames:
     """Return the frames of a slave if they can be sent on a bus.
 
     Raises:
-        _NoFrames: they cannot.
+        _NoFrames: the value is not a tuple of frames that can be sent.
     """
     if type(sent) is tuple:
         for frame in sent:
@@ -156,7 +156,7 @@ def checked_frames(sent: object) -> Frames:
 
 
 def _takes(call: object, *given: object) -> bool:
-    """Return whether it accepts these arguments; unknown for C functions."""
+    """Return whether a callable accepts the arguments; a guess for C functions."""
     if not callable(call):
         return False
     try:
@@ -209,7 +209,7 @@ class Crashes:
         self._report(_crash_text(error, self._who), _crash_lines(error))
 
     def watch(self, report: Crash) -> None:
-        """Report exceptions from now on, and earlier ones."""
+        """Report the recorded exceptions now, and later exceptions when they occur."""
         self._report = report
         for reason, where in self._kept:
             report(reason, where)
@@ -244,7 +244,7 @@ def _crash_text(error: Exception, who: str) -> str:
 
 
 def _crash_lines(error: Exception) -> list[str]:
-    """Return the traceback lines, outermost first, without ours before the user's."""
+    """Return the traceback lines, outermost first, without lines of tickrig before the user's."""
     if isinstance(error, _NoFrames):
         return []
     return list(_lines(error, _OURS)) or list(_lines(error, "no module"))

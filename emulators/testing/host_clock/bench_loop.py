@@ -19,13 +19,13 @@ _T = TypeVar("_T")
 _Ts = TypeVarTuple("_Ts")
 
 _EXECUTOR_S: Final = 5.0
-"""How long, in real time, a loop waits for a function that it runs in a thread."""
+"""Longest real time for which a loop waits for a function in a thread."""
 
 _Events = list[tuple[SelectorKey, int]]
 
 
 class _BenchLoop(asyncio.SelectorEventLoop):
-    """An event loop whose time is that of a rig.
+    """An event loop that uses the time of a rig.
 
     Instead of waiting for its next timer, the loop advances the time. Then it handles events of
     files, sockets and other threads, without waiting for them.
@@ -50,9 +50,9 @@ class _BenchLoop(asyncio.SelectorEventLoop):
         """Run a function in a thread, and wait for it without advancing the virtual time.
 
         Args:
-            executor: as in asyncio.
+            executor: executor, as in asyncio.
             func: the function.
-            args: its arguments.
+            args: arguments of the function.
         """
         if executor is None:
             if self._threads is None:
@@ -76,7 +76,7 @@ class _BenchLoop(asyncio.SelectorEventLoop):
 
 @contextmanager
 def bench_loops(passing: Passing) -> Iterator[None]:
-    """Make `asyncio.run` and others create event loops in the time of a rig.
+    """Make asyncio create event loops in the time of a rig, for example in `asyncio.run`.
 
     Args:
         passing: the object whose time advances, in this thread only.
@@ -116,7 +116,7 @@ class _PassingSelector(selectors.BaseSelector):
         self._inner.close()
 
     def select(self, timeout: float | None = None) -> _Events:
-        """Return ready events; without any, advance the time to the first one or the timeout."""
+        """Return ready events, after advancing the time to the first event or the timeout."""
         found: _Events = self._inner.select(0)
 
         def come() -> bool:

@@ -1,4 +1,4 @@
-"""Detection of host code: of users and libraries, not of Python, pytest, pyserial or tickrig."""
+"""Detection of host code, which excludes Python, pytest, pyserial and tickrig."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ _KEPT: Final = frozenset(
         *("hypothesis", "coverage", "debugpy", "IPython", "ipykernel"),
     }
 )
-"""Packages that keep the clock of this machine. On a rig, pyserial, python-can and canopen use our
-objects (`SimSerial`, the interface `tickrig`, `SimNetwork`), which wait on the rig themselves. On a
-real port these packages need real time."""
+"""Packages that keep the clock of this machine. On a rig, pyserial, python-can and canopen use
+objects of tickrig (`SimSerial`, the interface `tickrig`, `SimNetwork`), which wait on the rig
+themselves. On a real port these packages need real time."""
 
 _KEPT_BEGINNINGS: Final = ("pytest_", "pydev", "_pydev")
 
@@ -49,11 +49,11 @@ _PYTHON: Final = tuple(f"{sysconfig.get_path(name)}{os.sep}" for name in ("stdli
 
 @cache
 def is_host(module: str, file: str) -> bool:
-    """Return whether code is a host's.
+    """Return whether code is host code.
 
     Args:
-        module: name of its module.
-        file: its path in the code object.
+        module: name of the module of the code.
+        file: path of the file in the code object.
 
     >>> is_host("my_robot.link", "/home/me/my_robot/link.py"), is_host("queue", "<frozen queue>")
     (True, False)
@@ -66,12 +66,12 @@ def is_host(module: str, file: str) -> bool:
 
 @cache
 def is_installed(file: str) -> bool:
-    """Return whether a file is of an installed package."""
+    """Return whether a file belongs to an installed package."""
     return any(folder in file for folder in _INSTALLED)
 
 
 def place_of(file: str, line: int) -> str:
-    """Return a file and line for people."""
+    """Return a file and line as text for messages."""
     path = Path(file)
     return f"{path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path}:{line}"
 
@@ -81,11 +81,11 @@ def place_of(file: str, line: int) -> str:
 # A function that means something else to hosts, for a while.
 
 _Act = Callable[..., Any]
-"""Replacement of a function: called with the original, the calling frame and the arguments."""
+"""Replacement of a function, called with the original, the calling frame and the arguments."""
 
 
 class Patch:
-    """A function that replaces another one for hosts; other callers get the original.
+    """A function that replaces an original function for hosts. Other callers get the original.
 
     Args:
         original: the original function.
@@ -94,7 +94,8 @@ class Patch:
     Attributes:
         original: the original function.
         act: the replacement for hosts.
-        on: whether the patch is active; if not, code that still holds the patch calls the original.
+        on: whether the patch is active. If the patch is not active, code that still holds the patch
+            calls the original.
     """
 
     def __init__(self, original: Callable[..., Any], act: _Act) -> None:
@@ -102,7 +103,7 @@ class Patch:
         self.__name__, self.__doc__ = original.__name__, original.__doc__
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
-        """Call the replacement or the original, by the caller."""
+        """Call the replacement if the caller is a host, or else the original."""
         __tracebackhide__ = True
         # The caller alone decides; one level up, because nothing stands between it and this
         # call.
@@ -114,10 +115,10 @@ class Patch:
 
 
 class _MethodSwitch(Patch):
-    """A patch of a method: like a function, it is bound to the objects of its class."""
+    """A patch of a method. Like a function, the patch is bound to the objects of its class."""
 
     def __get__(self, item: object, owner: type | None = None) -> Callable[..., Any]:
-        """Bind it to an object."""
+        """Bind the patch to an object."""
         return self if item is None else MethodType(self, item)
 
 
@@ -133,20 +134,20 @@ def root_of(function: Any) -> Any:
 LOOKS: Final = (
     *("time", "time_ns", "monotonic", "monotonic_ns", "perf_counter", "perf_counter_ns"),
 )
-"""Functions of `time` that tell a time."""
+"""Functions of `time` that return a time."""
 
 KEEPABLE: Final = {
     id(found): found for found in (*(vars(time)[name] for name in (*LOOKS, "sleep")), select)
 }
-"""The functions by their identity, because some objects in modules cannot be hashed."""
+"""The functions by identity, because some objects in modules cannot be hashed."""
 
 
 class _Alias(NamedTuple):
     """A place where a function is stored.
 
     Attributes:
-        kept: returns the present object.
-        put: stores another one.
+        kept: function that returns the object that is stored at the place now.
+        put: function that stores another object at the place.
         function: the original function.
     """
 
@@ -156,7 +157,7 @@ class _Alias(NamedTuple):
 
 
 class _HostModules:
-    """The imported modules of hosts; a module is scanned once, and again when it grows.
+    """The imported modules of hosts. A module is scanned once, and again when it grows.
 
     A check of 1143 modules takes 40 us if nothing has changed, and 240 us if each module is looked
     up.
@@ -169,7 +170,7 @@ class _HostModules:
         self._places: dict[int, tuple[_Alias, ...]] = {}
 
     def places(self) -> Iterator[_Alias]:
-        """Yield all places where functions were stored; a place may hold another object by now."""
+        """Yield all places where functions were stored; a place may hold another object now."""
         modules = tuple(sys.modules.values())
         # By identity and in order: comparing by equality would call `__eq__` of strange
         # modules.
@@ -207,7 +208,7 @@ _HOST_MODULES: Final = _HostModules()
 
 
 def _names_of_host(module: object) -> dict[str, Any] | None:
-    """Return the names of a module; None if it is not a host's."""
+    """Return the names of a module, or None if the module is not host code."""
     names = vars(module) if isinstance(module, ModuleType) else {}
     file = names.get("__file__")
     return names if isinstance(file, str) and is_host(str(names.get("__name__")), file) else None
@@ -239,7 +240,7 @@ def _attributes(owner: type) -> Iterator[_Alias]:
 
 
 def _defaults(function: FunctionType) -> Iterator[_Alias]:
-    """Yield the defaults of its arguments."""
+    """Yield the defaults of the arguments of a function."""
     for at, value in enumerate(function.__defaults__ or ()):
         if (found := _original(value)) is not None:
             kept = partial(_default, function, at)
@@ -269,7 +270,7 @@ def _set_static(owner: type, key: str, value: Any) -> None:
 
 
 def _original(value: Any) -> Any:
-    """Return the clock function of a value, None if it is not one."""
+    """Return the original clock function of a value, or None for other values."""
     found = KEEPABLE.get(id(value))
     return KEEPABLE.get(id(root_of(value))) if isinstance(value, Patch) else found
 
@@ -277,7 +278,7 @@ def _original(value: Any) -> Any:
 # Installs and removes switches.
 
 Acts = Mapping[tuple[Any, str], _Act]
-"""Replacements for hosts, by the module or class of a function and its name."""
+"""Replacements for hosts by the module or class of a function and the name of the function."""
 
 
 class Patches:
@@ -295,7 +296,7 @@ class Patches:
         self._acts, self._undo = acts, ExitStack()
 
     def __enter__(self) -> None:
-        """Install the switches."""
+        """Install the patches."""
         new: dict[int, Patch] = {}
         for (owner, name), act in self._acts.items():
             before = vars(owner)[name]
@@ -318,6 +319,6 @@ class Patches:
 
 
 def _put_back(place: _Alias, switch: Patch, before: Any) -> None:
-    """Restore the original, unless the place has been changed since."""
+    """Restore the original, unless the place was changed by other code."""
     if place.kept() is switch:
         place.put(before)

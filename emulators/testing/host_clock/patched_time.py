@@ -69,7 +69,7 @@ _OTHER_CLOCKS: Final = {
     "freezegun": ("freezegun.api", ("freeze_factories",)),
     "time-machine": ("time_machine", ("traveller_stack", "coordinates_stack")),
 }
-"""Packages that replace the clock, and the place of their present replacement."""
+"""Packages that replace the clock, and the name of the replacement in each package."""
 
 
 def _check_clock() -> None:
@@ -87,7 +87,7 @@ def _check_clock() -> None:
 
 
 def _line_of(frame: FrameType) -> str:
-    """Return the running file and line, for people."""
+    """Return the running file and line as text for messages."""
     return host_code.place_of(frame.f_code.co_filename, frame.f_lineno)
 
 
@@ -96,10 +96,10 @@ class _ClockWaits:
 
     Args:
         passing: the object whose time advances.
-        clock: its functions of `time`.
+        clock: functions of `time` in the time of the rig.
 
     Attributes:
-        refusals: refused waits: in another thread, or in a callback of the rig.
+        refusals: refused waits in another thread, or in a callback of the rig.
     """
 
     def __init__(self, passing: Passing, clock: SimTime) -> None:
@@ -230,7 +230,7 @@ class _ClockWaits:
 
 
 class _Standing:
-    """A frozen time for threads that only read it."""
+    """A frozen time for threads that only read the clock."""
 
     def __init__(self, passing: Passing) -> None:
         self._passing = passing
@@ -244,7 +244,7 @@ class _Standing:
 
 
 class _ForEver(Exception):  # noqa: N818 - it is told in another one
-    """The event of a wait without a timeout never happens."""
+    """A wait without a timeout waits for an event that never happens."""
 
 
 def _other_thread() -> str:
@@ -261,7 +261,7 @@ def patched_time(passing: Passing) -> Iterator[SimTime]:
 
     In host code these functions use the clock of `passing`:
 
-    - of `time`: `sleep`, `time`, `monotonic`, `perf_counter`, and their variants in nanoseconds
+    - `sleep`, `time`, `monotonic`, `perf_counter` of `time`, and their variants in nanoseconds
     - `wait` and `wait_for` of threading's events and conditions
     - `get` and `put` of queues
     - a `select` of nothing with a timeout
@@ -270,23 +270,23 @@ def patched_time(passing: Passing) -> Iterator[SimTime]:
     imported before, event loops that are created in the block use the time of `passing` too.
 
     Host code is all code except that of Python, pytest, Hypothesis, coverage, pyserial, python-can,
-    canopen and tickrig. The functions are replaced in its modules wherever they are stored: names
-    (`from time import sleep`), attributes of classes, defaults of arguments. Threads that already
-    run keep their time. Of all other threads, only the caller's thread can wait.
+    canopen and tickrig. The functions are replaced in modules of hosts wherever they are stored:
+    names (`from time import sleep`), attributes of classes, defaults of arguments. Threads that
+    already run keep their time. Of all other threads, only the caller's thread can wait.
 
     Not patched: functions that objects have stored before, `datetime`, `socket`, `Thread.join`,
     semaphores, `threading.Timer`, `queue.SimpleQueue`.
 
     Args:
-        passing: a `RigPassing`, or a `SimNetwork`.
+        passing: object whose time advances: a `RigPassing`, or a `SimNetwork`.
 
     Yields:
         The clock.
 
     Raises:
-        HostTimeError: another thread or a callback of the rig waited; the error is raised there,
-            and again at the end, because hosts often catch it. It is also raised if freezegun or
-            time-machine has replaced the clock.
+        HostTimeError: another thread or a callback of the rig has waited. The error is raised in
+            that thread or callback, and again at the end, because hosts often catch it. The error
+            is also raised if freezegun or time-machine has replaced the clock.
     """
     _check_clock()
     clock = SimTime(passing)
@@ -298,7 +298,7 @@ def patched_time(passing: Passing) -> Iterator[SimTime]:
 
 
 def _loops(passing: Passing) -> AbstractContextManager[None]:
-    """Return a context that gives event loops this time; an empty one without asyncio."""
+    """Return a context that gives event loops the time of a rig, or an empty context."""
     if "asyncio" not in sys.modules:
         return nullcontext()
     return bench_loop.bench_loops(passing)
@@ -307,7 +307,7 @@ def _loops(passing: Passing) -> AbstractContextManager[None]:
 # Hosts that look at the clock of this machine while their bench is in virtual time.
 
 _WAITS: Final = ("sleep", "monotonic", "monotonic_ns")
-"""Functions called only for waiting."""
+"""Functions that are called only to wait."""
 
 _STAMPS: Final = ("time", "time_ns")
 """Functions that installed packages may call for time stamps."""
@@ -335,9 +335,9 @@ def unpatched_time_fails(
 ) -> Iterator[None]:
     """Raise UnpatchedTimeError if a host sleeps, or reads a clock that does not advance.
 
-    The error is raised at the first such call, with its file and line. If the host has caught it,
-    it is raised again at the end. If it caused another exception, it is added to that exception as
-    a note.
+    The error is raised at the first such call, with its file and line. If the host has caught the
+    error, it is raised again at the end. If the error caused another exception, that exception gets
+    a note with the error.
 
     `patched_time` defines host code; within its block nothing is refused. Always allowed are
     `perf_counter`, `time.time` in installed packages, and functions with which a test has replaced
@@ -345,7 +345,7 @@ def unpatched_time_fails(
 
     Args:
         allowed: names of allowed packages.
-        others: allowed threads; by default those that already run.
+        others: allowed threads. The default is all threads that already run.
     """
     others = threading.enumerate() if others is None else others
     refusals: list[str] = []

@@ -1,4 +1,4 @@
-"""What a user writes for a search: a bench, a host, its rules, and its invariants."""
+"""Base class of a user's machine for a search: a bench, a host, its rules and invariants."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ class WorldInput(NamedTuple):
     """An input that may change.
 
     Attributes:
-        name: of the input.
-        type: `level`, `button`.
-        low: its smallest value.
-        high: its largest value.
+        name: name of the input.
+        type: type of the input: `level` or `button`.
+        low: smallest value of the input.
+        high: largest value of the input.
     """
 
     name: str
@@ -34,15 +34,15 @@ class World:
 
     Args:
         bench: the bench, in virtual time.
-        faults: names of the faults that may occur, with arguments if wanted; by default all.
-        inputs: names of the inputs that may change; by default all except the objects of nodes.
+        faults: names of the faults that may occur, with or without arguments; by default all.
+        inputs: names of the inputs that may change; by default all inputs except objects of nodes.
 
     Attributes:
-        faults: those that may come, by name and arguments.
-        inputs: those that may change.
+        faults: faults that may occur, by name and arguments.
+        inputs: inputs that may change.
 
     Raises:
-        ValueError: unknown fault or input.
+        ValueError: a fault or an input is unknown.
     """
 
     def __init__(
@@ -69,7 +69,7 @@ class World:
         self._before = {name: self._bench.get(name) for name in self._watched}
 
     def calm(self) -> None:
-        """End all faults, and put all inputs back."""
+        """End all faults, and restore the values of all inputs."""
         for name in self._wire_faults:
             self._bench.clear(name)
         for name, value in self._before.items():
@@ -78,7 +78,7 @@ class World:
 
 
 def _bare(name: str, known: Mapping[str, Any]) -> str:
-    """Return the name of a fault that is written with its own arguments.
+    """Return the name of a fault that may be written with arguments.
 
     Raises:
         ValueError: the fault does not accept these arguments.
@@ -97,7 +97,7 @@ def _known(
     known: Mapping[str, Any],
     noun: str,
 ) -> list[str]:
-    """Return the wanted names, the usual ones if none are given."""
+    """Return the wanted names, or the usual names if no names are wanted."""
     if wanted is None:
         return list(usual)
     if isinstance(wanted, str):
@@ -125,8 +125,8 @@ def host_rule(**arguments: object) -> Callable[[F], F]:
     """Make a method of a `BenchMachine` a rule: an action that a search may execute.
 
     Args:
-        arguments: of the method, each with its possible values: a list, a tuple or a `range` of
-            plain values, or a strategy of Hypothesis.
+        arguments: arguments of the method, each with its possible values. The values are a list, a
+            tuple or a `range` of plain values, or a strategy of Hypothesis.
     """
 
     def mark(method: F) -> F:
@@ -159,16 +159,19 @@ class BenchMachine:
     Attributes:
         bench: the bench, in virtual time.
         world: the faults and inputs that may change in addition to the host's calls.
-        faults: names of possible temporary faults; by default all of the bench. A name may have
-            arguments: `"sdo_slow=2s"`.
-        inputs: names of the inputs and buttons that may change; by default all of the bench.
-        traffic: what other participants may send: frames in candump's notation, or bytes in hex to
-            a device. With several wires, each has the name of a device as prefix: `drive/705#00`.
+        faults: names of possible temporary faults. By default all faults of the bench are possible.
+            A name may have arguments: `"sdo_slow=2s"`.
+        inputs: names of the inputs and buttons that may change. By default all of the bench may
+            change.
+        traffic: traffic that other participants may send: frames in candump's notation, or bytes in
+            hex to a device. If the bench has several wires, each text has the name of a device as
+            prefix: `drive/705#00`.
         fault_for: shortest and longest duration of a fault, such as `("100ms", "300ms")`.
-        patience: longest bench time of one call. A longer call is a finding: the host waits without
-            end. A smaller value makes a search faster, because each such call takes this time.
+        patience: longest bench time of one call. A longer call is an error, because the host waits
+            without end. A smaller value makes a search faster, because each such call takes this
+            time.
         longest: longest bench time of a whole run.
-        patched: whether `time.sleep` and `time.monotonic` of hosts use the bench's time.
+        patched: whether `time.sleep` and `time.monotonic` of hosts use the time of the bench.
 
     >>> class Chair(BenchMachine):
     ...     faults = ()
@@ -195,11 +198,11 @@ class BenchMachine:
     world: World
 
     def make_bench(self) -> Bench:
-        """Return the bench, in virtual time; called once in a search."""
+        """Return the bench, in virtual time; a search calls this method once."""
         raise NotImplementedError(f"{type(self).__name__} makes no bench: write make_bench")
 
     def warm_up(self) -> None:
-        """Bring the bench into the state in which each run begins; called once."""
+        """Bring the bench into the state in which each run begins; called once per search."""
 
     def connect(self) -> None:
         """Connect the host at the beginning of each run; an exception raised here is a finding."""
@@ -208,20 +211,20 @@ class BenchMachine:
         """Check the result at the end of each run; call `calm` first if all faults should end."""
 
     def disconnect(self) -> None:
-        """Close what the host has open, after each run, whatever came of it."""
+        """Close the resources of the host after each run, whether or not the run has failed."""
 
     def calm(self) -> None:
-        """End all faults, and put all inputs back to what they were when the run began."""
+        """End all faults, and restore the values that all inputs had when the run began."""
         self.world.calm()
 
     @classmethod
     def rules(cls) -> dict[str, Mapping[str, object]]:
-        """Return the arguments of each rule, by its name."""
+        """Return the arguments of the rules, by name of the rule."""
         return {name: getattr(method, _RULE) for name, method in _marked(cls, _RULE)}
 
     @classmethod
     def invariants(cls) -> list[str]:
-        """Return the names of what must always be so."""
+        """Return the names of the invariants."""
         return [name for name, _ in _marked(cls, _INVARIANT)]
 
 

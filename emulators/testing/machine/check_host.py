@@ -1,4 +1,4 @@
-"""The search for what a host does wrong, and the replay of what was found."""
+"""The search for errors of a host, and the replay of an error."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ def check_host(
         machine: the bench, the host and its rules.
         max_examples: number of runs, if no error is found.
         max_steps: largest number of steps in a run.
-        seed: of the random choices. The same seed repeats the same search, independent of earlier
-            findings. With None each search is different, and begins with earlier findings.
+        seed: seed of the random choices. The same seed repeats the same search, independent of
+            earlier findings. With None each search is different, and begins with earlier findings.
 
     Raises:
         ModuleNotFoundError: Hypothesis is not installed.
@@ -90,15 +90,15 @@ def search_of(runs: HostRuns, *, max_examples: int, max_steps: int, seed: int | 
 
 
 def replay_host(machine: type[BenchMachine], scenario: Path | str) -> None:
-    """Repeat a failure that a search found; no random choices, and Hypothesis is not needed.
+    """Repeat a failure that a search found, without random choices and without Hypothesis.
 
     Args:
         machine: the bench, the host and its rules.
-        scenario: a file with the scenario, or its text of several lines.
+        scenario: path of a file with the scenario, or the scenario as a text of several lines.
 
     Raises:
         OSError: the file cannot be read.
-        ValueError: it is not a scenario of this machine; the message names the place.
+        ValueError: the text is not a scenario of this machine. The message names the place.
         Exception: the exception of the host, a rule or an invariant.
     """
     text, name = str(scenario), "scenario"
@@ -138,7 +138,7 @@ def note_of(runs: HostRuns, failure: HostFailure, *, repeats: bool = True) -> st
 
 
 def _place(machine: type) -> str:
-    """Return `FILE.py:Class`, the file as it is seen from here."""
+    """Return `FILE.py:Class` with the path of the file relative to the working directory."""
     import inspect  # noqa: PLC0415 - of failures alone
 
     try:

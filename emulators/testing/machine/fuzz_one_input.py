@@ -1,4 +1,4 @@
-"""Entry point for coverage-guided fuzzers: it takes bytes, and raises an exception for an error."""
+"""Entry point for coverage-guided fuzzers: a function of bytes that raises the errors it finds."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ def fuzz_one_input(
     Each call starts from the same snapshot.
 
     Args:
-        what: a `BenchMachine` or a device. For a `BenchMachine`, Hypothesis chooses its steps from
-            the bytes; its bench stays open. For a device, as in `DeviceFuzz`, the bytes are what it
-            receives.
+        what: a `BenchMachine` or a device. For a `BenchMachine`, Hypothesis chooses the steps from
+            the bytes, and the bench stays open. For a device, the bytes are decoded as in
+            `DeviceFuzz`.
         max_steps: largest number of steps in a run of the machine.
-        options: of `DeviceFuzz`.
+        options: options of `DeviceFuzz`.
 
     Returns:
-        The function. It raises the exception of the device, the host or the machine, with a note
-        that lists the steps. The note is also printed on standard error, because fuzzers do not
-        show notes.
+        The function for the fuzzer. The function raises the exception of the device, the host or
+        the machine, with a note that lists the steps. The note is also printed on standard error,
+        because fuzzers do not show notes.
 
     Raises:
         ModuleNotFoundError: `what` is a machine, and Hypothesis is not installed.
@@ -43,7 +43,7 @@ def fuzz_one_input(
 
 
 def printing_notes(one_input: Callable[[bytes], object]) -> Callable[[bytes], None]:
-    """Return the same, which also prints the notes of what it raises."""
+    """Return a function that also prints the notes of the exceptions that it raises."""
 
     def print_notes(data: bytes) -> None:
         try:
@@ -56,7 +56,7 @@ def printing_notes(one_input: Callable[[bytes], object]) -> Callable[[bytes], No
 
 
 class _OneInput:
-    """Runs of a machine, each by some bytes."""
+    """Function that runs a machine with steps from bytes."""
 
     def __init__(self, machine: type[BenchMachine], max_steps: int) -> None:
         self._runs = HostRuns(machine)

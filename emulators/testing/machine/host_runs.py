@@ -32,10 +32,10 @@ _WAIT: Final = "wait"
 _VERBS: Final = (_CALL, "set", "press", "fault", "send", _WAIT, SEED)
 
 _LONGEST: Final = 1_000_000
-"""Characters of a call."""
+"""Largest number of characters of a call."""
 
 _DIGITS: Final = 20
-"""Of a seed."""
+"""Largest number of digits of a seed."""
 
 _LINE: Final = re.compile(r"\+(\S+)\s+(\w+)(?:\s+(.*))?")
 
@@ -46,13 +46,14 @@ class HostStep:
 
     Attributes:
         wait_us: pause before the action.
-        verb: `call` of a rule, `set`, `press`, `fault`, `send`, `wait` for a pause only, or `seed`
-            of the random numbers of faults that begin after this step.
-        what: the rule, or the text that follows the verb in a scenario: `stick_v_pct 50`,
-            `drop=0.1`, `705#00`, or bytes in hex. With several wires the device is in front:
-            `drive/705#00`.
-        for_us: how long a button is pressed, or how long a fault stays.
-        arguments: of the rule.
+        verb: kind of the action: `call` calls a rule, `set`, `press`, `fault` and `send` act on the
+            bench, `wait` is only a pause, and `seed` sets the seed of faults that begin after this
+            step.
+        what: name of the rule, or the text that follows the verb in a scenario: `stick_v_pct 50`,
+            `drop=0.1`, `705#00`, or bytes in hex. If the bench has several wires, the name of the
+            device is in front: `drive/705#00`.
+        for_us: duration of the press of a button, or of a fault.
+        arguments: arguments of the rule.
     """
 
     wait_us: int
@@ -66,11 +67,11 @@ class HostStep:
         return f"<{self}>"
 
     def _repr_pretty_(self, printer: Any, cycle: bool) -> None:
-        """Write it in what Hypothesis prints."""
+        """Print the step in the output of Hypothesis."""
         printer.text(repr(self))
 
     def __str__(self) -> str:
-        """Write the line of a scenario.
+        """Return the line of a scenario.
 
         >>> print(HostStep(0, "fault", "drop=0.1", 300_000))
         +0us fault drop=0.1 for 300ms
@@ -83,7 +84,7 @@ class HostStep:
         return f"+{_time(self.wait_us)} {self.verb} {what}".rstrip() + lasting
 
     def do(self, bench: Bench) -> None:
-        """Wait, then execute the step on a bench; a `call` needs a machine instead.
+        """Wait, then execute the step on a bench; a `call` needs a machine instead of a bench.
 
         Args:
             bench: the bench.
@@ -119,12 +120,12 @@ def parse_steps(
     """Read the steps of a scenario.
 
     Args:
-        text: the whole file.
-        file: its name, for messages.
-        rules: of the machine; an argument may be any value that its rule lists.
+        text: content of the file.
+        file: name of the file, for messages.
+        rules: rules of the machine. An argument may be any value that its rule lists.
 
     Raises:
-        ValueError: `FILE:LINE: found text, what is allowed`.
+        ValueError: a line is invalid. The message is `FILE:LINE: found text, what is allowed`.
     """
     steps = []
     for number, content in content_lines(text):
@@ -171,7 +172,7 @@ def _parse_call(text: str, rules: Mapping[str, Mapping[str, object]]) -> tuple[s
 
 
 class _Floats(ast.NodeTransformer):
-    """Makes numbers of `inf` and `nan`, which are names to Python."""
+    """Replaces the names `inf` and `nan` by numbers."""
 
     def visit_Name(self, node: ast.Name) -> ast.expr:
         """Return the number."""
@@ -179,7 +180,7 @@ class _Floats(ast.NodeTransformer):
 
 
 def _value_of(node: ast.expr, listed: object) -> Any:
-    """Return a plain value, or the one of a list that is written like this."""
+    """Return a plain value, or the listed value that has the same text."""
     if isinstance(listed, list | tuple):
         text = ast.unparse(node)
         for value in listed:
@@ -200,9 +201,9 @@ def check_written(rule: str, name: str, value: object, listed: object = None) ->
 
     Args:
         rule: the rule with this argument.
-        name: of the argument.
+        name: name of the argument.
         value: the argument.
-        listed: the values that the rule lists; None if it lists none.
+        listed: values that the rule lists, or None if the rule lists no values.
     """
     try:
         node = ast.parse(_literal(value), mode="eval").body
@@ -237,7 +238,7 @@ _NO_FAILURES: Final = ("KeyboardInterrupt", "Skipped", "Exit", "UnsatisfiedAssum
 
 
 class HostHangsError(AssertionError):
-    """A host does not return: a call, or a whole run, takes longer than the machine allows."""
+    """A host does not return: a call or a whole run takes longer than the machine allows."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -246,7 +247,8 @@ class HostFailure:
 
     Attributes:
         error: the exception.
-        violated: what raised it, such as `invariant it_is_slow`, `rule drive`, `connect`, `end`.
+        violated: place that raised the exception, such as `invariant it_is_slow`, `rule drive`,
+            `connect`, `end`.
         at_us: time of the failure on the bench.
         steps: the steps before the failure.
         passed: the last traffic before the failure.
@@ -264,7 +266,7 @@ class HostFailure:
 
     @property
     def text(self) -> str:
-        """What is wrong, in a line."""
+        """The failure in one line."""
         said = str(self.error).partition("\n")[0]
         at = f"at {self.at_us / 1_000_000:.6f} s"
         return f"{self.violated}, {at}: {type(self.error).__name__}: {said}".rstrip(": ")
@@ -293,11 +295,11 @@ class HostRuns:
 
     Attributes:
         machine: the machine.
-        failure: the failure of the last run that failed; None if no run has failed.
+        failure: failure of the last failed run, or None if no run has failed.
 
     Raises:
-        ValueError: a fault or input of the machine is not on its bench.
-        NotOnThisBench: its bench is not in virtual time.
+        ValueError: a fault or input of the machine is not on the bench.
+        NotOnThisBench: the bench is not in virtual time.
     """
 
     def __init__(self, kind: type[BenchMachine]) -> None:
@@ -312,7 +314,7 @@ class HostRuns:
         self._invariants = kind.invariants()
 
     def __enter__(self) -> Self:
-        """Open the bench, warm it up, and keep what it is then."""
+        """Open the bench, warm it up, and take a snapshot."""
         try:
             self._open()
         except BaseException:
@@ -336,7 +338,7 @@ class HostRuns:
         self._snapshot = bench.snapshot(machine)
 
     def _time(self) -> AbstractContextManager[object]:
-        """Return the patches for hosts; they take 0.1 ms, and only one user may hold them."""
+        """Return the patches for hosts; an install takes 0.1 ms, and only one user may do it."""
         return self.machine.bench.patched_time() if self.machine.patched else nullcontext()
 
     def __exit__(self, *exception: object) -> None:
@@ -348,7 +350,7 @@ class HostRuns:
 
         Raises:
             HostHangsError: the host waits without end.
-            Exception: the exception of the machine, or of the host in it.
+            Exception: the exception of the machine or of the host.
         """
         # All runs begin at one snapshot with the same objects, so hosts that hold a device need no
         # update.
@@ -381,7 +383,7 @@ class HostRuns:
         """Remove the steps that are not needed for a run to fail in the same way.
 
         Returns:
-            A failure without unnecessary steps; None if the run does not fail again.
+            The failure without unnecessary steps, or None if the run does not fail again.
         """
         failed = self._again(failure, failure.steps)
         shorter = failed
@@ -398,7 +400,7 @@ class HostRuns:
         return failed
 
     def _again(self, failure: HostFailure, steps: Sequence[HostStep]) -> HostFailure | None:
-        """Return the failure of a run that fails in the same way, None if it does not."""
+        """Return the failure of a run that fails in the same way, or None."""
         before = self.failure
         try:
             self.run(steps)
@@ -490,12 +492,12 @@ class HostRuns:
                 raise
 
     def last_lines(self) -> str:
-        """Return what passed last, and what was done."""
+        """Return the last traffic and actions."""
         return "\n".join(self.machine.bench.transcript().splitlines()[-_LAST_LINES:])
 
 
 def _shorter(steps: Sequence[HostStep]) -> Iterator[list[HostStep]]:
-    """Yield shorter runs, each without one of the steps; first also without its waiting time."""
+    """Yield shorter runs, each without one step: first without its wait, then with its wait."""
     for at, step in enumerate(steps):
         before, after = list(steps[:at]), list(steps[at + 1 :])
         yield before + after

@@ -1,4 +1,4 @@
-"""Hypothesis strategies of what may happen to devices and hosts."""
+"""Hypothesis strategies for events at devices and hosts."""
 
 from __future__ import annotations
 
@@ -54,34 +54,35 @@ def timing() -> st.SearchStrategy[int]:
 def faults(
     bench: Bench, names: Sequence[str] | None = None, for_: Sequence[str] = ("100ms", "1s")
 ) -> st.SearchStrategy[HostStep]:
-    """Draw temporary faults; `step.do(bench)` starts one.
+    """Draw temporary faults; `step.do(bench)` starts the fault.
 
     Args:
         bench: the bench with the faults.
-        names: of faults of this bench; by default all.
-        for_: duration of the faults.
+        names: names of the faults. By default all faults of the bench are drawn.
+        for_: possible durations of a fault.
 
     Raises:
-        ValueError: unknown fault.
+        ValueError: a fault is unknown.
     """
     return _faults(World(bench, names, ()), for_)
 
 
 def operator(bench: Bench, names: Sequence[str] | None = None) -> st.SearchStrategy[HostStep]:
-    """Draw manual actions: pressed buttons, changed levels; `step.do(bench)` executes one.
+    """Draw manual actions: pressed buttons, changed levels. `step.do(bench)` executes the action.
 
     Args:
         bench: the bench with the inputs.
-        names: of inputs and buttons of this bench; by default all except the objects of nodes.
+        names: names of inputs and buttons. By default all of the bench are drawn, except the
+            objects of nodes.
 
     Raises:
-        ValueError: unknown input.
+        ValueError: an input is unknown.
     """
     return _operator(World(bench, (), names))
 
 
 def traffic(words: Sequence[str]) -> st.SearchStrategy[HostStep]:
-    """Draw what other participants send; `step.do(bench)` sends it.
+    """Draw traffic of other participants; `step.do(bench)` sends the traffic.
 
     Args:
         words: frames in candump's notation, or bytes in hex, as in `HostStep.what`.
@@ -122,7 +123,7 @@ def _calls(rules: Mapping[str, Mapping[str, object]]) -> st.SearchStrategy[HostS
     """Draw calls of rules.
 
     Args:
-        rules: the arguments of each, by its name.
+        rules: arguments of the rules, by name of the rule.
     """
     drawn = {
         name: st.fixed_dictionaries({each: _strategy(what) for each, what in given.items()})
@@ -192,7 +193,7 @@ def _strategy(what: object) -> st.SearchStrategy[Any]:
 
 
 def _values(item: WorldInput) -> st.SearchStrategy[float]:
-    """Draw integers in the range of a level, more often its limits and 0.
+    """Draw integers in the range of a level; the limits and 0 are more frequent.
 
     If the range contains no integer, only its limits are drawn.
     """

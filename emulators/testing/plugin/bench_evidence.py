@@ -1,4 +1,4 @@
-"""What a report shows of the bench of a test, taken before the bench is closed."""
+"""Data of a test's bench for a report, taken before the bench is closed."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from tickrig.host.text.trace import Mark
 # Keep what signals of a device were while a test ran.
 
 _MOST: Final = 4_000
-"""Number of samples kept of a signal; if there are more, all spikes are kept, but not all
+"""Number of samples kept of a signal. If there are more samples, all spikes are kept, but not all
 samples."""
 
 
@@ -31,9 +31,9 @@ class SignalSampler:
 
     Args:
         device: the device with the signals.
-        names: of inputs and outputs; ValueError if a name is unknown.
-        prefix: before each name in the series, such as `left_drive/`.
-        most: number of samples kept per signal, at least 4.
+        names: names of inputs and outputs. An unknown name raises ValueError.
+        prefix: text before each name in the series, such as `left_drive/`.
+        most: number of samples kept of each signal, at least 4.
     """
 
     def __init__(
@@ -49,7 +49,7 @@ class SignalSampler:
         """Read the signals: after each step (`Rig.watchers`), and once at the end.
 
         Args:
-            now_us: the time, not earlier than in the last call.
+            now_us: time, which is not earlier than in the last call.
         """
         for name, points in self._points.items():
             value = read_signal(self._device, name)
@@ -85,7 +85,7 @@ class SignalSampler:
 
 @dataclass(slots=True)
 class _Effect:
-    """A fault that occurred: its names, its rate, its beginning and end."""
+    """A fault that occurred, with its names, its rate, its beginning and its end."""
 
     names: tuple[str, str]
     rate: str
@@ -111,7 +111,7 @@ class _OrderedFaults:
         self._mode.hear(self._hear)
 
     def faults(self) -> tuple[bench_report.PlannedFault, ...]:
-        """Return what was ordered and what came, in the order in which that began."""
+        """Return the requested faults and the faults that occurred, in order of their start."""
         left, outcomes = list(self._effects), list[bench_report.PlannedFault]()
         for order in reversed(self._mode.orders):  # of two for one time the last one holds
             outcomes.insert(0, self._outcome_of(order, self._take(order, left)))
@@ -135,7 +135,7 @@ class _OrderedFaults:
             self._effects.append(effect)
 
     def _take(self, order: FaultOrder, left: list[_Effect]) -> _Effect | None:
-        """Remove and return the effect of a request; None if the fault has not occurred."""
+        """Remove and return the effect of a request, or None if the fault has not occurred."""
         for effect in left:
             if order.spec.name in effect.names and self._is_due(order, effect.from_us):
                 left.remove(effect)
@@ -149,7 +149,7 @@ class _OrderedFaults:
 
     @property
     def _by_hand(self) -> bool:
-        """Whether an operator makes faults, who is never there to the microsecond."""
+        """Whether an operator makes faults, whose times are not exact."""
         return self._mode.name == HARDWARE
 
     def _outcome_of(self, order: FaultOrder, effect: _Effect | None) -> bench_report.PlannedFault:
@@ -174,20 +174,20 @@ def _begun_us(fault: bench_report.PlannedFault) -> int:
 
 _JOURNAL_LINES: Final = 1_000
 _SAMPLES: Final = 1_000
-"""Of each signal."""
+"""Largest number of samples of each signal."""
 
 
 class BenchEvidence(NamedTuple):
-    """What a report shows of a bench.
+    """Data of a bench for a report.
 
     Attributes:
-        mode: of the bench.
+        mode: mode of the bench.
         now_us: time at which the bench was closed.
         journal: the last events.
         left_out: number of earlier lines.
         faults: requested faults, and faults that occurred.
         series: signals that changed.
-        trace: of the bench, for `tickrig replay`; empty if nothing was recorded.
+        trace: trace of the bench, for `tickrig replay`, or empty if nothing was recorded.
     """
 
     mode: str
@@ -214,7 +214,7 @@ class BenchWitness:
             bench._mode.act(self._begin)
 
     def evidence(self) -> BenchEvidence:
-        """Return what a report shows."""
+        """Return the data for a report."""
         mode = self._bench._mode
         lines = mode.journal()
         shown = list(decoded(self._bench))[-_JOURNAL_LINES:]

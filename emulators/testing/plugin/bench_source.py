@@ -1,4 +1,4 @@
-"""What a test says is on its bench, and the bench that is made of it."""
+"""Description of the bench in a test, and the bench that is made from the description."""
 
 from __future__ import annotations
 
@@ -38,17 +38,16 @@ from tickrig.host.text.values import Setting
 
 _Source = BenchedDevice | Mapping[str, Any] | Path
 BenchSource = _Source | Callable[[], _Source] | None
-"""A device or what makes one, arguments of `Bench` by name, or a rig file (`.toml`, `.yml`).
-
-A device may be a text too: what a rig file has as its `type`."""
+"""A device or a factory of a device, arguments of `Bench` by name, or a rig file (`.toml`, `.yml`).
+A device may also be a text, as the `type` in a rig file."""
 
 _NO_DEVICES: Final = ("seed", "line", "mode")
-"""Arguments of `Bench` that are something else."""
+"""Arguments of `Bench` that are not devices."""
 
 _NO_DEVICE: Final = (str, int, Path, type, DeviceType, LineSettings, FunctionType, type(None))
 
 _USED: Final = pytest.StashKey[list[object]]()
-"""The devices of the test before."""
+"""The devices of the previous test."""
 
 
 def _fresh(item: pytest.Item, source: BenchSource) -> BenchSource:
@@ -77,8 +76,8 @@ class WantedBench(NamedTuple):
     Attributes:
         source: the devices on the bench.
         mode: `virtual`, `real` or `hardware`.
-        seed: of all random numbers; None for the seed of the source.
-        folder: base of relative paths.
+        seed: seed of all random numbers, or None to use the seed of the source.
+        folder: folder that relative paths start from.
     """
 
     source: BenchSource
@@ -87,7 +86,7 @@ class WantedBench(NamedTuple):
     folder: Path
 
     def settled(self, item: pytest.Item) -> WantedBench:
-        """Return the request with the devices of this test: made, and with complete paths.
+        """Return the request with the devices of this test, made and with complete paths.
 
         Raises:
             ValueError: there is no device, or another test has used the devices.
@@ -106,7 +105,7 @@ class WantedBench(NamedTuple):
 
         Raises:
             ValueError: the configuration is not valid.
-            NotOnThisBench: not in this mode.
+            NotOnThisBench: the bench is not possible in this mode.
             BenchBlocked: a port is missing, or the user refused.
             OSError: a file cannot be read.
         """
@@ -120,7 +119,7 @@ class WantedBench(NamedTuple):
 
     @property
     def seed_used(self) -> int:
-        """The seed of all chance."""
+        """The seed of all random numbers."""
         if self.seed is not None:
             return self.seed
         if isinstance(self.source, Path):
@@ -132,12 +131,12 @@ class WantedBench(NamedTuple):
 
     @property
     def safe(self) -> Mapping[str, Mapping[str, Setting]]:
-        """What the rig file says of outputs when a test is over, by device and name."""
+        """Values that the rig file requires of outputs after a test, by device and name."""
         return plan_of(self.source).safe if isinstance(self.source, Path) else {}
 
     @property
     def text(self) -> str:
-        """What is on the bench, for people."""
+        """Description of the bench as text."""
         if isinstance(self.source, Path):
             return relpath(self.source)
         names = [name for name in self._options if name not in _NO_DEVICES]
@@ -177,11 +176,11 @@ def _placed_device(device: Any, folder: Path) -> Any:
 
 
 def plan_of(path: Path) -> RigPlan:
-    """Return the plan of a rig file; it is read again only after a change.
+    """Return the plan of a rig file; the file is read again only after a change.
 
     Raises:
-        OSError: it cannot be read.
-        ValueError: all errors in the file, one per line.
+        OSError: the file cannot be read.
+        ValueError: the file has errors. The message has all errors, one per line.
     """
     return _plan_of(path, path.stat().st_mtime_ns)
 
@@ -198,11 +197,11 @@ HAND: Final = "hand"
 _OR: Final = " or "
 _MEANT: Final = "did you mean"
 _DIGIT: Final = re.compile("[0-9]")
-"""Names that differ in a number alone, as `arm1` and `arm2`, are of different things."""
+"""Digits of a name; names that differ only in a digit (`arm1`, `arm2`) are not misspelt."""
 
 
 def _words_of(item: pytest.Item, marker: str) -> tuple[str, ...]:
-    """Return the words of all markers of a name, in the order of writing."""
+    """Return the words of all markers of a name, in the order in which the test has them."""
     marks = list(item.iter_markers(marker))[::-1]
     return tuple(str(word) for mark in marks for word in mark.args)
 
@@ -211,7 +210,7 @@ def allowed_of(item: pytest.Item) -> tuple[str, ...]:
     """Return the names in all markers `allows` of a test.
 
     Raises:
-        ValueError: an unknown name.
+        ValueError: a name is unknown.
     """
     allowed = _words_of(item, "allows")
     for word in allowed:
@@ -221,10 +220,10 @@ def allowed_of(item: pytest.Item) -> tuple[str, ...]:
 
 
 def needs_of(item: pytest.Item) -> tuple[str, ...]:
-    """Return the names in all markers `needs` of a test, in the order of writing.
+    """Return the names in all markers `needs` of a test, in the order in which the test has them.
 
     Raises:
-        ValueError: an unknown name.
+        ValueError: a name is unknown.
     """
     needs = _words_of(item, "needs")
     for choice in (choice for need in needs for choice in need.split(_OR)):
@@ -236,7 +235,7 @@ def needs_of(item: pytest.Item) -> tuple[str, ...]:
 
 
 def check_mode(needs: Iterable[str], mode: str) -> None:
-    """Raise NotOnThisBench if a test needs another kind of bench, before this one is opened."""
+    """Raise NotOnThisBench if a test needs another mode, before the bench is opened."""
     for need in needs:
         choices = need.split(_OR)
         if mode not in choices and all(choice in MODES for choice in choices):
@@ -259,7 +258,7 @@ def check_needs(needs: Iterable[str], bench: Bench) -> None:
 
 
 def _lack(choice: str, bench: Bench) -> str:
-    """Return what a bench lacks of the needed properties; empty if it has all."""
+    """Return the needed properties that a bench lacks, or "" if the bench has all of them."""
     if choice in MODES:
         return "" if choice == bench.mode else f"this bench is {bench.mode}"
     if choice == HAND:
@@ -276,14 +275,14 @@ def _lack(choice: str, bench: Bench) -> str:
 
 
 def _is_elsewhere(choice: str) -> bool:
-    """Return whether a device of another type than those of the bench has what is needed."""
+    """Return whether a device type that is not on the bench has the needed property."""
     kind, _, name = choice.partition(":")
     return name in _names_anywhere().get(kind, ())
 
 
 @cache
 def _names_anywhere() -> dict[str, set[str]]:
-    """Return the names of what device types and models have, which are made once for it."""
+    """Return the names of all properties of device types and models, each of which is made once."""
     names: dict[str, set[str]] = {"fault": set(), "input": set(), "output": set()}
     for each in (*DEVICES.names(), *MODELS):
         kind, place = kind_of(each, Path())
@@ -302,13 +301,13 @@ KINDS: Final[Mapping[str, Callable[[Bench], Iterable[str]]]] = {
     "output": lambda bench: bench.describe().outputs,
     "device": lambda bench: bench.devices,
 }
-"""The names for `needs`, each with a function that returns whether a bench has it."""
+"""The kinds of names for `needs`, each with a function that returns the names of a bench."""
 
 
 # Benches that have done something before the test: once for each test, then out of a snapshot.
 
 WarmUp = Callable[[Bench], Coroutine[Any, Any, None] | None] | None
-"""Prepares a bench before the test; None if there is no preparation."""
+"""Function that prepares a bench before the test (the bench runs a returned coroutine), or None."""
 
 
 class _BenchSnapshot(NamedTuple):
@@ -316,7 +315,7 @@ class _BenchSnapshot(NamedTuple):
 
     Attributes:
         digest: hash of the bench before its warm-up, without its seed.
-        bench: the bench; tests use only twins of it.
+        bench: the bench. Tests use only copies of this bench.
     """
 
     digest: bytes
@@ -324,11 +323,11 @@ class _BenchSnapshot(NamedTuple):
 
 
 SNAPSHOTS: Final = pytest.StashKey[dict[str, _BenchSnapshot]]()
-"""Snapshots by node ID, in runs that repeat tests; missing if each test runs once."""
+"""Snapshots by node ID, in runs that repeat tests; the key is missing if each test runs once."""
 
 
 def warmed(item: pytest.Item, bench: Bench, warm_up: WarmUp) -> Bench:
-    """Return the bench for a test, after the warm-up; in virtual time it is a twin of that bench.
+    """Return the bench for a test after the warm-up; in virtual time a twin replaces the bench.
 
     Hosts, triggers and tasks of the warm-up are removed.
 
@@ -367,7 +366,7 @@ def warmed(item: pytest.Item, bench: Bench, warm_up: WarmUp) -> Bench:
 
 
 def _do(warm_up: Callable[[Bench], Coroutine[Any, Any, None] | None], bench: Bench) -> None:
-    """Warm a bench up; if that fails, close it."""
+    """Warm a bench up; close the bench if the warm-up fails."""
     try:
         if iscoroutine(body := warm_up(bench)):
             bench.run(body)
@@ -381,7 +380,7 @@ def _state(rig: BenchRig) -> RigState:
 
 
 def _digest(state: RigState) -> bytes:
-    """Return the hash of a bench with all seeds of its wires left out; empty if it has none.
+    """Return the hash of a bench without the seeds of its wires, or "" if there is no hash.
 
     Raises:
         TypeError: an object in the bench cannot be copied.
@@ -398,7 +397,7 @@ def _digest(state: RigState) -> bytes:
 
 
 def _with_chance_of(fresh: RigState, bench: Bench) -> Bench:
-    """Return a twin whose wires draw as those of a fresh bench do."""
+    """Return a twin whose wires draw the same random numbers as the wires of a fresh bench."""
     state = bench._mode.act(_state)
     for chance, other in zip(state.chances, fresh.chances, strict=True):
         chance.seed = other.seed

@@ -1,4 +1,4 @@
-"""A test with its bench, which is opened before the test, checked after it, and always closed."""
+"""A test with its bench, which is opened before, checked after the test, and always closed."""
 
 from __future__ import annotations
 
@@ -71,16 +71,16 @@ else:
 
 
 class _BenchedTest(TestWithBench):
-    """A test, and its bench.
+    """A test and its bench.
 
     Args:
         item: the test.
         wanted: the requested bench.
         safe: the safe values of outputs at the end of the test.
-        warm_up: prepares the bench before the test.
+        warm_up: function that prepares the bench before the test.
 
     Attributes:
-        fingerprint: what happens on the bench, if two runs are compared.
+        fingerprint: events on the bench, if two runs are compared.
     """
 
     def __init__(
@@ -105,7 +105,7 @@ class _BenchedTest(TestWithBench):
         """Open the bench.
 
         Raises:
-            NotOnThisBench: it lacks what the test needs.
+            NotOnThisBench: the bench lacks something that the test needs.
             ValueError: the test needs something unknown.
         """
         needs, self._allowed = bench_source.needs_of(self.item), bench_source.allowed_of(self.item)
@@ -135,7 +135,7 @@ class _BenchedTest(TestWithBench):
         self._is_misused = True
 
     def close(self) -> None:
-        """Release all resources; a passed test fails if an error has occurred since."""
+        """Release all resources; a passed test fails if an error has occurred afterwards."""
         since = self.take_unheard() if self._passed else []
         with self._stack:
             if self.bench is not None:
@@ -144,7 +144,7 @@ class _BenchedTest(TestWithBench):
             pytest.fail("\n".join(since), pytrace=False)
 
     def _close(self, bench: Bench) -> None:
-        """Keep files of a passed test too, if configured; close the bench."""
+        """Keep files of a passed test, too, if configured, and close the bench."""
         try:
             if self.fingerprint is not None:
                 self.fingerprint.end()
@@ -156,7 +156,7 @@ class _BenchedTest(TestWithBench):
             bench.close()
 
     def _keep(self) -> None:
-        """Keep what is to be kept, once."""
+        """Keep the configured files, once."""
         folder = self._settings.artifacts
         if folder and self.bench and not (self.kept or self.not_kept):
             self.kept, self.not_kept = keep(self.bench, folder, str(self.item.nodeid))
@@ -169,7 +169,7 @@ class _BenchedTest(TestWithBench):
 
     @contextmanager
     def judged(self) -> Iterator[None]:
-        """Fail the test if it looks at a wrong clock, or leaves its bench as none may be."""
+        """Fail the test if it uses a wrong clock, or leaves its bench in a bad state."""
         assert self.bench is not None
         over = False
         try:
@@ -183,7 +183,7 @@ class _BenchedTest(TestWithBench):
         self._check(self.bench)
 
     def _check(self, bench: Bench) -> None:
-        """Fail a test that has passed so far."""
+        """Check the bench of a test that has passed; fail the test if there is a problem."""
         bench.check_tasks()
         if unheard := self.take_unheard():
             fail = MisusedError if self._is_misused else pytest.fail.Exception
@@ -204,7 +204,7 @@ class _BenchedTest(TestWithBench):
     def judge(
         self, report: pytest.TestReport, call: pytest.CallInfo[None], *, mistaken: bool
     ) -> None:
-        """Report what blocked a phase of the test, and add the evidence to a failure.
+        """Report the reason if a phase of the test is blocked, and add the evidence to a failure.
 
         Args:
             report: report of the phase.
@@ -235,7 +235,7 @@ def benched(
     safe: SafeState,
     warm_up: WarmUp = None,
 ) -> Iterator[Bench]:
-    """Yield a test its bench."""
+    """Yield the bench of a test."""
     settings = request.config.stash[SETTINGS]
     if settings.rig_file and (settings.ordered or source is None):
         source = settings.rig_file
@@ -258,7 +258,7 @@ def clocked(bench: Bench) -> Iterator[Any]:
 
 
 def _offer(bench: Bench) -> None:
-    """Let hosts that open a port or a bus by themselves find the wires under their names."""
+    """Offer the wires under their names to hosts that open a port or a bus themselves."""
     mode = bench._mode
     for wire, library in mode.act(_libraries) if bench.mode == VIRTUAL else ():
         if library in sys.modules:
@@ -266,7 +266,7 @@ def _offer(bench: Bench) -> None:
 
 
 def _libraries(rig: BenchRig) -> list[tuple[str, str]]:
-    """Return by what hosts open each wire."""
+    """Return the libraries by which hosts open each wire."""
     mounts = rig.state.mounts.values()
     return [(one.name, "serial" if isinstance(one, LineMount) else "can") for one in mounts]
 

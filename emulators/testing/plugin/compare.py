@@ -46,16 +46,16 @@ class Fingerprint:
         self._look(rig.rig.now_us)
 
     def end(self) -> None:
-        """Take down when it all ended."""
+        """Record the time of the end."""
         self._take(self._rig.rig.now_us, "(the end)")
 
     @property
     def digest(self) -> str:
-        """The hash of all that was taken down."""
+        """The hash of all recorded events."""
         return sha256("\n".join(self.lines).encode()).hexdigest()
 
     def difference(self, other: Fingerprint) -> str:
-        """Return the first line that differs from another run; empty if all are equal."""
+        """Return the first line that differs from another run, or "" if all lines are equal."""
         pairs = zip_longest(self.lines, other.lines, fillvalue="nothing")
         for number, (first, second) in enumerate(pairs, 1):
             if first != second:
@@ -80,13 +80,13 @@ class Fingerprint:
 
 
 _HASH: Final = "bench_hash"
-"""The property of a test that has the hash of all that happened on its bench."""
+"""Name of the property of a test that has the hash of the events on its bench."""
 
 FINGERPRINT: Final[pytest.StashKey[Fingerprint | None]] = pytest.StashKey()
 """The events of the latest run of a test with a bench."""
 
 _FIRST: Final[pytest.StashKey[Fingerprint]] = pytest.StashKey()
-"""Of the first run, while a test runs for the second time."""
+"""The events of the first run, while a test runs for the second time."""
 
 _CALL: Final = pytest.StashKey[pytest.TestReport]()
 
@@ -113,7 +113,7 @@ class Compare:
     def pytest_runtest_protocol(
         self, item: pytest.Item, nextitem: pytest.Item | None
     ) -> bool | None:
-        """Run a test twice, unless the first run says enough."""
+        """Run a test twice, unless the first run has failed."""
         if "bench" not in getattr(item, "fixturenames", ()):
             return None
         item.ihook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
@@ -135,14 +135,14 @@ class Compare:
         return report
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """Note the hash of a test, of whatever process."""
+        """Record the hash of a test, which another process may have run."""
         if report.when == "call":
             properties = dict(report.user_properties)
             if _HASH in properties:
                 self._hashes[str(report.nodeid)] = str(properties[_HASH])
 
     def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
-        """Report how many tests were compared, and the hash of all."""
+        """Report how many tests were compared, and the hash of all tests."""
         lines = [f"{nodeid} {digest}\n" for nodeid, digest in sorted(self._hashes.items())]
         digest = sha256("".join(lines).encode()).hexdigest()
         same = "1 test was" if len(lines) == 1 else f"{len(lines)} tests were"
@@ -167,7 +167,7 @@ def _run(item: pytest.Item, nextitem: pytest.Item | pytest.Collector | None) -> 
 
 
 def _end(item: pytest.Item, nextitem: pytest.Item | None) -> _Reports:
-    """Return back what a test shared with others, which there are none of."""
+    """Tear down the fixtures that a test shares with other tests; return the reports of errors."""
     end = partial(item.session._setupstate.teardown_exact, nextitem)
     call = pytest.CallInfo.from_call(end, when="teardown")
     if call.excinfo is None:

@@ -28,11 +28,11 @@ from tickrig.wire.can import LogLine
 
 _TRACE: Final = ".trace"
 _MOST: Final = 80
-"""Characters of a name that are of the test."""
+"""Largest number of characters of a file name that come from the name of the test."""
 
 
 def stem_of(nodeid: str) -> str:
-    """Return the base name of the files of a test: without a path, and unique to the test.
+    """Return the base name of the files of a test, which has no path and is unique to the test.
 
     >>> stem_of("tests/test_stop.py::test_it_stops[../fast]")
     'tests_test_stop.py_test_it_stops_fast-24cfca'
@@ -45,12 +45,12 @@ def keep(bench: Bench, folder: Path, nodeid: str) -> tuple[list[Path], list[str]
     """Write the files of a test.
 
     Args:
-        bench: its bench, still open.
+        bench: bench of the test, which is still open.
         folder: folder of the files; it is created.
-        nodeid: of the test.
+        nodeid: node ID of the test.
 
     Returns:
-        The files, and the reasons for missing or incomplete files, one per line.
+        The written files, and the reasons for missing or incomplete files, one per line.
     """
     kept: list[Path] = []
     failed: list[str] = []
@@ -101,7 +101,7 @@ _WRITERS: Final[dict[str, Callable[[Bench, Path], bool]]] = {
     ".log": _candump,
     ".txt": _transcript,
 }
-"""Writers by suffix; each returns whether it has written a file."""
+"""Writers by suffix; each writer returns whether it has written a file."""
 
 
 # How a test ended, and why, of the reports of its phases.
@@ -112,7 +112,7 @@ def outcome_of(item: pytest.Item, reports: Sequence[pytest.TestReport]) -> tuple
 
     Args:
         item: the test.
-        reports: of all its phases.
+        reports: reports of all phases of the test.
     """
     test = item.stash.get(BENCHED, None)
     for report in reports:

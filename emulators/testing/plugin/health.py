@@ -39,7 +39,7 @@ class Health:
     before. A line on which no host has sent anything may overflow, because no host reads the line.
 
     Args:
-        bench: the bench; for real devices only error frames are known.
+        bench: bench of the test. For real devices only error frames are known.
     """
 
     def __init__(self, bench: Bench) -> None:
@@ -53,7 +53,7 @@ class Health:
             self._mode.act(self._begin)
 
     def complaints(self, allowed: Container[str] = ()) -> tuple[str, ...]:
-        """Return the problems, one per line; empty if there are none.
+        """Return the problems, one per line, or "" if there are no problems.
 
         Args:
             allowed: permitted problems: `ERRORS`, `LOST`.
@@ -93,7 +93,7 @@ class Health:
         return "frame" if wire in self._buses else "byte"
 
     def _pass(self, wire: str, at_us: int, mark: Mark, data: bytes) -> None:
-        """Note that a host spoke."""
+        """Record that a host has sent data."""
         if mark is Mark.TO_DEVICE:
             self._spoken |= {wire}
 
@@ -104,7 +104,7 @@ class Health:
             self._on_bus(line)
 
     def _done(self, line: WireLine) -> None:
-        """Note that a fault came."""
+        """Record that a fault has occurred."""
         name = line.data.decode().partition("=")[0]
         names = {name, f"{line.source}/{name}"}
         if line.source in self._wires and names & self._wire_faults:
@@ -113,7 +113,7 @@ class Health:
             self._faulty = self._wires
 
     def _on_bus(self, line: WireLine) -> None:
-        """Note the first error frame of a bus on which no fault was."""
+        """Record the first error frame of a bus on which no fault has occurred."""
         if line.source in self._faulty or line.data[:1] not in b"23" or len(line.data) != 25:
             return
         try:
@@ -133,7 +133,7 @@ def _without_value(rig: BenchRig) -> list[str]:
 
 
 def _broken_off(rig: BenchRig) -> list[str]:
-    """Return why the trace of a bench is not whole."""
+    """Return why the trace of a bench is incomplete."""
     recorder = rig.state.recorder
     return [f"the trace: {recorder.error}"] if recorder and recorder.error else []
 
@@ -141,17 +141,17 @@ def _broken_off(rig: BenchRig) -> list[str]:
 # What outputs are when a test is over.
 
 SafeState = Mapping[str, Setting] | Callable[[Bench], object] | None
-"""Values of outputs by name, or a check that returns False or a text with the unsafe state."""
+"""Values of outputs by name, or a function that returns False or a text if the state is unsafe."""
 
 
 def with_plan(
     safe: SafeState, plan: Mapping[str, Mapping[str, Setting]], bench: Bench
 ) -> SafeState:
-    """Return the safe values of rig file and fixture; those of the fixture have priority.
+    """Return the safe values of rig file and fixture; values of the fixture have priority.
 
     Args:
-        safe: from the fixture.
-        plan: from the rig file, by device and output.
+        safe: safe values of the fixture.
+        plan: safe values of the rig file, by device and output.
         bench: the bench.
     """
     alone = len(bench.devices) == 1
@@ -175,7 +175,7 @@ def with_plan(
 
 
 def _short(name: str, bench: Bench) -> str:
-    """Return a name without the device that is alone on its bench."""
+    """Return a name without the name of the device, if the bench has only one device."""
     return name.removeprefix(f"{bench.devices[0]}/") if len(bench.devices) == 1 else name
 
 
@@ -186,7 +186,7 @@ def check_safe(bench: Bench, safe: SafeState) -> None:
 
 
 def unsafe(bench: Bench, safe: SafeState) -> list[str]:
-    """Return what is not as it has to be when a test is over, each in a line."""
+    """Return the outputs that are not safe after a test, one per line."""
     if safe is None:
         return []
     if isinstance(safe, Mapping):
@@ -209,13 +209,13 @@ THREADS: Final = "threads"
 
 @contextmanager
 def dead_threads(note: Callable[[str], None]) -> Iterator[None]:
-    """Record threads that start and die during the test: name, place and error.
+    """Record the name, place and error of threads that start and die during the test.
 
     For threads that started before the test, only pytest's warning appears, which covers all
     threads. A thread that ends by `sys.exit()` counts as dead only if it passes an error.
 
     Args:
-        note: called with a line, in the thread that dies.
+        note: function that is called with a line, in the thread that dies.
     """
     others, before = set(threading.enumerate()), threading.excepthook
 
@@ -246,7 +246,7 @@ def _module(died: threading.ExceptHookArgs) -> str:
 
 
 def _place(died: threading.ExceptHookArgs) -> str:
-    """Return where it was in the code of the host, or at all."""
+    """Return the place of an error in the code of the host, or else in any code."""
     places = [(frame, line) for frame, line in walk_tb(died.exc_traceback)]
     own = [
         (frame, line)
@@ -260,7 +260,7 @@ def _place(died: threading.ExceptHookArgs) -> str:
 # Coroutines that a test makes and forgets: what stands in them never happens.
 
 _WARNING: Final = r"coroutine '.*' was never awaited"
-"""How Python warns of it, when such a coroutine is thrown away."""
+"""Warning of Python about a coroutine that is discarded without being awaited."""
 
 _TOLD: Final = re.compile(r"coroutine '(.*)' was never awaited(?s:.*)  File \"(.*)\", line (\d+)")
 
@@ -270,7 +270,7 @@ def never_awaited(note: Callable[[str], None]) -> Iterator[None]:
     """Record coroutines that are discarded without being awaited, regardless of warning filters.
 
     Args:
-        note: called with a line for each coroutine.
+        note: function that is called with a line for each coroutine.
     """
     depth = sys.get_coroutine_origin_tracking_depth()
     with warnings.catch_warnings():
@@ -303,7 +303,7 @@ def guard(
     """Return a guard that fails a test in virtual time if it uses the clock of the machine.
 
     Args:
-        mode: of its bench.
+        mode: mode of the bench.
         allowed: names that the markers of the test allow.
         others: threads that ran before the bench was opened.
     """

@@ -39,7 +39,7 @@ def names_of(part: HasSignals) -> list[str]:
 
 
 def signals_of(rig: BenchRig) -> dict[str, Callable[[], Setting]]:
-    """Return what reads each signal, by its full name."""
+    """Return the functions that read the signals, by full name of the signal."""
     assembly = rig.state.assembly
     return {
         assembly.full_name(device, name): partial(read_signal, part, name)
@@ -49,14 +49,14 @@ def signals_of(rig: BenchRig) -> dict[str, Callable[[], Setting]]:
 
 
 def fault_names(bench: Bench) -> tuple[set[str], set[str]]:
-    """Return the names of the faults of all wires, and of those of all devices."""
+    """Return the names of the faults of all wires, and of the faults of all devices."""
     described = bench.describe()
     physical = {name for name in described.faults if name in described.inputs}
     return described.faults.keys() - physical, physical
 
 
 def buses_of(bench: Bench) -> tuple[str, ...]:
-    """Return the names of its CAN buses."""
+    """Return the names of the CAN buses of a bench."""
     mode = bench._mode
     try:
         mounts = mode.act(lambda rig: rig.state.mounts)
@@ -81,7 +81,7 @@ def decoded(bench: Bench) -> Iterator[tuple[WireLine, str]]:
 
 
 def last_lines(bench: Bench, count: int) -> str:
-    """Return the last events on a bench: time, place, direction, text.
+    """Return the last events on a bench, each with time, place, direction and text.
 
     Incomplete lines are at the end.
     """
@@ -94,7 +94,7 @@ def last_lines(bench: Bench, count: int) -> str:
 
 
 def frame_of(line: WireLine) -> CanFrame | ErrorFrame | None:
-    """Return the frame in a line of a CAN bus; None for a fault and its effect on a frame."""
+    """Return the frame in a line of a CAN bus, or None for a fault and its effect on a frame."""
     if line.mark in {Mark.PHYSICAL, Mark.WIRE}:
         return None
     text = line.data.decode()

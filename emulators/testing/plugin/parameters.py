@@ -12,7 +12,7 @@ from tickrig.host.text.values import parse_setting
 
 
 class ParameterPlugin:
-    """Gives tests the values of `--bench-param`; they replace the fixture with this name.
+    """Gives tests the values of `--bench-param`, which replace the fixture with the same name.
 
     Args:
         config: the configuration of pytest.
@@ -28,7 +28,7 @@ class ParameterPlugin:
         """Run a test with each value.
 
         Raises:
-            Collector.CollectError: the test already has values of its own.
+            Collector.CollectError: the test already has its own values for the parameter.
         """
         self._names.update(dict.fromkeys(metafunc.fixturenames))
         own = _own_names(metafunc)
@@ -45,7 +45,7 @@ class ParameterPlugin:
             metafunc.parametrize(name, [parse_setting(word) for word in words], ids=ids)
 
     def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
-        """Refuse what no test takes."""
+        """Refuse a parameter that no test uses."""
         unknown = [one.name for one in self._parameters if one.name not in self._taken]
         if items and unknown:
             names = [name for name in self._names if not name.startswith(("bench", "request"))]
@@ -55,7 +55,7 @@ class ParameterPlugin:
 
 
 def _own_names(metafunc: pytest.Metafunc) -> set[str]:
-    """Return what a test has values for by its own markers."""
+    """Return the names for which a test has values by its own markers."""
     names = set[str]()
     for marker in metafunc.definition.iter_markers("parametrize"):
         given = marker.args[0] if marker.args else marker.kwargs.get("argnames", "")
@@ -65,7 +65,7 @@ def _own_names(metafunc: pytest.Metafunc) -> set[str]:
 
 
 def words_of(item: pytest.Item) -> Mapping[str, str]:
-    """Return the values of `--bench-param` that a test runs with, as they were written."""
+    """Return the values of `--bench-param` with which a test runs, as written."""
     callspec = getattr(item, "callspec", None)
     if callspec is None:
         return {}

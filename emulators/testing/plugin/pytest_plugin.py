@@ -44,17 +44,17 @@ _PLUGINS: Final = {
     "parameters": "tickrig.emulators.testing.plugin.parameters:ParameterPlugin",
     "report": "tickrig.emulators.testing.plugin.report_plugin:ReportPlugin",
 }
-"""Plug-ins by the setting that enables them; each takes the configuration and the settings."""
+"""Plug-ins by the setting that enables them; arguments are the configuration and the settings."""
 
 _EXAMPLES: Final = {"needs": "fault:cut", "req": "SAF-12", "allows": "lost"}
-"""What each marker could name."""
+"""Example of a name for each marker."""
 
 _OTHER_LOOPS: Final = ("asyncio", "anyio", "trio", "twisted")
-"""Markers of async tests that are run by others."""
+"""Markers of async tests that other plug-ins run."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Enter the options, on the command line and in the configuration file."""
+    """Register the options of the command line and of the configuration file."""
     group = parser.getgroup("tickrig", "benches of tickrig")
     for option in OPTIONS:
         flag, name, text = option.flag, option.name, option.text
@@ -67,7 +67,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Enter the markers, and read what was asked for."""
+    """Register the markers, and read the settings."""
     for line in MARKERS:
         config.addinivalue_line("markers", line)
     if (config.getoption("bench_seed") or config.getini("bench_seed")) == RANDOM:
@@ -139,20 +139,20 @@ def _check_markers(collector: pytest.Collector, item: pytest.Function) -> None:
 
 @pytest.fixture
 def bench_config(request: pytest.FixtureRequest) -> BenchSource:
-    """What is on the bench; override it: a device, arguments of `Bench`, or a rig file."""
+    """The devices of the bench; override it to return a device, arguments, or a rig file."""
     source: BenchSource = getattr(request, "param", None)
     return source
 
 
 @pytest.fixture
 def bench_safe() -> SafeState:
-    """The safe values of outputs after a test; override it: values by name, or a check."""
+    """The safe values of outputs after a test; override it to return values by name, or a check."""
     return None
 
 
 @pytest.fixture
 def bench_warm_up() -> WarmUp:
-    """What is done to the bench before the test; override it: a function of the bench."""
+    """The preparation of the bench before a test; override it to return a function of the bench."""
     return None
 
 
@@ -164,7 +164,7 @@ def bench(
     bench_safe: SafeState,
     bench_warm_up: WarmUp,
 ) -> Iterator[Bench]:
-    """A bench for this test alone, of `bench_config` or `--bench`; healthy after the test."""
+    """A new bench for each test, from `bench_config` or `--bench`, which is checked afterwards."""
     source: BenchSource = getattr(request, "param", bench_config)
     with benched_test.benched(request, source, bench_mode, bench_safe, bench_warm_up) as opened:
         yield opened
@@ -200,7 +200,7 @@ def pytest_runtest_call(item: pytest.Item) -> Generator[None, None, None]:
 def pytest_runtest_makereport(
     item: pytest.Item, call: pytest.CallInfo[None]
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """Complete the reports of tests that have a bench, or are blocked without one."""
+    """Complete the reports of tests that have a bench, or that are blocked without a bench."""
     if (test := item.stash.get(BENCHED, None)) is None:
         report = yield
         if call.excinfo is not None and is_blocked(call.excinfo.value):
@@ -218,7 +218,7 @@ def pytest_runtest_makereport(
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> bool | None:
-    """Run an async test on its bench, unless it is of asyncio or the like."""
+    """Run an async test on its bench, unless another plug-in (such as asyncio) runs the test."""
     test = pyfuncitem.stash.get(BENCHED, None)
     if test is None or not iscoroutinefunction(pyfuncitem.obj):
         return None

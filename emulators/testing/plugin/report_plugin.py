@@ -1,4 +1,4 @@
-"""Records of tests for a report: made in workers, collected by the process that writes it."""
+"""Records of tests, made in workers and collected by the process that writes the report."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _OWN: Final = frozenset({"req", "parametrize", "usefixtures"})
 _REPORTS: Final = pytest.StashKey[list[pytest.TestReport]]()
 _EXPECTED: Final = pytest.StashKey[str]()
 _MOST: Final = 400
-"""Characters of what was expected."""
+"""Largest number of characters of the failed statement."""
 
 _Place = tuple[str, int, list[tuple[int, str]]]
 
@@ -47,7 +47,7 @@ class ReportPlugin:
 
     Raises:
         OSError: the file with the requirements cannot be read.
-        ValueError: errors in the file, or the report could not be written.
+        ValueError: the file has errors, or the report could not be written.
     """
 
     def __init__(self, config: pytest.Config, settings: PluginSettings) -> None:
@@ -77,7 +77,7 @@ class ReportPlugin:
         return report
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """Take the record of a test, of whatever process."""
+        """Store the record of a test, which another process may have run."""
         if data := getattr(report, _RECORD, None):
             record = from_data(TestRecord, json.loads(data))
             self._records[record.nodeid] = _place(report), record
@@ -102,7 +102,7 @@ class ReportPlugin:
             terminalreporter.write_line(f"bench: {line}")
 
     def _shown(self) -> Iterator[str]:
-        """Yield what the tests show of what they have to, for people."""
+        """Yield lines about the requirements that the tests show."""
         if not self._requirements:
             return
         rows = overview.requirement_rows(self._report(), overview.reported(self._tests()))
@@ -115,7 +115,7 @@ class ReportPlugin:
             yield f"tests name unknown requirements: {', '.join(unknown)}"
 
     def _tests(self) -> tuple[TestRecord, ...]:
-        """Return the records as they stand in the files, in whatever order the tests were run."""
+        """Return the records in the order of the tests in the files."""
         return tuple(record for _, record in sorted(self._records.values(), key=itemgetter(0)))
 
     def _report(self) -> BenchReport:
@@ -136,13 +136,13 @@ class ReportPlugin:
 
 
 def _place(report: pytest.TestReport) -> _Place:
-    """Return the position of a test: its file, its line, its name with numbers in numeric order."""
+    """Return the position of a test: file, line, and name with numbers in numeric order."""
     nodeid = str(report.nodeid)
     return nodeid.partition("::")[0], report.location[1] or 0, overview.natural(nodeid)
 
 
 def _statement(item: pytest.Item, error: pytest.ExceptionInfo[BaseException]) -> str:
-    """Return the last executed statement of a test in one line; empty if none was executed."""
+    """Return the last executed statement of a test in one line, or "" if none was executed."""
     for entry in reversed(error.traceback):
         if Path(entry.path) == item.path:
             with suppress(Exception):  # who has compiled the test need not have left its source
@@ -151,7 +151,7 @@ def _statement(item: pytest.Item, error: pytest.ExceptionInfo[BaseException]) ->
 
 
 def _is_reported(item: pytest.Item) -> bool:
-    """Return whether a report contains a test: it has a bench, or shows a requirement."""
+    """Return whether a report contains a test: the test has a bench, or shows a requirement."""
     return BENCHED in item.stash or item.get_closest_marker("req") is not None
 
 
@@ -160,7 +160,7 @@ def _record_of(item: pytest.Item, reports: list[pytest.TestReport]) -> TestRecor
 
     Args:
         item: the test.
-        reports: of all its phases.
+        reports: reports of all phases of the test.
     """
     outcome, reason, longrepr = outcome_of(item, reports)
     record = TestRecord(
@@ -178,7 +178,7 @@ def _record_of(item: pytest.Item, reports: list[pytest.TestReport]) -> TestRecor
 
 
 def _with_bench(item: pytest.Item, record: TestRecord) -> TestRecord:
-    """Add what there is to say of the bench of a test."""
+    """Add the data of the bench of a test to a record."""
     test = item.stash.get(BENCHED, None)
     if test is None:
         return record

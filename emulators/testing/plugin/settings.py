@@ -1,4 +1,4 @@
-"""What the options of pytest and the lines of its configuration file say about benches."""
+"""Settings of benches, from options of pytest and lines of its configuration file."""
 
 from __future__ import annotations
 
@@ -25,10 +25,11 @@ class _Option(NamedTuple):
     """An option of the command line and of the configuration file.
 
     Attributes:
-        name: as `bench_mode`: the option is `--bench-mode`.
-        metavar: placeholder of its value; empty if it has no value.
-        text: its help text.
-        many: whether it may be repeated; in the configuration file each value has its own line.
+        name: name, such as `bench_mode` for the option `--bench-mode`.
+        metavar: placeholder of the value, or empty if the option has no value.
+        text: help text of the option.
+        many: whether the option may be repeated. In the configuration file each value has its own
+            line.
     """
 
     name: str
@@ -38,7 +39,7 @@ class _Option(NamedTuple):
 
     @property
     def flag(self) -> str:
-        """As the command line has it."""
+        """The option as written on the command line."""
         return "--" + self.name.replace("_", "-")
 
 
@@ -59,7 +60,7 @@ class _BenchParameter(NamedTuple):
     """Values of an argument or fixture of tests.
 
     Attributes:
-        name: of the argument or fixture.
+        name: name of the argument or fixture.
         words: the values as written.
     """
 
@@ -71,15 +72,15 @@ class PluginSettings(NamedTuple):
     """The settings of the command line.
 
     Attributes:
-        rig_file: of the bench; None if tests define the bench themselves.
+        rig_file: path of the rig file, or None if tests define the bench themselves.
         ordered: whether the command line names the rig file.
         modes: modes in which each test runs.
-        seed: of all random numbers; None to use the seed of the rig file or test.
-        artifacts: folder for kept files, None for none.
+        seed: seed of all random numbers, or None to use the seed of the rig file or test.
+        artifacts: folder for kept files, or None to keep no files.
         every: whether to keep files of passed tests too.
         compare: whether each test runs twice.
-        report: file for the report, None if there is none.
-        requirements: file with the requirements, None if there is none.
+        report: file for the report, or None for no report.
+        requirements: file with the requirements, or None if there is none.
         parameters: parameters of tests, each with its values.
     """
 
@@ -96,7 +97,7 @@ class PluginSettings(NamedTuple):
 
     @classmethod
     def of(cls, config: pytest.Config) -> PluginSettings:
-        """Return the settings of a test run; UsageError if one is invalid."""
+        """Return the settings of a test run; raise UsageError if a setting is invalid."""
         wanted = {option.name: _wanted(config, option) for option in OPTIONS}
         return cls(
             _path(config, "bench", wanted["bench"]),
@@ -113,7 +114,7 @@ class PluginSettings(NamedTuple):
 
     @property
     def head(self) -> str:
-        """Lines at the start of a run; empty without options."""
+        """Lines at the start of a run, or no lines without options."""
         if self == PluginSettings():
             return ""
         seed = "" if self.seed is None else f", seed {self.seed}"

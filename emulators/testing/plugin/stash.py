@@ -1,4 +1,4 @@
-"""What a test keeps while it runs, and tests that their bench cannot run."""
+"""Data of a test while it runs, and a skip of tests that their bench cannot run."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ if TYPE_CHECKING:
 
 
 class TestWithBench(ABC):
-    """A test with a bench, as hooks and reports see it.
+    """A test with a bench, as hooks and reports use it.
 
     Args:
         item: the test.
-        wanted: what it requested.
+        wanted: bench that the test requested.
 
     Attributes:
-        bench: its bench, once it is open.
-        evidence: what a report shows of it, once it is closed.
-        blocked: why the test came to no verdict, empty if it did.
-        unheard: errors outside its body that were not reported yet, one line each.
+        bench: bench of the test, once the bench is open.
+        evidence: data of the bench for a report, once the bench is closed.
+        blocked: reason why the test came to no verdict, or empty if it came to a verdict.
+        unheard: errors outside the body of the test that were not reported yet, one per line.
         kept: files that were kept.
-        not_kept: why other files were not kept, or not completely, one line each.
+        not_kept: reasons why other files were not kept, or not completely, one per line.
     """
 
     __test__ = False
@@ -53,7 +53,7 @@ class TestWithBench(ABC):
 
     @abstractmethod
     def judged(self) -> AbstractContextManager[None]:
-        """Fail the test if it looks at a wrong clock, or leaves its bench as none may be."""
+        """Fail the test if it uses a wrong clock, or leaves its bench in a bad state."""
 
     @abstractmethod
     def judge(
@@ -67,7 +67,7 @@ class TestWithBench(ABC):
 
 
 BENCHED: Final[pytest.StashKey[TestWithBench]] = pytest.StashKey()
-"""Of a test that asked for a bench."""
+"""Data of a test that has requested a bench."""
 
 _ERRORS: Final = "tickrig.emulators.testing.bench.errors"
 
@@ -80,7 +80,7 @@ def is_blocked(error: BaseException) -> bool:
 
 @contextmanager
 def skipped_where_it_cannot() -> Iterator[None]:
-    """Skip the test if it asks for what this bench cannot do."""
+    """Skip the test if it uses an operation that its bench cannot do."""
     try:
         yield
     except Exception as error:

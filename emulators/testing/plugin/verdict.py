@@ -17,21 +17,21 @@ from tickrig.emulators.testing.bench.errors import BenchBlocked, BenchError
 _PACKAGE: Final = Path(tickrig.__file__).parent
 
 _MISTAKES: Final = (TypeError, AttributeError, NameError, ImportError, SyntaxError)
-"""What is wrong with a program, however late it runs."""
+"""Exceptions that mean an error in the program, however slow the machine is."""
 
 _REFUSALS: Final = (ValueError, LookupError, BenchError)
-"""How the bench refuses a request."""
+"""Exceptions by which the bench refuses a request."""
 
 _OF_STATE: Final = ("WireError", "RtcRefused", "ServerRefused")
-"""Refusals that depend on what has come, or on the state of a component."""
+"""Refusals that depend on received data, or on the state of a component."""
 
 _CHECKS: Final = tuple(
     f"tickrig.emulators.testing.{room}" for room in ("properties", "machine", "fuzz", "conformance")
 )
-"""What judges devices and hosts by AssertionError."""
+"""Packages that report errors of devices and hosts by AssertionError."""
 
 _LIBRARIES: Final = sys.stdlib_module_names | {"can", "canopen", "serial"}
-"""Errors that mean a mistake of the caller."""
+"""Modules whose errors mean a mistake of the caller."""
 
 
 class MisusedError(pytest.fail.Exception):  # type: ignore[name-defined,misc]  # pytest has it
@@ -45,12 +45,12 @@ def blocked(
     *,
     mistaken: bool = False,
 ) -> str:
-    """Return why a phase of a test gave no verdict about the device; empty if it did.
+    """Return why a phase of a test gave no verdict about the device, or "" if it gave a verdict.
 
     Args:
         report: report of the phase.
         call: the call of the phase.
-        bench: of the test, None if it was not opened.
+        bench: bench of the test, or None if the bench was not opened.
         mistaken: whether the test itself is wrong; see `is_mistake`.
     """
     error = None if call.excinfo is None else call.excinfo.value
@@ -64,9 +64,9 @@ def blocked(
 def is_mistake(error: BaseException) -> bool:
     """Return whether a test would raise this error on a fast machine, too.
 
-    A misspelt name is a mistake in the test, and so is any call that the bench refuses. It is not a
-    mistake if a test uses None as a message because no message arrived in time. An exception that
-    the host itself raises is not a mistake either.
+    A misspelt name is a mistake in the test. A call that the bench refuses is a mistake, too. The
+    use of None as a message is not a mistake, because the message may have arrived too late. An
+    exception that the host itself raises is not a mistake either.
     """
     if isinstance(error, BaseExceptionGroup):
         return any(map(is_mistake, error.exceptions))
@@ -82,7 +82,7 @@ def is_mistake(error: BaseException) -> bool:
 
 
 def _raiser(error: BaseException) -> str:
-    """Return the module that has raised an error, or has called the library that did."""
+    """Return the module that has raised an error, or that has called the library with the error."""
     names = [frame.f_globals.get("__name__") or "" for frame, _ in walk_tb(error.__traceback__)]
     named = [name for name in names if name != "_pytest.outcomes"]
     own = (name for name in reversed(named) if name.partition(".")[0] not in _LIBRARIES)
@@ -113,7 +113,7 @@ def _package_of(entry: TracebackType) -> str:
 
 
 def make_error(report: pytest.TestReport, reason: str) -> None:
-    """Make an error of the bench out of what would be a failure of the device, or expected."""
+    """Replace a failure of the device, or an expected failure, by an error of the bench."""
     report.outcome = "failed"
     report.__dict__.pop("wasxfail", None)  # a fault of the bench is unexpected
     if report.when == "call":
@@ -130,11 +130,11 @@ def make_error(report: pytest.TestReport, reason: str) -> None:
 
 
 def _cut(report: pytest.TestReport, *, shown: bool) -> None:
-    """Remove tickrig's own entries from a traceback: they do not explain the error.
+    """Remove tickrig's own entries from a traceback, because they do not explain the error.
 
     Args:
         report: the report of the test.
-        shown: whether the reason is already shown; then all entries may be removed.
+        shown: whether the reason is already shown. If it is, all entries may be removed.
     """
     traceback = getattr(report.longrepr, "reprtraceback", None)
     entries = getattr(traceback, "reprentries", [])

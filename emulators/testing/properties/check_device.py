@@ -40,11 +40,11 @@ def _check_start(start: Session, device: Any, nothing: Any) -> None:
 
     Args:
         start: the acts.
-        device: a device of this type; it is not changed.
+        device: a device of the same type, which is not changed.
         nothing: empty traffic.
 
     Raises:
-        ValueError: an act cannot be executed; the message has the act and the reason.
+        ValueError: an act cannot be executed. The message has the act and the reason.
     """
     for number, act in enumerate(start):
         try:
@@ -96,17 +96,17 @@ def _search(
     names: tuple[str, ...],
     max_examples: int,
 ) -> None:
-    """Draw sessions until a check raises, then search for shorter ones.
+    """Draw sessions until a check raises, then search for shorter sessions that fail.
 
     Args:
-        check: takes sessions by name.
+        check: function that takes sessions by name.
         drawn: the strategies of the sessions.
         names: the names of the sessions.
         max_examples: number of sessions of each name, if no check raises.
 
     Raises:
-        Exception: the exception of the check for the shortest session, with a note of what
-            occurred.
+        Exception: the exception of the check for the shortest session. A note lists the acts of the
+            session.
     """
     found: dict[str, Exception] = {}
     met: dict[str, dict[str, Session]] = {}
@@ -191,35 +191,37 @@ def check_device(  # noqa: PLR0913 - by name
 
     - The device has the attributes of a device, and returns values of the right types. `tick`
       clears `inputs.changed`.
-    - It does not raise an exception for any traffic or input.
-    - A new device with the same traffic behaves identically. On a line, a device replayed from the
-      trace does, too.
+    - The device does not raise an exception for any traffic or input.
+    - A new device with the same traffic behaves identically. On a serial line, a device replayed
+      from the trace behaves identically, too.
     - Ticks at which the device is not due change nothing (dense = sparse), up to a day later.
-    - A host that writes in pieces gets the same answers as a host that writes at once. A word of
-      `strategies.chunks` that arrives in two ticks is answered like a word that arrives in one.
-    - A reset device equals a new one with the same inputs.
+    - A host that writes in pieces gets the same answers as a host that writes at once. The device
+      gives the same answer to a word of `strategies.chunks` that arrives in two ticks as to a word
+      that arrives in one tick.
+    - A reset device equals a new device with the same inputs.
     - A copy behaves like the original, whether made by `copy.deepcopy`, by pickle or with its rig.
       Changes to the copy do not change the original. A device that a snapshot restores continues
       from that state.
 
     Args:
-        device_type: the factory of the device: a `DeviceType` or its name, a class or a function.
-        traffic: what a host sends at once, `strategies.chunks(...)` or `strategies.frames(...)`; by
-            default noise.
-        wire: factory of its wire, such as `CanWire`; by default that of its type, or a serial line.
-        start: acts that start the device, executed in order before each session: `(5_000, "send",
-            b"ON\n")` sends after 5 ms, `(0, "set", ("jam", 1))` sets an input, `(0, "reset", None)`
-            resets.
+        device_type: factory of the device: a `DeviceType` or its name, a class or a function.
+        traffic: strategy for the traffic that a host sends at once: `strategies.chunks(...)` or
+            `strategies.frames(...)`. The default is noise.
+        wire: factory of the wire, such as `CanWire`. The default is the wire of the device type, or
+            a serial line.
+        start: acts that start the device, executed in order before each session. `(5_000, "send",
+            b"ON\n")` sends after 5 ms, `(0, "set", ("jam", 1))` sets an input, and `(0, "reset",
+            None)` resets the device.
         max_examples: number of sessions for each test.
-        remembers: whether a reset keeps more than configuration and inputs: stored parameters, or
-            the position of an axis.
-        pauses: whether pauses within a word have no effect; False if a pause ends a frame, as in
-            Modbus RTU.
+        remembers: whether a reset keeps more than configuration and inputs, for example stored
+            parameters or the position of an axis.
+        pauses: whether pauses within a word have no effect. The value is False if a pause ends a
+            frame, as in Modbus RTU.
 
     Raises:
-        AssertionError: one of these properties does not hold. The message has the time and the
-            difference; a note has the shortest session found.
-        ValueError: an act of `start` cannot be executed, or no type has this name.
+        AssertionError: a property of the list above does not hold. The message has the time and the
+            difference, and a note has the shortest session found.
+        ValueError: an act of `start` cannot be executed, or no device type has the given name.
 
     >>> check_device("rrc", traffic=strategies.chunks([b"hello\n", b"device\n"]), max_examples=2)
     """
@@ -248,7 +250,7 @@ def check_device(  # noqa: PLR0913 - by name
 def _parts(
     device_type: DeviceType | str | Callable[[], Any], wire: WireMaker | None
 ) -> tuple[Callable[[], Any], WireMaker]:
-    """Return what makes the device, and what makes its wire."""
+    """Return the factory of the device, and the factory of its wire."""
     made = DEVICES.load(device_type) if isinstance(device_type, str) else device_type
     if isinstance(made, DeviceType):
         return partial(made.build, {}), wire or partial(made.line.wire, made.line.baud)

@@ -1,4 +1,4 @@
-"""What every device must keep, each for sessions that are drawn."""
+"""Properties that every device must have, each checked with drawn sessions."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ _WORDS_WITH_PAUSES: Final = 2
 """Number of words tried in each session; there are many sessions."""
 
 _Answer = tuple[bytes, list[Any]]
-"""What is sent, and the outputs then."""
+"""Bytes that the device sends, and the outputs afterwards."""
 
 _TICKS: Final = 20
 """Number of ticks to wait for an answer."""
@@ -97,7 +97,7 @@ def _check_pauses(played: device_bench.DeviceBench, session: Session) -> None:
 
 
 def _answer(played: device_bench.DeviceBench, first: bytes, rest: bytes) -> _Answer:
-    """Return what a copy of the device answers to two halves, and what is seen then."""
+    """Return the answer of a copy of the device to two halves, and the outputs afterwards."""
     device = twin(played.device)
     if hasattr(device, "horizon"):
         device.horizon = None
@@ -124,8 +124,8 @@ def _message(word: Word, at: int, wanted: _Answer, got: _Answer) -> str:
 _DAY_US: Final = 86_400_000_000
 
 _AHEAD_US: Final = (0, 10_000, 100_000, 1_000_000, 10_000_000, 60_000_000, 600_000_000)
-"""Delays after which a tick is tried. A last tick is tried just before the device is due, or after
-a day."""
+"""Delays after which a tick is tried. The last tick is tried just before the device is due, or
+after a day."""
 
 _MOST_WORDS: Final = 3
 """Number of words of a session that are sent after the session."""
@@ -134,8 +134,8 @@ _MOST_INPUTS: Final = 8
 """Number of inputs that are tried at the end of a session."""
 
 _SETTLES: Final = 50
-"""Number of ticks for a device to become idle after an input has changed; if it does not, this
-check is omitted."""
+"""Number of ticks for a device to become idle after a change of an input. If the device is not idle
+then, this check is omitted."""
 
 
 def _check_due_us(bench: Callable[..., device_bench.DeviceBench], session: Session) -> None:
@@ -145,11 +145,11 @@ def _check_due_us(bench: Callable[..., device_bench.DeviceBench], session: Sessi
     the check is repeated after a change of each input alone.
 
     Args:
-        bench: makes a bench.
+        bench: function that makes a bench.
         session: the acts.
 
     Raises:
-        AssertionError: such a tick changes something.
+        AssertionError: a tick before the device is due changes something.
     """
     played = bench()
     words = dict.fromkeys(what for _, verb, what in reversed(session) if verb == "send" and what)
@@ -164,7 +164,7 @@ def _check_due_us(bench: Callable[..., device_bench.DeviceBench], session: Sessi
 
 
 def _some_inputs(device: Any, number: int) -> list[InputSignal]:
-    """Return a part of the inputs, in each session another one."""
+    """Return a part of the inputs; each session gets another part."""
     table = device.inputs.table.values() if hasattr(device, "inputs") else ()
     items = [item for item in table if item.type is not SignalType.TEXT]
     parts = -(-len(items) // _MOST_INPUTS) or 1
@@ -189,7 +189,7 @@ def _changed_input(played: device_bench.DeviceBench, item: InputSignal) -> tuple
 
 
 def _probe_after(played: device_bench.DeviceBench, item: InputSignal) -> None:
-    """Look whether a copy is due in time after a change of an input."""
+    """Check whether a copy is due in time after a change of an input."""
     device, now_us = _changed_input(played, item)
     try:
         _Probe(device, now_us, played.nothing).check()
@@ -216,7 +216,7 @@ class _Probe:
         self._last_us = last_us - last_us % self._tick_us
 
     def check(self) -> None:
-        """Raise AssertionError if a tick before it is due changes something."""
+        """Raise AssertionError if a tick before the device is due changes something."""
         if self._last_us < self._first_us:
             return
         copied = _copy(self._device)
@@ -256,7 +256,7 @@ class _Probe:
         )
 
     def check_answers(self, words: list[Any]) -> None:
-        """Raise AssertionError if one that was ticked answers otherwise than one that was not."""
+        """Raise AssertionError if the answers of a copy differ after an early tick."""
         if self._last_us < self._first_us:
             return
         for word in words:
@@ -289,16 +289,16 @@ class DeviceChecks:
     """The checks of one device type.
 
     Args:
-        bench: makes a bench with one device.
-        remembers: a reset keeps more than configuration and inputs.
-        pauses: pauses within the host's traffic have no effect.
+        bench: function that makes a bench with one device.
+        remembers: whether a reset keeps more than configuration and inputs.
+        pauses: whether pauses within the host's traffic have no effect.
     """
 
     def __init__(self, bench: _Benches, remembers: bool, pauses: bool) -> None:
         self._bench, self._remembers, self._pauses = bench, remembers, pauses
 
     def check_ticks(self, session: Session) -> None:
-        """Which ticks are run, and how the host writes, makes no difference."""
+        """Check that the choice of ticks and the pieces written by the host have no effect."""
         bench, played = self._bench, self._bench()
         acts = played.with_end([*played.start, *session])  # it ticks at least once
         check_acts(bench(start=()).device, acts, played.nothing)
@@ -321,7 +321,7 @@ class DeviceChecks:
         _same(pieces, pieces.play(session), wanted, what, "in pieces", "at once")
 
     def check_reset(self, session: Session, after: Session) -> None:
-        """A reset keeps only the inputs."""
+        """Check that a reset keeps only the inputs."""
         once, twice = self._bench(), self._bench()
         once.play([*session, (0, "reset", None)])
         twice.play([*session, (0, "reset", None), (0, "reset", None)])
@@ -332,7 +332,7 @@ class DeviceChecks:
         _same(once, twice.play(after), once.play(after), what, "after two", "after one")
 
     def _check_inputs_forgotten(self, session: Session) -> None:
-        """A reset keeps only the input, not its effects."""
+        """Check that a reset keeps only the inputs, but not their effects."""
         played = self._bench()
         played.play(session)
         for item in _some_inputs(played.device, len(session)):
@@ -340,7 +340,7 @@ class DeviceChecks:
             self._check_fresh(played, device, ())
 
     def _check_fresh(self, once: device_bench.DeviceBench, device: Any, after: Session) -> None:
-        """A reset device equals one that was made now, or at 0, with the same inputs."""
+        """Check that a reset device equals a device made now, or at 0, with the same inputs."""
         was_reset, now_us = twin(device), once.rig.now_us
         now_us += (_SETTLES + 1) * device.tick_us  # it may have been ticked so often since then
         was_reset.reset()
@@ -354,7 +354,7 @@ class DeviceChecks:
             _same(once, one, others[-1], _KEEPS, "after a reset", "of a fresh one")
 
     def check_replay(self, session: Session) -> None:
-        """A device made from its trace does the same."""
+        """Check that a device made from the trace of a run behaves identically."""
         bench, wanted = self._bench, self._bench().play(session)
         if not hasattr(bench().device, "inputs") or bench().nothing != b"":
             return
@@ -370,7 +370,7 @@ class DeviceChecks:
             must(differs is None, f"a replay of its trace differs: {differs}")
 
     def check_copies(self, session: Session, after: Session, otherwise: Session) -> None:
-        """A copy behaves like the original, and does not change it."""
+        """Check that a copy behaves like the original, and does not change the original."""
         original, unchanged = self._bench(), self._bench()
         original.play(session)
         unchanged.play(session)

@@ -12,17 +12,17 @@ _MEMBERS: Final = {
     "tick": "tick(now_us, rx) returns what it sends",
     "reset": "reset() is power-on",
 }
-"""What a device on any wire has."""
+"""Attributes of a device on any wire."""
 
 _SIGNALS: Final = {
     "inputs": "an InputBank, InputBank(()) if there are none",
     "outputs": "a dict of OutputSignal by name, {} if there are none",
 }
-"""Further attributes of a device on a serial line; a node has them in its application."""
+"""Further attributes of a device on a serial line; the application of a node has them."""
 
 
 def must(holds: bool, text: str) -> None:
-    """Raise AssertionError with a text, and nothing else in it, unless something holds."""
+    """Raise AssertionError with only a text, unless `holds` is true."""
     if not holds:
         raise AssertionError(text)
 
@@ -31,7 +31,7 @@ def check_members(device: Any, nothing: Any) -> None:
     """Check that a device has the attributes of every device.
 
     Args:
-        device: the device; it is not changed.
+        device: the device, which is not changed.
         nothing: empty traffic.
 
     Raises:
@@ -44,7 +44,7 @@ def check_members(device: Any, nothing: Any) -> None:
 
 
 def check_period(device: Any) -> None:
-    """Raise AssertionError unless `tick_us` is a period, and `due_us` a time."""
+    """Raise AssertionError unless `tick_us` is a period and `due_us` is a time."""
     tick_us, kind = device.tick_us, type(device).__name__
     good = type(tick_us) is int and tick_us > 0
     must(good, f"{kind}.tick_us is {tick_us!r}: whole microseconds above 0")
@@ -58,7 +58,7 @@ def _check_due(device: Any) -> None:
 
 
 def check_acts(device: Any, acts: list[Act], nothing: Any) -> None:
-    """Execute acts on a device without a wire, and check the types of all that it returns.
+    """Execute acts on a device without a wire, and check the types of all returned values.
 
     Args:
         device: a new device.

@@ -1,4 +1,4 @@
-"""A device on its wire, a host at the other end, and all that can be seen of them."""
+"""A device on its wire, a host at the other end, and a record of everything observable."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from tickrig.wire.instant import NEVER
 NOTHING: Final[Session] = ()
 
 _AFTERWARDS_US: Final = 2_000_000
-"""How long a session is watched when nothing more is done."""
+"""Time for which a device is observed after the last act of a session."""
 
 Observation = tuple[Any, ...]
 """An observation: the time, the received traffic, and the outputs."""
@@ -28,11 +28,11 @@ Observation = tuple[Any, ...]
 
 @dataclass
 class DeviceBench:
-    """A device on its wire, with a host at the other end; it records all that can be observed.
+    """A device on its wire, with a host at the other end; the bench records all observations.
 
     Attributes:
-        make: makes the device.
-        wire: makes the wire.
+        make: function that makes the device.
+        wire: function that makes the wire.
         start: the acts before the session.
         dense: whether the rig runs every tick.
         pieces: whether the host writes byte by byte, or frame by frame.
@@ -66,11 +66,11 @@ class DeviceBench:
         return other
 
     def with_end(self, session: Session, afterwards_us: int = _AFTERWARDS_US) -> list[Act]:
-        """Return a session, and that nothing is done for a while after it."""
+        """Return a session, extended by a wait."""
         return [*session, (afterwards_us, "send", self.nothing)]
 
     def play(self, session: Session, afterwards_us: int = _AFTERWARDS_US) -> list[Observation]:
-        """Play a session; return what was received of the device and seen on it."""
+        """Play a session; return the observations of the device."""
         log = []
         for act in self.with_end(session, afterwards_us):
             self.rig.run_for(act[0])
@@ -79,12 +79,12 @@ class DeviceBench:
         return log
 
     def look(self) -> Observation:
-        """Return what is seen now."""
+        """Return the present observation."""
         received = self.end.poll(self.rig.now_us)
         return (self.rig.now_us, received, *outputs_of(self.device))
 
     def do(self, act: Act) -> None:
-        """Do an act, after its wait."""
+        """Wait as an act requires, then execute the act."""
         _, verb, what = act
         if verb == "reset":
             self.reset()
@@ -102,10 +102,10 @@ def outputs_of(device: Any) -> list[Any]:
 
 
 def drive(device: Any, now_us: int, session: Session, nothing: Any) -> list[Observation]:
-    """Play a session to a device without a wire.
+    """Play a session with a device that has no wire.
 
     Returns:
-        What it sends and its observations, with times relative to `now_us`.
+        The sent traffic and the observations, with times relative to `now_us`.
     """
     log, begin_us = [], now_us
     for wait_us, verb, what in [*session, (_AFTERWARDS_US, "send", nothing)]:
@@ -130,7 +130,7 @@ def drive(device: Any, now_us: int, session: Session, nothing: Any) -> list[Obse
 _SENDS: Final = "it sends"
 
 _LONGEST: Final = 100
-"""More of a value is not shown."""
+"""Largest number of characters shown of a value."""
 
 DENSE, SPARSE = "if every tick is run", "if those that due_us passes over are not"
 
@@ -160,13 +160,13 @@ def due_text(due_us: int) -> str:
 def difference(
     device: Any, one: Sequence[Observation], other: Sequence[Observation], first: str, second: str
 ) -> str:
-    """Return the first difference between two runs; empty if they are equal.
+    """Return the first difference between two runs, or "" if the runs are equal.
 
     Args:
         device: the device with the outputs.
         one: observations of one run.
         other: observations of the other run.
-        first: description of the first run, written after its value.
+        first: description of the first run, which is written after its value.
         second: description of the other run.
     """
     names = [_SENDS, *getattr(device, "outputs", ())]
@@ -203,12 +203,12 @@ def shorten(value: Any) -> str:
 
 
 def explain_ticks(bench: Callable[..., DeviceBench], start: Session, session: Session) -> str:
-    """Return where dense and sparse ticks first differ: the tick, the difference, and what was due.
+    """Return a text with the first difference of dense and sparse ticks, and with what was due.
 
     Args:
-        bench: makes a bench.
+        bench: function that makes a bench.
         start: the acts before the session.
-        session: a session in which they differ.
+        session: a session in which dense and sparse ticks differ.
     """
     sparse, dense = bench(start=()), bench(start=(), dense=True)
     for act in sparse.with_end([*start, *session]):
@@ -236,7 +236,7 @@ def shortened(acts: Sequence[_T], fails: Callable[[list[_T]], bool]) -> list[_T]
 
     Args:
         acts: acts that fail together.
-        fails: returns whether a shorter list of acts fails in the same way.
+        fails: function that returns whether a shorter list of acts fails in the same way.
 
     >>> shortened([1, 2, 3, 4], lambda fewer: 2 in fewer and 4 in fewer)
     [2, 4]

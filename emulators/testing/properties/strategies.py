@@ -1,4 +1,4 @@
-"""Hypothesis strategies of what a device may meet: bytes, frames, waits, changes of its inputs."""
+"""Hypothesis strategies for acts on a device: bytes, frames, waits, and changes of inputs."""
 
 from __future__ import annotations
 
@@ -12,17 +12,18 @@ from tickrig.device.physical import InputSignal, SignalType
 from tickrig.wire.can import CanFrame, Frames
 
 Act = tuple[int, str, Any]
-"""How long to wait before it in microseconds; `send`, `set` or `reset`; and what is sent or set."""
+"""An act: the wait before it in microseconds, the verb (`send`, `set`, `reset`), and the object."""
 
 Session = Sequence[Act]
 
 
 def chunks(lines: Sequence[bytes] = (), max_bytes: int = 40) -> st.SearchStrategy[bytes]:
-    """Draw what a host writes at once to a line.
+    """Draw bytes that a host writes at once to a serial line.
 
     Args:
-        lines: what the device understands; half of what is drawn are these, the rest is noise.
-        max_bytes: the longest noise.
+        lines: lines that the device understands. Half of the drawn bytes are such lines, the other
+            half is noise.
+        max_bytes: largest number of bytes of noise.
     """
     _check_words(lines)
     noise = st.binary(max_size=max_bytes)
@@ -30,7 +31,7 @@ def chunks(lines: Sequence[bytes] = (), max_bytes: int = 40) -> st.SearchStrateg
 
 
 class Word(bytes):
-    """The words that a device understands, as passed to `chunks`."""
+    """A word that a device understands, as passed to `chunks`."""
 
     __slots__ = ()
 
@@ -47,12 +48,12 @@ def _check_words(words: object) -> None:
 def frames(
     known: Sequence[str] = (), can_ids: Sequence[int] = (), most: int = 4
 ) -> st.SearchStrategy[Frames]:
-    """Draw what a host sends at once on a CAN bus: data frames, and remote ones, also with 29 bits.
+    """Draw frames that a host sends at once: data and remote frames, also with 29-bit identifiers.
 
     Args:
-        known: frames that the device understands, in candump's notation, as `601#40...`.
-        can_ids: identifiers that it listens to; others are drawn too.
-        most: how many frames at once.
+        known: frames that the device understands, in candump's notation, such as `601#40...`.
+        can_ids: identifiers that the device receives. Other identifiers are drawn too.
+        most: largest number of frames at once.
     """
     noise_ids = st.integers(0, 0x7FF)
     ids = st.sampled_from(can_ids) | noise_ids if can_ids else noise_ids
@@ -73,13 +74,13 @@ def _remote(can_id: int, extended: bool, length: int) -> CanFrame:
 
 
 def waits(tick_us: int) -> st.SearchStrategy[int]:
-    """Draw how long nothing is done, in microseconds, around ticks and up to seconds."""
+    """Draw the duration of a wait in microseconds, around multiples of ticks and up to seconds."""
     near = [0, 1, tick_us // 2, tick_us - 1, tick_us, tick_us + 1, 3 * tick_us, 10 * tick_us]
     return st.sampled_from([*near, 20_000, 100_000, 310_000, 1_500_000])
 
 
 def values(item: InputSignal) -> st.SearchStrategy[float]:
-    """Draw values of a physical input: any in its range, its ends and 0 or 1 more often."""
+    """Draw values in the range of a physical input; its limits, 0 and 1 are more frequent."""
     low, high = item.low, item.high
     ends = [value for value in (low, high, 0, 1) if low <= value <= high]
     if item.real:
@@ -88,7 +89,7 @@ def values(item: InputSignal) -> st.SearchStrategy[float]:
 
 
 def input_changes(device: Device[Any]) -> st.SearchStrategy[tuple[str, float]]:
-    """Draw what the world does to a device with `inputs`; nothing can be drawn without them."""
+    """Draw changes of the inputs of a device; nothing can be drawn without inputs."""
     table = device.inputs.table.values() if hasattr(device, "inputs") else ()
     items = [item for item in table if item.type is not SignalType.TEXT]
     return st.one_of([st.tuples(st.just(item.name), values(item)) for item in items])
@@ -100,8 +101,8 @@ def sessions(
     """Draw acts of a host and of the environment on a device, one after the other.
 
     Args:
-        device: a device of this type; it is not changed.
-        traffic: what a host sends at once, see `chunks` and `frames`.
+        device: a device of the same type, which is not changed.
+        traffic: strategy for the traffic that a host sends at once; see `chunks` and `frames`.
         most: largest number of acts.
     """
     wait = waits(device.tick_us)

@@ -23,15 +23,16 @@ Value = int | float | str | None
 
 
 class Outcome(StrEnum):
-    """How a test ended, in the order in which the report lists tests.
+    """Outcome of a test, in the order in which the report lists tests.
 
     Attributes:
         FAILED: the device or the host did not behave as expected.
         ERROR: the test itself or its fixtures are wrong.
-        BLOCKED: no verdict is possible: real time was not kept, a port is gone, or an operator
-            refused.
+        BLOCKED: no verdict is possible, because real time was not kept, a port is gone, or an
+            operator has refused.
         PASSED: everything was as expected.
-        SKIPPED: not run, for example because the bench does not support what the test needs.
+        SKIPPED: the test was not run, for example because the bench does not support what the test
+            needs.
     """
 
     FAILED = "failed"
@@ -43,14 +44,14 @@ class Outcome(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class RunEnvironment:
-    """Where and how tests ran; equal for all workers of a parallel run.
+    """Environment and settings of a test run, which are equal for all workers of a parallel run.
 
     Attributes:
         date: start of the run, as text.
         mode: `virtual`, `real` or `hardware`.
-        seed: of all random numbers; None if there is no seed.
-        rig_file: name of the rig file, empty if there is none.
-        rig_text: its content.
+        seed: seed of all random numbers, or None if there is no seed.
+        rig_file: name of the rig file, or empty if there is none.
+        rig_text: content of the rig file.
         tickrig: version of tickrig.
         python: version of Python.
         platform: system and machine.
@@ -66,7 +67,7 @@ class RunEnvironment:
     platform: str = ""
 
     def of_this_machine(self) -> RunEnvironment:
-        """Return it with the versions and the system of the Python that runs."""
+        """Return the environment with the versions and the system of the present Python."""
         return replace(
             self,
             tickrig=__version__,
@@ -80,7 +81,7 @@ class Requirement:
     """A requirement that tests must show.
 
     Attributes:
-        name: as in the marker `req`, such as `SAF-12`.
+        name: name, as in the marker `req`, such as `SAF-12`.
         text: the requirement as readable text.
     """
 
@@ -93,12 +94,13 @@ class PlannedFault:
     """A fault that a test requested, or that occurred without a request.
 
     Attributes:
-        name: as in the request, with device and rate: `left_drive/flip=0.01`.
-        from_us: when the fault began; None if its trigger did not occur.
-        to_us: when the fault ended; None if it stayed.
-        when: its trigger, such as `the 3rd OK:output`, or a time that was not reached; empty if it
-            began at its time.
-        ordered_us: when the fault was requested; None if unknown, as for a manual fault.
+        name: name as in the request, with device and rate: `left_drive/flip=0.01`.
+        from_us: time at which the fault began, or None if its trigger did not occur.
+        to_us: time at which the fault ended, or None if the fault stayed.
+        when: trigger, such as `the 3rd OK:output`, or a time that was not reached. The text is
+            empty if the fault began at its time.
+        ordered_us: time at which the fault was requested, or None if unknown, as for a manual
+            fault.
     """
 
     name: str
@@ -112,11 +114,11 @@ class JournalLine(NamedTuple):
     """An event: a line or decoded frame on a wire, an action, or a changed output.
 
     Attributes:
-        at_us: when, in the time of the bench.
-        source: device or wire; empty if there is only one.
-        mark: as in transcripts: `>` to the device, `<` from it, `!` an action, `*` an output, `?` a
-            missed expectation.
-        text: the event as readable text; bytes are escaped as in traces.
+        at_us: time of the event on the bench.
+        source: name of the device or wire, or empty if there is only one.
+        mark: mark of the direction, as in transcripts: `>` to the device, `<` from the device, `!`
+            an action, `*` an output, `?` a missed expectation.
+        text: the event as readable text. Bytes are escaped as in traces.
     """
 
     at_us: int
@@ -130,10 +132,11 @@ class SignalSeries:
     """The samples of a signal.
 
     Attributes:
-        name: of the signal, with its device if there are several: `left_drive/state`.
-        unit: of numbers; empty if they have none.
-        points: pairs of time and value, in the time of the bench; times do not decrease.
-        steps: whether a value holds until the next one; words always do.
+        name: name of the signal, with its device if there are several devices: `left_drive/state`.
+        unit: unit of the numbers, or empty if they have no unit.
+        points: pairs of time and value, with times of the bench in ascending order. Equal times may
+            occur.
+        steps: whether a value holds until the next value. Words always hold.
     """
 
     name: str
@@ -142,7 +145,7 @@ class SignalSeries:
     steps: bool = True
 
     def __post_init__(self) -> None:
-        """Convert booleans to 0 and 1, NaN to None; ValueError if times decrease."""
+        """Convert booleans to 0 and 1, and NaN to None; raise ValueError if times decrease."""
         times = [at_us for at_us, _ in self.points]
         if times != sorted(times):  # it costs a tenth of comparing pair by pair
             before_us, at_us = next(pair for pair in pairwise(times) if pair[1] < pair[0])
@@ -161,27 +164,27 @@ def _plain(value: Value) -> Value:
 
 @dataclass(frozen=True, slots=True)
 class TestRecord:
-    """One run of one test.
+    """A run of a test.
 
     Attributes:
-        nodeid: as in pytest: `tests/test_stop.py::test_it_stops[fast]`.
-        outcome: how it ended.
+        nodeid: node ID, as in pytest: `tests/test_stop.py::test_it_stops[fast]`.
+        outcome: outcome of the run.
         run: number of its environment in the report, from 0.
-        mode: `virtual`, `real` or `hardware`; empty if it had no bench.
-        virtual_us: time that passed on the bench; None without a bench.
+        mode: `virtual`, `real` or `hardware`, or empty if the test had no bench.
+        virtual_us: time that passed on the bench, or None without a bench.
         wall_us: duration of the test.
-        seed: of random numbers; None if none were used.
+        seed: seed of all random numbers, or None if the test used none.
         requirements: names of the requirements that the test shows.
-        markers: its other markers.
+        markers: other markers of the test.
         expected: the statement that failed, in one line: the last wait or check.
-        reason: why it failed, is blocked or was skipped, in one line.
+        reason: reason why the test failed, is blocked or was skipped, in one line.
         longrepr: pytest's text of the failure.
         command: shell command that repeats the test.
         faults: requested faults.
         journal: the last events, in order of time.
         journal_left_out: number of earlier events that are not in `journal`.
         series: recorded signals.
-        trace: of the bench, for `tickrig replay`; empty if none was kept.
+        trace: trace of the bench, for `tickrig replay`, or empty if no trace was kept.
         artefacts: names of kept files.
     """
 
@@ -210,14 +213,14 @@ class TestRecord:
 
 @dataclass(frozen=True, slots=True)
 class BenchReport:
-    """A test run, or several that were merged.
+    """A test run, or several merged test runs.
 
     Attributes:
         title: title of the page.
-        runs: where and how the tests ran, without duplicates.
-        tests: in the order of the report.
-        requirements: all requirements, including those that no test names; empty if there is no
-            list.
+        runs: environments in which the tests ran, without duplicates.
+        tests: tests in the order of the report.
+        requirements: all requirements, including requirements that no test names. It is empty if
+            there is no list.
     """
 
     title: str = "Bench report"
@@ -226,21 +229,21 @@ class BenchReport:
     requirements: tuple[Requirement, ...] = ()
 
     def __post_init__(self) -> None:
-        """Raise ValueError if a test belongs to a run that is not there."""
+        """Raise ValueError if a test belongs to a run that is not in the report."""
         for test in self.tests:
             if not 0 <= test.run < len(self.runs):
                 raise ValueError(f"{test.nodeid}: there is no run {test.run}")
 
 
 def merge_reports(reports: Sequence[BenchReport], title: str = "") -> BenchReport:
-    """Return one report of several: workers of a run, or runs in three modes.
+    """Merge several reports, such as reports of workers of a run, or of runs in three modes.
 
     Equal runs are merged into one, and so are equal requirements. Tests keep the order of the
     reports.
 
     Args:
-        reports: the reports to merge; without any, the result is empty.
-        title: of the page; by default the title of the first report.
+        reports: reports to merge. Without any report, the result is empty.
+        title: title of the page. The default is the title of the first report.
     """
     runs = tuple(dict.fromkeys(run for report in reports for run in report.runs))
     tests = tuple(
@@ -260,16 +263,16 @@ def merge_reports(reports: Sequence[BenchReport], title: str = "") -> BenchRepor
 
 
 Point = tuple[int, Value]
-"""A time in microseconds, and what the signal was then."""
+"""A time in microseconds, and the value of the signal at this time."""
 
 _GROUP: Final = 4
 
 
 def thinned(points: Sequence[Point], most: int) -> list[Point]:
-    """Return at most `most` samples: the first, the last, and the extremes of every four.
+    """Return at most `most` samples: the first, the last, and two extremes of every four samples.
 
-    If one of the four is a word, only the first and the last are kept. The step is repeated while
-    there are too many samples.
+    If one of the four samples is a word, only the first and the last sample are kept. The step is
+    repeated while there are too many samples.
 
     Args:
         points: samples in order of time.
@@ -285,7 +288,7 @@ def thinned(points: Sequence[Point], most: int) -> list[Point]:
 
 
 def _ends(group: list[Point]) -> list[Point]:
-    """Return two of some samples, in the order of time."""
+    """Return two samples of a group, in the order of time."""
     numbers = [value for _, value in group if isinstance(value, int | float)]
     if len(numbers) < len(group) or min(numbers) == max(numbers):
         return [group[0], group[-1]] if len(group) > 1 else group

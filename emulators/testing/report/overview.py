@@ -38,9 +38,9 @@ class ReportedTest:
 
     Attributes:
         record: the test.
-        anchor: link target on the page, equal in each report of these tests.
-        file: the part of the node ID before the name.
-        name: the rest of the node ID.
+        anchor: link target on the page, which is equal in each report with these tests.
+        file: part of the node ID before the name of the test.
+        name: rest of the node ID.
     """
 
     record: TestRecord
@@ -68,10 +68,10 @@ class _RequirementRow:
     """A requirement and its tests.
 
     Attributes:
-        name: of the requirement.
+        name: name of the requirement.
         text: the requirement as readable text.
         tests: the tests that name the requirement.
-        listed: whether it is in the list of requirements, or there is no list.
+        listed: whether the requirement is in the list of requirements, or there is no list.
     """
 
     name: str
@@ -81,12 +81,12 @@ class _RequirementRow:
 
     @property
     def passed(self) -> int:
-        """How many of its tests passed."""
+        """Number of passed tests of the requirement."""
         return sum(test.record.outcome is Outcome.PASSED for test in self.tests)
 
     @property
     def verdict(self) -> OverallVerdict:
-        """Verdict of all its tests; blocked tests are not counted."""
+        """Verdict of all tests of the requirement; blocked tests are not counted."""
         outcomes = {test.record.outcome for test in self.tests}
         if outcomes & {Outcome.FAILED, Outcome.ERROR}:
             return OverallVerdict.FAILED
@@ -94,7 +94,7 @@ class _RequirementRow:
 
 
 def reported(tests: Iterable[TestRecord]) -> tuple[ReportedTest, ...]:
-    """Give each test its place."""
+    """Return the tests with their places on the page."""
     used: Counter[str] = Counter()
     places = []
     for test in tests:
@@ -109,7 +109,7 @@ def reported(tests: Iterable[TestRecord]) -> tuple[ReportedTest, ...]:
 
 
 def by_file(tests: Sequence[ReportedTest]) -> list[tuple[str, list[ReportedTest]]]:
-    """Return the tests grouped by file, in order of first appearance; equal names stay together."""
+    """Return the tests grouped by file, in order of appearance; equal names stay together."""
     files: dict[str, int] = {}
     names: dict[str, int] = {}
     for number, test in enumerate(tests):
@@ -120,13 +120,13 @@ def by_file(tests: Sequence[ReportedTest]) -> list[tuple[str, list[ReportedTest]
 
 
 def counts(tests: Iterable[TestRecord]) -> dict[Outcome, int]:
-    """Count the tests by outcome, each outcome in its order."""
+    """Count the tests by outcome, in the order of the outcomes."""
     found = Counter(test.outcome for test in tests)
     return {outcome: found[outcome] for outcome in Outcome}
 
 
 def requirement_rows(report: BenchReport, tests: Iterable[ReportedTest]) -> list[_RequirementRow]:
-    """Return the requirements, by verdict and then by name, numbers in their order."""
+    """Return the requirements sorted by verdict, then by name with numbers in numeric order."""
     texts = {requirement.name: requirement.text for requirement in report.requirements}
     shown_by: dict[str, list[ReportedTest]] = {name: [] for name in texts}
     for test in tests:
@@ -149,7 +149,7 @@ def natural(name: str) -> list[tuple[int, str]]:
 
 
 def slowest(tests: Iterable[ReportedTest]) -> list[ReportedTest]:
-    """Return the tests that took longest, the slowest first."""
+    """Return the slowest tests, the slowest test first."""
     return sorted(tests, key=lambda test: -test.record.wall_us)[:_SLOWEST]
 
 
@@ -160,8 +160,8 @@ def read_requirements(path: Path) -> tuple[Requirement, ...]:
     """Read a file of requirements.
 
     Raises:
-        OSError: it cannot be read.
-        ValueError: all errors in the file, one per line.
+        OSError: the file cannot be read.
+        ValueError: the file has errors. The message has all errors, one per line.
     """
     try:
         return parse_requirements(path.read_text("utf-8"), str(path))
@@ -173,8 +173,8 @@ def parse_requirements(text: str, file: str) -> tuple[Requirement, ...]:
     """Return the requirements of a text.
 
     Args:
-        text: a requirement per line: the name, as in the marker `req`, then blanks, then its text.
-            A line that begins with `#` is a comment.
+        text: text with a requirement per line: the name, as in the marker `req`, then blanks, then
+            the text of the requirement. A line that begins with `#` is a comment.
         file: name of the file, for messages.
 
     Raises:

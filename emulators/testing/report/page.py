@@ -32,7 +32,7 @@ _LINE_BYTES: Final = 48
 
 
 class _PagePart(Enum):
-    """A part of a test, in the order in which parts are given room."""
+    """A part of a test, in the order in which parts get space on the page."""
 
     TEXT = auto()
     TIMELINE = auto()
@@ -42,7 +42,7 @@ class _PagePart(Enum):
 
 @dataclass(slots=True)
 class _PageRoom:
-    """Divides the space on the page: in each kind of part, failed tests come first.
+    """Divides the space on the page; for each kind of part, failed tests come first.
 
     Args:
         tests: all tests.
@@ -50,7 +50,7 @@ class _PageRoom:
         room_bytes: the available space.
 
     Attributes:
-        admitted: number of the test and part, for each part that fits.
+        admitted: parts that fit on the page, as number of the test and part.
     """
 
     tests: Sequence[bench_report.TestRecord]
@@ -59,7 +59,7 @@ class _PageRoom:
     admitted: set[tuple[int, _PagePart]] = field(init=False, default_factory=set)
 
     def __post_init__(self) -> None:
-        """Share the room."""
+        """Divide the space."""
         order = list(bench_report.Outcome)
         first = sorted(range(len(self.tests)), key=lambda n: order.index(self.tests[n].outcome))
         for part in _PagePart:
@@ -83,7 +83,7 @@ class _PageRoom:
 
 
 def _journal_texts(test: bench_report.TestRecord) -> Iterator[str]:
-    """Yield the texts of the lines that are shown, each with room for what is around it."""
+    """Yield the texts of the journal lines, each with room for the markup around the text."""
     for line in test.journal[-_JOURNAL_LINES:]:
         yield line.text[:_LINE_CHARACTERS] + " " * _LINE_BYTES
 
@@ -94,7 +94,7 @@ def _size_of(text: str) -> int:
 
 
 def _cut(text: str, most: int) -> tuple[str, int]:
-    """Return whole lines up to a length from the beginning, and the number of omitted ones."""
+    """Return the first lines up to a length, and the number of omitted lines."""
     if len(text) <= most:
         return text, 0
     end = text.rfind("\n", 0, most) + 1 or most
@@ -102,21 +102,21 @@ def _cut(text: str, most: int) -> tuple[str, int]:
 
 
 _MOST_OPEN: Final = 12
-"""Number of failed tests that are unfolded at once."""
+"""Largest number of failed tests that are expanded when the page opens."""
 
 
 @dataclass(frozen=True, slots=True)
 class _TestOnPage:
-    """A test with those of its parts that fit on the page.
+    """A test with the parts that fit on the page.
 
     Attributes:
         place: the test, its anchor and name.
-        timeline: its time line; None if there is none, or if it does not fit.
+        timeline: time line of the test, or None if there is none or it does not fit.
         longrepr: pytest's text of the failure.
-        journal: its last lines.
-        journal_left_out: number of earlier lines.
-        trace: its trace.
-        left_out: the parts that are not on the page, in words.
+        journal: last lines of the journal.
+        journal_left_out: number of earlier lines of the journal.
+        trace: trace of the test.
+        left_out: description of the parts that are not on the page.
         opened: whether the test is expanded when the page opens.
     """
 
@@ -131,11 +131,11 @@ class _TestOnPage:
 
 
 def html_page(report: bench_report.BenchReport, room_bytes: int = _PAGE_BYTES) -> str:
-    """Return the page.
+    """Return the HTML page of a report.
 
     Args:
         report: the report to show.
-        room_bytes: space for the data of tests; the page lists the data that do not fit.
+        room_bytes: space for the data of tests, in bytes. The page lists the data that do not fit.
     """
     places = overview.reported(report.tests)
     unwell = [place for place in places if place.record.outcome in overview.UNWELL]
@@ -160,7 +160,7 @@ def _template(page: str = "page.html") -> PageTemplate:
 # The page of one run without tests, as of `tickrig run --report`.
 
 _PATH_SIZE: Final = 400
-"""Of the longer side of a path, in units of its picture."""
+"""Length of the longer side of the picture of a path."""
 _PATH_POINTS: Final = 4_000
 
 
@@ -169,9 +169,9 @@ class PagePath:
     """A path: one signal drawn over another.
 
     Attributes:
-        x: name and unit.
-        y: name and unit.
-        points: values of both.
+        x: name and unit of the signal on the x axis.
+        y: name and unit of the signal on the y axis.
+        points: pairs of values of the two signals.
     """
 
     x: tuple[str, str]
@@ -180,7 +180,7 @@ class PagePath:
 
     @property
     def texts(self) -> list[str]:
-        """Labels of both axes: name, least and greatest value, unit."""
+        """Labels of both axes, each with name, least and greatest value, and unit."""
         return [
             f"{name} {min(column):.6g} to {max(column):.6g} {unit}".rstrip()
             for (name, unit), column in zip((self.x, self.y), self._columns, strict=True)
@@ -192,7 +192,7 @@ class PagePath:
 
     @property
     def drawn(self) -> tuple[float, float, str]:
-        """Width and height of the picture, and its path; equal units have one scale."""
+        """Width and height of the picture, and the drawn path; equal units have the same scale."""
         (left, right), (low, high) = (widened(min(c), max(c)) for c in self._columns)
         x_scale, y_scale = _PATH_SIZE / (right - left), _PATH_SIZE / (high - low)
         if self.x[1] == self.y[1]:
@@ -210,11 +210,11 @@ def run_page(
     wires: Sequence[Sequence[str]],
     paths: Sequence[PagePath] = (),
 ) -> str:
-    """Return the page of one run.
+    """Return the HTML page of one run.
 
     Args:
-        record: the run; `nodeid` is the title, `reason` the result.
-        run: where and how the run was executed.
+        record: the run. Its `nodeid` is the title, and its `reason` is the result.
+        run: environment and settings of the run.
         wires: name, place, rate and devices of each wire.
         paths: pairs of signals, one drawn over the other.
     """
@@ -256,7 +256,7 @@ def _test_on_page(
 def _left_out(
     test: bench_report.TestRecord, timeline: Timeline | None, parts: set[_PagePart]
 ) -> Iterator[str]:
-    """Yield what of a test is not on the page, for people."""
+    """Yield descriptions of the parts of a test that are not on the page."""
     texts = (
         (_PagePart.TEXT, "the text", test.longrepr, _TEXT_BYTES),
         (_PagePart.TRACE, "the trace", test.trace, _TRACE_BYTES),

@@ -33,7 +33,7 @@ else:
 _VERSION_KEY: Final = "tickrig-report"
 
 _MOST: Final = 2**63 - 1
-"""Limit of integers: as times in microseconds, 292,000 years."""
+"""Limit of integers; as a time in microseconds it is 292,000 years."""
 
 _MOST_SHARED: Final = 50_000
 """Number of values of a column that are stored before the store is emptied."""
@@ -41,7 +41,7 @@ _MOST_SHARED: Final = 50_000
 _T = TypeVar("_T")
 
 _Reader = Callable[[Any], Any]
-"""Makes a value of what JSON gives."""
+"""Function that converts a JSON value to a value of a report."""
 
 _NAMES: Final[Mapping[type, str]] = {
     int: "a whole number",
@@ -57,7 +57,7 @@ class ReportError(ValueError):
 
 
 def to_data(value: Any) -> Any:  # what a value holds is open
-    """Return a value of a report as dicts, lists, texts and numbers, as JSON has them."""
+    """Return a value of a report as dicts, lists, texts and numbers for JSON."""
     return asdict(value)
 
 
@@ -65,11 +65,11 @@ def from_data(kind: type[_T], data: object) -> _T:
     """Return the report value from the result of `to_data`.
 
     Args:
-        kind: `BenchReport`, `TestRecord`, ...
+        kind: type of the value: `BenchReport`, `TestRecord`, ...
         data: dicts, lists, texts and numbers.
 
     Raises:
-        ReportError: an invalid key or value.
+        ReportError: a key or value is invalid.
     """
     hint: Any = kind
     value: _T = _reader(hint)(data)
@@ -81,7 +81,7 @@ _VERSION: Final = 1
 
 
 def to_json(report: BenchReport) -> str:
-    """Write a report, on one line."""
+    """Return a report as JSON on one line."""
     data = {_VERSION_KEY: _VERSION, **_values(report)}
     return json.dumps(data, separators=(",", ":"), default=_values)
 
@@ -94,7 +94,8 @@ def from_json(text: str) -> BenchReport:
     """Read a report.
 
     Raises:
-        ReportError: not JSON, not a report, a report of another version, or an invalid value.
+        ReportError: the text is not JSON, not a report, a report of another version, or has an
+            invalid value.
     """
     return _read(StringIO(text))
 
@@ -120,7 +121,7 @@ _PIECE: Final = 1 << 20
 
 
 class _Scanner:
-    """Reads values and punctuation of JSON; only a part of the file is in memory.
+    """Reads values and punctuation of JSON, with only a part of the file in memory.
 
     Args:
         file: the JSON, without blanks between values.
@@ -132,22 +133,22 @@ class _Scanner:
 
     @property
     def mark(self) -> str:
-        """The next character; empty at the end."""
+        """The next character, or "" at the end."""
         if self._at == len(self._text):
             self._read_on()
         return self._text[self._at : self._at + 1]
 
     @property
     def rest(self) -> str:
-        """All that follows."""
+        """The rest of the file."""
         return self._text[self._at :] + self._file.read()
 
     def skip(self) -> None:
-        """Go on behind the next character."""
+        """Skip the next character."""
         self._at += 1
 
     def value(self) -> Any:
-        """Take the next value; ValueError if there is none."""
+        """Return the next value, and skip it; raise ValueError if there is no value."""
         while True:
             try:
                 found, end = self._scan(self._text, self._at)
@@ -170,10 +171,11 @@ class _Scanner:
 def _written_by_us(json_: _Scanner) -> BenchReport | None:
     """Read a report test by test; the JSON of a test is released before the next one is read.
 
-    This takes half of the time and a quarter of the memory of reading the report at once.
+    Reading test by test takes half of the time and a quarter of the memory of reading the report at
+    once.
 
     Returns:
-        The report; None if its form differs from the output of `to_json`.
+        The report, or None if its form differs from the output of `to_json`.
     """
     data, read, tests = dict[str, Any](), _reader(TestRecord), list[TestRecord]()
     opening = "{"
@@ -220,7 +222,7 @@ def _any_json(text: str) -> BenchReport:
 
 @cache
 def _reader(hint: Any) -> _Reader:
-    """Return what reads a type of a field."""
+    """Return the reader for the type of a field."""
     if get_origin(hint) is tuple:
         return _tuple_reader(get_args(hint))
     if isinstance(hint, type) and is_dataclass(hint):
@@ -248,13 +250,13 @@ def _allowed(kinds: tuple[type, ...]) -> frozenset[type]:
 def _rows_reader(hint: Any, each: _Reader) -> _Reader:
     """Return a function that reads many tuples of plain values, column by column.
 
-    It takes a tenth of the time of reading value by value. Equal values in this list or a later one
-    are stored once, because times and samples of tests are similar. Without this, ten thousand
-    tests take twice the memory.
+    The function takes a tenth of the time of reading value by value. Equal values in a list or in
+    later lists are stored once, because times and samples of tests are similar. Otherwise ten
+    thousand tests would take twice the memory.
 
     Args:
-        hint: the type of a tuple.
-        each: reads a single tuple, and explains an error in it.
+        hint: type of a tuple.
+        each: function that reads a single tuple, and that explains an error in the tuple.
     """
     allowed = [_allowed(get_args(member) or (member,)) for member in _members(hint)]
     make: Any = tuple if get_origin(hint) is tuple else partial(tuple.__new__, hint)
@@ -370,15 +372,15 @@ def _made(kind: type[Any], values: Mapping[str, Any]) -> Any:
 
 _PAGES: Final = (".html", ".htm", "")
 _JSON: Final = ".json"
-"""Ends the name of a report that is kept as JSON."""
+"""Suffix of the name of a report that is kept as JSON."""
 
 
 def check_report(path: Path) -> None:
     """Check before a run that its report can be written after it.
 
     Raises:
-        ValueError: Jinja2 or the folder is missing; the folder is not writable; or the name is that
-            of a folder, or has a suffix that reports do not have.
+        ValueError: Jinja2 or the folder is missing, or the folder is not writable, or the path is a
+            folder, or the suffix is not a suffix of reports.
     """
     if path.suffix.lower() not in (*_PAGES, _JSON) and not is_special(path):
         raise ValueError(f"report {path}: it is a page, as report.html, or JSON, as report.json")
@@ -390,10 +392,10 @@ def check_report(path: Path) -> None:
 def write_report(report: BenchReport, path: Path) -> None:
     """Write the page of a report; if the name ends in `.json`, write JSON as `write_run` does.
 
-    An existing file of this name is replaced only after the new one is complete.
+    An existing file is replaced only after the new file is complete.
 
     Raises:
-        OSError: the file cannot be written; its `filename` is `path`.
+        OSError: the file cannot be written. The `filename` of the exception is `path`.
         ImportError: Jinja2 is not installed (extra `report`).
     """
     if path.suffix.lower() == _JSON:
@@ -406,7 +408,7 @@ def write_run(report: BenchReport, path: Path) -> None:
     """Write a report as JSON atomically.
 
     Raises:
-        OSError: the file cannot be written; its `filename` is `path`.
+        OSError: the file cannot be written. The `filename` of the exception is `path`.
     """
     write_whole(path, to_json(report) + "\n")
 
@@ -416,7 +418,7 @@ def read_run(path: Path) -> BenchReport:
 
     Raises:
         OSError: the file cannot be read.
-        ValueError: not a report; the message has the place and the error.
+        ValueError: the file is not a report. The message has the place and the error.
     """
     try:
         with path.open(encoding="utf-8") as file:

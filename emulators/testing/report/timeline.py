@@ -17,28 +17,28 @@ from tickrig.host.text.values import counted
 # Positions are per cent of it, and so fit any width.
 
 _WIDE: Final = 25
-"""Per cent of the axis on which a text has room, even on a phone."""
+"""Width that a text needs, in per cent of the axis, even on a phone."""
 
 
 class TimeAxis(NamedTuple):
     """The displayed span of time.
 
     Attributes:
-        from_us: its beginning,
-        to_us: its end, later than the beginning.
+        from_us: beginning of the span.
+        to_us: end of the span, which is later than its beginning.
     """
 
     from_us: int
     to_us: int
 
     def part(self, at_us: int) -> float:
-        """Return the place of a time, in per cent from the left; times outside are at the edge."""
+        """Return the place of a time, in per cent from the left; a time outside is at the edge."""
         part = (at_us - self.from_us) * 100 / (self.to_us - self.from_us)
         return round(min(max(part, 0), 100), 2)
 
     @property
     def ticks(self) -> list[tuple[float, str]]:
-        """Round times: the place of each, and its label in seconds."""
+        """Places and labels (in seconds) of round times."""
         marks = ticks(self.from_us / 1e6, self.to_us / 1e6, 5)
         return [(self.part(round(second * 1e6)), text) for second, text in marks]
 
@@ -47,8 +47,8 @@ class TimeSpan(NamedTuple):
     """An event with a duration.
 
     Attributes:
-        left: its beginning, in per cent.
-        width: in per cent.
+        left: place of the beginning, in per cent.
+        width: width of the event, in per cent.
         text: description of the event.
     """
 
@@ -58,7 +58,7 @@ class TimeSpan(NamedTuple):
 
     @property
     def place(self) -> str:
-        """Place with room for its text: `inside`, `behind` or `before`."""
+        """Place that has room for the text: `inside`, `behind` or `before`."""
         if self.width >= _WIDE:
             return "inside"
         return "behind" if self.left + self.width <= 100 - _WIDE else "before"
@@ -69,13 +69,13 @@ class TimeSpan(NamedTuple):
 _WIDTH: Final = 1000
 _HEIGHT: Final = 100
 _MOST_POINTS: Final = 800
-"""Number of points of a curve; more are not visible."""
+"""Largest number of points of a curve; more points are not visible."""
 _MOST_WORDS: Final = 200
 _WORD_CHARACTERS: Final = 80
 CURVE_PX: Final = 64
 SWITCH_PX: Final = 32
 _SWITCH: Final[tuple[float, float]] = (0, 1)
-"""The scale of what is on or off."""
+"""The scale of a signal that is on or off."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,15 +83,15 @@ class Lane:
     """A signal on the axis.
 
     Attributes:
-        name: of the signal.
-        unit: of its numbers.
-        path: its curve; empty for words.
-        words: its values if they are words, or its only number.
-        low: its least number,
-        high: its greatest one.
-        scale: the numbers at the lower and the upper edge of the field.
-        zero: distance of zero from the top, in per cent; None if zero is at an edge or outside.
-        rows: values for a table: first, least, greatest and last value, number of samples.
+        name: name of the signal.
+        unit: unit of the numbers.
+        path: curve of the signal, or empty for words.
+        words: values of the signal if they are words, or its only number.
+        low: least number.
+        high: greatest number.
+        scale: numbers at the lower and the upper edge of the field.
+        zero: distance of zero from the top, in per cent, or None if zero is at an edge or outside.
+        rows: values for a table: first, least, greatest and last value, and number of samples.
     """
 
     name: str
@@ -106,17 +106,17 @@ class Lane:
 
     @property
     def constant(self) -> bool:
-        """It never changed."""
+        """Whether the signal never changed."""
         return not self.path and len(self.words) == 1
 
     @property
     def height(self) -> int:
-        """Height of its picture in pixels; switches need little."""
+        """Height of the picture in pixels; signals that are on or off need little."""
         return SWITCH_PX if self.scale == _SWITCH else CURVE_PX
 
 
 def _lane_of(series: bench_report.SignalSeries, axis: TimeAxis) -> Lane:
-    """Return how a signal with samples is drawn on an axis."""
+    """Return the lane of a signal with samples on an axis."""
     values = [value for _, value in series.points if value is not None]
     numbers = [value for value in values if not isinstance(value, str)]
     if not numbers or len(numbers) < len(values):
@@ -133,7 +133,7 @@ def _lane_of(series: bench_report.SignalSeries, axis: TimeAxis) -> Lane:
 
 
 def _constant(series: bench_report.SignalSeries, axis: TimeAxis) -> Lane:
-    """Return a lane that says a number once."""
+    """Return a lane with a number that stays."""
     value = series.points[0][1]
     text = f"{_text_of(value)} {series.unit}".rstrip()
     left = axis.part(series.points[0][0])
@@ -149,7 +149,7 @@ def _row(points: Sequence[bench_report.Point], numbers: Sequence[float]) -> tupl
 
 
 def _text_of(value: bench_report.Value) -> str:
-    """Write a value for people."""
+    """Return a value as readable text."""
     if isinstance(value, float):
         return f"{value:.6g}"
     return DASH if value is None else str(value)[:_WORD_CHARACTERS]
@@ -204,9 +204,9 @@ class _TimelineEvent(NamedTuple):
     """An event without a duration.
 
     Attributes:
-        left: its place, in per cent.
+        left: place of the event, in per cent.
         text: description of the event.
-        missed: whether it is a missed expectation.
+        missed: whether the event is a missed expectation.
     """
 
     left: float
@@ -216,14 +216,14 @@ class _TimelineEvent(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Timeline:
-    """Everything in a test that has a time.
+    """Everything in a test that belongs to a time.
 
     Attributes:
         axis: the displayed span of time.
         faults: the faults that occurred.
         events: actions, and missed expectations.
         lanes: the signals.
-        left_out: description of what is not drawn.
+        left_out: description of the signals and events that are not drawn.
     """
 
     axis: TimeAxis
@@ -234,14 +234,14 @@ class Timeline:
 
     @property
     def size(self) -> int:
-        """About how many characters a page needs for it."""
+        """Approximate number of characters that the time line needs on a page."""
         lanes = sum(len(lane.path) + 400 * len(lane.words) + 1_200 for lane in self.lanes)
         bands = len(self.faults) * len(self.lanes) * 80
         return lanes + bands + 300 * (len(self.events) + len(self.faults))
 
 
 def timeline_of(test: bench_report.TestRecord) -> Timeline | None:
-    """Return the time line of a test, None if there is nothing on it."""
+    """Return the time line of a test, or None if there is nothing on it."""
     if not (test.series or test.faults):
         return None
     axis = _axis_of(test)

@@ -36,13 +36,13 @@ from tickrig.host.text.section import Schema, Section, shown
 from tickrig.host.text.user_file import SUFFIX
 
 _BUS: Final = "can"
-"""The bus that a file leaves out."""
+"""Name of the bus that a file may omit."""
 
 RESERVED: Final = ("control", "tolerance", "body", _BUS)
-"""Names that mean something else beside those of devices."""
+"""Names that a device cannot have, because they have another meaning."""
 
 RIG_SUFFIXES: Final = (".toml", ".yml", ".yaml")
-"""Of rig files, and of a bus.yml, which is one."""
+"""Suffixes of rig files, and of a bus.yml, which counts as a rig file."""
 EDS_SUFFIXES: Final = (".eds", ".dcf", ".xdd", ".xdc")
 _DEVICE_KEYS: Final[Schema] = {**SERIAL_DEVICE, **CANOPEN_DEVICE}
 _READ_LATER: Final = "start"
@@ -54,13 +54,14 @@ class DeviceReader:
     """Reads the devices and puts them on wires.
 
     Args:
-        section: `[device]`; None if the file has none.
-        wires: of the file; None for a wire of unknown type. Wires that the file omits are added.
-        folder: folder of the files.
+        section: table `[device]`, or None if the file has no such table.
+        wires: wires of the file by name. The value is None for a wire of unknown type. Wires that
+            the file omits are added.
+        folder: folder that relative paths start from.
 
     Attributes:
-        plans: by name; None for a device of unknown type.
-        sections: the table of each.
+        plans: devices by name. The value is None for a device of unknown type.
+        sections: tables of the devices by name.
     """
 
     def __init__(self, section: Section | None, wires: _Wires, folder: Path) -> None:
@@ -77,7 +78,7 @@ class DeviceReader:
                 self.plans[name] = self._read(name, table)
 
     def check_stores(self) -> None:
-        """Note files that are there and keep something else than what nodes store."""
+        """Record the errors of store files that exist but have other content."""
         for name, device in self.plans.items():
             if device is not None and device.store is not None:
                 try:
@@ -90,7 +91,7 @@ class DeviceReader:
                     self.sections[name].wrong(f"{device.store}: {error.strerror}", "store")
 
     def put_on_wires(self) -> None:
-        """Find the wire of each device, and note what is wrong with wires."""
+        """Find the wire of each device, and record the errors of wires."""
         for name, device in self.plans.items():
             if device is not None:
                 wire = self._wire_of(self.sections[name], device)
@@ -137,7 +138,7 @@ class DeviceReader:
         )
 
     def _wire_of(self, section: Section, device: plan.DevicePlan) -> str | None:
-        """Return the wire of a device; None if it is unknown."""
+        """Return the wire of a device, or None if the wire is unknown."""
         is_node = device.kind is not plan.DeviceKind.SERIAL
         if not device.wire:
             return self._bus_of(section) if is_node else self._line_of(device.name)
@@ -151,7 +152,7 @@ class DeviceReader:
         return device.wire
 
     def _bus_of(self, section: Section) -> str | None:
-        """Return the only bus, made if the file has none."""
+        """Return the only bus; add a bus if the file has none."""
         if None in self._given.values():
             return None
         buses = [
@@ -167,7 +168,7 @@ class DeviceReader:
         return buses[0] if buses else _BUS
 
     def _line_of(self, name: str) -> str:
-        """Return the line of a device's own."""
+        """Return the serial line that belongs to one device."""
         self._wires.setdefault(name, plan.WirePlan(name=name, given=False))
         return name
 
@@ -183,15 +184,16 @@ def _sdo_limits(values: Mapping[str, Any]) -> SdoLimits:
 def kind_of(
     text: str, folder: Path, types: Callable[[], list[str]] = DEVICES.names
 ) -> tuple[plan.DeviceKind, str]:
-    """Return the kind of a type, and the type with its path for this program.
+    """Return the kind of a type, and the type with a path that this program can open.
 
     Args:
-        text: as in the file.
-        folder: where files are searched.
-        types: returns the names of all device types; called if the type is not built in.
+        text: type as in the file.
+        folder: folder in which files are searched.
+        types: function that returns the names of all device types. It is called if the type is not
+            built in.
 
     Raises:
-        ValueError: there is no such type or file.
+        ValueError: no such type or file exists.
     """
     if not text.isprintable():
         raise ValueError(f"no device {shown(text)}")
@@ -212,7 +214,7 @@ def kind_of(
 
 
 def _beside(config: Mapping[str, Any], folder: Path) -> dict[str, object]:
-    """Return options with `FILE.py:Class` found beside the rig file."""
+    """Return options; the path in `FILE.py:Class` is relative to the folder of the rig file."""
     return {
         key: str(folder / value) if isinstance(value, str) and f"{SUFFIX}:" in value else value
         for key, value in config.items()
@@ -226,7 +228,7 @@ _OPTIONAL: Final = {"framing", "buffer_bytes", "echo", "bursts"}
 
 
 def read_wires(section: Section | None) -> dict[str, plan.WirePlan | None]:
-    """Read all wires; None for a wire of unknown type."""
+    """Return all wires by name, with None for a wire of unknown type."""
     wires: dict[str, plan.WirePlan | None] = {}
     for name, table in section.subs() if section else ():
         try:
@@ -258,7 +260,7 @@ def check_wires(
     wires: Mapping[str, plan.WirePlan | None],
     devices: Mapping[str, plan.DevicePlan | None],
 ) -> None:
-    """Note wires with nothing on them, and serial lines of several devices."""
+    """Record the errors of wires without devices, and of serial lines with several devices."""
     all_known = None not in devices.values() and top.notes.document.whole
     for name, wire in wires.items():
         if wire is None or not wire.given:
@@ -282,9 +284,9 @@ class DoorReader:
     """Reads `[real]` and `[hardware]`.
 
     Args:
-        wires: by name; None for a wire of unknown type.
-        devices: by name; None for a device of unknown type.
-        folder: folder of the files.
+        wires: wires by name. The value is None for a wire of unknown type.
+        devices: devices by name. The value is None for a device of unknown type.
+        folder: folder that relative paths start from.
     """
 
     def __init__(
@@ -344,7 +346,7 @@ class DoorReader:
     def _tables(
         self, section: Section, *but: str
     ) -> Iterator[tuple[str, plan.WirePlan | None, Section]]:
-        """Yield each table with the wire of its name, or that of a device alone on its line."""
+        """Yield each table with the wire that it names, or with the line of the device it names."""
         names = [*self._devices, *(name for name in self._wires if name not in self._devices)]
         for name in section.values:
             if name in but:
@@ -375,7 +377,7 @@ class DoorReader:
         return plan.DoorPlan(link=self._file(found.get("link")), serve=tuple(serve))
 
     def _check_twice(self, section: Section, doors: Mapping[str, plan.DoorPlan]) -> None:
-        """Note links and addresses that two wires would have."""
+        """Record an error for each link or address that two wires have."""
         seen: dict[object, str] = {}
         for wire, door in doors.items():
             places: list[object] = [door.link] if door.link else []
@@ -401,7 +403,7 @@ def _is_url(section: Section, url: str) -> bool:
 
 
 def _hardware_schema(wire: plan.WirePlan | None, *, is_device: bool) -> Schema:
-    """Return the keys that a table of hardware can have."""
+    """Return the keys that a table of `[hardware]` can have."""
     of_device = HARDWARE_DEVICE if is_device else {}
     if wire is None:
         return of_device
@@ -411,7 +413,7 @@ def _hardware_schema(wire: plan.WirePlan | None, *, is_device: bool) -> Schema:
 
 
 def _bus(section: Section, found: Mapping[str, Any]) -> plan.BusPlan:
-    """Return a bus; its driver may be missing here, because it may exist on another machine."""
+    """Return a bus; its driver may be missing here, and may exist on another machine."""
     from can import VALID_INTERFACES  # noqa: PLC0415 - slow
 
     name = found["interface"]

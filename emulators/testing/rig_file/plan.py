@@ -1,4 +1,4 @@
-"""What a rig file says, and its keys."""
+"""The content of a rig file, and its keys."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ _STICK_PCT: Final = 10
 
 
 class WireType(Enum):
-    """What a wire is, as the file writes it."""
+    """Type of a wire, as written in the file."""
 
     SERIAL = "serial"
     RS485 = "rs485"
@@ -59,16 +59,19 @@ class WirePlan:
     """A wire.
 
     Attributes:
-        name: used by faults, connections and messages. A wire that the file omits has the name of
+        name: name for faults, connections and messages. A wire that the file omits has the name of
             its device, or is `can`.
-        type: serial line, RS485 or CAN bus.
-        bit_rate: in bit/s; None for the rate of its device (`DeviceType.line`, or that of a DCF).
-        framing: of a byte on a line: data bits, parity, stop bits.
-        buffer_bytes: size of the receive buffer of a line; None for the size of its device.
-        echo: on RS485, whether each end also receives its own bytes.
-        bursts: on RS485, whether bytes sent without a gap arrive together, after the last one.
-        given: whether the file has a table for it. If not, `type` is that of its device, which
-            makes the wire.
+        type: type of the wire: serial line, RS485 or CAN bus.
+        bit_rate: bit rate in bit/s, or None to use the rate of the device (`DeviceType.line`, or
+            the rate of a DCF).
+        framing: framing of a byte on a line: data bits, parity, stop bits.
+        buffer_bytes: size of the receive buffer of a line, or None to use the size of the device
+            type.
+        echo: whether each end of an RS485 wire also receives its own bytes.
+        bursts: whether bytes that are sent on RS485 without a gap arrive together, after the last
+            byte.
+        given: whether the file has a table for the wire. Without a table, `type` comes from the
+            device, which makes the wire.
     """
 
     name: str
@@ -92,7 +95,7 @@ class WirePlan:
 
 
 class DeviceKind(Enum):
-    """What the type of a device names."""
+    """Kind of object that the type of a device names."""
 
     SERIAL = "device type"
     MODEL = "CANopen model"
@@ -104,25 +107,25 @@ class DeviceKind(Enum):
 class MadeDevice:
     """The device that a reader has made to check the file; the first bench uses it.
 
-    A copy, in this process or in another one, does not contain the device.
+    A copy of this object, in this process or in another process, does not contain the device.
 
     Args:
         device: a device made by `configure`, or a slave.
-        of: the parameters of the device; a bench with other parameters does not use it.
+        of: parameters of the device. A bench with other parameters does not use the device.
     """
 
     def __init__(self, device: object = None, of: object = None) -> None:
         self._device, self._of = device, of
 
     def take(self, of: object) -> Any:
-        """Return the device once, if it was made with these parameters; else None."""
+        """Return the device once, if it was made with these parameters, or None otherwise."""
         if self._device is None or self._of != of:
             return None
         device, self._device = self._device, None
         return device
 
     def __reduce__(self) -> tuple[type[MadeDevice], tuple[()]]:
-        """Leave the device behind."""
+        """Make a copy that does not contain the device."""
         return MadeDevice, ()
 
 
@@ -131,18 +134,19 @@ class DevicePlan:
     """A device.
 
     Attributes:
-        name: its name for tests and signals.
+        name: name of the device for tests and signals.
         kind: kind of the `type`.
         type: name of a device type (`DEVICES`) or of a model (`MODELS`), path of an EDS or DCF,
             `FILE.yml:NODE` or `FILE.py:Class`.
-        wire: name of its wire, of `RigPlan.wires`.
+        wire: name of the wire, which is a key of `RigPlan.wires`.
         config: options of a device type by name, as in the file.
-        node_id: 1..127, `UNCONFIGURED`, or None for the node-ID of the DCF or model.
-        profile: of a file; one of `choices.PROFILES`; None for `auto`.
-        store: file for the data that a CANopen node stores by 1010h and LSS.
+        node_id: node-ID 1..127, or `UNCONFIGURED`, or None to use the node-ID of the DCF or model.
+        profile: profile of a device that a file describes, which is one of `choices.PROFILES`, or
+            None for `auto`.
+        store: file for the data that a CANopen node stores by object 1010h and LSS.
         sdo: limits of the SDO servers of a CANopen node.
-        start: initial inputs by name, with the members of groups one by one: a value, or the signal
-            that drives the input.
+        start: initial inputs by name, with the members of groups one by one. The value is a value,
+            or the signal that drives the input.
         made: the device, if the reader has made it and no bench uses it yet.
     """
 
@@ -162,7 +166,7 @@ class DevicePlan:
         """Return all parameters that determine the device when it is made.
 
         Args:
-            seed: of all random numbers, for a device on a serial line.
+            seed: seed of all random numbers, for a device on a serial line.
         """
         if self.kind is DeviceKind.SERIAL:
             return self.type, self.config, seed
@@ -174,8 +178,8 @@ class FaultPlan:
     """A fault.
 
     Attributes:
-        owner: name of the device or wire that has it.
-        spec: the fault, its rate, and its time.
+        owner: name of the device or wire that has the fault.
+        spec: the fault with its rate and its time.
     """
 
     owner: str
@@ -187,9 +191,9 @@ class BusPlan:
     """A bus of python-can.
 
     Attributes:
-        interface: its driver.
-        channel: of the driver.
-        bit_rate: in bit/s, if the driver sets it.
+        interface: name of the driver.
+        channel: channel of the driver.
+        bit_rate: bit rate in bit/s, or None if the driver does not set it.
         options: further options of the driver, by name.
     """
 
@@ -204,9 +208,9 @@ class DoorPlan:
     """The place of a wire for hosts in real time.
 
     Attributes:
-        link: of a line, the symbolic link to its pty; None for no link.
-        serve: of a line, additional URLs: `rfc2217://`, `socket://`.
-        bus: of a CAN bus, the outside bus that it is connected with.
+        link: symbolic link to the pty of a line, or None for no link.
+        serve: additional URLs of a line: `rfc2217://`, `socket://`.
+        bus: outside bus that a CAN bus is connected with.
     """
 
     link: Path | None = None
@@ -219,8 +223,8 @@ class RealPlan:
     """The bench in real time.
 
     Attributes:
-        control: the control socket to serve.
-        doors: by the name of the wire; a wire without an entry has a pty.
+        control: path of the control socket to serve.
+        doors: places by name of the wire. A wire without an entry has a pty.
     """
 
     control: Path | None = None
@@ -233,7 +237,7 @@ class PortPlan:
 
     Attributes:
         port: device path, or URL of pyserial.
-        baud: in bit/s; None for the rate of the wire.
+        baud: baud rate in bit/s, or None to use the rate of the wire.
     """
 
     port: str
@@ -245,8 +249,8 @@ class PowerPlan:
     """Commands that switch a device; without a command the operator switches it.
 
     Attributes:
-        on: command line that switches the device on, as a list of words; no shell is used.
-        off: command line that switches it off.
+        on: command line that switches the device on, as a list of words. No shell is used.
+        off: command line that switches the device off, as a list of words.
     """
 
     on: tuple[str, ...]
@@ -258,9 +262,9 @@ class Tolerances:
     """Permitted deviations of an operator and a real device.
 
     Attributes:
-        stick_pct: of a stick held by hand, in per cent.
-        time_us: of a time, in microseconds.
-        values: of further signals by name, in the unit of the signal.
+        stick_pct: deviation of a stick held by hand, in per cent.
+        time_us: deviation of a time, in microseconds.
+        values: deviations of further signals by name, in the unit of the signal.
     """
 
     stick_pct: float = _STICK_PCT
@@ -273,11 +277,11 @@ class HardwarePlan:
     """The places of the real devices.
 
     Attributes:
-        control: by the name of the device, the control socket of an emulator that replaces the
-            operator. The operator of the other devices is at the terminal.
-        ports: of lines, by the name of the wire.
-        buses: of CAN buses, by the name of the wire.
-        power: commands that switch a device, by its name.
+        control: control sockets of emulators that replace the operator, by name of the device. The
+            operator of the other devices is at the terminal.
+        ports: ports of lines, by name of the wire.
+        buses: buses of CAN wires, by name of the wire.
+        power: commands that switch a device, by name of the device.
         tolerance: the permitted deviations.
     """
 
@@ -293,16 +297,16 @@ class RigPlan:
     """The content of a rig file.
 
     Attributes:
-        seed: of all random numbers.
-        wires: by name, including those that the file omits.
-        devices: by name, in the order of the file.
-        signals: by name, for formulas.
-        faults: in the order of the file.
-        safe: for each device the safe values of outputs at the end of a test.
-        body: the body that drives move; None if there is none.
+        seed: seed of all random numbers.
+        wires: wires by name, including wires that the file omits.
+        devices: devices by name, in the order of the file.
+        signals: signals by name, for formulas.
+        faults: faults in the order of the file.
+        safe: safe values of outputs at the end of a test, for each device.
+        body: body that drives move, or None if there is none.
         real: the bench in real time.
-        hardware: the bench of real devices; None if the file has no such section.
-        path: of the file, for messages and relative paths; None without a file.
+        hardware: bench of real devices, or None if the file has no such section.
+        path: path of the file, for messages and relative paths, or None without a file.
     """
 
     seed: int = 0
@@ -320,7 +324,7 @@ class RigPlan:
         """Return the devices on a wire, in the order of the file.
 
         Args:
-            wire: its name.
+            wire: name of the wire.
         """
         return tuple(device for device in self.devices.values() if device.wire == wire)
 
@@ -402,7 +406,7 @@ def device_text(device: DevicePlan) -> str:
 
 
 def _places(plan: RigPlan, wire: str) -> Iterator[str]:
-    """Yield where a wire is in real time and on hardware, as far as the file says it."""
+    """Yield the places of a wire in real time and on hardware that the file defines."""
     if door := plan.real.doors.get(wire):
         bus = [bus_text(door.bus)] if door.bus else []
         yield f"real: {', '.join([*([str(door.link)] if door.link else []), *door.serve, *bus])}"
@@ -446,7 +450,7 @@ class RigFileError(ValueError):
 
     Attributes:
         file: name of the file.
-        mistakes: in the order of their lines.
+        mistakes: errors in the order of their lines.
     """
 
     def __init__(self, file: str, mistakes: tuple[Mistake, ...]) -> None:
@@ -455,7 +459,7 @@ class RigFileError(ValueError):
 
 
 def check_name(name: str) -> None:
-    """Raise ValueError unless a device, wire or signal can be called so."""
+    """Raise ValueError unless a text can be the name of a device, wire or signal."""
     if len(name) > _LONGEST_NAME:
         raise ValueError(f"a name of {len(name)} letters; {_LONGEST_NAME} are enough")
     if not _NAME.fullmatch(name):
@@ -465,14 +469,14 @@ def check_name(name: str) -> None:
 
 
 def framing(value: object) -> str:
-    """Take data bits, parity and stop bits."""
+    """Return data bits, parity and stop bits."""
     if isinstance(value, str) and _FRAMING.fullmatch(value):
         return value
     raise ValueError(f"it takes data bits, parity and stop bits as 8N1, not {shown(value)}")
 
 
 def node_id(value: object) -> int:
-    """Take a node-ID, or the word of a node that waits for one."""
+    """Return a node-ID, or the word for a node that waits for a node-ID."""
     if value == LSS:
         return UNCONFIGURED
     if isinstance(value, int) and not isinstance(value, bool) and 1 <= value <= 127:
@@ -517,7 +521,7 @@ WIRES: Final[Mapping[WireType, Schema]] = {
     WireType.RS485: _TYPE | _LINE | _RS485,
     WireType.CAN: _TYPE | {"bitrate": _BITRATE},
 }
-"""Of `[wire.NAME]`."""
+"""The keys of `[wire.NAME]`."""
 
 _DEVICE: Final = {
     "type": Field(
@@ -561,7 +565,7 @@ BODY: Final[Schema] = {
         texts, "a list of wheels", "wheels whose drive is mounted the other way round", _NONE
     ),
 }
-"""Beside the wheels of its kind."""
+"""The keys of `[body]`, in addition to the wheels of its kind."""
 
 _BUS: Final[Schema] = {
     "interface": Field(text, "a driver of python-can", "of the bus outside"),
@@ -638,4 +642,4 @@ PAGE: Final[Mapping[str, Schema]] = {
     "`[hardware.NAME]`, of a device": HARDWARE_DEVICE,
     "`[hardware.tolerance]`": TOLERANCE,
 }
-"""All tables, by what the page calls them."""
+"""The keys of all tables, by the name of the table on the page of the manual."""

@@ -34,13 +34,13 @@ class Probe:
     """The properties of a device.
 
     Attributes:
-        physical: its inputs and outputs.
-        wire_faults: faults of its end of the wire, or of its bus.
-        title: its name for messages.
-        baud: of a serial device, the rate of its type.
-        node_id: of a node, from its DCF or model.
-        bit_rate: of a node, from its DCF.
-        start: inputs whose initial values differ from the usual ones.
+        physical: inputs and outputs of the device.
+        wire_faults: faults of the device's end of the wire, or of its bus.
+        title: name of the device in messages.
+        baud: baud rate of the type of a serial device.
+        node_id: node-ID of a node, from its DCF or model.
+        bit_rate: bit rate of a node, from its DCF.
+        start: inputs whose initial values differ from the usual values.
         made: the device, for use by a bench.
     """
 
@@ -63,7 +63,7 @@ class Probe:
 
 @cache
 def eds_cache() -> late.EdsCache:
-    """Return the cache of the descriptions that this process has read, for all benches."""
+    """Return the cache of the EDS files that this process has read, for all benches."""
     return late.EdsCache()
 
 
@@ -72,7 +72,7 @@ class WrongDevice(NamedTuple):
 
     Attributes:
         reason: the text of the message.
-        keys: the place within its table.
+        keys: place of the error within the table of the device.
     """
 
     reason: str
@@ -84,10 +84,10 @@ def probe(plan: DevicePlan, seed: int = 0) -> Probe | list[WrongDevice]:
 
     Args:
         plan: the device.
-        seed: of all its random numbers, for a device on a serial line.
+        seed: seed of all random numbers, for a device on a serial line.
 
     Returns:
-        Its properties, or all errors.
+        The properties of the device, or all errors.
     """
     if plan.kind is DeviceKind.SERIAL:
         return _serial(plan, seed)
@@ -140,7 +140,7 @@ def _serial(plan: DevicePlan, seed: int) -> Probe | list[WrongDevice]:
 
 
 def _reason(name: str, key: str, value: object) -> str:
-    """Return why a device cannot have an option, empty if it can."""
+    """Return why a device cannot have an option, or "" if it can."""
     try:
         names = option_names(name)
     except ValueError:
@@ -152,7 +152,7 @@ def _reason(name: str, key: str, value: object) -> str:
 
 
 def _configured(name: str, config: Mapping[str, object], seed: int = 0) -> ConfiguredDevice | str:
-    """Return the device of these options, or why there can be none."""
+    """Return the device with the options, or the reason why it cannot be made."""
     try:
         return configure(name, config, seed)
     except ValueError as error:
@@ -167,7 +167,7 @@ _T = TypeVar("_T")
 
 
 class _Everything(Mapping[str, _T], Generic[_T]):
-    """A table that has every name, with the same behind it."""
+    """A table that has every name, with the same value for each name."""
 
     def __init__(self, item: _T) -> None:
         self._item = item
@@ -189,18 +189,18 @@ _ANY: Final = InputSignal("any", "", low=float("-inf"), high=float("inf"), real=
 
 
 class _UnknownInputs:
-    """Inputs that take everything."""
+    """Inputs that accept every name and value."""
 
     changed = False
     table: Mapping[str, InputSignal] = _Everything(_ANY)
     groups: Mapping[str, tuple[str, ...]] = {}
 
     def __getitem__(self, name: str) -> Setting:
-        """Return nothing of interest."""
+        """Return a placeholder."""
         return 0
 
     def set(self, name: str, value: Setting) -> None:
-        """Take a value."""
+        """Accept a value."""
 
     def check(self, name: str, value: Setting) -> Setting:
         """Return the value."""
@@ -211,19 +211,19 @@ class _UnknownInputs:
         return ()
 
     def find(self, name: str, signal_type: SignalType | None = None) -> InputSignal:
-        """Return something of this name."""
+        """Return a placeholder with this name."""
         return self.table[name]
 
 
 class _UnknownDevice:
-    """Replaces a device that cannot be made: the error is reported, and no further ones."""
+    """Replaces a device that cannot be made, so that no further errors are reported."""
 
     tick_us = 1_000
     inputs = _UnknownInputs()
     outputs: Mapping[str, OutputSignal] = _Everything(OutputSignal("any", ""))
 
     def read(self, name: str, /) -> Setting:
-        """Return nothing of interest."""
+        """Return a placeholder."""
         return 0
 
 
@@ -235,12 +235,12 @@ UNKNOWN: Final = _UnknownDevice()
 # `[safe.NAME]`: outputs at the end.
 
 _OBJECT: Final = "0x"
-"""How the names of objects of a node begin."""
+"""Beginning of the names of objects of a node."""
 
 Start = dict[str, Setting | SignalSpec]
 
 _UNREAD = SignalSpec(Constant(0.0))
-"""In place of a signal that cannot be read, so that formulas find its name."""
+"""Replacement of a signal that cannot be read, so that formulas find its name."""
 
 
 class StartReader:
@@ -271,9 +271,9 @@ class StartReader:
         """Read the initial inputs of a device.
 
         Args:
-            device: its name.
-            section: the table.
-            physical: its inputs and outputs.
+            device: name of the device.
+            section: table with the initial inputs.
+            physical: inputs and outputs of the device.
         """
         start: Start = {}
         names: list[str] = []  # a node has many objects
@@ -319,7 +319,7 @@ class StartReader:
     def _value(
         self, section: Section, keys: TomlPath, value: Any, full: str
     ) -> Setting | SignalSpec | None:
-        """Return a value, or a signal, which is checked later; None if an error was recorded."""
+        """Return a value, or a signal (checked later), or None if an error was recorded."""
         if isinstance(value, bool | int | float | str):
             return int(value) if isinstance(value, bool) else value
         spec = self._spec(section, keys, value)
@@ -330,7 +330,7 @@ class StartReader:
     def _keep(
         self, name: str, spec: SignalSpec, section: Section, keys: TomlPath, value: Any
     ) -> None:
-        """Keep a signal with the key that says what it is."""
+        """Store a signal with the key that defines its form."""
         form = [key for key in FORMS if isinstance(value, dict) and key in value]
         self._signals[name], self._places[name] = spec, (section, (*keys, *form[:1]))
 
@@ -353,8 +353,8 @@ def read_safe(section: Section, devices: Mapping[str, HasSignals]) -> dict[str, 
     """Read `[safe]`: for each device the safe values of outputs at the end of a test.
 
     Args:
-        section: the table.
-        devices: by name.
+        section: table `[safe]`.
+        devices: devices by name.
     """
     safe: dict[str, dict[str, Setting]] = {}
     for device, table in section.subs():
@@ -371,7 +371,7 @@ def read_safe(section: Section, devices: Mapping[str, HasSignals]) -> dict[str, 
 
 
 def _can_be_safe(section: Section, physical: HasSignals, name: str) -> bool:
-    """Return whether an output or input can have this value; record the error if not."""
+    """Return whether an output or input can have the value; record the error if not."""
     value = section.values[name]
     if is_broken(value):
         return False
@@ -390,14 +390,14 @@ def _can_be_safe(section: Section, physical: HasSignals, name: str) -> bool:
 
 
 def _alike(name: str, names: Iterable[str]) -> list[str]:
-    """Leave objects out where none is meant, and else those that begin otherwise."""
+    """Return names to suggest: objects only if an object is meant, with an equal beginning."""
     if name.startswith(_OBJECT):
         return [each for each in names if each.startswith(name[:4])]
     return [each for each in names if not each.startswith(_OBJECT)]
 
 
 def _without_lists(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return all values but those that may be groups."""
+    """Return all values except lists, which may be groups."""
     return {name: value for name, value in values.items() if not isinstance(value, list)}
 
 

@@ -72,14 +72,14 @@ _DUT: Final = (
 )
 _EDS: Final = re.compile(r"\s*\[(FileInfo|DeviceInfo|DeviceComissioning)\]", re.IGNORECASE)
 _HEAD: Final = 2_000
-"""Characters at its beginning by which a URDF is known."""
+"""Number of characters at the beginning of a file by which a URDF is recognised."""
 _SCENARIO: Final = re.compile(
     r"(?:[^\S\n]*+(?:#.*+)?\n)*+[^\S\n]*+\+?[0-9][0-9.]*(s|ms|us)?[ \t]+[a-z]+\b(?!\s*=)"
 )
 
 
 def _no_rig_file(text: str) -> str:
-    r"""Return what kind of file a text is if it is not a rig file; empty if unknown.
+    r"""Return the kind of file of a text that is not a rig file, or "" if unknown.
 
     >>> _no_rig_file("# drive\n0.1s press power_button\n")
     'it is a scenario: --scenario FILE plays it'
@@ -95,7 +95,7 @@ def _no_rig_file(text: str) -> str:
 
 
 def _refuse_old_tables(top: Section) -> Section:
-    """Return a rig file unchanged; record which tables replace those of earlier versions.
+    """Return a rig file unchanged; record an error for each table of an earlier version.
 
     Args:
         top: the whole file.
@@ -132,7 +132,7 @@ _BUS: Final = "bus"
 _MISNAMED: Final = "it is a bus.yml: its name has to end in .yml or .yaml"
 _TOML: Final = re.compile(rb"^[ \t]*+\[", re.MULTILINE)
 _TABLE: Final = re.compile(rb"^[ \t]*+\[[\w.-]+\]", re.MULTILINE)
-"""The head of a table, which no bus.yml has."""
+"""The header of a TOML table, which no bus.yml has."""
 
 
 def _is_bus_yml(path: Path, data: bytes) -> bool:
@@ -147,10 +147,10 @@ def _is_named(path: Path) -> bool:
 
 
 def _bus_as_rig(path: Path) -> Section:
-    """Return a bus.yml as if it were a rig file with its nodes alone.
+    """Return a bus.yml as if it were a rig file with only the nodes of the bus.
 
     Raises:
-        OSError: it cannot be read.
+        OSError: the file cannot be read.
     """
     document = TomlDocument({_BUS: path.name}, {(_BUS,): 1})
     if not _is_named(path):
@@ -165,8 +165,8 @@ def _with_nodes(top: Section, folder: Path, *, alone: bool = False) -> Section:
 
     Args:
         top: the whole file.
-        folder: where the bus.yml is searched.
-        alone: whether there is only the bus.yml; then an unreadable file is an OSError.
+        folder: folder in which the bus.yml is searched.
+        alone: whether there is only the bus.yml. An unreadable file then raises OSError.
     """
     given = top.values.get(_BUS)
     if given is None:
@@ -185,7 +185,7 @@ def _with_nodes(top: Section, folder: Path, *, alone: bool = False) -> Section:
 
 
 def _places(top: Section, path: Path, *, alone: bool) -> dict[str, int]:
-    """Return the lines of the nodes by their names; record errors."""
+    """Return the line numbers of the nodes by name; record errors."""
     try:
         bus = late.read_bus(path, cache=eds_cache())
     except ImportError as error:
@@ -232,8 +232,9 @@ def _read_faults(section: Section, owners: Mapping[str, _Faults | None]) -> Iter
     """Yield the valid faults.
 
     Args:
-        section: the table.
-        owners: devices and wires by name; None if the faults of an owner are unknown.
+        section: table `[fault]`.
+        owners: faults of devices and wires, by name of the owner. The value is None if the faults
+            of an owner are unknown.
     """
     for owner, value in section.values.items():
         if owner not in owners:
@@ -276,15 +277,15 @@ _PARAMETERS: Final = ("wheel_radius_m", "tread_m", "mass_kg", "friction")
 def _read_body(
     section: Section, devices: Mapping[str, HasSignals], node_ids: Mapping[int, str]
 ) -> BodyPlan | None:
-    """Read the table.
+    """Read the table `[body]`.
 
     Args:
-        section: the table.
-        devices: by name; the drives are among them.
-        node_ids: names of nodes by their node-IDs; a drive may be given by its node-ID.
+        section: table `[body]`.
+        devices: devices by name, including the drives.
+        node_ids: names of nodes by their node-IDs. A drive may be given by its node-ID.
 
     Returns:
-        The body; None if it is invalid.
+        The body, or None if it is invalid.
     """
     kind = section.values.get("kind")
     sides = SIDES.get(kind) if isinstance(kind, str) else None
@@ -314,7 +315,7 @@ def _drive(
     devices: Mapping[str, HasSignals],
     node_ids: Mapping[int, str],
 ) -> str | None:
-    """Return the device of a wheel, None if it cannot be one."""
+    """Return the device of a wheel, or None if the device cannot drive a wheel."""
     value = section.values.get(wheel)
     if type(value) is int:
         value = node_ids.get(value, str(value))
@@ -352,14 +353,14 @@ def read_rig_file(path: Path) -> RigPlan:
     """Read a rig file, or a bus.yml as a rig file.
 
     Args:
-        path: the file; names of other files are relative to its folder.
+        path: path of the file. Names of other files are relative to its folder.
 
     Returns:
         The content of the file.
 
     Raises:
-        OSError: it cannot be read.
-        RigFileError: all errors in the file.
+        OSError: the file cannot be read.
+        RigFileError: the file has errors; the exception has all of them.
     """
     try:
         with path.open("rb") as file:
@@ -404,8 +405,8 @@ def parse_rig_file(text: str, path: Path) -> RigPlan:
     """Read the text of a rig file; see `read_rig_file`.
 
     Args:
-        text: the whole text.
-        path: of the file, which need not exist.
+        text: content of the file.
+        path: path of the file, which need not exist.
     """
     if reason := _no_rig_file(text):
         raise RigFileError(str(path), (Mistake(1, reason),))
@@ -422,7 +423,7 @@ def _plan(top: Section, path: Path) -> RigPlan:
 
 
 class _Reader:
-    """Reads one file."""
+    """Reads a rig file."""
 
     def __init__(self, top: Section, path: Path) -> None:
         self._top, self._path, self._folder = top, path, path.parent
@@ -466,7 +467,7 @@ class _Reader:
         )
 
     def _make_probes(self, plans: Mapping[str, DevicePlan | None], seed: int) -> None:
-        """Make each device, but equal devices only once; a bench uses the made device."""
+        """Make each device, but equal devices only once; a bench then uses the device."""
         made: dict[str, Probe | list[WrongDevice]] = {}
         alone = len(self._wires) == 1
         for name, plan in plans.items():
@@ -488,7 +489,7 @@ class _Reader:
             self._physical[name] = found.physical if found else UNKNOWN
 
     def _with_starts(self, starts: StartReader) -> dict[str, DevicePlan]:
-        """Return the devices with their starts."""
+        """Return the devices with their initial inputs."""
         found: dict[str, DevicePlan] = {}
         for name, plan in self._devices.plans.items():
             section = self._devices.sections.get(name)
@@ -500,7 +501,7 @@ class _Reader:
         return found
 
     def _check_node_ids(self) -> dict[int, str]:
-        """Record nodes without a node-ID or with equal ones; return the names by node-ID."""
+        """Record nodes without a node-ID or with equal node-IDs; return the names by node-ID."""
         names: dict[int, str] = {}
         seen: dict[tuple[str, int], str] = {}
         for name, each in self._probes.items():
@@ -519,7 +520,7 @@ class _Reader:
         return names
 
     def _with_rate(self, wire: WirePlan) -> WirePlan:
-        """Return a bus with the bit rate of a DCF, if the file gives none."""
+        """Return a bus with the bit rate of a DCF, if the rig file gives no bit rate."""
         if wire.type is not WireType.CAN or wire.bit_rate is not None:
             return wire
         nodes = [each for each in self._devices.plans.values() if each and each.wire == wire.name]
@@ -527,7 +528,7 @@ class _Reader:
         return replace(wire, bit_rate=next((x.bit_rate for x in probes if x.bit_rate), None))
 
     def _wire_faults(self, wire: WirePlan | None) -> _Faults | None:
-        """Return the faults of a wire, None if they are not known."""
+        """Return the faults of a wire, or None if they are unknown."""
         if wire is None:
             return None
         faults: _Faults = CAN_FAULTS

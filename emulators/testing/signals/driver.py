@@ -28,13 +28,13 @@ from tickrig.wire.instant import NEVER
 # What the names in formulas mean: other signals, and inputs and outputs of devices.
 
 _LONGEST: Final = 100
-"""Largest number of signals of which each needs the next."""
+"""Largest length of a chain of signals in which each signal needs the next one."""
 
 _TAKEN: Final = ("t", "pi")
-"""What formulas name otherwise."""
+"""Names that have another meaning in formulas."""
 
 SLASH: Final = "/"
-"""Between the name of a device and that of its input or output."""
+"""Separator between the name of a device and the name of its input or output."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +43,7 @@ class _DeviceSignal:
 
     Attributes:
         device: the device.
-        name: of its input or output.
+        name: name of the input or output.
     """
 
     device: HasSignals
@@ -51,7 +51,7 @@ class _DeviceSignal:
 
     @property
     def number(self) -> float:
-        """Its present value; nan if that is a text."""
+        """The present value as a number, or nan if it is a text."""
         value = read_signal(self.device, self.name)
         return nan if isinstance(value, str) else float(value)
 
@@ -60,8 +60,9 @@ class _SignalScope:
     """The signals of a bench and its devices.
 
     Args:
-        signals: by name; `DEVICE/INPUT` drives that input, any other name is for formulas.
-        devices: by name.
+        signals: signals by name. `DEVICE/INPUT` drives that input, and any other name is for
+            formulas.
+        devices: devices by name.
     """
 
     def __init__(
@@ -70,12 +71,12 @@ class _SignalScope:
         self.signals, self.devices = signals, devices
 
     def find(self, name: str, owner: str) -> str | _DeviceSignal | None:
-        """Return the object behind a name: the name of a signal, a signal of a device, or None.
+        """Return the object of a name: the name of a signal, a signal of a device, or None.
 
         Args:
-            name: as in a formula: of a signal, of an input or output of the owner's device,
-                `DEVICE.NAME`, or in quotes `DEVICE/NAME`.
-            owner: the signal with the formula.
+            name: name as in a formula: a signal, an input or output of the owner's device,
+                `DEVICE.NAME`, or `DEVICE/NAME` in quotes.
+            owner: name of the signal with the formula.
         """
         own, slash, _ = owner.partition(SLASH)
         full = name if SLASH in name else name.replace(".", SLASH, 1)
@@ -87,7 +88,7 @@ class _SignalScope:
         return None
 
     def device_signal(self, key: str) -> _DeviceSignal | None:
-        """Return the input or output `DEVICE/NAME`, None if there is none."""
+        """Return the input or output `DEVICE/NAME`, or None if there is none."""
         device_name, _, name = key.partition(SLASH)
         device = self.devices.get(device_name)
         if device is None or not (name in device.inputs.table or name in device.outputs):
@@ -95,7 +96,7 @@ class _SignalScope:
         return _DeviceSignal(device, name)
 
     def needed(self, key: str) -> Iterator[str]:
-        """Yield the signals whose value of now a signal is computed of."""
+        """Yield the signals whose present values a signal needs."""
         source = self.signals[key].source
         if isinstance(source, Formula):
             for name in source.names:
@@ -103,7 +104,7 @@ class _SignalScope:
                     yield found
 
     def ordered(self) -> list[str]:
-        """Return all signals, each after those that it needs; ValueError if that is impossible."""
+        """Return all signals, each after the signals that it needs; ValueError if impossible."""
         order: dict[str, None] = {}
         for key in self.signals:
             self._enter(key, (), order)
@@ -132,11 +133,12 @@ def check_signals(
     """Check the signals of a bench: unknown names, values out of range, circular references.
 
     Args:
-        signals: by name; `DEVICE/INPUT` drives that input, any other name is for formulas.
-        devices: by name.
+        signals: signals by name. `DEVICE/INPUT` drives that input, and any other name is for
+            formulas.
+        devices: devices by name.
 
     Returns:
-        All mistakes; the first key of each is the name of its signal.
+        All mistakes. The first key of a mistake is the name of the signal.
     """
     scope = _SignalScope(signals, devices)
     mistakes = [mistake for key in signals for mistake in _check(scope, key)]
@@ -167,7 +169,7 @@ def _check(scope: _SignalScope, key: str) -> Iterator[SignalMistake]:
 
 
 def _near(scope: _SignalScope, key: str, wanted: str) -> str:
-    """Return what a formula may mean, or the names that it may use, its own device first."""
+    """Return similar names, or the names that a formula may use, those of its own device first."""
     own = key.partition(SLASH)[0]
     names = [name for name in scope.signals if SLASH not in name]
     for name in sorted(scope.devices, key=lambda name: name != own):
@@ -177,7 +179,7 @@ def _near(scope: _SignalScope, key: str, wanted: str) -> str:
 
 
 def _check_target(scope: _SignalScope, key: str) -> Iterator[SignalMistake]:
-    """Yield what is wrong with an input that is driven."""
+    """Yield the errors of an input that a signal drives."""
     device_name, _, name = key.partition(SLASH)
     device = scope.devices.get(device_name)
     if device is None:
@@ -249,12 +251,12 @@ class _RunningSignal(Copyable):
     """A signal while the bench runs.
 
     Args:
-        spec: its specification.
+        spec: specification of the signal.
 
     Attributes:
-        setting: its value; nan if it has none.
-        due_us: the earliest time of another value, if no other signal changes.
-        terms: the object behind each name in its formula.
+        setting: value of the signal, or nan if it has no value.
+        due_us: earliest time of another value, if no other signal changes.
+        terms: objects of the names in the formula.
     """
 
     __slots__ = ("due_us", "setting", "spec", "terms")
@@ -266,21 +268,21 @@ class _RunningSignal(Copyable):
 
     @property
     def number(self) -> float:
-        """Its value; nan if that is a text."""
+        """The value as a number, or nan if it is a text."""
         return nan if isinstance(self.setting, str) else self.setting
 
     @abstractmethod
     def update(self, now_us: int) -> None:
-        """Take the present value; the signals in its formula have been updated before."""
+        """Compute the present value; the signals in the formula were updated before."""
 
     def evaluate(self, formula: Formula, now_us: int) -> float:
-        """Return the value of its formula."""
+        """Return the value of a formula."""
         values = {name: term.number for name, term in self.terms.items()}
         return formula.value({**values, TIME: now_us / 1e6})
 
 
 class _TimeNode(_RunningSignal):
-    """A signal that depends on time alone."""
+    """A signal that depends only on time."""
 
     __slots__ = ("source",)
 
@@ -289,7 +291,7 @@ class _TimeNode(_RunningSignal):
         self.source = source
 
     def update(self, now_us: int) -> None:
-        """Take the value of now."""
+        """Compute the present value."""
         if now_us < self.due_us:
             return
         spec, at_us = self.spec, max(0, now_us - self.spec.from_us)
@@ -304,7 +306,7 @@ class _TimeNode(_RunningSignal):
 
 
 class _FormulaNode(_RunningSignal):
-    """A signal that is computed of others."""
+    """A signal that is computed from other signals."""
 
     __slots__ = ("formula",)
 
@@ -313,7 +315,7 @@ class _FormulaNode(_RunningSignal):
         self.formula = formula
 
     def update(self, now_us: int) -> None:
-        """Take the value of now, or hold that of before."""
+        """Compute the present value, or hold the previous value."""
         every_us = self.spec.every_us
         if every_us:
             if now_us < self.due_us:
@@ -325,7 +327,7 @@ class _FormulaNode(_RunningSignal):
 
 
 class _FilterNode(_RunningSignal):
-    """A signal with a memory: it moves each `every_us`, from the previous value of its formula."""
+    """A signal with a memory; it moves every `every_us`, by the previous value of its formula."""
 
     __slots__ = ("_gain", "_input", "_moves", "_state", "filter")
 
@@ -348,7 +350,7 @@ class _FilterNode(_RunningSignal):
         self.setting = self.spec.shaped(self._state)
 
     def observe(self, now_us: int) -> None:
-        """Look at what moves it."""
+        """Store the value of the formula, which moves the signal."""
         self._input = self.evaluate(self.filter.formula, now_us)
         if isnan(self._state) and isfinite(self._input):  # a lag that begins where its source is
             self._state = self._limited(self._input)
@@ -371,9 +373,9 @@ def _node_of(name: str, spec: SignalSpec, seed: int) -> _RunningSignal:
     """Return a signal for a running bench.
 
     Args:
-        name: of the signal; signals with different names have independent noise.
-        spec: its specification.
-        seed: of its noise, if the specification has none.
+        name: name of the signal. Signals with different names have independent noise.
+        spec: specification of the signal.
+        seed: seed of the noise, if the specification has none.
     """
     source = spec.source
     if isinstance(source, Formula):
@@ -400,18 +402,19 @@ class SignalDriver(Copyable):
     changes, or permanently after `release`.
 
     Args:
-        signals: by name; `DEVICE/INPUT` drives that input, any other name is for formulas.
-        devices: by name.
-        seed: of noise without a seed of its own.
+        signals: signals by name. `DEVICE/INPUT` drives that input, and any other name is for
+            formulas.
+        devices: devices by name.
+        seed: seed of noise that has no seed of its own.
 
     Raises:
-        ValueError: the mistakes found by `check_signals`.
+        ValueError: `check_signals` has found mistakes.
 
     Attributes:
-        tick_us: the signals act at multiples of this period; every tick of a device is at such a
-            multiple.
+        tick_us: period of the signals, which change at its multiples. Every tick of a device is at
+            such a multiple.
         due_us: time of the next change of a signal.
-        problems: by the name of the signal, what the signal could not do when that first happened.
+        problems: first problems of signals, by name of the signal.
     """
 
     def __init__(
@@ -442,7 +445,7 @@ class SignalDriver(Copyable):
             self.act(0)
 
     def _link(self, scope: _SignalScope) -> None:
-        """Let each node find what its formula names."""
+        """Find the objects of the names in all formulas."""
         for key, node in self._nodes.items():
             source = node.spec.source
             formula = source.formula if isinstance(source, Lag | Integral) else source
@@ -452,7 +455,7 @@ class SignalDriver(Copyable):
                 node.terms = {**node.terms, name: term} if term else node.terms
 
     def act(self, now_us: int, /) -> None:
-        """Take the values of now, and set the inputs whose value is another."""
+        """Compute the present values, and set the inputs whose values have changed."""
         for node in self._filters:
             node.update(now_us)
         for other in self._others:
@@ -465,16 +468,16 @@ class SignalDriver(Copyable):
         self.due_us = min((node.due_us for node in self._nodes.values()), default=NEVER)
 
     def value(self, name: str) -> Setting:
-        """Return the current value of a signal; KeyError if there is no such signal."""
+        """Return the current value of a signal; raise KeyError if the name is unknown."""
         return self._nodes[name].setting
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of all signals; those that drive an input are `DEVICE/INPUT`."""
+        """Names of all signals; a signal that drives an input is named `DEVICE/INPUT`."""
         return tuple(self._nodes)
 
     def release(self, name: str) -> None:
-        """Let an input be driven by hand from now on; no effect if no signal drives it."""
+        """Stop driving an input by its signal; do nothing if no signal drives the input."""
         self._targets.pop(name, None)
 
 

@@ -48,7 +48,7 @@ class _Name(Immutable):
 
 @dataclass(frozen=True, slots=True)
 class _Call(Immutable):
-    """A function or an operator, and what it is of."""
+    """A function or an operator with its arguments."""
 
     function: str
     terms: tuple[_Term, ...]
@@ -64,8 +64,8 @@ class Formula(Immutable):
     Attributes:
         text: the formula as written.
         term: the parsed formula.
-        names: the signals in it, in order, without `t`.
-        timed: whether it contains `t`.
+        names: names of the signals in the formula, in order, without `t`.
+        timed: whether the formula contains `t`.
     """
 
     text: str
@@ -74,10 +74,10 @@ class Formula(Immutable):
     timed: bool
 
     def value(self, values: Mapping[str, float]) -> float:
-        """Return its value; `nan` or `inf` as in IEEE 754 if it has no finite value.
+        """Return the value of the formula; it is `nan` or `inf` as in IEEE 754 if not finite.
 
         Args:
-            values: of its names, and of `t` in seconds.
+            values: values of the names, and of `t` in seconds.
         """
         return _value(self.term, values)
 
@@ -144,7 +144,7 @@ _LONGEST: Final = 2_000
 _DEEPEST: Final = 100
 
 CALLED: Final = ("abs", "sqrt", "sin", "cos", "exp", "floor", "min", "max", "clip")
-"""What is written as NAME(...)."""
+"""Functions that are written as NAME(...)."""
 
 _OPERATORS: Final[dict[type[ast.AST], str]] = {
     ast.Add: "+",
@@ -170,7 +170,7 @@ def parse_formula(text: str) -> Formula:
     """Read a formula.
 
     Raises:
-        ValueError: not a formula, too long, or with an unknown name or function.
+        ValueError: the text is not a formula, is too long, or has an unknown name or function.
     """
     if len(text) > _LONGEST:
         raise ValueError(f"a formula of {len(text)} characters; at most {_LONGEST} are taken")
@@ -213,7 +213,7 @@ def _read(node: ast.expr, deep: int) -> _Term:
 
 
 def _call(node: ast.expr) -> tuple[str, list[ast.expr]]:
-    """Return a function, or the operator that stands for it, and what it is of."""
+    """Return a function or the function of an operator, and its arguments."""
     match node:
         case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATORS:
             return _OPERATORS[type(op)], [left, right]

@@ -1,4 +1,4 @@
-"""Values that depend on time alone, as pure functions; and the fields of their tables.
+"""Values that depend only on time, as pure functions, and the fields of their tables.
 
 >>> RampSource(12.0, 9.5, over_us=10_000_000).value(4_000_000)
 11.0
@@ -28,7 +28,7 @@ class SignalSource(Protocol):
 
     @property
     def ends(self) -> tuple[float, ...]:
-        """Limits of its values; empty if they are unknown."""
+        """Limits of the values; empty if they are unknown."""
         ...
 
     def value(self, t_us: int, /) -> Setting:
@@ -36,7 +36,7 @@ class SignalSource(Protocol):
         ...
 
     def next_us(self, t_us: int, /) -> int:
-        """Return the earliest time after `t_us` with another value; `NEVER` if it stays."""
+        """Return the next time after `t_us` with another value, or `NEVER` if the value stays."""
         ...
 
 
@@ -72,8 +72,8 @@ class RampSource(Immutable):
         first: the value at time 0.
         last: the value at the end.
         over_us: duration of the change.
-        repeat: whether it starts again at the first value, as a saw-tooth; if not, it stays at the
-            last value.
+        repeat: whether the ramp starts again at the first value, as a saw-tooth. If not, the value
+            stays at the last value.
     """
 
     first: float
@@ -83,7 +83,7 @@ class RampSource(Immutable):
 
     @property
     def ends(self) -> tuple[float, ...]:
-        """Both ends."""
+        """The first and the last value."""
         return self.first, self.last
 
     def value(self, t_us: int, /) -> float:
@@ -94,7 +94,7 @@ class RampSource(Immutable):
         return self.first + (self.last - self.first) * (at_us / self.over_us)
 
     def next_us(self, t_us: int, /) -> int:
-        """Return the time at which it is another."""
+        """Return the next time at which the value is different."""
         ended = not self.repeat and t_us >= self.over_us
         return NEVER if ended or self.first == self.last else t_us + 1
 
@@ -104,7 +104,7 @@ SHAPES: Final[dict[str, Callable[[float], float]]] = {
     "triangle": lambda part: 1 - abs(1 - 2 * part),
     "square": lambda part: float(part >= 0),
 }
-"""How far it is on the way from the first value to the second, by the part of a period."""
+"""Functions that return the part of the way from the first value to the second, by the phase."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,8 +112,8 @@ class Wave(Immutable):
     """A periodic value between two limits.
 
     Attributes:
-        shape: `sine` begins in the middle and moves to the second limit; `triangle` and `square`
-            begin at the first limit.
+        shape: `sine`, `triangle` or `square`. A `sine` begins in the middle and moves to the second
+            limit. A `triangle` or a `square` begins at the first limit.
         first: the first limit.
         second: the second limit.
         period_us: duration of a period.
@@ -130,7 +130,7 @@ class Wave(Immutable):
 
     @property
     def ends(self) -> tuple[float, ...]:
-        """Both ends."""
+        """The two limits."""
         return self.first, self.second
 
     def value(self, t_us: int, /) -> float:
@@ -142,7 +142,7 @@ class Wave(Immutable):
         return self.first * (1 - way) + self.second * way
 
     def next_us(self, t_us: int, /) -> int:
-        """Return the time at which it is another."""
+        """Return the next time at which the value is different."""
         if self.shape != "square":
             return t_us + 1
         at_us = (t_us + self.phase_us) % self.period_us
@@ -155,15 +155,15 @@ class Wave(Immutable):
 
 @dataclass(frozen=True, slots=True)
 class Noise(Immutable):
-    """Random values, drawn each `every_us`; the value at a given time is always the same.
+    """Random values, drawn every `every_us`. The value at a given time is always the same.
 
     Attributes:
-        first: the mean of gaussian noise; the smallest value of uniform noise.
-        second: its standard deviation; the largest value of uniform noise.
-        uniform: uniform between two values; else gaussian.
-        every_us: how long a value stays.
-        seed: of the values; None for that of the bench.
-        stream: number of the noise; streams of a seed are independent.
+        first: mean of gaussian noise, or smallest value of uniform noise.
+        second: standard deviation of gaussian noise, or largest value of uniform noise.
+        uniform: whether the noise is uniform between two values. Otherwise it is gaussian.
+        every_us: time for which a value stays.
+        seed: seed of the values, or None to use the seed of the bench.
+        stream: number of the noise. Different numbers with the same seed give independent values.
     """
 
     first: float
@@ -175,11 +175,11 @@ class Noise(Immutable):
 
     @property
     def ends(self) -> tuple[float, ...]:
-        """The ends of uniform noise; gaussian noise has none."""
+        """The limits of uniform noise; gaussian noise has no limits."""
         return (self.first, self.second) if self.uniform else ()
 
     def value(self, t_us: int, /) -> float:
-        """Return the draw that holds at a time."""
+        """Return the value at a time."""
         chance = Chance(self.seed or 0, self.stream)
         chance.skip(t_us // self.every_us)
         part = ((chance.draw() >> 12) + 0.5) / 2**52  # above 0, below 1
@@ -190,7 +190,7 @@ class Noise(Immutable):
         return self.first + self.second * NormalDist().inv_cdf(part)
 
     def next_us(self, t_us: int, /) -> int:
-        """Return the time of the next draw."""
+        """Return the time of the next value."""
         return t_us - t_us % self.every_us + self.every_us
 
 
@@ -198,12 +198,12 @@ class Noise(Immutable):
 class ValueTable(Immutable):
     """Values at times.
 
-    The first value also holds before its time, the last one also after its time.
+    The first value also holds before its time, and the last value also holds after its time.
 
     Attributes:
-        times_us: times in ascending order; two equal times are a jump.
+        times_us: times in ascending order. Two equal times are a jump of the value.
         values: the value at each time.
-        linear: whether to interpolate linearly; if not, each value holds until the next time.
+        linear: whether to interpolate linearly. If not, each value holds until the next time.
         repeat: whether the table starts again from 0 at its last time.
     """
 
@@ -214,7 +214,7 @@ class ValueTable(Immutable):
 
     @property
     def ends(self) -> tuple[float, ...]:
-        """The least and the greatest."""
+        """The least and the greatest value."""
         return min(self.values), max(self.values)
 
     def value(self, t_us: int, /) -> float:
@@ -231,7 +231,7 @@ class ValueTable(Immutable):
         return left * (1 - way) + then * way
 
     def next_us(self, t_us: int, /) -> int:
-        """Return the time at which it may be another."""
+        """Return the next time at which the value may be different."""
         at_us = self._at_us(t_us)
         right = bisect_right(self.times_us, at_us)
         if right == len(self.values):
@@ -247,7 +247,7 @@ class ValueTable(Immutable):
 # A signal as it was asked for: where its values come from, and what is made of them.
 
 _SETTLED: Final = 1e-9
-"""A lag this near to its source, as a fraction of it, has arrived."""
+"""Relative distance from its source at which a lag has arrived."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -255,9 +255,9 @@ class Lag(Immutable):
     """A value that follows another: it covers 63 % of the distance in `tau_us` (first order).
 
     Attributes:
-        formula: the value that it follows.
-        tau_us: its time constant.
-        start: its first value; None for the first value of the formula.
+        formula: value that the lag follows.
+        tau_us: time constant of the lag.
+        start: first value, or None to use the first value of the formula.
     """
 
     formula: Formula
@@ -265,11 +265,11 @@ class Lag(Immutable):
     start: float | None = None
 
     def gain(self, every_us: int) -> float:
-        """Return which part of the way it goes in a time."""
+        """Return the part of the distance that the lag covers in a time."""
         return -expm1(-every_us / self.tau_us)
 
     def moved(self, value: float, source: float, gain: float) -> float:
-        """Return where it is after that time."""
+        """Return the value of the lag after that time."""
         if abs(source - value) <= _SETTLED * max(abs(source), abs(value)):
             return source
         return value + (source - value) * gain
@@ -277,11 +277,11 @@ class Lag(Immutable):
 
 @dataclass(frozen=True, slots=True)
 class Integral(Immutable):
-    """The integral of another value over time, in its unit times seconds.
+    """The integral of another value over time, in the unit of that value times seconds.
 
     Attributes:
-        formula: the value to integrate.
-        start: its first value.
+        formula: value to integrate.
+        start: first value of the integral.
     """
 
     formula: Formula
@@ -292,7 +292,7 @@ class Integral(Immutable):
         return every_us / 1e6
 
     def moved(self, value: float, source: float, gain: float) -> float:
-        """Return the sum after that time."""
+        """Return the integral after that time."""
         return value + source * gain
 
 
@@ -301,12 +301,14 @@ class SignalSpec(Immutable):
     """A signal.
 
     Attributes:
-        source: the source of its values.
-        from_us: start time of a source that depends on time; before it, the source stands still.
-        every_us: how long a value is held; with 0 there is a new value at each tick of the rig.
+        source: source of the values.
+        from_us: start time of a source that depends on time. Before this time the source stands
+            still.
+        every_us: time for which a value is held. With 0 there is a new value at each tick of the
+            rig.
         low: the least value.
         high: the greatest value.
-        step: values are rounded to multiples of this; 0 means no rounding.
+        step: quantisation: values are rounded to multiples of this number. 0 means no rounding.
     """
 
     source: SignalSource | Formula | Lag | Integral
@@ -317,7 +319,7 @@ class SignalSpec(Immutable):
     step: float = 0.0
 
     def shaped(self, value: Setting) -> Setting:
-        """Return what quantisation and limits leave of a value."""
+        """Return a value after quantisation and limiting."""
         if isinstance(value, str) or not (self.step or self.low > -inf or self.high < inf):
             return value
         if self.step and isfinite(value / self.step):
@@ -336,15 +338,15 @@ def _rounded(value: float, step: float) -> float:
 # Fields of a signal's table: each takes what TOML gives, or says what it takes instead.
 
 Keys = tuple[str | int, ...]
-"""Keys and indices from the top of a file, as `("device", "left", "start", "supply_v")`."""
+"""Keys and indices from the top of a file, such as `("device", "left", "start", "supply_v")`."""
 
 
 class SignalMistake(NamedTuple):
     """A mistake in a signal.
 
     Attributes:
-        keys: its place in the file.
-        reason: what was found, and what is allowed.
+        keys: place of the mistake in the file.
+        reason: text with the value that was found, and the values that are allowed.
 
     >>> print(SignalMistake(("signal", "load", "over"), "it is missing"))
     signal.load.over: it is missing
@@ -354,19 +356,19 @@ class SignalMistake(NamedTuple):
     reason: str
 
     def __str__(self) -> str:
-        """Write it in one line."""
+        """Return the mistake as one line."""
         return f"{'.'.join(map(str, self.keys))}: {self.reason}"
 
 
 _LEAST_US: Final = 100
-"""No period, ramp or time constant is shorter."""
+"""Shortest period, ramp or time constant."""
 
 _FINEST: Final = 1e-12
-"""No quantisation is finer."""
+"""Finest quantisation."""
 
 
 def number(value: object) -> float:
-    """Take a number, or true and false as 1 and 0."""
+    """Return a number, with 1 for true and 0 for false."""
     if isinstance(value, int | float):
         try:
             if isfinite(value):
@@ -377,28 +379,28 @@ def number(value: object) -> float:
 
 
 def step(value: object) -> float:
-    """Take a number from `_FINEST` on."""
+    """Return a number of at least `_FINEST`."""
     if (found := number(value)) < _FINEST:
         raise ValueError(f"it takes a number from {_FINEST:g} on, as 0.01, not {value!r:.60}")
     return found
 
 
 def part(value: object) -> float:
-    """Take a number above 0 and below 1."""
+    """Return a number above 0 and below 1."""
     if not 0 < (found := number(value)) < 1:
         raise ValueError(f"it takes a number between 0 and 1, as 0.25, not {value!r:.60}")
     return found
 
 
 def seed(value: object) -> int:
-    """Take a whole number from 0 on."""
+    """Return a whole number of at least 0."""
     if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value < 1 << 64:
         raise ValueError(f"it takes a whole number from 0 on, not {value!r:.60}")
     return value
 
 
 def pair(value: object) -> tuple[float, float]:
-    """Take two numbers."""
+    """Return two numbers."""
     if isinstance(value, list) and len(value) == 2:
         first, second = value
         return number(first), number(second)
@@ -406,7 +408,7 @@ def pair(value: object) -> tuple[float, float]:
 
 
 def spread(value: object) -> float | tuple[float, float]:
-    """Take a standard deviation, or the ends of a range."""
+    """Return a standard deviation, or the limits of a range."""
     if isinstance(value, list):
         return pair(value)
     if (found := number(value)) < 0:
@@ -422,14 +424,14 @@ def time(value: object) -> int:
 
 
 def some_time(value: object) -> int:
-    """Convert a time to microseconds; ValueError if it is too short."""
+    """Convert a time to microseconds; raise ValueError if the time is too short."""
     if (found := time(value)) < _LEAST_US:
         raise ValueError(f'it takes a time from "{_LEAST_US}us" on, not {value!r:.60}')
     return found
 
 
 def formula(value: object) -> Formula:
-    """Take a formula, or a number."""
+    """Return a formula of a text or a number."""
     if isinstance(value, int | float):
         value = repr(float(number(value)))
     if not isinstance(value, str):

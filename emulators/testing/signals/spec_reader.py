@@ -1,4 +1,4 @@
-"""Signals as TOML gives them: a number, a text, or a table as `{ramp = [12.0, 9.5], over = "10s"}`.
+"""Signals in TOML: a number, a text, or a table such as `{ramp = [12.0, 9.5], over = "10s"}`.
 
 >>> read_signal_spec({"ramp": [12.0, 9.5], "over": "10s"}).source.value(5_000_000)
 10.75
@@ -27,10 +27,10 @@ _EVERY_US: Final = 10_000
 """Default interval at which noise is drawn, and lags and integrals advance."""
 
 _Fields = Mapping[str, Any]
-"""The values of a table's keys, each as its reader has left it."""
+"""Values by key of a table, as the readers have converted them."""
 
 _Reader = Callable[[object], object]
-"""Converts a TOML value to a field; ValueError with what is allowed."""
+"""Function that converts a TOML value to a field; a ValueError says which values are allowed."""
 
 _COMMON: Final[Mapping[str, _Reader]] = {
     "every": sources.some_time,
@@ -46,10 +46,11 @@ class _Form:
     """A form of a signal as a table.
 
     Attributes:
-        keys: possible keys; the first one identifies the form.
-        build: makes the source from its fields; ValueError if they do not match.
+        keys: possible keys. The first key identifies the form.
+        build: function that makes the source from its fields. It raises ValueError if they do not
+            match.
         needed: required keys.
-        every_us: how long a value is held, if there is no key `every`.
+        every_us: time for which a value is held, if there is no key `every`.
     """
 
     keys: Mapping[str, _Reader]
@@ -128,7 +129,7 @@ FORMS: Final[Mapping[str, _Form]] = {
         every_us=_EVERY_US,
     ),
 }
-"""What a signal can be, by the key that names it."""
+"""Forms of a signal, by the key that identifies the form."""
 
 
 def read_signal_spec(
@@ -139,9 +140,9 @@ def read_signal_spec(
     `check_signals` checks whether the signals named in a formula exist.
 
     Args:
-        value: a number, true or false, a text, or a table (docs/reference/bench/signals.md).
+        value: number, true or false, text, or table (docs/reference/bench/signals.md).
         keys: place of the value in the file, for mistakes.
-        folder: folder of the files of tables; by default the working directory.
+        folder: folder of files with tables. The default is the working directory.
 
     Returns:
         The signal, or all mistakes in it.
@@ -201,7 +202,7 @@ def _read_fields(
 
 
 def _limits(fields: _Fields) -> dict[str, float]:
-    """Return the limits and the quantisation; ValueError if no value is between the limits."""
+    """Return limits and quantisation; raise ValueError if no value is between the limits."""
     named = {"min": "low", "max": "high", "step": "step"}
     limits = {named[key]: float(fields[key]) for key in named if key in fields}
     if limits.get("low", -inf) > limits.get("high", inf):

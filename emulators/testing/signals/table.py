@@ -1,4 +1,4 @@
-"""Tables of values at times, as a rig file has them.
+"""Tables of values at times, as in a rig file.
 
 >>> read_table(Path(), {"table": [[0, 12.0], ["4s", 10.0]]}).value(1_000_000)
 11.5
@@ -39,14 +39,14 @@ _MOST: Final = 1_000_000
 """Largest number of values in a file."""
 
 _UNITS: Final = {"_us": 1, "_ms": 1_000, "_s": 1_000_000}
-"""Endings of the name of a column with times, and their unit in microseconds; other columns are in
+"""Endings of the name of a column with times, and the unit in microseconds. Other columns are in
 seconds."""
 
 _TRACE: Final = ".trace"
 
 
 def _seconds_us(value: float, unit_us: int) -> int:
-    """Convert a time of at least 0 to microseconds; ValueError if it is not a time."""
+    """Convert a time of at least 0 to microseconds; raise ValueError for other values."""
     if not 0 <= value * unit_us < 1e18:
         raise ValueError(f"{value:g} is no time from 0 on")
     return round(value * unit_us)
@@ -61,8 +61,8 @@ def read_points(path: Path, column: str | None) -> _Points:
     """Read a column of a file.
 
     Args:
-        path: a CSV file, a trace, or a CAN log; the suffix selects the format.
-        column: a column of the CSV file, an input of the trace, or bits of a frame.
+        path: path of a CSV file, a trace, or a CAN log. The suffix selects the format.
+        column: name of a column of the CSV file or of an input of the trace, or bits of a frame.
 
     Raises:
         ValueError: the file cannot be read, has no such column, or has no value in this column.
@@ -167,7 +167,7 @@ def _point(line: int, row: list[str], place: int, unit_us: int) -> tuple[int, fl
 
 
 def _place(head: list[str], column: str | None) -> int:
-    """Return the index of the column; a name is not always needed."""
+    """Return the index of the column; `column` may be None if there is only one."""
     if column is None and len(head) == 2:
         return 1
     if column in head[1:]:
@@ -201,11 +201,11 @@ def read_table(folder: Path, fields: Mapping[str, Any]) -> ValueTable:
 
     Args:
         folder: folder of the files.
-        fields: `table`, which is a list of points or the name of a file; optional are `column`,
-            `interpolation` and `repeat`.
+        fields: fields `table` and optionally `column`, `interpolation` and `repeat`. The `table` is
+            a list of points or the name of a file.
 
     Raises:
-        ValueError: an invalid field; for a file, the message has its name and the line.
+        ValueError: a field is invalid. For a file, the message has the name and the line.
     """
     given, column = fields["table"], fields.get("column")
     way = fields.get("interpolation")

@@ -1,4 +1,4 @@
-"""Tests for your own devices; needs the extra `test` (pytest and Hypothesis)."""
+"""Tests for your own devices. The package needs the extra `test` (pytest and Hypothesis)."""
 
 from tickrig._lazy import lazy
 

@@ -18,11 +18,12 @@ _LINES = 20
 class BenchTestCase(unittest.TestCase):
     """A test case whose tests each have a fresh bench, closed when the test is over.
 
-    Derive from it and write `make_bench`. A test that asks for what the bench cannot do is skipped;
-    one that fails has a note with the last lines and frames of the bench.
+    Derive your test case from this class and write `make_bench`. A test is skipped if it uses an
+    operation that the bench cannot do. A test that fails has a note with the last lines and frames
+    of the bench.
 
     Attributes:
-        bench: the bench, from `setUp` on.
+        bench: the bench of the present test, from `setUp` on.
         patched: whether hosts that call `time.sleep` and `time.monotonic` use the bench's time.
 
     >>> import io
@@ -41,7 +42,7 @@ class BenchTestCase(unittest.TestCase):
     bench: Bench
 
     def make_bench(self) -> Bench:
-        """Return the bench of a test; called before each one."""
+        """Return a new bench; `setUp` calls this method before each test."""
         raise NotImplementedError(f"{type(self).__name__} makes no bench: write make_bench")
 
     def setUp(self) -> None:
@@ -56,14 +57,14 @@ class BenchTestCase(unittest.TestCase):
         """Run the test, as unittest and pytest do.
 
         Args:
-            result: where it is reported.
+            result: object that collects the result of the test.
         """
         name = self._testMethodName
         setattr(self, name, self._noted(getattr(self, name)))
         return super().run(result)
 
     def _noted(self, test: Callable[[], Any]) -> Callable[[], Any]:
-        """Return the test, whose failure says what happened last."""
+        """Return the test; if it fails, the error has a note with the last lines and frames."""
 
         @wraps(test)
         def run_test() -> Any:
@@ -83,7 +84,7 @@ class BenchTestCase(unittest.TestCase):
 
 @contextmanager
 def _skipped() -> Iterator[None]:
-    """Skip a test that asks for what its bench cannot do."""
+    """Skip a test that uses an operation that its bench cannot do."""
     try:
         yield
     except NotOnThisBench as error:

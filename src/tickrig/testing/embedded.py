@@ -1,7 +1,8 @@
 """`dut` of pytest-embedded on a bench: `pytest_plugins = ["tickrig.testing.embedded"]`.
 
-It overrides three fixtures of pytest-embedded, so that its service `serial` opens the port of the
-fixture `bench`. The bench is in real time: `dut` reads in a thread of its own.
+This module overrides three fixtures of pytest-embedded, so that the service `serial` of
+pytest-embedded opens the port of the fixture `bench`. The bench is in real time: `dut` reads in a
+thread of its own.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ def embedded_services(request: pytest.FixtureRequest) -> str:
 
 @pytest.fixture
 def port(bench: Bench) -> str:
-    """Port that `dut` opens: that of the bench."""
+    """Port of the bench, which `dut` opens."""
     if bench.mode == VIRTUAL:
         raise NotOnThisBench("dut needs real time: --bench-mode real")
     return bench.url
@@ -30,10 +31,10 @@ def port(bench: Bench) -> str:
 
 @pytest.fixture(scope="session")
 def target(request: pytest.FixtureRequest) -> Any:
-    """`--target` of pytest-embedded; with `--lg-env` the target of labgrid.
+    """Value of `--target` of pytest-embedded, or the target of labgrid if `--lg-env` is given.
 
     labgrid and pytest-embedded both have a fixture of this name. Where both are installed,
-    pytest-embedded gets that of labgrid, which skips each test that has no `--lg-env`.
+    pytest-embedded gets the fixture of labgrid, which skips each test that has no `--lg-env`.
     """
     if request.config.getoption("lg_env", None):
         return request.getfixturevalue("env").get_target()

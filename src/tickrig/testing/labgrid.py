@@ -1,4 +1,4 @@
-"""A bench in labgrid: a resource that names it, and a driver with its console and its power.
+"""A bench in labgrid: a resource for the bench, and a driver for its console and power.
 
 `imports: [tickrig.testing.labgrid]` in the environment file registers both.
 """
@@ -27,9 +27,10 @@ class TickrigBench(Resource):
     """The bench of a rig file.
 
     Attributes:
-        rig: the rig file, relative to the environment file.
+        rig: path of the rig file, relative to the environment file.
         mode: `virtual`, `real` or `hardware`.
-        device: whose console and power it is, if there are several devices.
+        device: name of the device whose console and power the driver uses, if the bench has
+            several.
     """
 
     rig: str = attr.ib(validator=_TEXT)
@@ -42,13 +43,14 @@ class TickrigBench(Resource):
 class TickrigDriver(ConsoleExpectMixin, Driver, ConsoleProtocol, PowerProtocol):
     """Console and power of a bench, and the bench itself.
 
-    Activating the driver opens it, with its supply on; deactivating closes it.
+    Activating the driver opens the bench with the supply on. Deactivating the driver closes the
+    bench.
 
     Attributes:
-        delay: how long `cycle` leaves the supply off, in seconds of the bench.
-        txdelay: pause between chunks that the console sends, in seconds of the machine.
-        txchunk: bytes in each of these chunks.
-        bench: the bench, as long as the driver is active.
+        delay: time for which `cycle` leaves the supply off, in seconds of bench time.
+        txdelay: pause between chunks that the console sends, in seconds of real time.
+        txchunk: number of bytes in each chunk that the console sends.
+        bench: the bench, which exists only while the driver is active.
     """
 
     bindings = {"place": TickrigBench}  # noqa: RUF012 - as all drivers of labgrid
@@ -62,7 +64,7 @@ class TickrigDriver(ConsoleExpectMixin, Driver, ConsoleProtocol, PowerProtocol):
     bench: Bench
 
     def __attrs_post_init__(self) -> None:
-        """Be ready to be activated."""
+        """Prepare the driver for activation."""
         super().__attrs_post_init__()
         self._port: Any = None
 
@@ -95,7 +97,7 @@ class TickrigDriver(ConsoleExpectMixin, Driver, ConsoleProtocol, PowerProtocol):
             port.close()
 
     def _read(self, size: int = 1, timeout: float = 0.0, max_size: int | None = None) -> bytes:
-        """Read as labgrid's SerialDriver: `size` bytes or what is there, at most `max_size`."""
+        """Read at least `size` and at most `max_size` bytes, as labgrid's SerialDriver does."""
         self.open()
         self._port.timeout = timeout
         wanted = max(size, self._port.in_waiting)
@@ -121,7 +123,7 @@ class TickrigDriver(ConsoleExpectMixin, Driver, ConsoleProtocol, PowerProtocol):
 
     @Driver.check_active
     def cycle(self) -> None:
-        """Switch the supply off, and on again after `delay`."""
+        """Switch the supply off, and switch it on again after `delay`."""
         self.off()
         self.bench.run_for(round(self.delay * 1_000_000))
         self.on()

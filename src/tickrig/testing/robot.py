@@ -24,13 +24,14 @@ class BenchLibrary:
     """Keywords for a bench of emulated or real devices, one bench at a time.
 
     A test that fails shows the last lines and frames of its bench, and the bench is closed when the
-    test is over. Names of several devices are `DEVICE/NAME`.
+    test is over. If the bench has several devices, the name of a signal is `DEVICE/NAME`.
 
     Attributes:
-        ROBOT_LIBRARY_SCOPE: each test has a library of its own.
-        ROBOT_LIBRARY_VERSION: that of tickrig.
-        ROBOT_LISTENER_API_VERSION: the library listens for the end of a test.
-        ROBOT_LIBRARY_LISTENER: itself.
+        ROBOT_LIBRARY_SCOPE: scope of the library: each test has its own instance.
+        ROBOT_LIBRARY_VERSION: version of tickrig.
+        ROBOT_LISTENER_API_VERSION: version of the listener interface, by which the library notices
+            the end of a test.
+        ROBOT_LIBRARY_LISTENER: the listener, which is the library itself.
     """
 
     ROBOT_LIBRARY_SCOPE = "TEST"
@@ -44,7 +45,7 @@ class BenchLibrary:
         self._heard: deque[tuple[str, str]] = deque(maxlen=_KEPT)
 
     def _end_test(self, data: object, result: Any) -> None:
-        """Show what happened, and close the bench; Robot Framework calls it."""
+        """Show what happened, and close the bench; Robot Framework calls this method."""
         if self._bench is None:
             return
         if result.failed:
@@ -56,19 +57,20 @@ class BenchLibrary:
         """The bench that is open.
 
         Raises:
-            RuntimeError: none is.
+            RuntimeError: no bench is open.
         """
         if self._bench is None:
             raise RuntimeError("no bench is open: use `Open Bench` first")
         return self._bench
 
     def open_bench(self, what: str, mode: str = "virtual", seed: int | None = None) -> None:
-        """Open a bench: of a rig file (``rig.toml``), or of one device by its type (``rrc``).
+        """Open the bench of a rig file (``rig.toml``) or of one device type (``rrc``).
 
         Args:
-            what: the rig file, or the type.
-            mode: ``virtual`` or ``real``; ``hardware`` with a rig file.
-            seed: of all chance; that of the rig file, or 0, unless given.
+            what: path of the rig file, or name of the device type.
+            mode: ``virtual`` or ``real``, or with a rig file also ``hardware``.
+            seed: seed of all random numbers; by default the seed of the rig file, or 0 without a
+                rig file.
         """
         self.close_bench()
         if Path(what).suffix in (".toml", ".yml", ".yaml"):
@@ -78,7 +80,7 @@ class BenchLibrary:
         self._bench._mode.hear(self._hear)
 
     def close_bench(self) -> None:
-        """Close the bench. One that is not open is no error."""
+        """Close the bench. If no bench is open, nothing happens."""
         bench, self._bench = self._bench, None
         self._links.clear()
         self._heard.clear()
@@ -93,29 +95,29 @@ class BenchLibrary:
         return self.bench[device] if device else self.bench
 
     def advance(self, duration: str) -> None:
-        """Let time pass: ``100ms``, ``2s``.
+        """Advance the time of the bench by a duration: ``100ms``, ``2s``.
 
         Args:
-            duration: how long.
+            duration: duration with its unit.
         """
         self.bench.run_for(duration)
 
     def send(self, text: str, device: str = "", end: str = r"\n") -> None:
-        r"""Send a line as the host; ``\xhh`` is a byte.
+        r"""Send a line as the host; ``\xhh`` stands for a byte in hex.
 
         Args:
             text: the line without its end.
-            device: to which device, if there are several wires.
-            end: its end.
+            device: name of the device that gets the line, if the bench has several wires.
+            end: end of the line.
         """
         self._link(device).send(unescape(text + end))
 
     def send_frame(self, frame: str, device: str = "") -> None:
-        """Send a CAN frame in candump's notation, as ``701#05``.
+        """Send a CAN frame in candump's notation, such as ``701#05``.
 
         Args:
-            frame: the frame.
-            device: on whose bus, if there are several.
+            frame: the frame in candump's notation.
+            device: name of a device on the bus, if the bench has several buses.
         """
         self._link(device).send((CanFrame.parse(frame),))
 
@@ -127,12 +129,12 @@ class BenchLibrary:
     def expect(self, pattern: str, within: str = "1s", device: str = "") -> str:
         """Wait for a line or a frame of a device, and return it.
 
-        Lines that came since the last one that was expected count, too.
+        Lines that have arrived since the last expected line count, too.
 
         Args:
             pattern: the whole line, or the frame in candump's notation; ``*`` stands for anything.
-            within: for how long at most.
-            device: of which device, or wire; of any unless given.
+            within: longest wait.
+            device: name of the device or wire that sends the line; by default any.
         """
         wanted = re.compile(".*".join(map(re.escape, pattern.split("*"))), re.DOTALL)
         bench, passed = self.bench, list[str]()
@@ -153,11 +155,11 @@ class BenchLibrary:
         return passed[-1]
 
     def order_fault(self, fault: str, duration: str | None = None) -> None:
-        """Order a fault: ``cut``, ``cut@2s-3s``, ``axis2/sdo_slow=2s``.
+        """Start a fault, now or at a time: ``cut``, ``cut@2s-3s``, ``axis2/sdo_slow=2s``.
 
         Args:
-            fault: the fault, with its arguments.
-            duration: how long it stays; until it is cleared unless given.
+            fault: the fault with its arguments.
+            duration: duration of the fault; by default the fault stays until it is cleared.
         """
         self.bench.fault(fault, for_=duration)
 
@@ -165,16 +167,16 @@ class BenchLibrary:
         """Clear a fault.
 
         Args:
-            name: of the fault.
+            name: name of the fault.
         """
         self.bench.clear(name)
 
     def press(self, button: str, duration: str = "100ms") -> None:
-        """Press a button and let it go.
+        """Press a button and release it.
 
         Args:
-            button: its name.
-            duration: how long it is pressed.
+            button: name of the button.
+            duration: time for which the button is pressed.
         """
         self.bench.press(button, duration)
 
@@ -182,16 +184,16 @@ class BenchLibrary:
         """Set an input, or all inputs of a group.
 
         Args:
-            name: of the input or group.
-            *values: one, or one for each input of the group.
+            name: name of the input or group.
+            *values: one value, or one value for each input of the group.
         """
         self.bench.set(name, *(parse_setting(str(value)) for value in values))
 
     def get_signal(self, name: str) -> Setting:
-        """Return an input, an output, or an object of a CANopen node (``axis2/0x6041``).
+        """Return the value of an input, output, or object of a CANopen node (``axis2/0x6041``).
 
         Args:
-            name: of the signal.
+            name: name of the signal.
         """
         return self.bench.get(name)
 
@@ -199,9 +201,9 @@ class BenchLibrary:
         """Wait until a signal has a value.
 
         Args:
-            name: of the signal.
-            value: the value.
-            within: for how long at most.
+            name: name of the signal.
+            value: the expected value.
+            within: longest wait.
         """
         wanted, bench = parse_setting(str(value)), self.bench
         if not bench.wait_until(lambda: bench.get(name) == wanted, within):
@@ -211,7 +213,7 @@ class BenchLibrary:
         """Switch the supply off.
 
         Args:
-            device: of which device; of all unless given.
+            device: name of the device to switch off; by default all devices.
         """
         self._of(device).switch_off()
 
@@ -219,6 +221,6 @@ class BenchLibrary:
         """Switch the supply on.
 
         Args:
-            device: to which device; to all unless given.
+            device: name of the device to switch on; by default all devices.
         """
         self._of(device).switch_on()

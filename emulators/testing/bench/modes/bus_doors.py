@@ -28,7 +28,7 @@ from tickrig.wire.can import Frames
 
 
 class BusGone(PortGone, can.CanOperationError):
-    """A bus is gone; for hosts, python-can's own error."""
+    """A bus is gone; hosts can catch it as an error of python-can."""
 
 
 class _Watched(can.BusABC):
@@ -81,11 +81,11 @@ def _open_bus(plan: BusPlan, options: dict[str, Any]) -> can.BusABC:
     """Open a bus.
 
     Args:
-        plan: the bus.
+        plan: address and options of the bus.
         options: further options of `can.Bus`.
 
     Raises:
-        BusGone: it cannot be opened.
+        BusGone: the bus cannot be opened.
     """
     rate = {} if plan.bit_rate is None else {"bitrate": plan.bit_rate}
     try:
@@ -120,7 +120,7 @@ def frame_link(plan: BusPlan, watch: HostPace) -> StampedLink:
     """Return a link to a bus, which does not receive its own frames.
 
     Raises:
-        BusGone: it cannot be opened.
+        BusGone: the bus cannot be opened.
     """
     link = can_link.CanLink(_open_bus(plan, {}), _name_of(plan))
     link.on_error_frame = lambda frame: watch.passed(Mark.FROM_DEVICE, (frame,))
@@ -131,12 +131,12 @@ def join_bus(end: CanEnd, plan: BusPlan, stack: ExitStack) -> CanBridge:
     """Return a bridge from an end of an emulated bus to one of python-can.
 
     Args:
-        end: of the emulated bus.
+        end: end of the emulated bus.
         plan: the bus of python-can.
-        stack: closes it at the end.
+        stack: stack that closes the bridge at the end.
 
     Raises:
-        BusGone: it cannot be opened.
+        BusGone: the bus of python-can cannot be opened.
     """
     bus = _open_bus(plan, {})
     stack.callback(can_link.close_bus, bus)

@@ -34,8 +34,8 @@ class PortRecord:
 
     Args:
         plan: the rig file.
-        mounts: equivalent wires, for their types.
-        now_us: the time.
+        mounts: wires of an equivalent emulated bench, for the types of the wires.
+        now_us: function that returns the time in microseconds.
     """
 
     def __init__(
@@ -94,9 +94,9 @@ class DoorJournal(Journal):
     """A journal of what hosts send and receive; hosts have threads.
 
     Args:
-        now_us: the time.
-        after: called after received traffic.
-        record: gets the same data, for a trace.
+        now_us: function that returns the time in microseconds.
+        after: function that is called after traffic was received.
+        record: trace that gets the same data.
     """
 
     def __init__(
@@ -111,8 +111,8 @@ class DoorJournal(Journal):
         """Return a monitor for a connection of a wire.
 
         Args:
-            mount: an equivalent wire.
-            pace: records how late the host is.
+            mount: wire of an equivalent emulated bench.
+            pace: monitor that records how late the host is.
         """
         if isinstance(mount, LineMount):
             return _Watch(pace, partial(self._hear_bytes, mount.name, self._splitting(mount)))
@@ -121,7 +121,7 @@ class DoorJournal(Journal):
         return watch
 
     def note(self, device: str, text: str, **changes: Setting) -> None:
-        """Record an action on a device, and its inputs after it."""
+        """Record an action on a device, and the inputs of the device after the action."""
         with self._lock:
             for name, value in changes.items():
                 self.record.changed(device, name, value)
@@ -133,7 +133,7 @@ class DoorJournal(Journal):
         return super().lines()
 
     def look(self) -> None:
-        """Add frames that ended with a silence; no rig does this here."""
+        """Add frames that ended with a silence, because no rig adds them here."""
         with self._lock:
             self.end_silent(self._now_us())
 
@@ -149,7 +149,7 @@ class DoorJournal(Journal):
         self._after()
 
     def hear_frames(self, wire: str, watch: _BusWatch, mark: Mark, frames: Seen) -> None:
-        """Record frames of a connection, unless another one of the bus has recorded them.
+        """Record frames of a connection, unless another connection of the bus has recorded them.
 
         The trace has no error frames.
         """
@@ -165,7 +165,7 @@ class DoorJournal(Journal):
         self._after()
 
     def announce(self, wire: str, watch: _BusWatch, frames: Seen, by: int = 1) -> None:
-        """Mark frames as known at all other connections of a bus, or unmark them."""
+        """Mark frames as known, or unmark them, at all other connections of a bus."""
         with self._lock:
             self._announce(wire, watch, frames, by)
 
@@ -194,7 +194,8 @@ class _BusWatch(_Watch):
     """Monitor of one of several connections of a bus; each connection sees each frame.
 
     Attributes:
-        known: frames that are already in the journal, but that this connection has not seen yet.
+        known: frames that are already in the journal, but that this connection has not received
+            yet.
     """
 
     def __init__(self, pace: HostPace, wire: str, journal: DoorJournal) -> None:
@@ -204,7 +205,7 @@ class _BusWatch(_Watch):
 
     @contextmanager
     def sending(self, frames: Frames) -> Iterator[None]:
-        """Mark frames at the other connections before they can see them."""
+        """Mark frames at the other connections before these can receive the frames."""
         self._journal.announce(self._wire, self, frames)
         try:
             yield

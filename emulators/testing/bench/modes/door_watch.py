@@ -30,20 +30,20 @@ def _now_us() -> int:
 
 
 class HostPace:
-    """Monitor of a connection: how late its host was in its waits; subclasses see the traffic.
+    """Monitor that measures how late the host of a connection was; subclasses get the traffic.
 
     Attributes:
-        late_us: the worst so far.
+        late_us: largest delay up to now.
     """
 
     def __init__(self, now_us: Callable[[], int] = _now_us) -> None:
         self._now_us, self.late_us = now_us, 0
 
     def used(self) -> None:
-        """Called before the host sends or waits; may forbid it by raising."""
+        """Called before the host sends or waits; an exception forbids the call."""
 
     def passed(self, mark: Mark, traffic: Any) -> None:
-        """Called with bytes or frames."""
+        """Called with bytes or frames that the host has sent or received."""
 
     def waited(self, wanted_us: int, took_us: int) -> None:
         """Record a wait without result: the requested and the actual duration."""
@@ -62,14 +62,14 @@ class HostPace:
 
 
 class LinkGone(PortGone, LinkClosed):
-    """The port of a link is gone; for hosts, the line is closed."""
+    """The port of a link is gone; hosts can catch it as a closed line."""
 
 
 class WatchedLink(Generic[W]):
     """A `Link` that reports its traffic, and the duration of waits without result.
 
     Args:
-        link: the other link.
+        link: the link that is monitored.
         watch: the monitor.
     """
 
@@ -78,7 +78,7 @@ class WatchedLink(Generic[W]):
 
     @property
     def now_us(self) -> int:
-        """The clock of the other link."""
+        """The time of the monitored link."""
         return self._link.now_us
 
     def send(self, traffic: W, /) -> None:
@@ -108,7 +108,7 @@ class WatchedLink(Generic[W]):
         return traffic
 
     def close(self) -> None:
-        """Close the other link."""
+        """Close the monitored link."""
         self._closed = True
         self._link.close()
 
@@ -133,7 +133,7 @@ class WatchedFrameLink(WatchedLink[Frames]):
     """A monitored `StampedLink`.
 
     Args:
-        link: the other link.
+        link: the link that is monitored.
         watch: the monitor.
     """
 
@@ -142,7 +142,7 @@ class WatchedFrameLink(WatchedLink[Frames]):
         self._stamped = link
 
     def receive_stamped(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
-        """Wait for a first frame; return a time, and all that had arrived by then.
+        """Wait for a frame; return a time, and all frames that had arrived by that time.
 
         Raises:
             LinkGone: the bus is gone.
@@ -160,7 +160,7 @@ class WatchedFrameLink(WatchedLink[Frames]):
 
 
 class SerialGone(PortGone, serial.SerialException):
-    """A port is gone; for hosts, pyserial's own error."""
+    """A port is gone; hosts can catch it as an error of pyserial."""
 
 
 class WatchedPort(serial.SerialBase):
@@ -169,7 +169,7 @@ class WatchedPort(serial.SerialBase):
     _watch: HostPace
 
     def read(self, size: int = 1) -> bytes:
-        """Read like the port, and record data and delay."""
+        """Read from the port, and record data and delay."""
         self._watch.used()
         wanted_s, begun_ns = self.timeout, monotonic_ns()
         try:
@@ -186,7 +186,7 @@ class WatchedPort(serial.SerialBase):
         return data
 
     def write(self, data: Any) -> int | None:
-        """Write like the port, and record the data."""
+        """Write to the port, and record the data."""
         self._watch.used()
         try:
             written = super().write(data)
@@ -202,12 +202,12 @@ def open_watched_serial(url: str, watch: HostPace, options: dict[str, Any]) -> s
     """Open a port.
 
     Args:
-        url: for `serial.serial_for_url`.
+        url: URL of the port for `serial.serial_for_url`.
         watch: monitor of the traffic.
-        options: those of `serial.Serial`.
+        options: options of `serial.Serial`.
 
     Raises:
-        SerialGone: it cannot be opened.
+        SerialGone: the port cannot be opened.
         ValueError: an option is out of range.
     """
     try:
@@ -230,10 +230,10 @@ _LATE_US: Final = 5_000
 
 
 def too_slow(**late_us: int) -> str:
-    """Return which parts of a bench were too late for a verdict; empty if none was.
+    """Return which parts of a bench were too late for a verdict, or "" if no part was.
 
     Args:
-        late_us: of each part, in microseconds.
+        late_us: delay of each part, in microseconds.
 
     >>> too_slow(host=1_000, emulator=57_400)
     'the machine was too slow: host up to 1 ms, emulator up to 57 ms late'
@@ -248,10 +248,10 @@ def too_slow(**late_us: int) -> str:
 
 _TASKS: Final = Path("/proc/self/task")
 _LOOK_US: Final = 10_000
-"""Shortest time over which waits are added up; sleeping threads wait a little at each wake-up."""
+"""Shortest time over which waits are added up. Sleeping threads wait a little at each wake-up."""
 
 _LONG_US: Final = 20 * _LOOK_US
-"""Longest such time; over a longer time many short waits would add up to a large delay."""
+"""Longest time over which waits are added up, so that short waits are no large delay."""
 
 
 class CpuWaits:
@@ -262,11 +262,11 @@ class CpuWaits:
     Documentation/scheduler/sched-stats).
 
     Args:
-        tasks: the folder of the threads.
+        tasks: path of the folder with the threads.
         spares_looker: whether to omit the calling thread, which measures its own delay.
 
     Attributes:
-        worst_us: the longest wait until now, measured over about `_LOOK_US`.
+        worst_us: longest wait up to now, measured over about `_LOOK_US`.
     """
 
     def __init__(self, tasks: Path = _TASKS, *, spares_looker: bool = False) -> None:

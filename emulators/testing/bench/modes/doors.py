@@ -50,8 +50,8 @@ class LinePlace:
 
     Attributes:
         url: device path, or URL of pyserial.
-        baud: in bit/s.
-        framing: data bits, parity, stop bits.
+        baud: baud rate in bit/s.
+        framing: data bits, parity and stop bits.
     """
 
     url: str
@@ -60,12 +60,12 @@ class LinePlace:
 
 
 class Doors:
-    """The `_HostDoors` of benches in real time; ports left open by hosts are closed with them.
+    """The `_HostDoors` of benches in real time. `close` also closes ports left open by hosts.
 
     Args:
         places: addresses of the wires, by name.
-        watch_of: returns the monitor for a wire.
-        begin: starts the time; called when a connection is open.
+        watch_of: function that returns the monitor for a wire.
+        begin: function that starts the time; it is called when a connection is open.
     """
 
     def __init__(
@@ -169,22 +169,22 @@ class OutsideEnds:
     """Addresses of the wires of a bench in real time.
 
     A serial line is at a pty and at the addresses in `serve`. On a system without ptys, a TCP port
-    replaces the pty. A CAN bus is connected with a python-can bus; by default that is a bus in this
-    process, on its own channel.
+    replaces the pty. A CAN bus is connected with a python-can bus; by default the python-can bus is
+    in this process, on its own channel.
 
     Args:
         mounts: the wires.
-        plan: their addresses.
+        plan: addresses of the wires.
 
     Attributes:
-        clock: of the rig.
-        bridges: between the wires and the outside, for the rig.
-        places: addresses for hosts in this process, by the name of the wire.
-        ports: of the lines, by the name of the wire.
+        clock: clock of the rig.
+        bridges: bridges between the wires and the outside, for the rig.
+        places: addresses for hosts in this process, by name of the wire.
+        ports: ports of the lines, by name of the wire.
 
     Raises:
         BusGone: a bus cannot be opened.
-        OSError: no free port, or a link cannot be made.
+        OSError: no port is free, or a link cannot be made.
     """
 
     def __init__(self, mounts: Iterable[Mount], plan: RealPlan | None = None) -> None:
@@ -214,7 +214,7 @@ class OutsideEnds:
         self.places[mount.name] = LinePlace(url, mount.settings.baud)
 
     def _own_port(self, link: Path | None) -> pty_port.PtyPort | NetworkPort:
-        """Open the port for hosts of this process: a TCP port where there are no ptys."""
+        """Open the port for hosts of this process: a pty, or a TCP port if there are no ptys."""
         try:
             pty = pty_port.PtyPort(link)
         except ImportError:
@@ -237,5 +237,5 @@ class OutsideEnds:
 
 
 def _own_bus(mount: BusMount) -> BusPlan:
-    """Return a bus of its own."""
+    """Return a bus in this process, on its own channel."""
     return BusPlan(interface=_IN_PROCESS, channel=f"{mount.name} {id(mount)}")

@@ -30,12 +30,12 @@ from tickrig.host.control.requests import Object
 def _places_of(
     plan: RigPlan, hardware: HardwarePlan, mounts: Mapping[str, Mount]
 ) -> dict[str, LinePlace | BusPlan]:
-    """Return the addresses of the wires, by name; unknown ones are omitted.
+    """Return the addresses of the wires by name; unknown addresses are omitted.
 
     Args:
         plan: the rig file.
-        hardware: its section for real devices.
-        mounts: equivalent wires, with the rates of their devices.
+        hardware: section of the rig file for real devices.
+        mounts: wires of an equivalent emulated bench, with the rates of the devices.
     """
     places: dict[str, LinePlace | BusPlan] = dict(hardware.buses)
     for wire, port in hardware.ports.items():
@@ -63,7 +63,7 @@ class HardwareMode(BenchMode):
     the bench waits.
 
     Args:
-        plan: content of the rig file with `[hardware]`.
+        plan: content of a rig file with the section `[hardware]`.
         terminal: terminal of the human.
 
     Raises:
@@ -114,7 +114,7 @@ class HardwareMode(BenchMode):
         return (time.monotonic_ns() - self._begun_ns) // 1_000
 
     def request(self, do: str, **fields: Any) -> Object:
-        """Execute a request by the operator; ValueError if it is refused."""
+        """Execute a request by the operator; ValueError if the request is refused."""
         return self._operators.request(do, fields)
 
     def fault(
@@ -136,11 +136,11 @@ class HardwareMode(BenchMode):
         self._operators.clear(owner, fault)
 
     def switch_power(self, owner: str, *, on: bool) -> None:
-        """Switch the supply of a device, or of all if the name is empty."""
+        """Switch the supply of a device, or of all devices if `owner` is empty."""
         self._operators.switch_power(owner, on=on)
 
     def observe(self, owner: str, text: str, seen: Condition, within_us: int) -> bool:
-        """Ask the human at a device for an observation; an emulator is read."""
+        """Ask the human at a device for an observation, or check the condition with an emulator."""
         answer = self._operators.sees(owner, text)
         return super().observe(owner, text, seen, within_us) if answer is None else answer
 
@@ -174,7 +174,7 @@ class HardwareMode(BenchMode):
                 time.sleep(wait_us / 1e6)
 
     def too_slow(self) -> str:
-        """Return why failures are not valid; empty if they are valid, or if a human answered no."""
+        """Return why failures are not valid, or "" if they are valid or a human answered no."""
         if self._operators.said_no:
             return ""
         host_us = max(self._pace.late_us, self._waits.worst_us)

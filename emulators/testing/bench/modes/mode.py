@@ -39,7 +39,7 @@ class _HostDoors(Protocol):
     """
 
     def link(self, wire: str) -> Link[Any]:
-        """Connect a host: bytes on a serial line, frames on a bus."""
+        """Connect a host; the link carries bytes on a serial line, or frames on a bus."""
         ...
 
     def serial(self, wire: str, options: dict[str, Any]) -> serial.SerialBase:
@@ -63,19 +63,19 @@ class _HostDoors(Protocol):
 
 
 class BenchMode(ABC):
-    """A mode: the place of the devices, and the passing of time.
+    """A mode defines where the devices are and how time passes.
 
     Unsupported operations raise `NotOnThisBench`.
 
     Args:
-        rig: the rig with the devices; for real devices, a rig with equivalent devices that does not
+        rig: rig with the devices. For real devices, the rig has equivalent devices and does not
             run.
         tolerance: the tolerances.
 
     Attributes:
-        name: `virtual`, `real` or `hardware`.
+        name: name of the mode: `virtual`, `real` or `hardware`.
         tolerance: the tolerances.
-        doors: connections for hosts; the first one starts the time.
+        doors: connections for hosts. The first connection starts the time.
     """
 
     name: ClassVar[str]
@@ -109,7 +109,7 @@ class BenchMode(ABC):
 
     @abstractmethod
     def request(self, do: str, **fields: Any) -> Object:
-        """Execute a request of the control socket; ValueError if it is refused."""
+        """Execute a request of the control socket; ValueError if the request is refused."""
 
     @abstractmethod
     def act(self, action: Callable[[BenchRig], _T]) -> _T:
@@ -119,7 +119,7 @@ class BenchMode(ABC):
     def fault(
         self, owner: str, spec: FaultSpec, condition: Condition | None, for_us: int | None
     ) -> None:
-        """Start or schedule a fault of a device, a wire or (empty) any of them."""
+        """Start or schedule a fault of a device or wire, or of any if `owner` is empty."""
 
     @property
     def orders(self) -> Sequence[FaultOrder]:
@@ -127,31 +127,31 @@ class BenchMode(ABC):
         return self._rig.orders
 
     def check_fault(self, owner: str, name: str) -> None:
-        """Raise ValueError unless a device, a wire or (empty) any has a fault of this name."""
+        """Raise ValueError unless a device or wire, or any if `owner` is empty, has the fault."""
         self._query(lambda rig: rig.state.full_fault_name(owner, name))
 
     def describe(self, owner: str) -> BenchDescription:
-        """Return inputs, outputs and faults of a device, or of all devices if the name is empty."""
+        """Return inputs, outputs and faults of a device, or of all devices if `owner` is empty."""
         return self._query(lambda rig: rig.describe(owner))
 
     @abstractmethod
     def clear(self, owner: str, fault: str) -> None:
-        """Clear a fault, also a scheduled one."""
+        """Clear a fault, or cancel a scheduled fault."""
 
     @abstractmethod
     def switch_power(self, owner: str, *, on: bool) -> None:
-        """Switch the supply of a device, or of all if the name is empty."""
+        """Switch the supply of a device, or of all devices if `owner` is empty."""
 
     def hear(self, listener: Callable[[WireLine], None]) -> None:
         """Call a listener with each line and frame from now on."""
         self._query(lambda rig: rig.journal.listeners.append(listener))
 
     def observe(self, owner: str, text: str, seen: Condition, within_us: int) -> bool:
-        """Return an observation at a device; a human operator is shown the text and answers."""
+        """Return an observation at a device; a human operator sees the text and answers."""
         return self.wait_until(seen, within_us + self.tolerance.time_us)
 
     def perform(self, owner: str, text: str, do: Callable[[], object]) -> None:
-        """Run an action at a device: by the test, or by a human who gets the text."""
+        """Run an action at a device. The test runs `do`, or a human reads the text."""
         do()
 
     def meanwhile(self, host: Callable[[int], object]) -> None:  # noqa: B027 - nothing to do
@@ -183,7 +183,7 @@ class BenchMode(ABC):
 
     @abstractmethod
     def too_slow(self) -> str:
-        """Return why failures are not valid, if real time was not kept; else empty."""
+        """Return why failures are not valid, or "" if real time was kept."""
 
     @abstractmethod
     def fork(self) -> BenchMode:
@@ -201,7 +201,7 @@ POWER: Final = {"rrc_power": 1, "power_cut": 0, "power_off": 0}
 
 
 class EmulatedMode(BenchMode):
-    """The part of a `BenchMode` of emulated devices that does not depend on the time."""
+    """The part of a `BenchMode` that emulated devices in virtual and real time share."""
 
     @cached_property
     def _control(self) -> EmulatorControl:
@@ -212,7 +212,7 @@ class EmulatedMode(BenchMode):
         return self.act(question)
 
     def request(self, do: str, **fields: object) -> Object:
-        """Execute a request of the control socket; ValueError if it is refused."""
+        """Execute a request of the control socket; ValueError if the request is refused."""
         request = {"v": VERSION, "do": do, **fields}
         return _answer_of(self.act(lambda rig: self._control.answer(request)))
 
@@ -235,11 +235,11 @@ class EmulatedMode(BenchMode):
         )
 
     def clear(self, owner: str, fault: str) -> None:
-        """Clear a fault, also a scheduled one."""
+        """Clear a fault, or cancel a scheduled fault."""
         self.act(lambda rig: rig.operator.clear(rig.state.full_fault_name(owner, fault)))
 
     def switch_power(self, owner: str, *, on: bool) -> None:
-        """Switch the supply of a device, or of all if the name is empty."""
+        """Switch the supply of a device, or of all devices if `owner` is empty."""
         for name in [owner] if owner else self.devices:
             inputs = self._rig.state.assembly.parts[name].inputs
             found = next((item for item in POWER if item in inputs.table), None)
@@ -254,7 +254,7 @@ class EmulatedMode(BenchMode):
 
 
 def _answer_of(answer: Object) -> Object:
-    """Return an answer; if it is a refusal, raise ValueError with its text."""
+    """Return an answer; if the answer is a refusal, raise ValueError with its text."""
     if not answer["ok"]:
         raise ValueError(str(answer["error"]))
     return answer

@@ -32,7 +32,7 @@ from tickrig.wire.instant import NEVER
 # A device that is switched by commands.
 
 _SWITCH_S: Final = 30.0
-"""Time-out of a command."""
+"""Time-out of a command that switches a device."""
 
 
 class _PowerSwitch:
@@ -40,7 +40,7 @@ class _PowerSwitch:
 
     Args:
         device: name of the device.
-        plan: the commands.
+        plan: commands of the rig file.
     """
 
     def __init__(self, device: str, plan: PowerPlan) -> None:
@@ -50,7 +50,7 @@ class _PowerSwitch:
         """Switch the supply.
 
         Raises:
-            BenchBlocked: the command cannot be run, failed, or did not end.
+            BenchBlocked: the command cannot be run, has failed, or did not end.
         """
         command = self._plan.on if on else self._plan.off
         try:
@@ -84,7 +84,7 @@ _DONE: Final = "then press Enter (n: not done, c: cannot be done)"
 
 
 class Terminal:
-    """Asks at the terminal of this process, even if standard input and output are redirected.
+    """Asks a human at the terminal, even if standard input and output are redirected.
 
     pytest may therefore capture both. Hosts keep running while the terminal waits for an answer.
 
@@ -92,7 +92,8 @@ class Terminal:
         path: path of the terminal.
 
     Attributes:
-        hosts: called in turn with microseconds during the wait for an answer.
+        hosts: functions that are called in turn, with a duration in microseconds, during the wait
+            for an answer.
     """
 
     def __init__(self, path: str = _TERMINAL) -> None:
@@ -125,8 +126,8 @@ class Terminal:
             text: the action, as a sentence without its end.
 
         Raises:
-            OperatorRefused: it was not done.
-            NotOnThisBench: it is impossible.
+            OperatorRefused: the human did not do the action.
+            NotOnThisBench: the human answered that the action is impossible.
         """
         while answer := self.prompt(f"{text}, {_DONE}:").lower():
             if answer == "n":
@@ -152,18 +153,19 @@ _HOLD_US: Final = 1_000_000
 class _HumanOperator:
     """The operator of a device: a human at the terminal, with the texts of the device type.
 
-    The operator is not asked twice for the same set value. Names are those within the device.
+    The operator is not asked twice for the same set value. Names have no prefix of the device.
 
     Args:
         device: name of the device.
-        physical: an equivalent device, for its tables and set values.
+        physical: equivalent emulated device, for its tables and set values.
         terminal: terminal of the human.
-        power: switches the device; None if the human does.
+        power: switch of the device, or None if the human switches the device.
 
     Attributes:
         late_us: largest known delay of the device.
-        quick: acts without delay.
-        said_no: whether the human answered no; this answer is valid however late the machine was.
+        quick: whether the operator acts without delay.
+        said_no: whether the human answered no. This answer is valid even if the machine was too
+            slow.
     """
 
     late_us, quick = 0, False
@@ -186,7 +188,7 @@ class _HumanOperator:
             self._power.switch(on=False)
 
     def begin(self) -> None:
-        """Switch it on, if a command can."""
+        """Switch the device on, if a command can."""
         if self._power is not None:
             self._power.switch(on=True)
 
@@ -229,7 +231,7 @@ class _HumanOperator:
         self.have_done(f"press the {text}{held} and let it go")
 
     def fault(self, spec: FaultSpec, now_us: int, for_us: int | None) -> None:
-        """Ask to make a physical fault; NotOnThisBench for a wire fault or a given time."""
+        """Ask to make a physical fault; raise NotOnThisBench for a wire fault or a given time."""
         item = self._find_fault(spec.name)
         if (spec.arguments, spec.from_us, spec.to_us, for_us) != ((), 0, NEVER, None):
             raise errors.NotOnThisBench(f"no hand makes {spec.name} at a certain time")
@@ -254,7 +256,7 @@ class _HumanOperator:
         return True
 
     def switch_power(self, *, on: bool) -> None:
-        """Switch the device, or ask to switch it."""
+        """Switch the supply by a command, or ask the human to switch it."""
         if self._power is not None:
             self._power.switch(on=on)
         else:
@@ -293,16 +295,17 @@ _OBJECT: Final = "0x"
 class _EmulatorOperator:
     """The operator of a device: the control socket of an emulator.
 
-    Names are those within the device, as for a human operator.
+    Names have no prefix of the device, as for a human operator.
 
     Args:
-        path: path of the socket.
-        plan: the device; an emulator of several devices has the device under its name or node-ID.
+        path: path of the control socket.
+        plan: plan of the device. An emulator of several devices has the device under its name or
+            node-ID.
 
     Raises:
         PortGone: the emulator is not running.
         MachineTooSlow: the emulator does not answer.
-        ValueError: the emulator has several devices, but not this one.
+        ValueError: the emulator has several devices, but not the device of the plan.
     """
 
     said_no, quick = False, True
@@ -355,7 +358,7 @@ class _EmulatorOperator:
         self._off_us = self._now_us
 
     def begin(self) -> None:
-        """Switch it on after it has been without power."""
+        """Switch the device on after it has been without power."""
         if self._power is None:
             return
         while self._now_us < self._off_us + 2 * self._tick_us:
@@ -402,7 +405,7 @@ class _EmulatorOperator:
         return None
 
     def have_done(self, text: str) -> bool:
-        """Return False: an emulator cannot follow words."""
+        """Return False: an emulator cannot follow a description in words."""
         return False
 
     def switch_power(self, *, on: bool) -> None:
@@ -429,7 +432,7 @@ class _EmulatorOperator:
 
     @property
     def _power(self) -> str | None:
-        """The input for its supply, None if there is none."""
+        """The input for the supply of the device, or None if the device has no such input."""
         return next((name for name in POWER if self._prefix + name in self._inputs), None)
 
     @property
@@ -475,14 +478,14 @@ _DeviceOperator = _HumanOperator | _EmulatorOperator
 
 
 class Operators:
-    """The operators of a bench, with their devices by name.
+    """The operators of all devices of a bench.
 
     Args:
-        plan: the rig file.
-        where: its section for real devices.
-        like: equivalent devices, for their tables; they do not run.
+        plan: content of the rig file.
+        where: section of the rig file for real devices.
+        like: equivalent emulated devices, for their tables. These devices do not run.
         terminal: terminal of the human.
-        journal: records the actions.
+        journal: journal that records the actions.
 
     Raises:
         PortGone: an emulator in place of a device is missing.
@@ -532,7 +535,7 @@ class Operators:
             operator.close()
 
     def request(self, do: str, fields: dict[str, Any]) -> Object:
-        """Execute a request of a control socket; ValueError if it is refused."""
+        """Execute a request of a control socket; ValueError if the request is refused."""
         match do:
             case "set":
                 self._set(fields["name"], fields["value"])
@@ -566,8 +569,8 @@ class Operators:
         """Return an action that makes a fault at a time of the bench.
 
         Args:
-            owner: a device or wire, empty for any.
-            order: the fault, which gets its full name; a fault with a condition must act at once.
+            owner: name of the device or wire, or empty for any.
+            order: the fault, which gets its full name. A fault with a condition must act at once.
         """
         name = self._like.state.full_fault_name(owner, order.spec.name)
         spec = order.spec = replace(order.spec, name=name)
@@ -596,7 +599,7 @@ class Operators:
         self._journal.note(device, f"{bare}=0", **({bare: 0} if is_input else {}))
 
     def switch_power(self, owner: str, *, on: bool) -> None:
-        """Switch the supply of a device, or of all if the name is empty."""
+        """Switch the supply of a device, or of all devices if `owner` is empty."""
         for device in [owner] if owner else self._plan.devices:
             self._operator_at(device).switch_power(on=on)
             if device in self._waiting:  # the test says itself what it is to have
@@ -606,7 +609,7 @@ class Operators:
                 self._journal.record.was_reset(device)
 
     def sees(self, owner: str, text: str) -> bool | None:
-        """Ask the human at a device, or at the first device with a human; None if there is none."""
+        """Ask the human at a device, or the first human; return None if there is no human."""
         for device in [owner] if owner else self._plan.devices:
             answer = self._operator_at(device).sees(text)
             if answer is not None:
@@ -615,7 +618,7 @@ class Operators:
         return None
 
     def have_done(self, owner: str, text: str) -> bool:
-        """Show a text to the human at a device, or the first one; return False if there is none."""
+        """Show a text to the human at a device, or the first human; return False without one."""
         for device in [owner] if owner else self._plan.devices:
             if self._operator_at(device).have_done(text):
                 self._journal.note(device, f"done: {text}")
@@ -641,7 +644,7 @@ class Operators:
         )
 
     def _owner(self, name: str) -> tuple[str, str]:
-        """Return the device of a signal, and its name there; ValueError if there is none."""
+        """Return the device of a signal, and the name without prefix; ValueError if unknown."""
         assembly = self._like.state.assembly
         groups = assembly.inputs.groups
         if not (name in assembly.inputs.table or name in assembly.outputs or name in groups):
@@ -652,7 +655,7 @@ class Operators:
         return device, name.removeprefix(f"{device}/")
 
     def _fault_owner(self, name: str) -> tuple[str, str]:
-        """Return the operator that can make a fault, and its name there."""
+        """Return the operator that can make a fault, and the fault's name without prefix."""
         if name not in self._like.state.faults.fault_types:
             return self._owner(name)
         wire, _, bare = name.rpartition("/")

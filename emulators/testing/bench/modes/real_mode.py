@@ -44,7 +44,7 @@ class _RigThread:
 
     Args:
         emulator: the emulator.
-        clock: its clock, which waits here.
+        clock: clock of the emulator, which waits in this thread.
     """
 
     def __init__(self, emulator: RunningEmulator, clock: ServingClock) -> None:
@@ -83,14 +83,15 @@ class _RigThread:
         """Wait until a condition is true, checked after each step.
 
         Args:
-            done: is called in this thread; its exception is raised in the caller's.
-            until_us: the first step at or after this time is the last, in the time of the rig.
+            done: function that is called in this thread. An exception of the function is raised in
+                the thread of the caller.
+            until_us: time of the rig. The first step at or after this time is the last step.
 
         Returns:
-            False after the time-out.
+            True if the condition is true, or False after the time-out.
 
         Raises:
-            BenchError: no time passes, or the caller is in this thread.
+            BenchError: time does not pass, or the caller is in this thread.
         """
         if self.here:
             raise BenchError("what is asked between two ticks cannot wait: no time passes there")
@@ -109,7 +110,7 @@ class _RigThread:
         self._raise_error()
 
     def _await(self) -> Future[Any] | None:
-        """Return a future that this thread will resolve, None if time stands still."""
+        """Return a future that this thread will resolve, or None if time stands still."""
         with self._lock:
             if self.running:
                 future: Future[Any] = Future()
@@ -132,7 +133,7 @@ class _RigThread:
             raise error
 
     def _watch(self, future: Future[bool], done: Callable[[], bool], until_us: int) -> None:
-        """Check now and after each step, until there is an answer."""
+        """Check a condition now and after each step, until there is an answer."""
         rig = self._emulator.rig
 
         def look(now_us: int) -> None:
@@ -163,7 +164,7 @@ class _RigThread:
                 self._error = None
 
     def _serve(self, wait_us: int) -> None:
-        """Execute one requested call, within a time."""
+        """Execute one requested call, if there is one within a time."""
         with suppress(Empty):
             self._calls.get(wait_us / 1e6)()
 
@@ -182,7 +183,7 @@ def _settle(future: Future[_T], do: Callable[[], _T]) -> None:
 # The control socket of a bench, in its own thread.
 
 _LOOK_US: Final = 100_000
-"""Period at which it checks whether to stop."""
+"""Period at which the thread checks whether to stop."""
 
 _Call = Callable[[Callable[[], bytes]], bytes]
 """Runs a function between two ticks."""
@@ -192,9 +193,9 @@ class _ControlThread:
     """Serves a control socket, and answers each request between two ticks of the rig.
 
     Args:
-        path: of the socket.
-        control: answers requests.
-        call: runs a function between two ticks.
+        path: path of the socket.
+        control: object that answers requests.
+        call: function that runs a function between two ticks.
 
     Raises:
         OSError: the socket cannot be made.
@@ -232,7 +233,7 @@ _IN_REAL_TIME: Final = Tolerances(stick_pct=0, time_us=100_000)
 
 
 class HostInCondition(BaseException):
-    """A condition that is asked between two ticks cannot wait for a device."""
+    """A condition that is checked between two ticks tried to wait for a device."""
 
 
 class _Watch(HostPace):
@@ -252,7 +253,7 @@ class RealMode(EmulatedMode):
 
     Args:
         rig: the rig, with the clock and the bridges of `outside`.
-        outside: addresses of its wires for hosts; closed at the end.
+        outside: addresses of the wires for hosts, which are closed at the end.
     """
 
     name = "real"
@@ -279,11 +280,11 @@ class RealMode(EmulatedMode):
         Args:
             mounts: the wires with their devices.
             plan: addresses for hosts.
-            rig_at: makes the rig, with the clock and the bridges of the outside.
+            rig_at: function that makes the rig, with the clock and the bridges of the outside.
 
         Raises:
             PortGone: a bus cannot be opened.
-            OSError: no free port, or a link or socket cannot be made.
+            OSError: no port is free, or a link or socket cannot be made.
         """
         outside = OutsideEnds(mounts, plan)
         with ExitStack() as undo:
@@ -297,7 +298,7 @@ class RealMode(EmulatedMode):
 
     @property
     def now_us(self) -> int:
-        """The time of the rig; between two ticks interpolated by the machine's clock."""
+        """The time of the rig; the machine's clock interpolates it between two ticks."""
         rig = self._rig.rig
         if self._thread.here and rig.acting_us is not None:
             return rig.acting_us
@@ -337,7 +338,7 @@ class RealMode(EmulatedMode):
             return self._ask_until(done, until_us)
 
     def _judge(self, done: Callable[[], bool]) -> bool:
-        """Ask a condition in the thread of the rig, where it cannot wait."""
+        """Check a condition in the thread of the rig, where the condition cannot wait."""
         self._judging = True
         try:
             return done()
@@ -364,7 +365,7 @@ class RealMode(EmulatedMode):
             self._thread.start()
 
     def too_slow(self) -> str:
-        """Return why failures are not valid, if real time was not kept; else empty."""
+        """Return why failures are not valid, or "" if real time was kept."""
         rig, behind_us = self._rig.rig, 0
         if self._thread.running:
             behind_us = self._clock.now_us - rig.now_us - self._tick_us
@@ -379,12 +380,12 @@ class RealMode(EmulatedMode):
         raise NotOnThisBench("a twin goes on in virtual time: this bench is in real time")
 
     def close(self) -> None:
-        """Release all resources; raise an exception of a device not raised before."""
+        """Release all resources; raise an exception of a device that was not raised before."""
         self._begun = True
         self._stack.close()
 
     def _watch_settings(self, outside: OutsideEnds) -> None:
-        """Record a port setting of a host that differs from the device's."""
+        """Record each port setting of a host that differs from the device's setting."""
         for wire, ports in outside.ports.items():
             mount = self._rig.state.mounts[wire]
             assert isinstance(mount, LineMount)

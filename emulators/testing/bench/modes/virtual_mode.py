@@ -45,12 +45,12 @@ _LONGEST_US: Final = 3_600_000_000
 
 
 class RigPassing:
-    """A `Passing` that is a rig's time.
+    """A `Passing` in the time of a rig.
 
     Callbacks in the middle of a step may read the clock, but not wait.
 
     Args:
-        rig: advanced while a caller waits.
+        rig: rig that is advanced while a caller waits.
     """
 
     def __init__(self, rig: Rig) -> None:
@@ -58,16 +58,16 @@ class RigPassing:
 
     @property
     def time_s(self) -> float:
-        """Seconds since 1970: a rig begins with the year 2000."""
+        """Seconds since 1970; the time of a rig begins with the year 2000."""
         return EPOCH_S + self._rig.now_us / 1e6
 
     def wait(self, done: Callable[[], bool], timeout_s: float | None) -> bool:
         """Advance the time until `done()`; return False after the timeout.
 
-        Without a timeout it returns False when there are no more events, or after an hour.
+        Without a timeout, the method returns False when there are no more events, or after an hour.
 
         Raises:
-            HostTimeError: called by the rig, in the middle of a step.
+            HostTimeError: the rig has called the method in the middle of a step.
         """
         timeout_us = _LONGEST_US if timeout_s is None else max(0, round(timeout_s * 1e6))
         if not self._rig.in_step:
@@ -81,7 +81,7 @@ _T = TypeVar("_T")
 
 
 class _Offers:
-    """The offered names; a snapshot withdraws names that were offered later."""
+    """The names offered to hosts; a snapshot withdraws names that were offered later."""
 
     def __init__(self) -> None:
         self._open: list[AbstractContextManager[object]] = []
