@@ -22,22 +22,22 @@ else:  # completion does without
 
 
 class DeviceField(NamedTuple):  # a dataclass takes 2 ms more to import
-    """One option of a device; give its attributes by name.
+    """An option of a device; pass its attributes by name.
 
     Attributes:
-        name: its key in the configuration for `DeviceType.build`.
-        kind: `str`, `int`, `float`, or `bool` for a flag.
-        option: its name on command lines (without the dashes) and in rig files; by default `name`
+        name: key of the option in the configuration for `DeviceType.build`.
+        kind: type of the value: `str`, `int`, `float`, or `bool` for a flag.
+        option: name on command lines (without the dashes) and in rig files. The default is `name`
             with dashes.
-        low: smallest value of a number, None for any.
-        high: largest value of a number, None for any.
-        choices: allowed texts, empty for any.
-        proposals: texts that the shell completes; others are allowed.
-        unit: unit of a number, or form of a text, shown in help: `M`, `X,Y,RADIUS`.
-        default: value if the option is not set.
-        many: whether the option can be given several times; its value is then a tuple.
-        help: one sentence.
-        needs: names of other fields; this field has an effect only if one of them is set.
+        low: smallest value of a number, or None for no limit.
+        high: largest value of a number, or None for no limit.
+        choices: allowed texts, or empty if any text is allowed.
+        proposals: texts that the shell completes. Other texts are allowed, too.
+        unit: unit of a number, or form of a text, which the help shows: `M`, `X,Y,RADIUS`.
+        default: value if the option is not given.
+        many: whether the option can be given several times. The value is then a tuple.
+        help: help text of one sentence.
+        needs: names of other fields. The field has an effect only if one of these fields is set.
     """
 
     name: str
@@ -55,12 +55,12 @@ class DeviceField(NamedTuple):  # a dataclass takes 2 ms more to import
 
     @property
     def word(self) -> str:
-        """Its name on command lines, without the dashes."""
+        """Name of the option on command lines, without the dashes."""
         return self.option or self.name.replace("_", "-")
 
     @property
     def unset(self) -> Any:
-        """Its value if not set."""
+        """Value of the field if the option is not given."""
         if self.many:
             return tuple(self.default or ())
         return self.default if self.kind is not bool else bool(self.default)
@@ -69,7 +69,7 @@ class DeviceField(NamedTuple):  # a dataclass takes 2 ms more to import
         """Return a value of a rig file, converted as on the command line.
 
         Raises:
-            ValueError: the value is out of range, or not of this kind.
+            ValueError: the value is out of range, or has a wrong type.
 
         >>> DeviceField(name="baud", kind=int, low=300).read("9600")
         9600
@@ -108,12 +108,13 @@ def read_config(
 
     Args:
         owner: the device type, for messages.
-        fields: its fields.
-        config: values by the option names of command lines, without leading dashes: `run-s` or
-            `run_s`. A field of several values has a list. Missing options get their default.
+        fields: fields of the device type.
+        config: values by option name of the command line, without leading dashes: `run-s` or
+            `run_s`. A field of several values has a list. Options that are missing get their
+            default.
 
     Raises:
-        ValueError: unknown field, or invalid value; the message starts with the field.
+        ValueError: a field is unknown, or a value is invalid. The message starts with the field.
     """
     known = {field.word: field for field in fields}
     given: dict[str, Any] = {}
@@ -139,12 +140,12 @@ def read_config(
 def check_needed(
     fields: Iterable[DeviceField], values: Mapping[str, object], given: Container[str]
 ) -> None:
-    """Raise ValueError if a field is set that does nothing without another one.
+    """Raise ValueError if a field is set that has no effect without another field.
 
     Args:
         fields: fields of a device.
-        values: values by the names of the fields.
-        given: names of the fields that were set; a field with its default is not set.
+        values: values by name of the field.
+        given: names of the fields that were set. A field with its default is not set.
     """
     known = {field.name: field for field in fields}
     for name, field in known.items():
@@ -156,7 +157,7 @@ def check_needed(
 
 
 def _plain(key: str, field: DeviceField, value: object) -> list[Any]:
-    """Return the values of a field in a file as a list; ValueError for another kind."""
+    """Return the values of a field in a file as a list; raise ValueError for a wrong type."""
     if field.kind is bool:
         if not isinstance(value, bool):
             raise ValueError(f"{key}: {value!r} is not true or false")

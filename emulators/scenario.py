@@ -22,19 +22,19 @@ from tickrig.host.text.values import Setting, format_time, parse_setting, parse_
 # Scenarios: timed actions on a device (docs/reference/bench/scenario.md).
 
 Encoder = Callable[[bytes], bytes]
-"""Converts the text in a scenario to a line for the wire."""
+"""Function that converts the text in a scenario to a line for the wire."""
 
 
 @dataclass(frozen=True, slots=True)
 class Send:
-    """Send bytes as the host; the transcript shows `shown`."""
+    """Send bytes as the host. The transcript shows the text `shown`."""
 
     data: bytes
     shown: bytes
 
 
 Sender = Callable[[str], Send]
-"""Reads the argument of a verb that sends."""
+"""Function that reads the argument of a verb that sends."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,10 +102,10 @@ class ScenarioParser:
     """Reads and checks scenarios for one device.
 
     Args:
-        device: the device; its inputs and outputs are the valid names.
-        operator: the operator of the device; it determines the valid actions.
+        device: device whose inputs and outputs are the valid names.
+        operator: operator of the device, which determines the valid actions.
         encoders: further verbs that send a line, in addition to `send`.
-        senders: the sending verbs of a wire without lines.
+        senders: sending verbs of a wire without lines.
     """
 
     def __init__(
@@ -133,7 +133,7 @@ class ScenarioParser:
         """Read a whole scenario.
 
         Raises:
-            StepError: `FILE:LINE: the text, and what is allowed`.
+            StepError: a line is invalid. The message is `FILE:LINE: the text, and what is allowed`.
         """
         steps: list[ScenarioStep] = []
         for number, content in content_lines(text):
@@ -219,7 +219,7 @@ def parse_raw(rest: str) -> Send:
     """Read the argument of `raw`: bytes in hex.
 
     Raises:
-        ValueError: not bytes in hex.
+        ValueError: the text is not bytes in hex.
     """
     try:
         data = bytes.fromhex(rest)
@@ -252,9 +252,9 @@ class ScenarioPlayer:
     """Runs a scenario as the time of the emulator advances.
 
     Args:
-        emulator: the emulator; it must not have run yet.
+        emulator: emulator, which must not have run yet.
         scenario: the scenario.
-        transcript: receives missed expectations and watched outputs.
+        transcript: transcript that receives missed expectations and watched outputs.
         stays: whether to keep the emulator running if the scenario has no `end`.
 
     Attributes:

@@ -1,4 +1,4 @@
-"""An emulator in a process of its own, as a user would start it."""
+"""An emulator in a separate process, as a user would start it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import Final
 
 _START_S: Final = 60.0
-"""Time-out for the start of an emulator on a busy machine; if it ends, that is detected at once."""
+"""Time-out for the start of an emulator on a busy machine. The end of its process is detected at
+once."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,9 +23,9 @@ class Child:
 
     Attributes:
         process: the process.
-        link: the terminal that it serves, if any.
-        control: its control socket.
-        log: its output so far.
+        link: terminal that the emulator serves, if any.
+        control: control socket of the emulator.
+        log: output of the emulator up to now.
     """
 
     process: subprocess.Popen[bytes]
@@ -34,10 +35,10 @@ class Child:
 
 
 class _ChildError(RuntimeError):
-    """An emulator that does not start.
+    """An emulator does not start.
 
     Attributes:
-        status: its exit status, 1 if it did not end.
+        status: exit status of the emulator, or 1 if it did not end.
     """
 
     def __init__(self, text: str, status: int | None) -> None:
@@ -47,7 +48,7 @@ class _ChildError(RuntimeError):
 
 @contextmanager
 def running(module: str, *options: str, linked: bool = True) -> Iterator[Child]:
-    """Run the emulator whose command is `main` of a module; end it on exit.
+    """Run the emulator whose command is `main` of a module; end the emulator on exit.
 
     Args:
         module: the module with the command.
@@ -55,7 +56,8 @@ def running(module: str, *options: str, linked: bool = True) -> Iterator[Child]:
         linked: whether the command has an option `--link` for a terminal.
 
     Raises:
-        _ChildError: the emulator does not start; the message is the last line of its output.
+        _ChildError: the emulator does not start. The message is the last line of the emulator's
+            output.
     """
     with tempfile.TemporaryDirectory(prefix="tickrig-") as name:
         link, control, log = (Path(name, part) for part in ("tty", "control", "log"))

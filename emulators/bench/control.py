@@ -26,8 +26,8 @@ class _Controlled(Protocol):
     """The target of requests: a `RunningEmulator`, or an object without a wire.
 
     Attributes:
-        name: its name.
-        operator: executes the actions.
+        name: name of the target.
+        operator: operator that executes the actions.
     """
 
     name: str
@@ -35,7 +35,7 @@ class _Controlled(Protocol):
 
     @property
     def device(self) -> HasSignals:
-        """Its inputs and outputs."""
+        """The inputs and outputs of the target."""
         ...
 
     @property
@@ -49,7 +49,7 @@ class _Controlled(Protocol):
         ...
 
     def status(self) -> Mapping[str, object]:
-        """Return its status."""
+        """Return the status of the target."""
         ...
 
     @property
@@ -206,7 +206,7 @@ class RequestInbox:
     """Accepts requests from any thread; the emulator's own thread answers them.
 
     Args:
-        control: answers the requests in the same way as those of the control socket.
+        control: object that answers the requests in the same way as requests of the control socket.
     """
 
     def __init__(self, control: EmulatorControl) -> None:

@@ -28,10 +28,10 @@ class FaultSpec:
     """A fault with its arguments and times.
 
     Attributes:
-        name: a fault of the wire, or a physical fault of the device.
-        arguments: as written; `bind_arguments` of rig/faults.py reads them.
-        from_us: start, in the rig's time.
-        to_us: end; `NEVER` if the fault stays until it is cleared.
+        name: name of a fault of the wire, or of a physical fault of the device.
+        arguments: arguments as written, which `bind_arguments` of rig/faults.py reads.
+        from_us: start of the fault, in the rig's time.
+        to_us: end of the fault, or `NEVER` if the fault stays until it is cleared.
     """
 
     name: str
@@ -62,12 +62,12 @@ def parse_fault_spec(text: str, check_name: Callable[[str], object] = _any_name)
     """Read a fault.
 
     Args:
-        text: such as `flip=0.001@5s-7s`.
-        check_name: called with the name before the times are read; raises ValueError for an unknown
-            fault.
+        text: text of a fault, such as `flip=0.001@5s-7s`.
+        check_name: function that is called with the name before the times are read. It raises
+            ValueError for an unknown fault.
 
     Raises:
-        ValueError: wrong form, or unknown name.
+        ValueError: the text has a wrong form, or the name is unknown.
 
     >>> parse_fault_spec("flip=0.001@5s-7s")
     FaultSpec(name='flip', arguments=('0.001',), from_us=5000000, to_us=7000000)
@@ -109,12 +109,12 @@ class FaultOrder:
     """A fault scheduled for a time or for a condition.
 
     Attributes:
-        spec: the fault, by its full name.
-        ordered_us: when the fault was scheduled.
-        for_us: duration of the fault; None for the duration in `spec`.
-        when: description of the condition; empty if the fault waits for a time.
-        due_us: start of the fault; None while it waits for its condition.
-        to_us: end of the fault; `NEVER` if it stays until it is cleared.
+        spec: the fault with its full name.
+        ordered_us: time at which the fault was scheduled.
+        for_us: duration of the fault, or None to use the duration in `spec`.
+        when: description of the condition, or empty if the fault waits for a time.
+        due_us: start of the fault, or None while the fault waits for its condition.
+        to_us: end of the fault, or `NEVER` if the fault stays until it is cleared.
     """
 
     spec: FaultSpec
@@ -125,7 +125,7 @@ class FaultOrder:
     to_us: int = NEVER
 
     def begin(self, now_us: int) -> FaultSpec:
-        """Start the fault after its wait; return it with its end."""
+        """Start the fault after its wait; return the fault with its end."""
         self.due_us = max(now_us, self.spec.from_us)
         self.to_us = self.spec.to_us if self.for_us is None else self.due_us + self.for_us
         return replace(self.spec, to_us=self.to_us)
@@ -136,7 +136,7 @@ PRESS_US: Final = 100_000
 
 
 _PHYSICAL: Final = FaultForm("", rated=False)
-"""Arguments of a device fault: none, it is on or off."""
+"""Arguments of a device fault, which is on or off and has no arguments."""
 
 
 class WireFaults(Protocol):
@@ -156,14 +156,14 @@ class WireFaults(Protocol):
         """Raise ValueError unless the fault can be armed with these arguments."""
 
     def arm(self, name: str, *arguments: str) -> None:
-        """Arm a fault; one of the same name is replaced."""
+        """Arm a fault; it replaces an armed fault of the same name."""
 
     def acted(self, name: str) -> int:
         """Return how often a fault has acted since it was last armed."""
         ...
 
     def clear(self, name: str) -> None:
-        """Clear a fault; does nothing if it is not armed."""
+        """Clear a fault; do nothing if the fault is not armed."""
 
 
 # The faults of several wires and of their nodes in one table.
@@ -177,9 +177,9 @@ class AssemblyFaults(Copyable):
     plain names, except those with the name of a fault of the wire.
 
     Args:
-        wires: the wires, by name.
-        nodes: the nodes, by name.
-        alone: the name of the only device; empty if there are several devices.
+        wires: wires by name.
+        nodes: nodes by name.
+        alone: name of the only device, or empty if there are several devices.
     """
 
     def __init__(
@@ -199,14 +199,14 @@ class AssemblyFaults(Copyable):
         return tuple(self._wires)
 
     def of_wire(self, wire: str) -> dict[str, str]:
-        """Return the full names of the faults of a wire, by their names on that wire."""
+        """Return the full names of a wire's faults, by the names that they have on the wire."""
         bare = self._bare is not None
         return {
             fault: fault if bare else f"{wire}/{fault}" for fault in self._wires[wire].fault_types
         }
 
     def of_node(self, node: str) -> dict[str, str]:
-        """Return the full names of the faults of a node, by their names on that node."""
+        """Return the full names of a node's faults, by the names that they have on the node."""
         held = self._nodes.get(node)
         if held is None:
             return {}
@@ -237,7 +237,7 @@ class AssemblyFaults(Copyable):
         holder.check(fault, *arguments)
 
     def arm(self, name: str, *arguments: str) -> None:
-        """Arm a fault; one of the same name is replaced."""
+        """Arm a fault; it replaces an armed fault of the same name."""
         holder, fault = self.find(name)
         holder.arm(fault, *arguments)
 
@@ -247,12 +247,12 @@ class AssemblyFaults(Copyable):
         return holder.acted(fault)
 
     def clear(self, name: str) -> None:
-        """Clear a fault; does nothing if it is not armed."""
+        """Clear a fault; do nothing if the fault is not armed."""
         holder, fault = self.find(name)
         holder.clear(fault)
 
     def find(self, name: str) -> tuple[WireFaults, str]:
-        """Return the owner of a fault by full name, and its name there; KeyError if unknown."""
+        """Return the owner of a fault and the fault's name at the owner; KeyError if unknown."""
         owner, slash, fault = name.rpartition("/")
         holders = [self._bare, self._alone]
         if slash:
@@ -265,7 +265,7 @@ class AssemblyFaults(Copyable):
 
 
 class _FaultTable(Mapping[str, FaultForm]):
-    """The faults by their full names, created on request: there may be many nodes."""
+    """The faults by full name, created on request because there may be many nodes."""
 
     def __init__(self, faults: AssemblyFaults) -> None:
         self._faults = faults
@@ -300,8 +300,9 @@ class Assembly(Copyable):
     has the name of its device as prefix: `left_drive/shaft_load_nm`.
 
     Args:
-        parts: the devices by name, at least one.
-        plain: one of several devices, whose signals have their plain names without a prefix.
+        parts: devices by name, at least one device.
+        plain: name of the device whose signals have their plain names without a prefix, if there
+            are several devices.
     """
 
     def __init__(self, parts: Mapping[str, HasSignals], plain: str | None = None) -> None:
@@ -327,7 +328,7 @@ class Assembly(Copyable):
         }
 
     def read(self, name: str, /) -> Setting:
-        """Return the present value of an output; KeyError if there is none."""
+        """Return the present value of an output; raise KeyError if the name is unknown."""
         part, rest = self.find(name)
         if part is None:
             raise KeyError(name)
@@ -338,7 +339,7 @@ class Assembly(Copyable):
         return name if part == self._plain else f"{part}/{name}"
 
     def find(self, name: str) -> tuple[HasSignals | None, str]:
-        """Return the device that a name belongs to, None if there is none, and the rest."""
+        """Return the device that a name belongs to (or None), and the rest of the name."""
         prefix, slash, rest = name.partition("/")
         if slash and (part := self.parts.get(prefix)):
             return part, rest
@@ -357,7 +358,7 @@ class _AssemblyInputs(Copyable):
         assembly: the devices.
 
     Attributes:
-        changed: not used; each device checks `changed` of its own inputs.
+        changed: attribute that is not used, because each device checks `changed` of its own inputs.
     """
 
     def __init__(self, assembly: Assembly) -> None:
@@ -365,7 +366,7 @@ class _AssemblyInputs(Copyable):
 
     @property
     def table(self) -> Mapping[str, InputSignal]:
-        """All inputs by their full names."""
+        """All inputs by full name."""
         return _Table(self._assembly)
 
     @property
@@ -384,7 +385,7 @@ class _AssemblyInputs(Copyable):
         return part.inputs[rest]
 
     def set(self, name: str, value: Setting) -> None:
-        """Set an input; ValueError if it is unknown or does not accept the value."""
+        """Set an input; raise ValueError if it is unknown or does not accept the value."""
         part, rest = self._find(name)
         part.inputs.set(rest, value)
 
@@ -402,7 +403,7 @@ class _AssemblyInputs(Copyable):
         )
 
     def find(self, name: str, signal_type: SignalType | None = None) -> InputSignal:
-        """Return the description of an input; ValueError if there is no input of this type."""
+        """Return the description of an input; ValueError if no input has the name and type."""
         part, rest = self._assembly.find(name)
         if part is not None:
             return part.inputs.find(rest, signal_type)
@@ -418,7 +419,7 @@ class _AssemblyInputs(Copyable):
 
 
 class _Table(Mapping[str, InputSignal]):
-    """The descriptions, created on request: nodes have many objects."""
+    """The descriptions, created on request because nodes have many objects."""
 
     def __init__(self, assembly: Assembly) -> None:
         self._assembly = assembly
@@ -448,11 +449,11 @@ class _FaultRow(NamedTuple):
 
     Attributes:
         name: name of the fault.
-        text: description.
-        arguments: the arguments of the latest arming by name, or the defaults of the fault.
+        text: description of the fault.
+        arguments: arguments of the latest arming by name, or the defaults of the fault.
         on: whether the fault is active.
-        since_us: start; None if the fault is off, or was not ordered.
-        acted: how often the fault has acted since it was last armed; None for a fault of the
+        since_us: start of the fault, or None if it is off or was not ordered.
+        acted: number of actions of the fault since it was last armed, or None for a fault of the
             device, which acts continuously.
     """
 
@@ -467,15 +468,15 @@ class _FaultRow(NamedTuple):
 class Operator(Copyable):
     """Sets inputs, presses buttons, and starts and clears faults.
 
-    An action between two ticks takes effect in the next tick, at `now_us` at the earliest. A press
-    lasts for at least one tick, however short it is.
+    An action between two ticks takes effect in the next tick, at `now_us` at the earliest. Each
+    press lasts for at least one tick.
 
     Args:
         inputs: the physical inputs of the device.
         tick_us: the device's control period.
         event_queue: queue for releases and scheduled faults.
         wire: the port on which wire faults are armed.
-        note: called with each change, such as `power_button=1`.
+        note: function that is called with each change, such as `power_button=1`.
     """
 
     _new_in_twins: ClassVar[Mapping[str, object]] = {"note": _ignore}
@@ -499,13 +500,14 @@ class Operator(Copyable):
         """Start and arguments of each active fault."""
 
         self._spans: dict[str, dict[int, int]] = {}
-        """Start and end of each scheduled fault, by its name."""
+        """Start and end of the scheduled faults, by name of the fault."""
 
     def set(self, name: str, *values: Setting) -> None:
         """Set an input, or all inputs of a group.
 
         Raises:
-            ValueError: unknown input or group, wrong number of values, or a value out of range.
+            ValueError: the input or group is unknown, the number of values is wrong, or a value is
+                out of range.
         """
         for member, value in self.check_set(name, *values):
             self._event_queue.drop(("release", member))
@@ -527,7 +529,7 @@ class Operator(Copyable):
         return pairs
 
     def press(self, now_us: int, name: str, duration_us: int = PRESS_US) -> None:
-        """Press a button and release it after `duration_us`; ValueError if it is not a button."""
+        """Press a button, and release it after `duration_us`; ValueError if it is not a button."""
         self.check_press(name, duration_us)
         self._put(name, 1)
         tick_us = self._tick_us_of(name)
@@ -554,7 +556,7 @@ class Operator(Copyable):
         self.set(name, 0)
 
     def fault(self, now_us: int, spec: FaultSpec) -> None:
-        """Start a fault, now or at its time; ValueError if that is impossible.
+        """Start a fault, now or at its time; raise ValueError if that is impossible.
 
         The fault replaces faults of the same name at overlapping times.
         """
@@ -583,7 +585,7 @@ class Operator(Copyable):
             bind_arguments(spec.name, _PHYSICAL, spec.arguments)
 
     def clear(self, name: str) -> None:
-        """Clear a fault, also a scheduled one; ValueError if there is no fault of this name."""
+        """Clear a fault, or cancel a scheduled fault; raise ValueError if the name is unknown."""
         self.check_clear(name)
         name = self.full_name_of(name)
         self._drop_fault(name)
@@ -629,7 +631,7 @@ class Operator(Copyable):
         return name in self._inputs.table and bool(self._inputs[name])
 
     def _drop_fault(self, name: str, from_us: int = 0, to_us: int = NEVER) -> None:
-        """Cancel the scheduled occurrences of a fault, or only the overlapping ones."""
+        """Cancel the scheduled occurrences of a fault that overlap a time span (by default all)."""
         spans = self._spans.get(name, {})
         for begin_us, end_us in tuple(spans.items()):
             if begin_us < to_us and from_us < end_us:

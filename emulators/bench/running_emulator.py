@@ -28,7 +28,7 @@ _SWITCH_S: Final = 0.0005
 
 @contextmanager
 def keeping_time() -> Iterator[None]:
-    """Shorten the switch interval, and freeze old objects: collecting them takes 50 ms."""
+    """Shorten the switch interval, and freeze old objects, because collecting them takes 50 ms."""
     before_s = sys.getswitchinterval()
     sys.setswitchinterval(_SWITCH_S)
     gc.freeze()
@@ -40,7 +40,8 @@ def keeping_time() -> Iterator[None]:
 
 
 UNSEEN_US: Final = 100_000
-"""How far devices may compute ahead without an observer of each step (32 drives: twice as fast)."""
+"""Time by which devices may compute ahead if no observer needs each step (32 drives: twice as
+fast)."""
 
 
 class RunningEmulator(ABC):
@@ -54,12 +55,12 @@ class RunningEmulator(ABC):
         trace: the recording, closed at the end.
 
     Attributes:
-        operator: sets inputs, presses buttons, starts faults.
-        event_queue: actions between ticks; the code that advances the rig's time runs them.
+        operator: operator that sets inputs, presses buttons and starts faults.
+        event_queue: actions between ticks. The code that advances the rig's time runs them.
         log: the latest lines or frames on the wire.
         rig: the rig.
-        after_step: called with the time after each step.
-        running: False once `stop` was called.
+        after_step: functions that are called with the time after each step.
+        running: whether the emulator runs, which is false once `stop` was called.
     """
 
     rig: Rig
@@ -85,7 +86,7 @@ class RunningEmulator(ABC):
 
     @property
     def effective_us(self) -> int:
-        """The time at which an action takes effect: at once in an action, else at the next tick."""
+        """The time at which an action takes effect: now within an action, or else the next tick."""
         if self.rig.acting_us is not None:
             return self.rig.acting_us
         now_us, tick_us = self.rig.now_us, self.device.tick_us
@@ -104,7 +105,7 @@ class RunningEmulator(ABC):
 
     @property
     def _host_due_us(self) -> int:
-        """Arrival time of the next data for a host in this process; `NEVER` for one outside."""
+        """Arrival time of the next data for a host in this process, or `NEVER`."""
         return NEVER
 
     def _listen(self, now_us: int) -> None:  # noqa: B027 - hosts of a bench poll themselves
@@ -117,11 +118,11 @@ class RunningEmulator(ABC):
     @property
     @abstractmethod
     def lost(self) -> dict[str, int]:
-        """Counts of lost data by buffer."""
+        """Amount of lost data by buffer."""
 
     @property
     def trace_error(self) -> str:
-        """Reason for the early end of the recording, empty if there was no error."""
+        """Reason for the early end of the recording, or "" if there was no error."""
         return self._trace.error if self._trace else ""
 
     def stop(self) -> None:
@@ -158,7 +159,7 @@ class OutputWatch:
 
     Args:
         device: the device with the outputs.
-        write: receives the lines.
+        write: function that receives the lines.
         names: names of the outputs that are watched from the start.
     """
 
@@ -174,7 +175,7 @@ class OutputWatch:
             self._shown.setdefault(name, "")
 
     def __call__(self, now_us: int) -> None:
-        """Write what has changed."""
+        """Write the outputs that have changed."""
         for name, shown in self._shown.items():
             if (value := read_signal(self._device, name)) != shown:
                 self._shown[name] = value
@@ -182,12 +183,12 @@ class OutputWatch:
 
 
 class Transcript:
-    """Writes lines of the wire as the host sees them, actions of the operator, watched outputs.
+    """Writes lines of the wire as the host sees them, actions of the operator, and watched outputs.
 
     Args:
         emulator: the emulator to watch.
-        write: receives the lines.
-        wanted: selects lines of the wire.
+        write: function that receives the lines.
+        wanted: function that selects lines of the wire.
     """
 
     def __init__(
@@ -214,7 +215,7 @@ class Transcript:
         self._watch(now_us)
 
     def send(self, now_us: int, data: bytes, shown: bytes) -> None:
-        """Send as the host, and show the data at once even if not a complete line."""
+        """Send data as the host, and show the data at once, even if the line is incomplete."""
         self.write(now_us, Mark.TO_DEVICE, escape(shown))
         self._sending = True
         self._emulator.send(now_us, data)

@@ -1,1 +1,1 @@
-"""The emulated CAN bus (ISO 11898-1); the slave itself sorts the frames of its tick."""
+"""The emulated CAN bus (ISO 11898-1). A slave itself sorts the frames of a tick."""

@@ -1,4 +1,4 @@
-"""Arbitration: the bits that nodes compare, whose frame is next, and when it starts."""
+"""Arbitration: the bits that nodes compare, and the sender and start of the next frame."""
 
 from __future__ import annotations
 
@@ -46,8 +46,8 @@ class CanArbiter(ArbiterFields):
     All times are in the units of the segment.
 
     Attributes:
-        heads: a heap of whole numbers, which sort faster than tuples. The high bits are the
-            priority of the first frame of a queue, the low bits are the number of the node.
+        heads: a heap of whole numbers, which are sorted faster than tuples. The high bits are the
+            priority of the first frame of a queue, and the low bits are the number of the node.
         free: earliest time at which a frame can start.
         slow: whether some node has to wait longer than the bus is busy.
     """
@@ -69,14 +69,14 @@ class CanArbiter(ArbiterFields):
         del self._ends[end.number - _FIRST_NUMBER]
 
     def put_back(self, ends: Iterable[CanEnd]) -> None:
-        """Let nodes take part again, those that still have a frame to send."""
+        """Let those nodes take part again that still have a frame to send."""
         for end in ends:
             if end.waiting:
                 self.push(end)
 
     @in_kernel
     def push(self, end: CanEnd) -> None:
-        """Let a node take part again, which has a frame to send."""
+        """Let a node that has a frame to send take part again."""
         frame = end.next
         rank = priority(frame) if frame[2] or frame[3] else frame[0] << _CAN_ID_PLACE
         head = rank << _NUMBER_BITS | end.number - _FIRST_NUMBER
@@ -92,7 +92,7 @@ class CanArbiter(ArbiterFields):
         return winners
 
     def take_waiting(self, *, everybody: bool = False) -> tuple[int, list[CanEnd]]:
-        """Return the start, then the winner, or winners, of the nodes with the shortest wait."""
+        """Return the start, then the winner or winners among the nodes with the shortest wait."""
         waiting = {head: self._ends[head & _NUMBER_MASK] for head in sorted(self.heads)}
         start = max(self.free, min(end.held for end in waiting.values()))
         able = [head for head, end in waiting.items() if end.held <= start]

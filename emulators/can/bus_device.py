@@ -8,7 +8,7 @@ from typing import Protocol, TypeGuard
 from tickrig.wire.can import ErrorState
 
 Accepted = frozenset[int] | None
-"""CAN-IDs that an end accepts, 29-bit ones with bit 29 set; None for all."""
+"""CAN-IDs that an end accepts, or None for all. A 29-bit CAN-ID has bit 29 set."""
 
 
 class Filtering(Protocol):
@@ -21,7 +21,7 @@ class Filtering(Protocol):
 
     @property
     def accepts(self) -> Accepted:
-        """The CAN-IDs; None, for all, from power-on or a reset to the first tick."""
+        """The accepted CAN-IDs, or None for all from power-on or a reset to the first tick."""
         ...
 
     @property

@@ -32,11 +32,11 @@ class CanEmulator(RunningEmulator):
         stations: the devices, each on its end of the bus.
         wire: the bus.
         couplings: connections of the devices besides the bus.
-        outside: the host's bus, if the host is outside the rig.
-        clock: by default a `VirtualClock`.
-        trace: the recording, closed at the end.
-        link: name of the bus outside, as text.
-        faults: object on which faults are armed; by default the bus.
+        outside: outside bus of the host, if the host is outside the rig.
+        clock: clock of the rig, or None to use a `VirtualClock`.
+        trace: the recording, which is closed at the end.
+        link: name of the outside bus, as text.
+        faults: object on which faults are armed, or None to use the bus.
     """
 
     def __init__(  # noqa: PLR0913 - options, by keyword

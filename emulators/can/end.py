@@ -23,7 +23,7 @@ _QUEUE_FRAMES: Final = 4_096
 
 @in_kernel
 def _ignore(at_us: int) -> None:
-    """Wake nothing: no device ticks at this end."""
+    """Wake no device, because no device ticks at this end."""
 
 
 _NEW_IN_TWINS: Final[Mapping[str, object]] = {
@@ -36,21 +36,22 @@ _NEW_IN_TWINS: Final[Mapping[str, object]] = {
 class CanEnd(EndFields):
     """One node on a `CanWire`; a `WirePort[Frames]`.
 
-    Frames leave in the order in which they were given. A frame is received by
-    every other end of the bus whose filter lets it through.
+    Frames are sent in the order of their queue. Every other end of the bus whose filter passes a
+    frame receives it.
 
     Attributes:
         wire: the bus.
         number: index among the ends of the bus.
         controller: error counters and error state.
-        waiting: number of frames not yet sent.
-        next: the first frame not yet sent, if any.
-        room: how many more frames may wait; 0 while the node is bus-off.
+        waiting: number of frames that were not sent yet.
+        next: first frame that was not sent yet, if any.
+        room: number of further frames that may wait, which is 0 while the node is bus-off.
         held: earliest start of the node's next frame, in units of the segment.
-        arrived_us: end of the first received frame in the inbox, `NEVER` if the inbox is empty.
-        lost: frames lost because a queue or inbox was full, or the node was bus-off.
+        arrived_us: end of the first received frame in the inbox, or `NEVER` if the inbox is empty.
+        lost: number of frames lost because a queue or inbox was full, or the node was bus-off.
         unfiltered: whether the filter of this end is disabled until the next poll.
-        on_error_state: called with the time and the new state when the error state changes.
+        on_error_state: function that is called with the time and the new state when the error state
+            changes.
         auto_recovery: whether the node leaves bus-off automatically, as with most drivers.
     """
 
@@ -83,12 +84,12 @@ class CanEnd(EndFields):
         raise TypeError("CanEnd cannot be copied by copy.copy: use copy.deepcopy")
 
     def __deepcopy__(self, memo: dict[int, Any]) -> CanEnd:
-        """Return a twin; twins of one deepcopy share what their originals share."""
+        """Return a twin; twins of one deepcopy share the parts that their originals share."""
         return twin(self, memo)
 
     @property
     def accepts(self) -> bus_device.Accepted:
-        """Accepted CAN-IDs; a change applies to frames that end after it."""
+        """Accepted CAN-IDs; a change applies to frames that end after the change."""
         return self._accepts
 
     @accepts.setter
@@ -98,7 +99,7 @@ class CanEnd(EndFields):
 
     @property
     def due_us(self) -> int:
-        """When the next frame will have arrived, or earlier: its receivers are not known yet."""
+        """Earliest time at which the next frame may arrive, while its receivers are unknown."""
         return self.arrived_us if self._first else self.wire.due_us
 
     @property
@@ -132,7 +133,7 @@ class CanEnd(EndFields):
         return frames
 
     def poll_stamped(self, now_us: int) -> tuple[tuple[int, CanFrame], ...]:
-        """Return the same frames, each with the time at which it ended."""
+        """Return the frames that ended by `now_us`, each with the time at which it ended."""
         if self.segment.now_us < now_us:
             self.wire.advance(now_us)
         if not self._first and not self.unfiltered:  # mostly: a fifth of what a host's wait costs
@@ -175,7 +176,7 @@ class CanEnd(EndFields):
 
     @in_kernel
     def receive(self, at_us: int, frame: CanFrame, alone: Frames) -> None:
-        """Receive a frame from the bus; `alone` is a tuple of it, shared by all receivers."""
+        """Receive a frame from the bus; all receivers share `alone`, a tuple with the frame."""
         if not self._first:  # one of all ends' objects is touched, not six: 5 % of eight buses
             self._first, self.arrived_us = alone, at_us
             self.wake(at_us)
@@ -213,7 +214,7 @@ class CanEnd(EndFields):
         self._first, self._more, self.arrived_us = (), None, NEVER
 
     def open(self, *, on_bus: bool) -> None:
-        """Enable or disable sending; disabling drops the waiting frames."""
+        """Enable or disable sending; when sending is disabled, the waiting frames are dropped."""
         self.room = _QUEUE_FRAMES if on_bus else 0
         if not on_bus:
             self.lost += self.waiting
@@ -234,8 +235,8 @@ class CanEnd(EndFields):
 class Babbler(CanEnd):
     """A node that always has a frame to send and ignores its error state.
 
-    It stands in this module because a class of a compiled module cannot derive from a class with
-    the fields of the kernel.
+    This class is in this module because a class of a compiled module cannot derive from a class
+    with the fields of the kernel.
     """
 
     __slots__ = ()

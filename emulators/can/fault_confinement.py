@@ -37,7 +37,7 @@ class ErrorCounters(Part):
         self.restart()
 
     def restart(self) -> None:
-        """Become error-active with both counters at 0: power-on, or after bus-off."""
+        """Become error-active with both counters at 0, at power-on or after bus-off."""
         self.tec = self.rec = 0
         self.state = ErrorState.ACTIVE
 
@@ -95,11 +95,11 @@ class ErrorCounters(Part):
 
 
 class FaultConfinement(Part):
-    """Counts successes and errors of all nodes; good frames on an intact bus take no time here.
+    """Counts successes and errors of all nodes. Good frames on an intact bus need no counting.
 
     Args:
         ends: all ends of the bus.
-        changed: called with the time and the end whenever an error state changes.
+        changed: function that is called with the time and the end whenever an error state changes.
 
     Attributes:
         marked: ends with a counter that is not 0.
@@ -117,14 +117,14 @@ class FaultConfinement(Part):
             self.count(at_us, end, good)
 
     def failed(self, at_us: int, senders: list[CanEnd]) -> None:
-        """Count an error frame that all nodes saw."""
+        """Count an error frame that all nodes have received."""
         self.failed_to_send(at_us, senders)
         for end in self._ends:
             if end not in senders:
                 self.count(at_us, end, ErrorCounters.receive_failed)
 
     def failed_to_send(self, at_us: int, senders: Iterable[CanEnd]) -> None:
-        """Count an error that only its senders saw."""
+        """Count an error that only the senders have detected."""
         for end in senders:
             self.count(at_us, end, ErrorCounters.transmit_failed)
 
@@ -165,7 +165,7 @@ class Recovery(Part):
     """Counts the recessive sequences for each node that waits to return from bus-off.
 
     Args:
-        bit: length of a bit; all times in this class are in the same unit.
+        bit: length of a bit. All times in this class are in the same unit.
 
     Attributes:
         active: whether any node waits.
@@ -177,7 +177,7 @@ class Recovery(Part):
         self.active = False
 
     def begin(self, end: CanEnd, now: int) -> None:
-        """Let a node wait for its return; a second call has no effect."""
+        """Start the wait of a node for its return; a second call has no effect."""
         self._waiting.setdefault(end.number, (end, _SEQUENCES, now))
         self.active = True
 
@@ -188,7 +188,7 @@ class Recovery(Part):
 
     @property
     def due(self) -> int:
-        """When the first node will be back if the bus stays recessive."""
+        """Time at which the first node will return if the bus stays recessive."""
         return min(
             (since + left * self._sequence for _, left, since in self._waiting.values()),
             default=NEVER,
@@ -201,7 +201,7 @@ class Recovery(Part):
             self._waiting[number] = (end, left - seen, max(since, until))
 
     def take(self, now: int) -> list[CanEnd]:
-        """Return the nodes that are back by `now`."""
+        """Return the nodes that have returned by `now`."""
         back = [
             end
             for end, left, since in self._waiting.values()

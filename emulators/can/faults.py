@@ -13,7 +13,7 @@ from tickrig.emulators.rig.faults import FaultArguments, FaultForm, FaultTally, 
 from tickrig.wire.can import CanFrame
 
 _DELAY_US: Final = 10_000
-"""How long a delayed node does not send."""
+"""Time for which a delayed node does not send."""
 
 
 class FaultVerdict(Enum):
@@ -30,7 +30,7 @@ class _CanFaultType(FaultForm):
     """A fault that can be armed by name.
 
     Attributes:
-        verdict: its effect on a frame that it hits.
+        verdict: effect of the fault on a frame that it hits.
     """
 
     verdict: FaultVerdict | None = None
@@ -62,8 +62,8 @@ class _ArmedFault(Copyable):
     """An armed fault of a bus, for all nodes or for one.
 
     Attributes:
-        number: number of the node whose frames the fault hits; None for all nodes.
-        hits: whether the fault hits the planned frame; None until a random number is drawn.
+        number: number of the node whose frames the fault hits, or None for all nodes.
+        hits: whether the fault hits the planned frame, or None until a random number is drawn.
     """
 
     __slots__ = ("hits", "number", "tally", "threshold", "verdict")
@@ -76,27 +76,28 @@ class _ArmedFault(Copyable):
         self.hits: bool | None = None
 
     def concerns(self, senders: Sequence[int]) -> bool:
-        """Return whether it can hit frames of these nodes."""
+        """Return whether the fault can hit frames of the nodes."""
         return self.number is None or self.number in senders
 
 
 class CanFaults(Copyable):
     """The faults of one bus; each fault with a rate draws independently.
 
-    One random number is drawn for each frame on the bus, and one each time a node sends, so every
-    run is the same. A fault of one node draws only for the
-    frames of that node.
+    One random number is drawn for each frame on the bus, and one random number each time a node
+    sends. Every run is therefore the same. A fault of one node draws only for the frames of that
+    node.
 
     Args:
-        seed: seed of its random numbers.
-        changed: called with each fault that starts (True) or ends (False).
+        seed: seed of the random numbers.
+        changed: function that is called with each fault that starts (True) or ends (False).
 
     Attributes:
-        seed: seed of its random numbers; a new one applies to later draws.
+        seed: seed of the random numbers. A new seed applies to later draws.
         fault_types: the faults that can be armed, by name.
         active: whether any fault is armed.
         place: a number that determines the position of the inverted bit.
-        listeners: called with the time and each frame that no node takes.
+        listeners: functions that are called with the time and each frame that no node receives
+            because of a fault.
     """
 
     fault_types = CAN_FAULTS
@@ -121,17 +122,17 @@ class CanFaults(Copyable):
         bind_arguments(name, self.fault_types[name], arguments)
 
     def arm(self, name: str, *arguments: str, number: int | None = None) -> None:
-        """Arm a fault at the present time of the bus; one of the same name is replaced.
+        """Arm a fault at the present time of the bus; it replaces an armed fault of the same name.
 
         Args:
             name: name of the fault.
-            *arguments: the texts after `NAME=`, split at commas.
+            *arguments: texts after `NAME=`, split at commas.
             number: number of the end of the only node whose frames the fault hits, for a fault of
                 `NARROWED`.
 
         Raises:
             KeyError: no fault has this name.
-            ValueError: an unknown argument, or a value out of range.
+            ValueError: an argument is unknown, or a value is out of range.
         """
         fault_type, key = self.fault_types[name], _key(name, number)
         bound = bind_arguments(name, fault_type, arguments)
@@ -142,7 +143,7 @@ class CanFaults(Copyable):
         self._changed(key, True)
 
     def clear(self, name: str, number: int | None = None) -> None:
-        """Clear a fault; does nothing if it is not armed."""
+        """Clear a fault; do nothing if the fault is not armed."""
         key = _key(name, number)
         if self._armed.pop(key, None) is not None:
             self.active = bool(self._armed)
@@ -155,7 +156,7 @@ class CanFaults(Copyable):
         return self._tallies[key].acted if key in self._tallies else 0
 
     def judge(self, senders: Sequence[int]) -> FaultVerdict:
-        """Return the effect on the next frame of these nodes; the same until `spend`."""
+        """Return the effect on the next frame of the senders; it stays the same until `spend`."""
         if self._planned is None:
             self.place = self.chance("place").draw()
         self._planned, self._hitting = senders, None
@@ -170,7 +171,7 @@ class CanFaults(Copyable):
         return verdict or FaultVerdict.SENT
 
     def spend(self) -> None:
-        """Note that the latest judged frame has been on the bus."""
+        """Record that the latest judged frame has been on the bus."""
         if self._hitting is not None:
             self._hitting.tally.allow()
         self._forget(self._planned or ())

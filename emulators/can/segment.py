@@ -1,4 +1,4 @@
-"""A segment of a CAN bus: which frame is sent next, and when."""
+"""A segment of a CAN bus, which determines the next frame and the time at which it is sent."""
 
 # Theory of operation.
 #
@@ -77,7 +77,7 @@ _HEADER_BITS: Final = 19  # from start of frame to DLC
 
 
 def _first_difference(frames: Sequence[CanFrame]) -> int:
-    """Return the bit, counted without stuff bits, at which frames of one priority first differ."""
+    """Return the bit at which frames of one priority first differ, counted without stuff bits."""
     control = 39 if frames[0].extended else 19
     if len({frame.dlc for frame in frames}) > 1:
         return control
@@ -92,11 +92,11 @@ class CanSegment(TransmissionOutcomes):
     at that very time still takes part in the arbitration.
 
     Args:
-        bit_rate: bits a second.
+        bit_rate: bit rate in bit/s.
         start_us: start time.
         faults: the armed faults.
-        observers: called with each frame that ends.
-        on_traffic: called when a frame may end earlier than the previous `due_us`.
+        observers: functions that are called with each frame that ends.
+        on_traffic: function that is called when a frame may end earlier than the previous `due_us`.
 
     Attributes:
         now_us: present time of the bus.
@@ -131,7 +131,7 @@ class CanSegment(TransmissionOutcomes):
 
     @property
     def present(self) -> tuple[int, int]:
-        """Start and end of the busy time of the present frame, in units."""
+        """Start and end of the present frame's busy time, in units of the segment."""
         return (self._start, self._free) if self._winners else (0, 0)
 
     @in_kernel
@@ -235,7 +235,7 @@ class CanSegment(TransmissionOutcomes):
             self._recovery.begin(end, quiet)
 
     def disturb(self, now_us: int) -> None:
-        """Plan again what has not started at `now_us`, after a change."""
+        """Plan the next transmission again after a change, if it has not started at `now_us`."""
         self.advance(now_us)
         if self._start >= now_us * self.unit:
             self._withdraw()
@@ -262,7 +262,7 @@ class CanSegment(TransmissionOutcomes):
 
     @in_kernel
     def _plan(self) -> None:
-        """Determine what ends next, and when."""
+        """Determine the transmission or return that ends next, and its end."""
         self._stale = False
         arbiter = self._arbiter
         if arbiter.heads and not self._repeating:
@@ -285,7 +285,7 @@ class CanSegment(TransmissionOutcomes):
             self._plan_return()
 
     def _plan_return(self) -> None:
-        """Plan the earliest return from bus-off if it ends next."""
+        """Plan the earliest return from bus-off, if no transmission ends before."""
         self._arbiter.put_back(self._winners)
         self._winners, self._start = [], self._recovery.due
         self._finish, self._due_us = self._come_back, -(-self._start // self.unit)

@@ -37,7 +37,7 @@ class BusyTime(BusyFields):
         self._spans: deque[tuple[int, int]] = deque(maxlen=KEPT_SPANS)
 
     def note(self, since: int, until: int) -> None:
-        """Add a span that starts at the end of the latest one, or later."""
+        """Add a span that starts at the end of the latest span, or later."""
         if since != self._until:
             self._spans.append((self._since, self._until))
             self._since = since
@@ -69,7 +69,7 @@ class _CanRoutes(RoutesFields):
 
     Attributes:
         ends: all ends, in the order in which they joined.
-        unfiltered: ends whose filter is disabled until their next poll.
+        unfiltered: ends whose filter is disabled until the next poll.
     """
 
     __slots__ = ()
@@ -104,7 +104,7 @@ class _CanRoutes(RoutesFields):
 
 
 Observer = Callable[[int, CanFrame | ErrorFrame], None]
-"""Called with each frame and error frame, and its end."""
+"""Function that is called with the end time of each frame or error frame, and the frame."""
 
 RECESSIVE_BITS: Final = 8 + INTERFRAME_BITS  # from the ACK or error delimiter to the next frame
 _SUSPEND_BITS: Final = 8  # a passive node's wait after it has sent
@@ -118,8 +118,8 @@ class TransmissionOutcomes(SegmentFields):
     for its outcome.
 
     Attributes:
-        unit: units in a microsecond.
-        bit: units in a bit.
+        unit: number of units in a microsecond.
+        bit: number of units in a bit.
         routes: the ends and their filters.
         busy: the latest busy times of the bus, in units.
     """
@@ -153,7 +153,7 @@ class TransmissionOutcomes(SegmentFields):
 
     @in_kernel
     def _deliver(self) -> None:
-        """Deliver a frame of one sender on an intact bus to all receivers, on a short path."""
+        """Deliver a frame of one sender on an intact bus to all receivers (fast path)."""
         winners, confinement = self._winners, self._confinement
         if len(winners) > 1 or confinement.marked or self._faults.active or self._recovery.active:
             self._deliver_and_count()
@@ -221,7 +221,7 @@ class TransmissionOutcomes(SegmentFields):
         self._end_attempt()
 
     def _fail_alone(self) -> None:
-        """The same, but seen only by the senders."""
+        """Signal an error frame that only the senders detect; they will send again."""
         self._confinement.failed_to_send(self._due_us, self._winners)
         self._notify(BIT_ERROR)
         self._end_attempt()
@@ -240,7 +240,7 @@ class TransmissionOutcomes(SegmentFields):
             self._confinement.count(self._due_us, end, ErrorCounters.restart)
 
     def _take_off(self, frame: CanFrame) -> None:
-        """Remove a successful frame from its queues."""
+        """Remove a successful frame from the queues of its senders."""
         for end in self._winners:
             end.take()
         if self._confinement.marked:

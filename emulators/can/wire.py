@@ -24,11 +24,11 @@ class CanWire(Copyable):
     r"""A classic CAN bus (ISO 11898-1); each node has a `CanEnd`.
 
     A frame takes exactly the time of its bits, including stuff bits. It is received and
-    time-stamped after its end of frame. If several frames wait, the arbitration field decides.
-    If nodes send the very same frame at the same time, they send it together. If their frames have
+    time-stamped after its end of frame. If several frames wait, the arbitration field decides. If
+    several nodes send the same frame at the same time, the frame is sent once. If their frames have
     the same identifier but different contents, the nodes collide. An unacknowledged frame, or a
-    frame broken by a fault, is sent again after the error frame. TEC and REC count as in
-    ISO 11898-1.
+    frame broken by a fault, is sent again after the error frame. TEC and REC count as in ISO
+    11898-1.
 
     Not emulated: propagation and bit timing (all nodes see a bit at once), overload frames, errors
     that only one receiver sees, reception of a node's own frames (a controller does not receive its
@@ -36,15 +36,16 @@ class CanWire(Copyable):
     Observers are not called for each repetition, and the bus load does not include the repetitions.
 
     Args:
-        bit_rate: 10 000 to 1 000 000 bit/s.
+        bit_rate: bit rate, 10 000 to 1 000 000 bit/s.
         seed: seed of the random numbers in faults.
 
     Attributes:
-        bit_rate: bits a second.
+        bit_rate: bit rate in bit/s.
         bus: the bus of all connected ends.
-        faults: the armed faults; `arm` and `clear` act at the present time of the bus.
-        observers: called with each frame and each error frame on the bus with its time.
-        on_traffic: called when a frame may end earlier than the previous `due_us`.
+        faults: armed faults. `arm` and `clear` act at the present time of the bus.
+        observers: functions that are called with each frame and each error frame on the bus, and
+            with its time.
+        on_traffic: function that is called when a frame may end earlier than the previous `due_us`.
 
     >>> wire = CanWire(bit_rate=500_000)
     >>> node, host = wire.end(), wire.end()
@@ -68,13 +69,14 @@ class CanWire(Copyable):
         self._babbler: CanEnd | None = None
 
     def end(self, accepts: Accepted = None) -> CanEnd:
-        """Connect one more node.
+        """Connect another node.
 
         Args:
-            accepts: CAN-IDs that the node receives; 29-bit CAN-IDs have bit 29 set. None for all.
+            accepts: CAN-IDs that the node receives, or None for all. A 29-bit CAN-ID has bit 29
+                set.
 
         Returns:
-            The node's end, its port in a `Station`.
+            The end of the node, which is its port in a `Station`.
         """
         end = CanEnd(self, self._count, accepts)
         self._count += 1
@@ -83,7 +85,7 @@ class CanWire(Copyable):
 
     @property
     def _kernel_bus(self) -> CanSegment | None:
-        """The bus, for code that advances it without the wire; None in a derived class."""
+        """The bus for code that advances the bus without the wire, or None in a derived class."""
         return self.bus if type(self) is CanWire else None
 
     @property
@@ -111,7 +113,7 @@ class CanWire(Copyable):
             until_us: latest time.
 
         Returns:
-            Whether there was such a frame.
+            True if a station has received a frame by then.
         """
         if not self._apart:
             return self.bus.advance_until_received(until_us)
@@ -126,7 +128,7 @@ class CanWire(Copyable):
             window_us: length of the time before now that is measured, at most a second.
 
         Returns:
-            The share of bits, in 0.1 %.
+            The share of busy time, in 0.1 %.
         """
         bus = self.bus
         now = bus.now_us * bus.unit
@@ -211,4 +213,4 @@ class CanWire(Copyable):
 
 
 def _ignore(name: str, armed: bool) -> None:
-    """Ignore changes of faults: a disconnected segment has none."""
+    """Ignore changes of faults, because a disconnected segment has no faults."""

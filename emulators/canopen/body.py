@@ -29,8 +29,8 @@ class _PoseSignal:
     Args:
         body: the body.
         name: `x_m`, `y_m` or `heading_deg`.
-        text: description for people.
-        unit: its unit.
+        text: description as readable text.
+        unit: unit of the coordinate.
     """
 
     def __init__(self, body: WheeledBody, name: str, text: str, unit: str) -> None:
@@ -112,7 +112,7 @@ class DrivenWheel(NamedTuple):
     Attributes:
         name: name of the wheel.
         node: the drive.
-        forward: -1 if it is mounted the other way round.
+        forward: sign of the shaft: -1 if the wheel is mounted the other way round, or else 1.
     """
 
     name: str
@@ -153,7 +153,7 @@ class BodyOnDrives:
 
     @property
     def due_us(self) -> int:
-        """Whether it slides, that is moves without a drive."""
+        """Time of the next action, which is a tick while the body slides without a drive."""
         return NEVER if self.body.resting else 0
 
     def act(self, now_us: int, /) -> None:
@@ -162,7 +162,7 @@ class BodyOnDrives:
         self._load()
 
     def signal(self, name: str) -> NodeSignal | None:
-        """Return the signal of this name, None if there is none."""
+        """Return the signal with the name, or None if there is none."""
         return self.physical.get(name)
 
     def signal_names(self) -> list[str]:
@@ -170,7 +170,7 @@ class BodyOnDrives:
         return list(self.physical)
 
     def read(self, name: str) -> Setting:
-        """Return an output; KeyError if there is none."""
+        """Return the value of an output; raise KeyError if the name is unknown."""
         match name:
             case "speed_m_s":
                 return self.body.speed_m_s
@@ -186,7 +186,7 @@ class BodyOnDrives:
 
 
 class _Shaft:
-    """The shaft of a drive, seen from its wheel."""
+    """The shaft of a drive, with values at its wheel."""
 
     def __init__(self, wheel: DrivenWheel) -> None:
         node, self._forward = wheel.node, wheel.forward
@@ -208,7 +208,7 @@ class _Shaft:
 
 
 def _set(bank: QuantityBank, name: str, value: float) -> None:
-    """Set an input, limited to its range; an ideal motor has none and is not loaded."""
+    """Set an input, limited to its range; an ideal motor has no such input and no load."""
     item = bank.table.get(name)
     if item is not None and bank[name] != (value := min(max(value, item.low), item.high)):
         bank.set(name, value)
@@ -219,8 +219,8 @@ class BodyPlan:
     """A body on drives, as described in a rig file.
 
     Attributes:
-        kind: a name of `wheeled_body.SIDES`.
-        drives: device name of each wheel.
+        kind: kind of the body, which is a name of `wheeled_body.SIDES`.
+        drives: device names by wheel.
         mirrored: wheels whose drive is mounted the other way round.
         parameters: the given arguments of `BodyParameters`.
     """
@@ -231,7 +231,7 @@ class BodyPlan:
     parameters: Mapping[str, float] = field(default_factory=dict)
 
     def put_on(self, nodes: Iterable[Node]) -> BodyOnDrives:
-        """Put the body on the shafts of its drives, which are among the nodes."""
+        """Connect the body with the shafts of its drives, which are among the nodes."""
         by_name = {node.name: node for node in nodes}
         wheels = [
             DrivenWheel(wheel, by_name[drive], -1 if wheel in self.mirrored else 1)

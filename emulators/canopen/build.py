@@ -41,10 +41,10 @@ class Described:
     """A fully described node.
 
     Attributes:
-        name: prefix of its signals, and key of its memory in a store file.
-        node_id: 1..127, or `UNCONFIGURED`.
-        description: description in its file or model.
-        about: what it moves, for people; empty if unknown.
+        name: prefix of the signals of the node, and key of its memory in a store file.
+        node_id: node-ID 1..127, or `UNCONFIGURED`.
+        description: description of the device in its file or model.
+        about: text about what the node moves, or empty if unknown.
     """
 
     name: str
@@ -54,11 +54,12 @@ class Described:
 
 
 def describe_nodes(specs: Iterable[NodeSpec], profile: str = AUTO) -> list[Described]:
-    """Read the files; ValueError if one is unusable, or a node-ID is missing or duplicate.
+    """Read the files; raise ValueError if a file is unusable, or a node-ID is missing or duplicate.
 
     Args:
         specs: the nodes.
-        profile: a name of `choices.PROFILES`, for nodes of files without a profile.
+        profile: profile for nodes of files without a profile, which is a name of
+            `choices.PROFILES`.
     """
     cache, found = EdsCache(), dict[str, Described]()
     for spec in specs:
@@ -79,7 +80,7 @@ def describe_nodes(specs: Iterable[NodeSpec], profile: str = AUTO) -> list[Descr
 
 
 def describe_device(name: str) -> DeviceDescription:
-    """Describe a model, or the DeviceRTC of a user's file; ValueError if there is none."""
+    """Describe a model, or the DeviceRTC of a user's file; raise ValueError if unknown."""
     if name in MODELS:
         return MODELS[name].describe()
     return describe_rtc(name)
@@ -107,10 +108,10 @@ def describe(cache: EdsCache, device: Path | str, profile: str = AUTO) -> Device
     """Describe the node of a file, a model or a user's class; ValueError for anything else.
 
     Args:
-        cache: cache of files.
-        device: its EDS or DCF, the name of a model, `FILE.yml:NODE` of a bus.yml, or
+        cache: cache of EDS files.
+        device: EDS or DCF of the node, name of a model, `FILE.yml:NODE` of a bus.yml, or
             `FILE.py:Class` of a DeviceRTC.
-        profile: a name of `choices.PROFILES`, for an EDS or DCF.
+        profile: profile for an EDS or DCF, which is a name of `choices.PROFILES`.
     """
     if isinstance(device, str):
         return _bus_node(cache, device) if is_bus_node(device) else describe_device(device)
@@ -121,13 +122,13 @@ def read_bus_file(file: Path, urdf: Path | None, cache: EdsCache, profile: str =
     """Read a bus.yml.
 
     Args:
-        file: the bus.yml.
-        urdf: the robot with its joints, None for the robot named in the file.
+        file: path of the bus.yml.
+        urdf: URDF of the robot with the joints, or None for the robot that the file names.
         cache: cache of EDS files.
-        profile: a name of `choices.PROFILES`, for nodes without a profile.
+        profile: profile for nodes without a profile, which is a name of `choices.PROFILES`.
 
     Raises:
-        ValueError: all errors, one line each.
+        ValueError: the file has errors. The message has all errors, one per line.
     """
     from tickrig.emulators.canopen.bus_file.bus_nodes import read_bus  # noqa: PLC0415 - slow
 
@@ -161,7 +162,7 @@ def _read(cache: EdsCache, file: Path, profile: str) -> DeviceDescription:
 
 
 def _name(node_id: int, found: dict[str, Described]) -> str:
-    """Return the node-ID; nodes that wait for one are lss, lss2, ..."""
+    """Return the node-ID as name; nodes that wait for a node-ID are lss, lss2, ..."""
     if node_id != UNCONFIGURED:
         return str(node_id)
     count = sum(item.node_id == UNCONFIGURED for item in found.values())
@@ -172,14 +173,14 @@ ANY_ID: Final = 1
 
 
 _NODE_INPUTS: Final = ("power_off", "unplugged", "emergency")
-"""Inputs of every node, besides those of its device."""
+"""Inputs that every node has in addition to the inputs of its device."""
 
 
 def describe_rtc(spec: str) -> DeviceDescription:
     """Describe the component of `FILE.py:Class`.
 
     Raises:
-        ValueError: its file cannot be run, or it is not a valid DeviceRTC.
+        ValueError: the file cannot be run, or the component is not a valid DeviceRTC.
     """
     kind: type[CanopenComponent] = find_class(spec, CanopenComponent)
     for item in kind.physical:

@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from typing import Final
 
 MODELS: Final = ("f-palette", "f-palette-boot", "motor-core-unit", "epos", "rtc-echo")
-"""Names of `models.MODELS`."""
+"""Names of the models in `models.MODELS`."""
 
 AUTO: Final = "auto"
 PROFILES: Final = (AUTO, "none", "401", "402")
-"""`AUTO`, and names of `profiles.PROFILES`."""
+"""`AUTO`, and the names of the profiles in `eds.PROFILES`."""
 
 NODE_FAULTS: Final = (
     *("power_off", "unplugged", "sdo_abort", "sdo_busy", "sdo_mute", "sdo_slow", "sdo_twice"),
@@ -28,7 +28,7 @@ MODEL_FAULTS: Final[Mapping[str, tuple[str, ...]]] = {
     "motor-core-unit": _DRIVE,
     "epos": _DRIVE,
 }
-"""Physical faults by the name of the model, beside those of every node."""
+"""Physical faults by name of the model, in addition to the faults of every node."""
 
 _BUS_NODE: Final = re.compile(r".+\.ya?ml:.+", re.IGNORECASE)
 

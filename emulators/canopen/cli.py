@@ -32,7 +32,7 @@ def _complete_node(
 
 
 def _device_faults(context: click.Context) -> tuple[str, ...]:
-    """Return the faults of the node, with those of its model if --model is given."""
+    """Return the faults of the node, with the faults of its model if --model is given."""
     return (*NODE_FAULTS, *MODEL_FAULTS.get(context.params.get("model") or "", ()))
 
 

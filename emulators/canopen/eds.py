@@ -49,7 +49,7 @@ _MODULE_OBJECTS: Final = (
 
 
 def application_of(dictionary: Dictionary, profile: str = AUTO) -> ServiceMaker:
-    """Return a profile of `choices.PROFILES`; `auto` selects that of the device type, if available.
+    """Return a profile of `choices.PROFILES`; `auto` selects the profile of the device type.
 
     >>> application_of(Dictionary([])).__name__
     'Application'
@@ -62,7 +62,7 @@ def application_of(dictionary: Dictionary, profile: str = AUTO) -> ServiceMaker:
 
 
 def profile_name(application: ServiceMaker) -> str:
-    """Return the name of a profile, `none` if it is not in `PROFILES`.
+    """Return the name of a profile, or `none` if it is not in `PROFILES`.
 
     >>> profile_name(Ds401)
     '401'
@@ -82,7 +82,7 @@ def _looks_like(dictionary: Dictionary) -> str:
 
 
 def _default_of(application: ServiceMaker, index: int, sub: int) -> int | None:
-    """Return the default of an entry in a profile, -1 for all bits; None if it has none.
+    """Return the default of an entry in a profile (-1 for all bits), or None without a default.
 
     >>> _default_of(Ds402, 0x6081, 0), _default_of(Ds401, 0x6206, 1), _default_of(Ds402, 0x2000, 0)
     (10000, -1, None)
@@ -106,15 +106,15 @@ class DeviceDescription:
     """Description of a device, from which slaves can be made.
 
     Attributes:
-        file: the EDS or DCF, or the name of the model.
-        info: vendor, product, bit rates.
-        template: the objects with default values; never given to a slave.
-        node_id: node-ID in a DCF or of a model, None if missing.
-        bit_rate: bit rate in a DCF in bit/s, None if missing.
+        file: path of the EDS or DCF, or name of the model.
+        info: vendor, product and bit rates.
+        template: objects with default values. The template is never given to a slave.
+        node_id: node-ID in a DCF or of a model, or None if missing.
+        bit_rate: bit rate in a DCF in bit/s, or None if missing.
         application: factory of the application.
         warnings: deviations of the file from the standard, and values that the file leaves open.
-        start: initial values of inputs that differ from the usual ones, by name.
-        files: for a node of a bus.yml: its EDS or DCF, and the URDF with its joint.
+        start: initial values by name, for inputs whose initial values differ from the usual values.
+        files: EDS or DCF of a node of a bus.yml, and the URDF with its joint.
     """
 
     file: str
@@ -152,7 +152,7 @@ _COB_IDS: Final = (
 
 
 def _predefined(index: int, sub: int) -> tuple[int, bool] | None:
-    """Return a default, and whether to add the node-ID; None if there is none.
+    """Return a default and whether to add the node-ID, or None without a default.
 
     >>> _predefined(0x1800, 1), _predefined(0x1809, 1), _predefined(0x2000, 0)
     ((384, True), (2147483648, False), None)
@@ -170,16 +170,16 @@ def read_eds(path: Path, profile: str = AUTO) -> DeviceDescription:
     """Read an EDS or DCF file (CiA 306).
 
     Args:
-        path: the file, with any name.
-        profile: profile for defaults that are missing in the file: `auto` for the profile of the
-            device type, `401`, `402` or `none`.
+        path: path of the file, with any name.
+        profile: profile for defaults that are missing in the file: `auto` to use the profile of the
+            device type, or `401`, `402` or `none`.
 
     Returns:
         The description of the device; pass its `make_dictionary()` to `make_slave`.
 
     Raises:
         OSError: the file cannot be read.
-        EdsError: it is malformed.
+        EdsError: the file is malformed.
     """
     return describe(open_eds(path), profile)
 
@@ -197,10 +197,10 @@ def describe(file: EdsFile, profile: str = AUTO) -> DeviceDescription:
 
     Args:
         file: the EDS or DCF.
-        profile: a name of `choices.PROFILES`.
+        profile: profile for missing defaults, which is a name of `choices.PROFILES`.
 
     Raises:
-        EdsError: the file has errors that would change the device; the message lists all of them.
+        EdsError: the file has errors that would change the device. The message lists all of them.
     """
     return in_profile(_describe(file, read_device(file)), profile)
 
@@ -211,7 +211,7 @@ def _description_of(name: str, data: bytes) -> DeviceDescription:
 
 
 def _describe(file: EdsFile, device: EdsDevice) -> DeviceDescription:
-    """Describe a device by its file only; values may be open."""
+    """Describe a device by its file only; values may be missing."""
     if file.errors:
         raise EdsError(file.errors)
     return DeviceDescription(
@@ -230,12 +230,13 @@ def in_profile(
     """Return a device with its profile, which supplies defaults missing in the file.
 
     Args:
-        description: the device as described by its file alone, from `EdsCache.read`.
-        profile: a name of `choices.PROFILES`.
-        defaults: defaults with priority over those of the profile, by (index, sub-index).
+        description: description of the device by its file alone, from `EdsCache.read`.
+        profile: profile of the device, which is a name of `choices.PROFILES`.
+        defaults: defaults by (index, sub-index), which have priority over the defaults of the
+            profile.
 
     Returns:
-        The device; its warnings list the chosen values.
+        The description with the profile. Its warnings list the chosen values.
     """
     given = description.template.description
     application = application_of(description.template, profile)
@@ -344,7 +345,7 @@ class EdsCache:
     """Reads each EDS or DCF once, and again when the file has changed.
 
     Attributes:
-        others: other cached results by their source, with the versions of their files.
+        others: other cached results by source, with the versions of their files.
     """
 
     def __init__(self) -> None:
@@ -356,7 +357,7 @@ class EdsCache:
 
         Raises:
             OSError: the file cannot be read.
-            EdsError: it is malformed.
+            EdsError: the file is malformed.
         """
         version = version_of(path)
         known = self._known.get((path, profile))
@@ -368,6 +369,6 @@ class EdsCache:
 
 
 def version_of(path: Path) -> Version:
-    """Return a stamp that changes with the file; OSError if the file is not accessible."""
+    """Return a stamp that changes with the file; raise OSError if the file is not accessible."""
     status = path.stat()
     return status.st_mtime_ns, status.st_size

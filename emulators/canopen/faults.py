@@ -65,7 +65,7 @@ _TIME_COB_ID: Final = 0x100
 _MAX_DATA: Final = 8
 _BIT_US: Final = 1_000_000
 _SHORTEST_BITS: Final = 47
-"""Bits of a frame without data, with those to the next one."""
+"""Number of bits of a frame without data, including the bits up to the next frame."""
 
 
 class _NodeFrames(Flag):
@@ -163,18 +163,18 @@ class _SdoBlocks(Copyable):
 # How faults are declared.
 
 _Sent = tuple[tuple[int, CanFrame], ...]
-"""The frames sent instead of a frame, each with its delay in us."""
+"""The frames that are sent instead of a frame, each with its delay in us."""
 
 
 class _ArmedNodeFault(Copyable):
     """An armed fault of a node.
 
     Attributes:
-        fault_type: its declaration.
+        fault_type: declaration of the fault.
         arguments: arguments of the arming.
-        trigger: decides when the fault acts.
-        kept: stored data, by CAN-ID.
-        next_us: time of the next action that the fault takes by itself; 0 for at once.
+        trigger: trigger that decides when the fault acts.
+        kept: stored data by CAN-ID.
+        next_us: time of the next action that the fault takes by itself, or 0 for at once.
     """
 
     __slots__ = ("arguments", "fault_type", "kept", "next_us", "trigger")
@@ -201,12 +201,12 @@ class _NodeFaultType(FaultForm):
 
     Attributes:
         frames: the kind of frames that the fault acts on.
-        instead: returns the frames sent instead of a frame.
-        matches: returns whether the fault acts on a frame of that kind.
-        by_itself: action that the fault takes in each `period` (an argument), or in each tick if
-            it has no such argument.
-        abort: returns the frame with which the fault itself answers the request.
-        controller: acts on the CAN controller.
+        instead: function that returns the frames sent instead of a frame.
+        matches: function that returns whether the fault acts on a frame of that kind.
+        by_itself: action that the fault takes in each `period` (an argument), or in each tick if it
+            has no such argument.
+        abort: function that returns the frame with which the fault itself answers the request.
+        controller: function that acts on the CAN controller.
         silent: whether the node neither sends nor receives until the held frame has been sent.
         boots: whether the second node sends a boot-up first.
     """
@@ -280,9 +280,9 @@ class _Target:
     """Objects whose transfers are aborted, and the abort code.
 
     Attributes:
-        index: None for all objects.
-        sub: None for all sub-indices.
-        code: the abort code.
+        index: index of the objects, or None for all objects.
+        sub: sub-index of the objects, or None for all sub-indices.
+        code: abort code.
     """
 
     index: int | None
@@ -316,7 +316,7 @@ def _parse_target(word: str) -> _Target:
 
 
 def _number(word: str) -> int | None:
-    """Read a number in CiA notation, `8110h`, or Python notation; None if invalid."""
+    """Read a number in CiA notation (`8110h`) or Python notation; return None if invalid."""
     try:
         return int(word[:-1], 16) if word[-1:] in ("h", "H") else int(word, 0)
     except ValueError:
@@ -404,7 +404,7 @@ def _on(
     *arguments: FaultArgument,
     **more: Any,
 ) -> _NodeFaultType:
-    """Return a fault that acts on frames; with the argument `tpdo` on those of one TPDO."""
+    """Return a fault that acts on frames, or on frames of one TPDO with the argument `tpdo`."""
     if _TPDO in arguments:
         more["matches"] = _is_tpdo
     return _NodeFaultType(text, arguments=arguments, frames=frames, instead=instead, **more)
@@ -542,13 +542,13 @@ class NodeFaults(Copyable):
 
     Args:
         node: the node.
-        wire: the node's bus. It supplies the random numbers, and its faults are limited to the
+        wire: bus of the node, which supplies the random numbers. Its faults are limited to the
             frames of the node.
 
     Attributes:
         station: the station of the node, as soon as the node has one.
-        listeners: called if the faults change frames: with the time, the direction, the sent frames
-            and the frames after the faults. A twin has no listeners.
+        listeners: functions that are called if the faults change frames, with the time, the
+            direction, the sent frames and the frames after the faults. A twin has no listeners.
     """
 
     fault_types: Mapping[str, FaultForm] = {
@@ -577,11 +577,11 @@ class NodeFaults(Copyable):
         bind_arguments(name, self.fault_types[name], arguments)
 
     def arm(self, name: str, *arguments: str) -> None:
-        """Arm a fault; one of the same name is replaced.
+        """Arm a fault; it replaces an armed fault of the same name.
 
         Raises:
             KeyError: no fault has this name.
-            ValueError: an unknown argument, or a value out of range.
+            ValueError: an argument is unknown, or a value is out of range.
         """
         self.clear(name)
         if name in NARROWED:
@@ -603,7 +603,7 @@ class NodeFaults(Copyable):
             self.station.device = _FaultyNode(self.station.device, self)
 
     def clear(self, name: str) -> None:
-        """Clear a fault; does nothing if it is not armed. Delayed frames are sent now."""
+        """Clear a fault, and send delayed frames now; do nothing if the fault is not armed."""
         if name in self._narrowed:
             self.wire.faults.clear(name, self.node.port.number)
             self._narrowed = tuple(each for each in self._narrowed if each != name)
@@ -635,7 +635,7 @@ class NodeFaults(Copyable):
         return not (self._armed or self._held)
 
     def cob_id(self, index: int, sub: int, otherwise: int) -> int:
-        """Return the CAN-ID in an object of the node, or a default without the object."""
+        """Return the CAN-ID in an object of the node, or a default if there is no such object."""
         entry = self.node.slave.dictionary.find(index, sub)
         return otherwise if entry is None else entry.number & CAN_ID_MASK
 
@@ -678,7 +678,7 @@ class NodeFaults(Copyable):
         return tuple(left), tuple(sent)
 
     def after(self, now_us: int, sent: Frames) -> Frames:
-        """Return the frames sent in a tick: the node's own after faults, and delayed ones."""
+        """Return the frames sent in a tick: the node's frames after faults, and delayed frames."""
         left = list[CanFrame]()
         for frame in sent:
             left += self._send(frame)
@@ -773,7 +773,7 @@ class _FaultyNode(Copyable, DeviceBefore[Frames]):
 
     @property
     def due_us(self) -> int:
-        """When the device is due or a fault acts."""
+        """Time at which the device is due or a fault acts."""
         return min(super().due_us, self._faults.due_us)
 
     def tick(self, now_us: int, rx: Frames, /) -> Frames:

@@ -23,11 +23,11 @@ class EmulatedModel:
     """A device model that needs no file.
 
     Attributes:
-        name: its name on command lines and in rig files.
-        text: description for people.
-        node_id: its default node-ID.
-        dictionary: makes the objects with default values.
-        application: factory of its application.
+        name: name of the model on command lines and in rig files.
+        text: description as readable text.
+        node_id: default node-ID of the model.
+        dictionary: function that makes the objects with default values.
+        application: factory of the application.
     """
 
     name: str
@@ -37,7 +37,7 @@ class EmulatedModel:
     application: ServiceMaker
 
     def describe(self) -> DeviceDescription:
-        """Return its description, including properties that an EDS cannot express."""
+        """Return the description of the model, including properties that an EDS cannot express."""
         template = self.dictionary()
         return DeviceDescription(
             self.name,

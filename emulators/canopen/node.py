@@ -55,19 +55,20 @@ class Node(Copyable):
     Not emulated: a change of the bit rate of the bus. LSS switches the bit rate of the node only.
 
     Args:
-        name: prefix of its signals among those of other nodes.
+        name: prefix of the node's signals among the signals of other nodes.
         slave: the slave.
-        wire: its bus.
+        wire: bus of the node.
 
     Attributes:
         application: the application of the device.
-        port: its end of the bus.
-        physical: its physical inputs, by name.
-        groups: names of several of these that are set together.
-        outputs: its physical outputs, by name.
-        on_set: called with the name and the value of each input or object that was set by name.
-        on_crash: called with an exception from the slave's program. The program then restarts, as
-            after a watchdog. Without `on_crash` the exception is raised here.
+        port: end of the bus at the node.
+        physical: physical inputs by name.
+        groups: names of physical inputs that are set together, by name of the group.
+        outputs: physical outputs by name.
+        on_set: function that is called with the name and the value of each input or object that was
+            set by name.
+        on_crash: function that is called with an exception of the slave's program. The program then
+            restarts, as after a watchdog. Without `on_crash` the exception is raised here.
     """
 
     _new_in_twins: ClassVar[Mapping[str, object]] = {"on_set": None, "on_crash": None}
@@ -98,7 +99,7 @@ class Node(Copyable):
 
     @property
     def is_on(self) -> bool:
-        """Whether it has power."""
+        """Whether the node has power."""
         return self._on
 
     @property
@@ -113,14 +114,14 @@ class Node(Copyable):
 
     @property
     def due_us(self) -> int:
-        """When the slave is due."""
+        """Time at which the slave is due."""
         if self._pending:
             return 0
         return self.slave.due_us if self._on else self._coasts_us
 
     @property
     def horizon(self) -> Horizon | None:
-        """How far the slave may compute ahead."""
+        """Time up to which the slave may compute ahead."""
         return self.slave.horizon
 
     @horizon.setter
@@ -129,7 +130,7 @@ class Node(Copyable):
 
     @property
     def accepts(self) -> Accepted:
-        """CAN-IDs that it listens to."""
+        """CAN-IDs that the node receives."""
         return self.slave.accepts
 
     @property
@@ -139,19 +140,19 @@ class Node(Copyable):
 
     @property
     def on_accepts(self) -> list[Callable[[], None]]:
-        """Callback for a change of these two."""
+        """Callback for a change of `accepts` or `reconfigured_by`."""
         return self.slave.on_accepts
 
     def bus_state(self, state: ErrorState, /) -> None:
-        """Accept a change of its CAN controller; the slave gets it in the next tick."""
+        """Accept a change of the CAN controller; the slave gets the change in the next tick."""
         self._defer(partial(self.slave.bus_state, state))
 
     def reset(self) -> None:
-        """Power-on reset."""
+        """Reset the node as at power-on."""
         self.slave.reset()
 
     def tick(self, now_us: int, rx: Frames, /) -> Frames:
-        """Tick the slave, if it has power."""
+        """Tick the slave, if the node has power."""
         if not self._on:
             self._pending.clear()
             if now_us >= self._coasts_us:
@@ -170,7 +171,7 @@ class Node(Copyable):
             return ()
 
     def signal(self, name: str) -> signals.NodeSignal | None:
-        """Return the signal of this name, None if there is none."""
+        """Return the signal with the name, or None if there is none."""
         signal = self.physical.get(name) or self._object(name)
         return signals.NotedSignal(signal, self.on_set) if signal and self.on_set else signal
 
@@ -188,14 +189,14 @@ class Node(Copyable):
         return [*self.physical, *(signals.object_name(dictionary, entry) for entry in dictionary)]
 
     def begin_with(self, start: Mapping[str, Setting]) -> None:
-        """Set initial values of inputs and objects; ValueError if a value is not accepted."""
+        """Set initial values of inputs and objects; raise ValueError if a value is not accepted."""
         for name, value in start.items():
             if (signal := self.signal(name)) is None:
                 raise ValueError(f"{self.name} has no input {name!r}")
             signal.write(value)
 
     def read(self, name: str) -> Setting:
-        """Return an output; KeyError if there is none."""
+        """Return the value of an output; raise KeyError if the name is unknown."""
         match name:
             case "state":
                 return _STATE_NAMES[self.slave.state] if self._on and self._ticked else _OFF
@@ -206,7 +207,7 @@ class Node(Copyable):
         return self.application.read(name)
 
     def _defer(self, action: Callable[[], None]) -> None:
-        """Schedule an action for the start of the next tick; it may change the accepted CAN-IDs."""
+        """Schedule an action for the next tick; the action may change the accepted CAN-IDs."""
         self._pending.append(action)
         self.port.pass_all()
 
@@ -217,7 +218,7 @@ class Node(Copyable):
             self._pending.pop(0)()
 
     def _begin_anew(self, on_crash: Callable[[Exception], object]) -> None:
-        """Reset the slave; if that fails it is dead until its power is switched."""
+        """Reset the slave; if the reset fails, the slave is dead until its power is switched."""
         self._pending.clear()
         try:
             self.slave.reset()
@@ -253,9 +254,9 @@ class _NodePart(Protocol):
 
     Attributes:
         name: name of the part.
-        physical: its physical inputs, by name.
-        groups: names of several of these that are set together.
-        outputs: its physical outputs, by name.
+        physical: physical inputs by name.
+        groups: names of physical inputs that are set together, by name of the group.
+        outputs: physical outputs by name.
     """
 
     name: str
@@ -264,14 +265,14 @@ class _NodePart(Protocol):
     outputs: Mapping[str, OutputSignal]
 
     def signal(self, name: str) -> signals.NodeSignal | None:
-        """Return the signal of this name, None if there is none."""
+        """Return the signal with the name, or None if there is none."""
 
     def signal_names(self) -> list[str]:
         """Return all names."""
         ...
 
     def read(self, name: str) -> Setting:
-        """Return an output; KeyError if there is none."""
+        """Return the value of an output; raise KeyError if the name is unknown."""
         ...
 
 
@@ -304,7 +305,7 @@ class _NodeInputs:
     """The `Inputs` of a node: its physical side and every object of its dictionary.
 
     Attributes:
-        table: the inputs by name; the name of a variable may also include its sub-index.
+        table: inputs by name. The name of a variable may also include its sub-index.
         groups: names of several inputs that are set together.
     """
 
@@ -318,7 +319,7 @@ class _NodeInputs:
         return self._signal(name).read()
 
     def set(self, name: str, value: Setting) -> None:
-        """Set an input; ValueError if it does not exist or does not accept the value."""
+        """Set an input; raise ValueError if it does not exist or does not accept the value."""
         self._signal(name).write(value)
 
     def check(self, name: str, value: Setting) -> Setting:
@@ -326,7 +327,7 @@ class _NodeInputs:
         return self._signal(name).check(value)
 
     def find(self, name: str, signal_type: SignalType | None = None) -> InputSignal:
-        """Return the description of an input; ValueError if there is no input of this type."""
+        """Return the description of an input; ValueError if no input has the name and type."""
         item = self.table.get(name)
         if item is None or signal_type not in (None, item.type):
             wanted = signal_type.value if signal_type else "input"
@@ -348,7 +349,7 @@ class _NodeInputs:
 
 
 class _Table(Mapping[str, InputSignal]):
-    """The descriptions, created on request: nodes have many objects."""
+    """The descriptions, created on request because nodes have many objects."""
 
     def __init__(self, part: _NodePart) -> None:
         self._part = part
@@ -378,8 +379,8 @@ _logger = log_of(__name__)
 class SecondNodeAlarm(PortBefore):
     """A port that warns, once for each node, if another node outside has the same node-ID.
 
-    It checks boot-ups, heartbeats and answers to guarding. A second node that sends no such frame
-    is not detected. A second node is also not detected while the emulated node has no power.
+    The port checks boot-ups, heartbeats and answers to guarding. A second node that sends no such
+    frame is not detected. A second node is also not detected while the emulated node has no power.
 
     Args:
         port: the port on the bus.
@@ -391,7 +392,7 @@ class SecondNodeAlarm(PortBefore):
         self._alone = list(nodes)
 
     def poll(self, now_us: int, /) -> Frames:
-        """Read what others have sent."""
+        """Read the frames that other nodes have sent."""
         frames = super().poll(now_us)
         for frame in frames:
             if frame.can_id in _ERROR_CONTROL and self._alone:

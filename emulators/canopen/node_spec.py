@@ -13,19 +13,19 @@ from tickrig.emulators.canopen.choices import MODELS
 from tickrig.host.text.user_file import SUFFIX
 
 LSS: Final = "lss"
-"""In place of a node-ID: the node waits for LSS to assign one."""
+"""Text in place of a node-ID, for a node that waits until LSS assigns a node-ID."""
 
 _IDS: Final = re.compile(r"([0-9]{1,3})(?:-([0-9]{1,3}))?")
 
 
 @dataclass(frozen=True, slots=True)
 class NodeSpec:
-    """One node.
+    """A node on the command line.
 
     Attributes:
-        device: its EDS or DCF, the name of a model, or `FILE.py:Class` of a DeviceRTC.
-        node_id: 1..127, `UNCONFIGURED`, or None for the node-ID of the DCF or model.
-        profile: a name of `choices.PROFILES`, None for the profile of all nodes.
+        device: EDS or DCF of the node, name of a model, or `FILE.py:Class` of a DeviceRTC.
+        node_id: node-ID 1..127, or `UNCONFIGURED`, or None to use the node-ID of the DCF or model.
+        profile: name of `choices.PROFILES`, or None to use the profile of all nodes.
     """
 
     device: Path | str
@@ -36,8 +36,8 @@ class NodeSpec:
 def parse_node(text: str) -> Iterator[NodeSpec]:
     """Read `5=a.eds`, `1-20=a.eds`, `5=epos`, `5=a.py:Class`, `lss=a.eds` or `a.dcf`.
 
-    ValueError for any other text. A name such as `epos` means the model, unless there is a file of
-    this name.
+    Any other text raises ValueError. A name such as `epos` means the model, unless a file of this
+    name exists.
 
     >>> [spec.node_id for spec in parse_node("5-7=a.eds")]
     [5, 6, 7]
@@ -53,7 +53,7 @@ def parse_node(text: str) -> Iterator[NodeSpec]:
 
 
 def parse_ids(what: str, text: str) -> Iterable[int]:
-    """Read a node-ID, a range of them, or `lss`."""
+    """Read a node-ID, a range of node-IDs, or `lss`."""
     if text == LSS:
         return (UNCONFIGURED,)
     match = _IDS.fullmatch(text)

@@ -41,7 +41,7 @@ class NodeSignal(Protocol):
         ...
 
     def check(self, value: Setting) -> Setting:
-        """Return the value that `write` would set; ValueError if it is not accepted."""
+        """Return the value that `write` would set; raise ValueError if it is not accepted."""
         ...
 
     def write(self, value: Setting) -> None:
@@ -49,7 +49,7 @@ class NodeSignal(Protocol):
 
 
 def object_name(dictionary: Dictionary, entry: Entry) -> str:
-    """Return the name of an entry: `0x6000:1`, a variable `0x1017`.
+    """Return the name of an entry, such as `0x6000:1`, or `0x1017` for a variable.
 
     The sub-index is decimal.
     """
@@ -60,7 +60,7 @@ def object_name(dictionary: Dictionary, entry: Entry) -> str:
 
 
 def find_object(dictionary: Dictionary, name: str) -> Entry | None:
-    """Return the entry of this name, None if there is none; `0x6000` is `0x6000:0`."""
+    """Return the entry with the name, or None if there is none; `0x6000` means `0x6000:0`."""
     match = _NAME.fullmatch(name)
     if match is None:
         return None
@@ -69,7 +69,7 @@ def find_object(dictionary: Dictionary, name: str) -> Entry | None:
 
 
 _DeferredCall = Callable[[Callable[[], None]], None]
-"""Schedules an action for the start of the node's next tick."""
+"""Function that schedules an action for the start of the node's next tick."""
 
 
 class ObjectSignal:
@@ -80,9 +80,9 @@ class ObjectSignal:
     is set here takes effect. The value changes at the start of the node's next tick.
 
     Args:
-        name: as returned by `object_name`.
-        entry: the object.
-        later: schedules the change.
+        name: name of the object, as returned by `object_name`.
+        entry: the object in the dictionary.
+        later: function that schedules the change.
     """
 
     def __init__(self, name: str, entry: Entry, defer: _DeferredCall) -> None:
@@ -119,7 +119,7 @@ class ObjectSignal:
         return value
 
     def write(self, value: Setting) -> None:
-        """Set the value; ValueError if its owner refuses it."""
+        """Set the value; raise ValueError if the owner of the object refuses the value."""
         entry, data = self._entry, self._encode(value)
         try:
             entry.check_owner(data)
@@ -143,7 +143,7 @@ class ObjectSignal:
         return data
 
     def _limits(self) -> tuple[float, float]:
-        """Return the limits of a number, or those of its type."""
+        """Return the limits of a number, or the limits of its data type."""
         low, high = _range(self._entry.data_type)
         entry = self._entry.description
         return low if entry.low is None else entry.low, high if entry.high is None else entry.high
@@ -171,7 +171,7 @@ def _range(data_type: DataType) -> tuple[float, float]:
 
 
 def _value(data_type: DataType, value: Setting) -> Value:
-    """Return the value in the form of the data type; FieldError if it does not fit."""
+    """Return the value in the form of the data type; raise FieldError if it does not fit."""
     if data_type in _TEXTS:
         return str(value)
     if _is_number(data_type):
@@ -196,8 +196,8 @@ class SwitchSignal:
 
     Args:
         name: name of the fault.
-        text: description for people.
-        switch: called with the new value.
+        text: description as readable text.
+        switch: function that is called with the new value.
     """
 
     def __init__(self, name: str, text: str, switch: Callable[[int], None]) -> None:
@@ -221,11 +221,11 @@ class SwitchSignal:
 
 
 class Emergency:
-    """An error seen by the application: the emergency error code, 0 after the end of the error.
+    """An error of the application, as emergency error code; 0 means the end of the error.
 
     Args:
         slave: the slave.
-        later: schedules the change.
+        later: function that schedules the change.
     """
 
     def __init__(self, slave: CanopenSlave, defer: _DeferredCall) -> None:
@@ -244,7 +244,7 @@ class Emergency:
         return value
 
     def write(self, value: Setting) -> None:
-        """Clear the previous error, raise this one."""
+        """Clear the previous error, and raise the new error."""
         old, self._code = self._code, self.check(value)
         if old and old != self._code:
             self._defer(partial(self._slave.emergency_clear, old))
@@ -258,7 +258,7 @@ class Quantity:
     Args:
         bank: the inputs of the node's application.
         item: the input.
-        on_change: called after each change.
+        on_change: function that is called after each change.
     """
 
     def __init__(
@@ -275,7 +275,7 @@ class Quantity:
         return self._bank.check(self.item.name, value)
 
     def write(self, value: Setting) -> None:
-        """Set the value; the device's next tick sees it."""
+        """Set the value, which takes effect in the device's next tick."""
         self._bank.set(self.item.name, value)
         self._on_change()
 
@@ -287,15 +287,15 @@ def _register_bit(code: int) -> int:
 
 
 OnSet = Callable[[str, Setting], None]
-"""Called with the name and value of each set signal."""
+"""Function that is called with the name and value of each set signal."""
 
 
 class NotedSignal:
     """A signal that reports its new values; see `NodeSignal`.
 
     Args:
-        signal: the signal.
-        note: called after each change.
+        signal: the signal itself.
+        note: function that is called after each change.
     """
 
     def __init__(self, signal: NodeSignal, note: OnSet) -> None:

@@ -19,7 +19,7 @@ _log = log_of(__name__)
 
 
 class StoreError(ValueError):
-    """The file is not a store file; it is not changed."""
+    """The file is not a store file; the file is not changed."""
 
 
 class StoreFile:
@@ -28,7 +28,7 @@ class StoreFile:
     The file is replaced as a whole, so it is never half written.
 
     Args:
-        path: the file; it may be missing.
+        path: path of the file, which may be missing.
 
     Raises:
         StoreError: the file has another format, or is damaged.
@@ -41,7 +41,7 @@ class StoreFile:
         self._written = self._versions()
 
     def nonvolatile(self, name: str, dictionary: Dictionary) -> Nonvolatile:
-        """Return the memory of a node, empty for a new one; the node changes it in place.
+        """Return the memory of a node, which the node changes in place; it is empty for a new node.
 
         Values that do not fit the dictionary, because the EDS has changed, are dropped.
         """
@@ -55,7 +55,7 @@ class StoreFile:
         """Write the file if a node has stored something; return whether the file was written.
 
         Raises:
-            OSError: the file cannot be written; the old file is kept.
+            OSError: the file cannot be written. The old file is kept.
         """
         versions = self._versions()
         if versions == self._written:

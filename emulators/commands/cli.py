@@ -62,7 +62,7 @@ DEMOS: Final = {
 @click.group(cls=LazyGroup, commands=DEMOS, invoke_without_command=True)
 @click.pass_context
 def demo(context: click.Context) -> None:
-    """Show an emulated device and a host at work; each ends by itself.
+    """Show an emulated device and a host at work; each demonstration ends by itself.
 
     Without a name, list the demonstrations.
 
@@ -85,15 +85,16 @@ def demo(context: click.Context) -> None:
 )
 @works_in("tickrig.emulators.commands.doctor:run_doctor")
 def doctor(**options: Any) -> None:
-    """See what of this machine tickrig can use, and what to do.
+    """Check what tickrig can use on this machine, and show what to do.
 
-    A row for each check: ok, note (it works, and there is something to know) or missing. It
-    looks at Python, packages and extras, groups, SocketCAN, ports and adapters, and how well the
-    machine keeps time. It needs no root, changes nothing, and ends within half a minute.
+    The table has a row for each check: ok, note (it works, and there is something to know) or
+    missing. The checks cover Python, packages and extras, groups, SocketCAN, ports and adapters,
+    and how well the machine keeps time. The command needs no root, changes nothing, and ends within
+    half a minute.
 
-    Exit status 0: all that is needed is there: Python 3.11 or newer, the packages of tickrig,
-    pseudo-terminals, and what --need names. 1: something needed is missing. All other rows are
-    for information.
+    The exit status is 0 if everything needed is there: Python 3.11 or newer, the packages of
+    tickrig, pseudo-terminals, and the checks that --need names. The exit status is 1 if something
+    needed is missing. All other rows are for information.
 
     \b
     tickrig doctor

@@ -29,7 +29,7 @@ _PATIENCE_S: Final = 1.0
 
 _Complete = Callable[[click.Context, click.Parameter, str], list[str]]
 _Names = Callable[[Any], Iterator[str]]
-"""Returns names from the answer of an emulator to `describe`."""
+"""Function that returns names from the answer of an emulator to `describe`."""
 
 
 def _buttons(described: Any) -> Iterator[str]:
@@ -38,7 +38,7 @@ def _buttons(described: Any) -> Iterator[str]:
 
 
 def faults(described: Any) -> Iterator[str]:
-    """Yield faults of the wire, then of the device."""
+    """Yield faults of the wire, then faults of the device."""
     yield from (each["name"] for each in described.get("wire_faults", ()))
     yield from (each["name"] for each in described.get("inputs", ()) if each["kind"] == "fault")
 
@@ -57,7 +57,7 @@ def _seen(described: Any) -> Iterator[str]:
 
 
 def _complete(names: _Names) -> _Complete:
-    """Return a completion function for these names."""
+    """Return a completion function for names."""
 
     def completed(context: click.Context, parameter: click.Parameter, begun: str) -> list[str]:
         assert context.parent is not None
@@ -150,8 +150,8 @@ def verb(
     """Return a decorator that makes a command from a function that returns its request fields.
 
     Args:
-        show: formats the answer as lines for people.
-        whom: the program that answers, for messages.
+        show: function that formats the answer as lines of text.
+        whom: name of the program that answers, for messages.
         settings: settings of the command.
     """
 
@@ -220,7 +220,7 @@ def press(name: str, duration: str) -> Object:
 @verb()
 @click.argument("spec", shell_complete=_complete(faults))
 def fault(spec: str) -> Object:
-    """Start a fault: NAME[=ARGUMENT[,ARGUMENT]][@FROM[-TO]], times since the start.
+    """Start a fault: NAME[=ARGUMENT[,ARGUMENT]][@FROM[-TO]]. Times count from the start.
 
     \b
     tickrig ctl /tmp/rrc.ctl fault flip=0.001
@@ -241,7 +241,7 @@ def clear(name: str) -> Object:
 
 @verb(_faults)
 def faults_() -> Object:
-    """List the faults: on or off, since when, how often each acted, its arguments.
+    """List the faults: on or off, start time, number of actions, arguments.
 
     \b
     tickrig ctl /tmp/rrc.ctl faults
@@ -300,7 +300,7 @@ def goal(x: float, y: float, deg: float) -> Object:
 @verb(whom=_CART)
 @click.argument("file", type=PATH, required=False)
 def path(file: Path | None) -> Object:
-    """Drive it along the points of FILE, as 'rh3 path', or along its defined path.
+    """Drive the cart along the points of FILE, as 'rh3 path', or along its defined path.
 
     \b
     tickrig ctl /tmp/cart path corners.txt

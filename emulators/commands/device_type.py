@@ -19,21 +19,22 @@ if TYPE_CHECKING:
     import click
 
 _SEED: Final = "seed"
-"""Key in traces for wire faults, which a replay does not need: it has the resulting traffic."""
+"""Key in traces for wire faults. A replay does not need it, because it has the resulting
+traffic."""
 
 _MEMBERS: Final = ("tick_us", "due_us", "reset", "tick", "inputs", "outputs", "read")
 """Interface of a device on a serial line (docs/howto/extending.md)."""
 
 
 def by_miniterm(link: str, baud: int) -> str:
-    """Return how to talk to a text-line device; miniterm comes with pyserial."""
+    """Return the command to talk to a device with text lines; miniterm comes with pyserial."""
     return f" Talk to it with\n  python -m serial.tools.miniterm --eol LF -e {link} {baud}"
 
 
 def _field_of_option(option: click.Option) -> DeviceField:
     """Return the field of a `click.Option`, which device types of tickrig 0.1 declare.
 
-    Types other than click's numbers and choices become texts.
+    A type that is not one of click's numbers and choices becomes a text.
     """
     kinds: dict[str, type[str | int | float]] = {"integer": int, "float": float}
     kind = bool if option.is_flag else kinds.get(option.type.name.partition(" ")[0], str)
@@ -57,23 +58,24 @@ class DeviceType:
     """A type of device on a serial line: an entry point of the group `tickrig.devices`.
 
     Attributes:
-        name: its name in traces and for `tickrig emu`.
-        title: title for people.
-        build: makes a device from the configuration in a trace; ValueError if the configuration is
-            invalid.
-        text: one sentence for `tickrig emu --help`.
-        fields: its options on its command line and in rig files; their values are the
-            configuration.
-        options: the options as click options, used before `fields` existed; they become fields.
-        configure: further processing of a command line; see `Configure`.
-        line: baud rate, wire faults, and the rule that splits the traffic for the log.
-        encoders: further verbs of its scenarios that send a line.
-        senders: the sending verbs of its scenarios, if the line carries no text.
-        is_event: selects the lines that -v shows.
-        panel: runs the operator panel until it is closed.
-        talk: returns the instructions for talking to the device at a path and a baud rate.
-        config_of: returns the configuration of a device made by a program, None if the device
-            cannot be rebuilt from a configuration.
+        name: name of the type in traces and for `tickrig emu`.
+        title: title as readable text.
+        build: function that makes a device from the configuration in a trace. It raises ValueError
+            if the configuration is invalid.
+        text: sentence for `tickrig emu --help`.
+        fields: options on the command line and in rig files. Their values are the configuration.
+        options: options as click options, which were used before `fields` existed. They become
+            fields.
+        configure: function for further processing of a command line; see `Configure`.
+        line: baud rate, wire faults, and rule that splits the traffic for the log.
+        encoders: further verbs of scenarios that send a line.
+        senders: sending verbs of scenarios, if the line does not carry text.
+        is_event: function that selects the lines that -v shows.
+        panel: function that runs the operator panel until it is closed.
+        talk: function that returns the instructions for talking to the device at a path and a baud
+            rate.
+        config_of: function that returns the configuration of a device made by a program, or None if
+            the device cannot be rebuilt from a configuration.
         user_code: `FILE.py:Class` whose errors are reported in one line, if the device runs such
             code.
     """
@@ -102,7 +104,7 @@ class DeviceType:
         """Make the device for a command line or a rig file.
 
         Args:
-            options: the values of the fields.
+            options: values of the fields.
             seed: seed of all random numbers.
 
         Raises:
@@ -125,13 +127,13 @@ class DeviceType:
         """Make the device on which a trace was recorded.
 
         Args:
-            config: its configuration in the trace.
+            config: configuration of the device in the trace.
 
         Returns:
             The device in its state at the start of the recording.
 
         Raises:
-            ValueError: invalid configuration.
+            ValueError: the configuration is invalid.
         """
         settings = {name: value for name, value in config.items() if name != _SEED}
         if self.configure is None:
@@ -145,9 +147,9 @@ class ConfiguredDevice:
     """A device as configured on a command line.
 
     Attributes:
-        type: its type, after changes by its options.
+        type: device type, after changes by its options.
         device: the device.
-        config: all its settings, for the trace.
+        config: all settings of the device, for the trace.
     """
 
     type: DeviceType
@@ -156,7 +158,7 @@ class ConfiguredDevice:
 
 
 Configure = Callable[[DeviceType, Mapping[str, Any], int], ConfiguredDevice]
-"""Makes a device from its type, its options and a seed."""
+"""Function that makes a device from its type, its options and a seed."""
 
 DEVICES: Final = ExtensionGroup[DeviceType](
     name="tickrig.devices",
@@ -179,12 +181,12 @@ def configure(name: str, config: Mapping[str, object], seed: int = 0) -> Configu
 
     Args:
         name: name of the device type.
-        config: values by the option names of command lines, without dashes; see `read_config`.
+        config: values by option name of the command line, without dashes; see `read_config`.
         seed: seed of the device's random numbers.
 
     Raises:
         ExtensionError: the type is unknown, or cannot be loaded.
-        ValueError: unknown field, or invalid value; the message starts with the field.
+        ValueError: a field is unknown, or a value is invalid. The message starts with the field.
 
     >>> configure("rtc-lite", {"node": "lite-a"}).config["node"]
     'lite-a'
@@ -194,7 +196,7 @@ def configure(name: str, config: Mapping[str, object], seed: int = 0) -> Configu
 
 
 def option_names(name: str) -> tuple[str, ...]:
-    """Return the options of a device type without their dashes; ExtensionError if it is unknown."""
+    """Return the options of a device type without dashes; ExtensionError if the type is unknown."""
     return tuple(field.word for field in DEVICES.load(name).fields)
 
 
@@ -206,7 +208,7 @@ def build_recorded(header: Header, *, run_code: bool = False) -> Emulated[bytes]
         run_code: whether to run a Python file that the trace names.
 
     Raises:
-        ValueError: unknown device type, or invalid configuration.
+        ValueError: the device type is unknown, or the configuration is invalid.
     """
     check_no_code(header.config.values(), run_code=run_code)
     if header.device not in DEVICES.built_in and header.device not in DEVICES.names():

@@ -1,4 +1,4 @@
-"""What of this machine tickrig can use: `tickrig doctor`.
+"""Checks of this machine for `tickrig doctor`: what tickrig can use.
 
 Each check is a probe. It reads files, opens devices that any user may open, and closes them again.
 No probe needs root. A probe that takes too long is abandoned. If a probe raises an exception, the
@@ -36,7 +36,7 @@ from tickrig.host.text.page_text import json_text, one_line
 
 
 class _CheckState(StrEnum):
-    """What a check found.
+    """Result of a check.
 
     Attributes:
         OK: the checked item exists.
@@ -56,8 +56,8 @@ class _CheckRow:
     Attributes:
         name: name of the check, as `--need` accepts it.
         state: result of the check.
-        found: description of the result, for people.
-        do: what the user has to do; empty if nothing.
+        found: description of the result as readable text.
+        do: text that tells the user what to do, or empty if there is nothing to do.
         needed: whether tickrig does not work here without the item, or `--need` names it.
     """
 
@@ -151,7 +151,7 @@ def _package_row(extra: str, wanted: Sequence[str]) -> _CheckRow:
 
 
 def _numbers(text: str) -> tuple[int, ...]:
-    """Return a version to be compared; what is behind its numbers does not count.
+    """Return a version for comparisons; the text after the numbers does not count.
 
     >>> _numbers("8.2.0rc1") < _numbers("8.10")
     True
@@ -166,7 +166,7 @@ def _numbers(text: str) -> tuple[int, ...]:
 # What the system has.
 
 _GROUPS: Final = ("dialout", "uucp")
-"""Who may open serial ports: of Debian and Fedora, of Arch."""
+"""Groups that may open serial ports, on Debian and Fedora, and on Arch."""
 _NET: Final = Path("/sys/class/net")
 _CAN: Final = "280"
 """The type of a CAN interface in `/sys/class/net` (ARPHRD_CAN)."""
@@ -177,7 +177,7 @@ _NO_SOCKETCAN: Final = (
 
 
 def _terminals() -> _Rows:
-    """Look for pseudo-terminals, where emulators are in real time."""
+    """Check for pseudo-terminals, where hosts reach emulators in real time."""
     if sys.platform == "win32":
         do = "emulators in real time run in WSL or a container: docs/howto/windows.md"
         yield _CheckRow("terminals", _NOTE, "Windows has no pseudo-terminals", do)
@@ -262,7 +262,7 @@ def _vcan() -> _Rows:
 
 
 def _guests() -> _Rows:
-    """Look for what `tools/with-vcan` and our CI run where the kernel has no SocketCAN."""
+    """Check for the virtual machine of `tools/with-vcan`, for a kernel without SocketCAN."""
     if sys.platform != "linux":
         return
     uml = which(os.environ.get("WITH_VCAN_UML", "linux.uml"))
@@ -310,7 +310,7 @@ found = can.detect_available_configs(sorted(set(can.VALID_INTERFACES) - others),
 print(json.dumps([[str(one["interface"]), str(one["channel"])] for one in found]), flush=True)
 os._exit(0)
 """
-"""In a process of its own, which ends though a driver hangs: python-can loads those of makers."""
+"""Program of a separate process that lists adapters; it can be ended if a vendor's driver hangs."""
 
 _ADAPTER_S: Final = 8.0
 
@@ -348,7 +348,7 @@ _FAIR_US: Final = 10_000
 
 
 def _jitter() -> _Rows:
-    """Wake up each millisecond for half a second, as a rig in real time does."""
+    """Measure delays: wake up each millisecond for half a second, as a rig in real time does."""
     late_us = []
     with keeping_time():
         due_ns = time.perf_counter_ns()
@@ -374,7 +374,7 @@ def _jitter() -> _Rows:
 
 @dataclass(frozen=True, slots=True)
 class _Probe:
-    """A check: what it is called if it has no row of its own, and how long it may take."""
+    """A check with its time-out, and with a name for a row if the check itself returns no row."""
 
     name: str
     look: Callable[[], _Rows]
@@ -397,7 +397,7 @@ _PROBES: Final = (
 
 
 def _rows_of(probe: _Probe) -> list[_CheckRow]:
-    """Return what a probe finds; one that takes too long, or fails, has a row that says so."""
+    """Return the rows of a probe; if it fails or takes too long, a row has the reason."""
     rows: list[_CheckRow] = []
 
     def look() -> None:
@@ -449,7 +449,7 @@ def run_doctor(*, as_json: bool, needs: Sequence[str]) -> int:
 
 
 def _lacks(rows: Sequence[_CheckRow], name: str, is_wanted: bool) -> bool:
-    """Return whether a needed check found nothing; of several ports one is enough."""
+    """Return whether a needed item is missing; if there are several ports, one is enough."""
     states = [row.state for row in rows if row.name == name and row.needed]
     if is_wanted and name in ("serial port", "can adapter"):
         return _OK not in states

@@ -1,4 +1,4 @@
-"""The command `tickrig emu`: all device types, built-in and of other packages."""
+"""The command `tickrig emu` for all device types, built-in or of other packages."""
 
 from __future__ import annotations
 
@@ -40,10 +40,10 @@ Together with --link, --serve or --control it is played in real time."""
 
 
 class _DeviceGroup(LazyGroup):
-    """Built-in command lines, and one generated for each device type of another package."""
+    """Built-in command lines, and a generated command line for each other device type."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Return the names, built-in ones first; report each device type that cannot be loaded."""
+        """Return the names, built-in names first; report each device type that cannot be loaded."""
         self.commands.update(
             (name, device_command(each))
             for name, each in run_options.device_types().load_foreign(say).items()
@@ -65,7 +65,7 @@ class _DeviceGroup(LazyGroup):
 
 
 def device_command(device_type: DeviceType) -> click.Command:
-    """Make the command line of a device type: its own options and the common ones."""
+    """Make the command line of a device type with its own options and the common options."""
     declared = {option.name: option for option in device_type.options}
 
     @run_options.device_options(field for field in device_type.fields if field.name not in declared)
@@ -89,7 +89,7 @@ def _inputs(device_type: DeviceType) -> Iterable[InputSignal]:
 
 @click.group(cls=_DeviceGroup, commands=_OURS)
 def emu() -> None:
-    """Emulate a built-in device or one of an installed package.
+    """Emulate a built-in device or a device of an installed package.
 
     \b
     tickrig emu rrc --link /tmp/rrc

@@ -1,4 +1,4 @@
-"""The command `tickrig new`: begin a package of one's own."""
+"""The command `tickrig new`: create a package that extends tickrig."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def new() -> None:
 def device(name: str, folder: Path, binary: bool) -> None:
     """Write the package of a device on a serial line into a new folder NAME.
 
-    It runs at once, and is yours to change:
+    The package runs at once, and you can change it:
 
     \b
     tickrig new device lamp
@@ -67,7 +67,7 @@ def device(name: str, folder: Path, binary: bool) -> None:
 
 
 def _write(place: Path, texts: Mapping[str, str]) -> None:
-    """Write the files of a package into its folder, which goes again if they cannot be written."""
+    """Write the files of a package into its folder; delete the folder if the write fails."""
     try:
         for path, text in texts.items():
             file = place / path
@@ -87,7 +87,7 @@ _OF_LINES: Final = {
     "fields": 'DeviceField(name="greeting", default="ready", help="What it says first."),',
     "line": "baud=115_200",
 }
-"""What stands in the device type of a device that answers lines."""
+"""Texts in the device type of a device that answers lines."""
 
 _OF_FRAMES: Final = {
     "imports": "from $module.frames import FRAMES\n",
@@ -98,11 +98,11 @@ _OF_FRAMES: Final = {
     """,
     "line": "baud=115_200, splitter=FRAMES",
 }
-"""What stands there if it answers frames with a length and a CRC."""
+"""Texts in the device type of a device that answers frames with a length and a CRC."""
 
 
 def files(name: str, module: str, *, binary: bool = False) -> dict[str, str]:
-    """Return the texts of a package by their paths in its folder.
+    """Return the texts of a package by path in its folder.
 
     Args:
         name: name of the device for `tickrig emu`.

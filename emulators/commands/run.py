@@ -40,7 +40,7 @@ class RunOptions:
 
     @property
     def in_real_time(self) -> bool:
-        """Whether it runs in real time."""
+        """Whether the emulator runs in real time."""
         raise NotImplementedError
 
 
@@ -48,10 +48,10 @@ _OptionsT = TypeVar("_OptionsT", bound=RunOptions)
 
 
 class EmulatorRun(ABC, Generic[_OptionsT]):
-    """One run.
+    """A run of emulated devices.
 
     Args:
-        options: the command line.
+        options: options of the command line.
     """
 
     def __init__(self, options: _OptionsT) -> None:
@@ -105,15 +105,15 @@ class EmulatorRun(ABC, Generic[_OptionsT]):
 
     @property
     def _ends_in_order(self) -> bool:
-        """Whether Ctrl-C ends the run as its own end does."""
+        """Whether Ctrl-C ends the run in the same way as the end of its duration."""
         return self._in_real_time
 
     def _show(self, bench: RunningEmulator) -> None:
-        """Show the run when it has ended, before all is given back."""
+        """Show the result of the run at its end, before the resources are released."""
 
     @abstractmethod
     def _make(self) -> tuple[Operator, ScenarioParser]:
-        """Make the devices, and all that faults and scenario are checked against; open nothing."""
+        """Make the devices, against which faults and scenario are checked; open nothing."""
 
     @abstractmethod
     def _open(self, stack: ExitStack) -> RunningEmulator:
@@ -121,7 +121,7 @@ class EmulatorRun(ABC, Generic[_OptionsT]):
 
     @abstractmethod
     def _greet(self, bench: RunningEmulator) -> None:
-        """Print its address and how to talk to it."""
+        """Print the address of the emulator and how to talk to it."""
 
     @abstractmethod
     def _attend(
@@ -142,12 +142,12 @@ class EmulatorRun(ABC, Generic[_OptionsT]):
             raise messages.Refused(str(error)) from None
 
     def _say_how(self, otherwise: str) -> None:
-        """Print how to operate it, or the option needed for that."""
+        """Print how to operate the emulator, or the option that is needed to operate it."""
         control = self._options.control
         messages.say(f"  tickrig ctl {control} describe" if control else otherwise)
 
     def _go_on(self, bench: RunningEmulator) -> None:
-        """Step until it is stopped."""
+        """Step until the emulator is stopped."""
         while bench.running and not self._stopped:
             bench.step()
 
@@ -189,7 +189,7 @@ def mistakes_in(specs: Iterable[object]) -> Iterator[None]:
     """Report in one line an exception of a callback in a user's file; re-raise others.
 
     Args:
-        specs: the devices; each `FILE.py:Class` is user code.
+        specs: specifications of the devices. Each `FILE.py:Class` is user code.
     """
     files = {spec.rpartition(":")[0]: spec for spec in specs if isinstance(spec, str)}
     try:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 _Faults = Callable[[click.Context], Iterable[str]]
-"""Returns the faults of a device with the options so far."""
+"""Function that returns the faults of a device with the options given before."""
 
 
 def device_options(fields: Iterable[DeviceField]) -> Decorator:
@@ -63,7 +63,7 @@ def run_options(wire_faults: str, device_faults: _Faults) -> Decorator:
 
     Args:
         wire_faults: names of wire faults, separated by commas.
-        device_faults: returns the names of device faults, for shell completion.
+        device_faults: function that returns the names of device faults, for shell completion.
     """
 
     def complete(context: click.Context, option: click.Parameter, begun: str) -> list[str]:
@@ -104,8 +104,8 @@ def line_options(wire_faults: str, inputs: str | Callable[[], Iterable[InputSign
 
     Args:
         wire_faults: names of wire faults, separated by commas.
-        inputs: returns the physical inputs of the device for shell completion, or is the place of
-            a table of them, `MODULE:NAME`.
+        inputs: function that returns the physical inputs of the device for shell completion, or the
+            place of a table of the inputs, `MODULE:NAME`.
     """
 
     def device_faults(context: click.Context) -> list[str]:
@@ -134,8 +134,8 @@ def run_named(name: str, options: Mapping[str, Any]) -> int:
     """Run a device for a command line, and return the exit status.
 
     Args:
-        name: name of one of `device_type.DEVICES`.
-        options: the options of the device, and those of `line_options`.
+        name: name of a device type in `device_type.DEVICES`.
+        options: options of the device, and options of `line_options`.
 
     Raises:
         Refused: the device cannot be run with these options.
@@ -159,9 +159,9 @@ def serial_command(
     The docstring of the decorated function is the help text; its body is empty.
 
     Args:
-        name: name of one of `device_type.DEVICES`.
+        name: name of a device type in `device_type.DEVICES`.
         fields: fields of the device.
-        inputs: place of the table of its physical inputs, as `MODULE:NAME`.
+        inputs: place of the table of physical inputs, as `MODULE:NAME`.
         wire_faults: names of wire faults, separated by commas.
         panel: whether the device has an operator panel.
     """
@@ -195,7 +195,7 @@ def type_option(text: str) -> Decorator:
     """Return a decorator that adds `--type NAME`, which the shell completes.
 
     Args:
-        text: its help.
+        text: help text of the option.
     """
     return click.option("--type", "type_name", default="", shell_complete=_complete, help=text)
 

@@ -43,7 +43,7 @@ class _Options(RunOptions):
 
     @property
     def in_real_time(self) -> bool:
-        """A scenario alone runs in virtual time."""
+        """Whether the run is in real time; a scenario alone runs in virtual time."""
         return not self.scenario or bool(self.link or self.serve or self.control or self.panel)
 
 
@@ -51,8 +51,8 @@ def run_device(device_type: DeviceType, options: Mapping[str, Any]) -> int:
     """Run a device for a command line, and return the exit status.
 
     Args:
-        device_type: its type.
-        options: all options: those of the type and those of `line_options`.
+        device_type: type of the device.
+        options: all options: options of the type and options of `line_options`.
 
     Raises:
         Refused: the options cannot be carried out.
@@ -70,11 +70,11 @@ def run_device(device_type: DeviceType, options: Mapping[str, Any]) -> int:
 
 
 class _SerialRun(EmulatorRun[_Options]):
-    """One run.
+    """A run of a device on a serial line.
 
     Args:
         configured: the device.
-        options: the command line.
+        options: options of the command line.
     """
 
     def __init__(self, configured: ConfiguredDevice, options: _Options) -> None:
@@ -125,7 +125,7 @@ class _SerialRun(EmulatorRun[_Options]):
         return self._emulator
 
     def _open_ports(self, stack: ExitStack) -> list[pty_port.PtyPort | NetworkPort]:
-        """Open the ports for hosts: a pty if requested or nothing else is."""
+        """Open the ports for hosts, with a pty if it is requested or if no other port is."""
         ports: list[pty_port.PtyPort | NetworkPort] = []
         if self._options.link or not self._urls:
             ports.append(self._open_pty(stack))
@@ -155,7 +155,7 @@ class _SerialRun(EmulatorRun[_Options]):
         return port
 
     def _show_setting(self, passes: bool, setting: str) -> None:
-        """Warn of different settings of host and device; a pty hides them, RFC 2217 does not."""
+        """Warn of different settings of host and device, which a pty hides and RFC 2217 shows."""
         if not self._options.panel and self._emulator is not None:
             own = self._emulator.line.b.uart.setting
             ends = "on a real line they would" if passes else "they do"

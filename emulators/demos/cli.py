@@ -1,4 +1,4 @@
-"""The commands of `tickrig demo`; the work of each stands in a module of its own."""
+"""The commands of `tickrig demo`; each command has a separate module for its work."""
 
 from __future__ import annotations
 
@@ -56,10 +56,10 @@ def rtc_lite(virtual: bool) -> None:
 def tkernel(no_caches: bool) -> None:
     """Let a robot keep its position by ucodes while the service that resolves them is gone.
 
-    A cart of Reference Hardware 3 with worn wheels drives along a corridor
-    with infra-red markers; a node on T-Kernel reads their ucodes. On the way
-    back the resolution service is unreachable, and the caches of the node go
-    on. In virtual time: the same lines each time.
+    A cart of Reference Hardware 3 with worn wheels drives along a corridor with infra-red markers;
+    a node on T-Kernel reads their ucodes. On the way back the resolution service is unreachable,
+    and the caches of the node replace it. The run is in virtual time and prints the same lines each
+    time.
 
     \b
     tickrig demo tkernel
@@ -91,9 +91,9 @@ def fig120(plot: Path | None, **options: Any) -> None:
 def follow(**options: Any) -> None:
     """Let two robots follow a preceding one (experiment A, Fig. 96).
 
-    A joystick drives Ref-Hard, Segway RMP follows Ref-Hard by its position, and
-    Omni-Wheel follows Segway RMP. In virtual time: the same lines each time. With
-    --control or --openrtm it runs in real time, and others change the connections.
+    A joystick drives Ref-Hard, Segway RMP follows Ref-Hard by its position, and Omni-Wheel follows
+    Segway RMP. The run is in virtual time and prints the same lines each time. With --control or
+    --openrtm it runs in real time, and other programs can change the connections.
 
     \b
     tickrig demo follow --plot follow.png
@@ -109,11 +109,10 @@ def follow(**options: Any) -> None:
 def leader(**options: Any) -> None:
     """Exchange leaders of two pairs of robots, remove a connection and join it again (B1).
 
-    Two joysticks drive Omni-Wheel and Segway RMP; Ref-Hard and BlackShip follow
-    them. The leaders are exchanged twice, then Ref-Hard's connection is removed,
-    and joined again (Figs. 98 and 99). In virtual time: the same lines each time.
-    With --control or --openrtm it runs in real time, and others change the
-    connections.
+    Two joysticks drive Omni-Wheel and Segway RMP; Ref-Hard and BlackShip follow them. The leaders
+    are exchanged twice, then Ref-Hard's connection is removed, and joined again (Figs. 98 and 99).
+    The run is in virtual time and prints the same lines each time. With --control or --openrtm it
+    runs in real time, and other programs can change the connections.
 
     \b
     tickrig demo leader --plot leader.png
@@ -129,11 +128,11 @@ def leader(**options: Any) -> None:
 def four(**options: Any) -> None:
     """Drive four robots with one joystick, then each with any (B2, Figs. 91 and 101).
 
-    It begins as B1 ends. All connections that command a robot are removed, and
-    the robots stop. Then one joystick is connected to all four, and later two of
-    them are given to the other joystick. In virtual time: the same lines each
-    time. With --control or --openrtm it runs in real time, and others change the
-    connections.
+    The experiment begins with the connections at the end of B1. All connections that command a
+    robot are removed, and the robots stop. Then one joystick is connected to all four, and later
+    two of them are given to the other joystick. The run is in virtual time and prints the same
+    lines each time. With --control or --openrtm it runs in real time, and other programs can change
+    the connections.
 
     \b
     tickrig demo four --plot four.png
@@ -147,9 +146,9 @@ def four(**options: Any) -> None:
 def joystick(**options: Any) -> None:
     """Drive two robots of different make with one joystick (Fig. 92).
 
-    The joystick writes RTC::TimedVelocity of phase 1 to Ref-Hard on two wheels and
-    to Omni-Wheel. In virtual time: the same lines each time. With --control or
-    --openrtm it runs in real time, and others change the connections.
+    The joystick writes RTC::TimedVelocity of phase 1 to Ref-Hard on two wheels and to Omni-Wheel.
+    The run is in virtual time and prints the same lines each time. With --control or --openrtm it
+    runs in real time, and other programs can change the connections.
 
     \b
     tickrig demo joystick --plot joystick.png
@@ -164,8 +163,8 @@ def joystick(**options: Any) -> None:
 def rh3(plot: Path | None) -> None:
     """Let a cart of Reference Hardware 3 drive to a goal, and along a path.
 
-    PositionInput sends a goal, then the square that it has as its path; the cart
-    stands on rough ground. In virtual time: the same lines each time.
+    PositionInput sends a goal, then the square that it has as its path; the cart stands on rough
+    ground. The run is in virtual time and prints the same lines each time.
 
     \b
     tickrig demo rh3
@@ -179,9 +178,8 @@ def rh3(plot: Path | None) -> None:
 def beego(plot: Path | None) -> None:
     """Drive beego, two CANopen drives at its wheels, with a joystick.
 
-    The server of RTC-CANopen starts two emulated EPOS as proxies; a joystick
-    drives straight on, along an arc and on the spot. In virtual time: the same
-    lines each time.
+    The server of RTC-CANopen starts two emulated EPOS as proxies; a joystick drives straight on,
+    along an arc and on the spot. The run is in virtual time and prints the same lines each time.
 
     \b
     tickrig demo beego
@@ -195,9 +193,9 @@ def beego(plot: Path | None) -> None:
 def fourx(plot: Path | None) -> None:
     """Drive FourX, four motor core units at its wheels, with a joystick.
 
-    The server of RTC-CANopen starts four emulated motor core units as proxies; a
-    joystick drives straight on, along an arc and on the spot. In virtual time: the
-    same lines each time.
+    The server of RTC-CANopen starts four emulated motor core units as proxies; a joystick drives
+    straight on, along an arc and on the spot. The run is in virtual time and prints the same lines
+    each time.
 
     \b
     tickrig demo fourx

@@ -39,13 +39,13 @@ _SECOND_US: Final = 1_000_000
 _ROW_US: Final = 2 * _SECOND_US
 _RATE_HZ: Final = 50.0
 _PATIENT: Final = "3600"
-"""Seconds: a follower whose leader is silent goes on to where it saw it last, and waits there."""
+"""Seconds for which a follower waits at the last position of a silent leader."""
 
 _Echo = Callable[[str], None]
 
 
 class _Push(NamedTuple):
-    """How a stick is held for some time; 1.0 is as far as it goes."""
+    """Position of a stick for some time; 1.0 is the end of its travel."""
 
     duration_s: float
     forward: float = 0.0
@@ -58,8 +58,8 @@ class _Act(NamedTuple):
 
     Attributes:
         at_s: time of the change, in s.
-        text: description for people.
-        steps: words of `tickrig rtc`; `{pose0}`, `{base0}` are ports of robot 0.
+        text: description as readable text.
+        steps: words of `tickrig rtc`, in which `{pose0}`, `{base0}` are ports of robot 0.
     """
 
     at_s: float
@@ -77,11 +77,12 @@ class Experiment:
             port names.
         omni: name and first pose of the robot on omni wheels, which has the next number.
         sticks: motions of each joystick, which are repeated.
-        driven: joysticks by the robot that they drive at first.
-        followed: leaders by their follower, at first.
-        acts: the changes; the last one ends the experiment.
+        driven: joysticks by name of the robot that each of them drives at first.
+        followed: leaders by name of the follower, at first.
+        acts: the changes. The last change ends the experiment.
         phase: phase of the common interface between joysticks and robots.
-        controlled: robots that a joystick can be connected to; by default all in `driven`.
+        controlled: robots that a joystick can be connected to. The default is all robots in
+            `driven`.
     """
 
     title: str
@@ -101,7 +102,7 @@ class Experiment:
 
 
 _ROUND: Final = (_Push(7, 1.0), _Push(5.2, 1.0, 1.0))
-"""Along a square with round corners."""
+"""Motion along a square with round corners."""
 
 FOLLOW: Final = Experiment(
     "Experiment A: two robots follow a preceding one (Fig. 96)",
@@ -209,13 +210,13 @@ JOYSTICK: Final = Experiment(
 
 
 class _Program:
-    """A hand that pushes a stick as a table says, again and again."""
+    """A simulated hand that pushes a stick according to a table, repeatedly."""
 
     def __init__(self, pushes: tuple[_Push, ...]) -> None:
         self._pushes, self._ends_s = pushes, list(accumulate(push.duration_s for push in pushes))
 
     def poll(self, now_us: int, /) -> StickPosition:
-        """Return where it pushes."""
+        """Return the position of the stick."""
         at_s = now_us / _SECOND_US % self._ends_s[-1]
         push = next(
             push for push, end_s in zip(self._pushes, self._ends_s, strict=True) if at_s < end_s
@@ -223,7 +224,7 @@ class _Program:
         return StickPosition(push.forward, push.left, push.turn)
 
     def close(self) -> None:
-        """Nothing is open."""
+        """Do nothing, because nothing is open."""
 
 
 class ConvoyRun:
@@ -231,8 +232,8 @@ class ConvoyRun:
 
     Args:
         experiment: the experiment.
-        echo: receives a line of the table each 2 s.
-        clock: clock of a run in real time; without it the run is in virtual time.
+        echo: function that receives a line of the table every 2 s.
+        clock: clock of a run in real time. Without a clock the run is in virtual time.
 
     Attributes:
         convoy: the robots.
@@ -265,7 +266,7 @@ class ConvoyRun:
         }
 
     def begin(self) -> None:
-        """Print the head of the table, and where the robots stand."""
+        """Print the head of the table, and the positions of the robots."""
         self._echo(f"  time s{''.join(f'{name:>16}' for name in self._experiment.names)}")
         self.look(0)
 
@@ -281,7 +282,7 @@ class ConvoyRun:
                 self.look(loop.now_us)
 
     def change(self, act: _Act) -> None:
-        """Change connectors, and say how a tool does the same."""
+        """Change connectors, and print the commands that do the same."""
         self._echo(f"\n{act.at_s:8.1f}  {act.text}")
         for step in act.steps:
             words = step.format_map(self.ports)
@@ -293,7 +294,7 @@ class ConvoyRun:
             self.marks.append(Mark(act.at_s, act.text))
 
     def look(self, now_us: int) -> None:
-        """Note where the robots are, and what others have connected."""
+        """Record the positions of the robots, and the changes of connectors by other programs."""
         poses = [robot.true_pose for robot in self.convoy.robots]
         leaders = dict(self._followed())
         for number, control in self._controls.items():
@@ -319,7 +320,7 @@ class ConvoyRun:
             self._echo(f"{now_us / _SECOND_US:8.1f}{places}")
 
     def _note_connectors(self, now_s: float) -> None:
-        """Make a mark where connectors differ from those of the look before."""
+        """Make a mark if the connectors have changed since the previous sample."""
         connected = frozenset(it.ports for it in self.convoy.loop.manager.connectors)
         before, self._connected = self._connected, connected
         if before is None or before == connected or self._played:
@@ -330,7 +331,7 @@ class ConvoyRun:
         self._echo(f"\n{now_s:8.1f}  {', '.join(changes)}")
 
     def _followed(self) -> Iterator[tuple[int, int]]:
-        """Yield followers and their leaders, as they are connected now."""
+        """Yield the followers and leaders that are connected now."""
         for number in self._experiment.followed:
             port = self.convoy.loop.manager.port(f"Follower{number}.leader")
             for connector in port.connectors:

@@ -54,7 +54,7 @@ class CurveSample(NamedTuple):
 
     @property
     def reference_deg(self) -> float:
-        """The reference in degrees, at the full scale that 2010h:01 has at power-on."""
+        """The reference in degrees, with the full scale that 2010h:01 has at power-on."""
         return self.reference * _FULL_SCALE_DEG / _FULL_SCALE
 
 
@@ -125,15 +125,15 @@ _OFF: Final = 1 << 31
 
 @dataclass(frozen=True, slots=True)
 class _Write:
-    """One expedited SDO download.
+    """An expedited SDO download.
 
     Attributes:
-        node_id: the server.
+        node_id: node-ID of the server.
         index: index of the object.
         sub: sub-index of the object.
         value: the written value.
         size: size of the value in bytes.
-        text: purpose of the download, for people.
+        text: purpose of the download, as readable text.
     """
 
     node_id: int
@@ -165,10 +165,10 @@ _WRITES: Final = (
     _Write(MOTOR, 0x1401, 2, 255, 1, "act on reception"),
     _Write(MOTOR, 0x1401, 1, LINK, 4, "RPDO2 on: the link is made"),
 )
-"""In this order (NEDO report, 3.4.43.3, Fig. 120: PDO linking)."""
+"""The downloads in the order of the NEDO report (3.4.43.3, Fig. 120: PDO linking)."""
 
 _PATIENCE_S: Final = 30.0
-"""How long an SDO answer may take on a busy machine; the library waits 0.3 s and tries once."""
+"""Time-out of an SDO answer on a busy machine; the library waits 0.3 s and tries once."""
 
 _START_ORDER: Final = (MOTOR, PALETTE)
 
@@ -197,7 +197,7 @@ def set_up(network: canopen.Network) -> None:
 
 BIT_RATE: Final = 1_000_000
 CAST: Final = {PALETTE: "f-palette", MOTOR: "motor-core-unit"}
-"""Which model has which node-ID."""
+"""Models by node-ID."""
 
 _EMULATOR: Final = "tickrig.emulators.canopen.cli"
 
@@ -238,7 +238,7 @@ class VirtualStage:
 
 
 class _BusStage:
-    """An emulator in a process of its own on a bus of python-can, in real time."""
+    """An emulator in a separate process on a bus of python-can, in real time."""
 
     step_us = 20_000
 
@@ -255,14 +255,14 @@ class _BusStage:
         time.sleep(max(0, at_us - self.now_us) / 1e6)
 
     def get(self, name: str) -> Setting:
-        """Ask the emulator."""
+        """Read the value of a signal from the emulator."""
         values = self._hand.request("get", names=[name])["values"]
         assert isinstance(values, dict)
         value: Setting = values[name]
         return value
 
     def set(self, name: str, value: Setting) -> None:
-        """Tell the emulator."""
+        """Set a signal in the emulator."""
         self._hand.request("set", name=name, value=value)
 
 
@@ -278,7 +278,7 @@ def bus_stage(
 
     Args:
         arguments: arguments of a command line that select the bus.
-        open_bus: opens the same bus.
+        open_bus: function that opens the same bus.
 
     Raises:
         RuntimeError: the emulator does not start.
@@ -307,7 +307,7 @@ _STEP_US: Final = 600_000
 _TURN_US: Final = 2_000_000
 _REST_US: Final = 300_000
 _PERIOD_US: Final = 100_000
-"""A line of the table each tenth of a second."""
+"""Period of the lines of the table, a tenth of a second."""
 
 _POTENTIOMETER: Final = f"{PALETTE}/ai1_v"
 _REFERENCE: Final = f"{MOTOR}/0x6411:1"
@@ -321,9 +321,10 @@ class _Act:
     """A part of the demonstration.
 
     Attributes:
-        title: description for people.
+        title: description as readable text.
         duration_us: duration of the act.
-        volts: returns the voltage of the potentiometer for the elapsed share of the act, 0..1.
+        volts: function that returns the voltage of the potentiometer for the elapsed share of the
+            act, 0..1.
         is_step: whether the shaft arrives within the act.
     """
 
@@ -352,7 +353,7 @@ def _turned_back(done: float) -> float:
 
 
 def run_demo(stage: _Fig120Stage, echo: _Echo) -> list[CurveSample]:
-    """Play it.
+    """Play the demonstration.
 
     Returns:
         All samples.
@@ -398,7 +399,7 @@ def _turn(stage: _Fig120Stage, echo: _Echo) -> list[CurveSample]:
 
 
 def _arrival(samples: list[CurveSample]) -> str:
-    """Return where the shaft rests, and when it came within 0.01 deg of the last reference."""
+    """Return the final angle, and the time at which it came within 0.01 deg of the reference."""
     wanted = samples[-1].reference_deg
     late = [sample for sample in samples if abs(sample.angle_deg - wanted) > _AT_REST_DEG]
     after_s = (late[-1].time_s if late else samples[0].time_s) - samples[0].time_s

@@ -38,7 +38,7 @@ _GOAL: Final = Pose(1.5, 0.5, 1.57)
 
 
 def drive_rh3(echo: _Echo) -> RobotTrack:
-    """Drive a cart to a goal and along a path; print how well it went."""
+    """Drive a cart to a goal and along a path; print the deviations."""
     loop = ClosedLoop(BaseParameters(noise=0.05, seed=7))
     start(loop)
     track, chain, planned = RobotTrack("RH3"), loop.chain, list[Pose]()
@@ -67,7 +67,7 @@ def drive_rh3(echo: _Echo) -> RobotTrack:
 # beego and FourX: a joystick, a base as an RT component, and proxies of what its wheels have.
 
 _WAY: Final = ((0, 0, 1), (60, 0, 4), (40, 50, 4), (60, 0, 2), (0, -100, 2), (60, 0, 2), (0, 0, 1))
-"""How the joystick is held: forward and to the left in %, and for how many seconds."""
+"""Positions of the joystick: forward and to the left in %, and duration in seconds."""
 
 
 def drive_beego(echo: _Echo) -> RobotTrack:
@@ -118,7 +118,7 @@ def _place(pose: Pose) -> str:
 
 
 def _device_files(definition: SystemDefinition) -> dict[str, DeviceFile]:
-    """Read what the EDS files of a definition say, which an installation does not have."""
+    """Read the data of the EDS files of a definition, which an installation does not have."""
     files = {}
     with TemporaryDirectory() as folder:
         for name in {node.eds for node in definition.nodes}:

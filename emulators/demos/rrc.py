@@ -1,4 +1,4 @@
-"""`tickrig demo rrc`: an RRC on a pty, driven by the host client, with what is on the wire."""
+"""`tickrig demo rrc`: an RRC on a pty, driven by the host client, with a display of the traffic."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ from tickrig.wire.rrc.replies import RrcEvent
 
 _Echo = Callable[[str], None]
 _Request = Callable[..., Object]
-"""Makes a request to the emulator, as `ControlClient.request`."""
+"""Function that makes a request to the emulator, as `ControlClient.request`."""
 
 _PATIENCE_US: Final = 30_000_000
-"""How long an answer or an event may take on a busy machine."""
+"""Time-out of an answer or an event on a busy machine."""
 
 _MAX_REFUSALS: Final = 1_000
-"""Renewals of a watchdog are refused while the event that ended it is still on its way."""
+"""Largest number of refused renewals of a watchdog, before the event that ended it arrives."""
 
 _STATUS_SHOWN: Final = 2
-"""So many status lines in a row are printed; the rest is counted."""
+"""Number of status lines in a row that are printed; further lines are counted."""
 
 
 class _AnswerSample(NamedTuple):
-    """One of the nine sample commands of the manual's test procedure."""
+    """A sample command of the manual's test procedure, which has nine."""
 
     command: cmd.Command
     effect: str
@@ -63,7 +63,7 @@ _MEANING: Final = {
 
 
 class _DemoTranscript:
-    """A `Link[bytes]` that prints each line that passes through another."""
+    """A `Link[bytes]` that prints each line that passes through another link."""
 
     def __init__(self, link: Link[bytes], echo: _Echo) -> None:
         self._link, self._echo, self._start_us = link, echo, link.now_us
@@ -75,13 +75,13 @@ class _DemoTranscript:
         return self._link.now_us
 
     def send(self, traffic: bytes, /) -> None:
-        """Send and print."""
+        """Send and print data."""
         self._link.send(traffic)
         for line in self._sent.push(traffic):
             self._print(">", line.decode("latin-1"))
 
     def receive(self, timeout_us: int, /) -> bytes:
-        """Receive and print; of many status lines only the first."""
+        """Receive and print lines, but only the first of many status lines."""
         data = self._link.receive(timeout_us)
         for line in self._received.push(data):
             self._statuses = self._statuses + 1 if line.startswith(b"SA:") else 0
@@ -104,7 +104,7 @@ def run_demo(echo: _Echo) -> None:
 
     Raises:
         RuntimeError: the emulator does not start.
-        LinkError, DeviceRefused: something went wrong on the way.
+        LinkError, DeviceRefused: the link or the device has reported an error.
     """
     with (
         running("tickrig.emulators.rrc.cli") as child,
@@ -115,10 +115,10 @@ def run_demo(echo: _Echo) -> None:
 
 
 def play(link: Link[bytes], request: _Request, echo: _Echo) -> None:
-    """Run the demonstration on an emulator that is there.
+    """Run the demonstration on an existing emulator.
 
     Raises:
-        LinkError, DeviceRefused: something went wrong on the way.
+        LinkError, DeviceRefused: the link or the device has reported an error.
     """
     echo("> is what the host sends, < what the RRC answers, with the time in seconds.")
     transcript = _DemoTranscript(link, echo)

@@ -29,12 +29,12 @@ from tickrig.host.rtc.system.schedule import RealTime
 # Where the demonstration is played: two devices on ptys in real time, or a rig in virtual time.
 
 NODES: Final = {"LiteA": "lite-a", "LiteB": "lite-b"}
-"""Which node plays which part."""
+"""Names of the nodes by name of the proxy."""
 
 _BAUD: Final = 57_600
 _EMULATOR: Final = "tickrig.emulators.rtc_lite.cli"
 _PATIENCE_S: Final = 30.0
-"""How long an emulator may take to answer on a busy machine."""
+"""Time-out of an answer of an emulator on a busy machine."""
 
 _POWER_CUT: Final = "power_cut"
 
@@ -60,12 +60,12 @@ class VirtualSetup:
         self.manager.tick(self._rig.now_us)
 
     def power(self, name: str, *, on: bool) -> None:
-        """Cut or give the power of a node."""
+        """Switch the power of a node."""
         self._nodes[name].inputs.set(_POWER_CUT, 0 if on else 1)
 
 
 class _PtySetup:
-    """Emulators in processes of their own, each on a pseudo-terminal, in real time."""
+    """Emulators in separate processes, each on a pseudo-terminal, in real time."""
 
     def __init__(
         self,
@@ -81,7 +81,7 @@ class _PtySetup:
         self._runner.step()
 
     def power(self, name: str, *, on: bool) -> None:
-        """Tell the emulator."""
+        """Switch the power of a node in its emulator."""
         if on:
             self._controls[name].request("clear", name=_POWER_CUT)
         else:
@@ -118,7 +118,7 @@ _RATE_HZ: Final = 10.0
 _NUMBERS: Final = (1, -5, 2_147_483_647)
 _LAST: Final = 42
 _PATIENCE_US: Final = 60_000_000
-"""The longest that a chapter may take, on a machine so busy that it has to recover repeatedly."""
+"""Longest duration of a chapter, on a machine so busy that the system recovers repeatedly."""
 
 _LOST: Final = "LiteA0"
 """The proxy of the device whose power is cut."""
@@ -219,7 +219,7 @@ class _DemoRun:
                 self._source.enter(number)
 
     def _arrives(self, number: int) -> bool:
-        """Wait for a number; return False if a component is no longer Active before it comes."""
+        """Wait for a number; return False if a component leaves Active before it comes."""
         received = self._sink.received
         self._run_until(
             lambda: any(value.data == number for value in received) or not self._active(_CHAIN)
@@ -248,7 +248,7 @@ class _DemoRun:
         self._show_system()
 
     def _restore(self, *names: str) -> None:
-        """Reset components in Error, join and activate what is Inactive, until all are Active."""
+        """Reset components in Error, and join and activate Inactive ones, until all are Active."""
         names = names or _CHAIN
 
         def restored() -> bool:

@@ -1,4 +1,4 @@
-"""What the commands of `tickrig demo` do on the terminal; each loads no other demonstration."""
+"""The work of the commands of `tickrig demo`; no command loads another demonstration."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def _run_experiment(
 def _serve(
     experiment: experiments.Experiment, control: Path | None, engines: EngineOptions
 ) -> experiments.ConvoyRun:
-    """Run an experiment in real time until Ctrl-C; others change its connectors.
+    """Run an experiment in real time until Ctrl-C; other programs can change its connectors.
 
     Raises:
         Refused: an engine or the control socket cannot be opened.
@@ -156,7 +156,7 @@ def _run_robot(
 def _draw(
     plot: Path | None, shown: Sequence[tracks.RobotTrack], marks: Sequence[tracks.Mark], title: str
 ) -> None:
-    """Draw what robots did, if a file for it is named."""
+    """Draw the motions of robots, if a file for the picture is given."""
     if plot is None:
         return
     try:
@@ -167,7 +167,7 @@ def _draw(
 
 
 def show_fig120(plot: Path | None, **options: Any) -> None:
-    """Run the demonstration of Fig. 120, and draw its curves into a file."""
+    """Run the demonstration of Fig. 120, and draw its curves to a file, if one is given."""
     if plot is not None:
         picture.check_plot(plot)
     samples = _play(BusOptions(**options))

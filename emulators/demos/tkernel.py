@@ -35,9 +35,9 @@ class Estimate:
 
     Attributes:
         range_m: range of the reader.
-        x_m: estimated position, x.
-        y_m: estimated position, y, to the left of x.
-        fixes: how often a place has corrected the estimate.
+        x_m: estimated position in x.
+        y_m: estimated position in y, which is to the left of x.
+        fixes: number of corrections of the estimate by a place.
     """
 
     range_m: float
@@ -46,7 +46,7 @@ class Estimate:
     fixes: int = 0
 
     def move(self, dx_m: float, dy_m: float) -> None:
-        """Go on as the odometry did."""
+        """Move the estimate by the motion that the odometry has measured."""
         self.x_m += dx_m
         self.y_m += dy_m
 
@@ -60,31 +60,32 @@ class Estimate:
         self.fixes += 1
 
     def error_m(self, x_m: float, y_m: float) -> float:
-        """Return how far it is off."""
+        """Return the distance between the estimate and a position."""
         return hypot(self.x_m - x_m, self.y_m - y_m)
 
 
 # The stage: a cart in a corridor with markers, the node that it carries, the service.
 
 _LENGTH_M: Final = 8.0
-"""The way of the cart along the corridor."""
+"""Length of the cart's path along the corridor."""
 
 _BACK_M: Final = 3.0
-"""Where it comes back to: further on are markers that it has not seen before."""
+"""Position at which the way back ends; further markers have not been read before."""
 
 _SPACING_M: Final = 2.0
 _ASIDE_M: Final = 1.0
-"""How far the markers are beside that way."""
+"""Distance of the markers from the path."""
 
 _WORN: Final = 1.12
-"""Wheels and tread are 12 % more than the odometry knows: it errs on the way, not when turning."""
+"""Ratio of the true wheels and tread to those of the odometry, which is wrong in distance, not in
+turns."""
 
 _BASE: Final = "http://127.0.0.1:8640"
 _WIDE: Final = {"dataport.buffer.length": "64"}
 
 
 def _corridor() -> tuple[tuple[Marker, ...], UcodeTable]:
-    """Return markers each 2 m, on both sides in turn, and what is known of them."""
+    """Return markers every 2 m, on both sides in turn, and a table with their places."""
     places = [
         (_SPACING_M * number, -_ASIDE_M if number % 2 else _ASIDE_M) for number in range(-1, 7)
     ]
@@ -101,12 +102,12 @@ class _MountedReader(Mounted):
     """A reader in the middle of the axle.
 
     Args:
-        base: the base that carries the reader.
+        base: base that carries the reader.
         markers: the markers in the surroundings.
 
     Attributes:
         reader: the reader.
-        line: its line; `b` is the host's end.
+        line: line of the reader. Its end `b` is the host's end.
         station: the reader on its line.
     """
 
@@ -115,7 +116,7 @@ class _MountedReader(Mounted):
         self.station: Station[bytes] = Station(self.reader, self.line.a)
 
     def act(self, now_us: int, /) -> None:
-        """Put the reader where the base has taken it."""
+        """Set the pose of the reader from the pose of the base."""
         for name in PLACE:
             if self.reader.inputs[name] != (value := self._base.read(name)):
                 self.reader.inputs.set(name, value)
@@ -154,7 +155,7 @@ class CorridorStage:
 
     @property
     def error_m(self) -> float:
-        """How far off it believes to be."""
+        """Distance between the estimated and the true position."""
         return self.estimate.error_m(self.loop.pose.x, self.loop.pose.y)
 
     def lookup(self, name: str) -> Lookup[Any]:
@@ -165,7 +166,7 @@ class CorridorStage:
         return component
 
     def run_to(self, t_us: int) -> None:
-        """Go on to a time, and believe what was learned."""
+        """Run to a time, and update the estimate."""
         self.loop.run_to(t_us)
         pose = self.loop.chain.odometry.pose
         self.estimate.move(pose.x - self._odometry.x, pose.y - self._odometry.y)
@@ -174,7 +175,7 @@ class CorridorStage:
             self._fix()
 
     def _fix(self) -> None:
-        """Believe the places that were found; a place is that of the latest round."""
+        """Correct the estimate by the places that were found in the latest round."""
         ucodes, levels, places, points = self._probes
         for found, levels_pct in zip(_taken(ucodes), _taken(levels), strict=True):
             self._round = dict(zip(found.data, levels_pct.data, strict=True))
@@ -208,7 +209,7 @@ class CorridorStage:
 
 
 def _taken(port: InPort[Any]) -> list[Any]:
-    """Take all new values of a port."""
+    """Return all new values of a port."""
     taken = []
     while port.is_new:
         taken.append(port.read())
@@ -221,12 +222,12 @@ _Echo = Callable[[str], None]
 
 _SECOND_US: Final = 1_000_000
 _STEP_US: Final = 100_000
-"""How often the robot looks: as often as the reader tells."""
+"""Period of the robot, which is the period of the reader."""
 
 _ROW_US: Final = 2 * _SECOND_US
 _BOOTED_US: Final = 4 * _SECOND_US
 _LEG_US: Final = 60 * _SECOND_US
-"""More than a way along the corridor takes."""
+"""Time limit for a drive along the corridor."""
 
 _NEAR_M: Final = 0.02
 _HEAD: Final = "   time   x true   x odometry   x believed   off     hits stale misses failures"
@@ -254,10 +255,10 @@ def run_demo(stage: CorridorStage, echo: _Echo) -> list[Moment]:
 
     Args:
         stage: the stage, which has not run yet.
-        echo: receives lines for people.
+        echo: function that receives lines of text.
 
     Returns:
-        The state each 100 ms, from the first step on.
+        The states every 100 ms, from the first step on.
     """
     moments: list[Moment] = []
     stage.loop.activate("tuned")

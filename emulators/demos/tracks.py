@@ -1,4 +1,4 @@
-"""What robots of a demonstration did: planned and driven paths, and speeds, as a picture."""
+"""Motions of robots in a demonstration as a picture: planned and driven paths, and speeds."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LOOK_US: Final = 100_000
-"""From one look at the robots to the next."""
+"""Period of the samples."""
 
 _COLOURS: Final = ("tab:blue", "tab:orange", "tab:green", "tab:red")
 _NEVER: Final = Pose(nan, nan, nan)
-"""Interrupts a line of the picture."""
+"""Pose that interrupts a line of the picture."""
 
 
 class RobotSample(NamedTuple):
     """A robot at one time.
 
     Attributes:
-        time_s: since the start.
+        time_s: time since the start, in s.
         pose: pose of the robot.
-        planned: commanded pose; None without a command.
-        gap_m: distance to the robot that it follows; None if it does not follow a robot.
+        planned: commanded pose, or None without a command.
+        gap_m: distance to the robot that it follows, in m, or None if it does not follow a robot.
     """
 
     time_s: float
@@ -40,7 +40,7 @@ class RobotSample(NamedTuple):
 
     @property
     def gap(self) -> float:
-        """The same for a curve, which NaN interrupts."""
+        """The gap for a curve, with NaN (an interruption) in place of None."""
         return nan if self.gap_m is None else self.gap_m
 
 
@@ -50,7 +50,7 @@ class RobotTrack:
 
     Attributes:
         name: name of the robot.
-        looks: samples of the robot, one each `LOOK_US`.
+        looks: samples of the robot, one sample every `LOOK_US`.
         corners: corners of the planned path, if the path is known before the run. Otherwise `looks`
             contain the path.
     """
@@ -61,11 +61,11 @@ class RobotTrack:
 
     @property
     def planned(self) -> Sequence[Pose]:
-        """The planned path; a pose of NaN interrupts it."""
+        """The planned path, which a pose of NaN interrupts."""
         return self.corners or [look.planned or _NEVER for look in self.looks]
 
     def speeds(self) -> Iterator[tuple[float, float, float]]:
-        """Yield time in s, speed in m/s and turning in rad/s between looks."""
+        """Yield time in s, speed in m/s and turning rate in rad/s between samples."""
         for before, now in pairwise(self.looks):
             step_s = now.time_s - before.time_s
             way_m = before.pose.distance(now.pose)
@@ -78,8 +78,8 @@ class Mark(NamedTuple):
     """A moment at which something was changed.
 
     Attributes:
-        time_s: since the start.
-        text: what was changed.
+        time_s: time since the start, in s.
+        text: description of the change.
     """
 
     time_s: float
@@ -91,8 +91,8 @@ def advanced(pose: Pose, velocity: tuple[float, float, float], step_s: float) ->
 
     Args:
         pose: pose before the command.
-        velocity: forward and to the left in m/s, turning in rad/s.
-        step_s: duration of the command, s.
+        velocity: velocity forward and to the left in m/s, and turning rate in rad/s.
+        step_s: duration of the command in s.
 
     >>> advanced(Pose(), (0.5, 0.0, 0.0), 2.0)
     Pose(x=1.0, y=0.0, heading=0.0)

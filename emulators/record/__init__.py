@@ -1,1 +1,1 @@
-"""Runs recorded, replayed and compared: wire logs, traces, candump files."""
+"""Recording, replay and comparison of runs: wire logs, traces, candump files."""

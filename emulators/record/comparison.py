@@ -14,7 +14,7 @@ _DRIFT: Final = 2_000
 """Reciprocal of the largest drift between two clocks: 500 ppm."""
 
 _ROUNDING: Final = 1e-9
-"""1.1 - 1.0 is a little more than 0.1."""
+"""Tolerance for rounding: 1.1 - 1.0 is a little more than 0.1."""
 
 _RULE: Final = re.compile(
     r"(.+?)(?:\[([0-9]{1,4}):([0-9]{1,4})\])?=([0-9]{1,12}(?:\.[0-9]{1,9})?)(%)?"
@@ -28,11 +28,12 @@ class NumberRule:
     """A tolerance for numbers in lines that match a pattern.
 
     Attributes:
-        pattern: a shell pattern: `EV:batt*`, `181#*`.
-        least: largest allowed difference; in percent if `share`.
+        pattern: shell pattern, such as `EV:batt*` or `181#*`.
+        least: largest allowed difference, in percent if `share` is true.
         share: whether `least` is a percentage of the recorded number.
-        place: position of the field; None for all decimal numbers of the line. It counts characters
-            of a text line (hex digits), or data bytes of a frame, the lowest first.
+        place: position of the field, or None for all decimal numbers of the line. The position
+            counts characters of a text line (hex digits), or data bytes of a frame, with the lowest
+            byte first.
     """
 
     pattern: str
@@ -41,7 +42,7 @@ class NumberRule:
     place: tuple[int, int] | None = None
 
     def allows(self, recorded: str, emulated: str) -> bool:
-        """Return whether two lines differ only in these numbers and within the tolerance."""
+        """Return whether two lines differ only in the rule's numbers, within the tolerance."""
         if not (fnmatchcase(recorded, self.pattern) and fnmatchcase(emulated, self.pattern)):
             return False
         split = _split_numbers if self.place is None else self._split_field
@@ -83,10 +84,10 @@ def _split_numbers(text: str) -> tuple[str, list[float]]:
 
 
 def parse_number_rule(text: str) -> NumberRule:
-    """Read `PATTERN=TOLERANCE`, `PATTERN[FROM:TO]=TOLERANCE`, with % for a share.
+    """Read `PATTERN=TOLERANCE` or `PATTERN[FROM:TO]=TOLERANCE`; a `%` means a share.
 
     Raises:
-        ValueError: invalid form.
+        ValueError: the text has an invalid form.
 
     >>> parse_number_rule("EV:batt*=5").allows("EV:batt 98", "EV:batt 95")
     True
@@ -105,7 +106,7 @@ class Tolerance:
     """Tolerances of a comparison.
 
     Attributes:
-        time_us: tolerance of times; the drift of two clocks is added.
+        time_us: tolerance of times, to which the drift of two clocks is added.
         numbers: tolerances of numbers.
         ignored: patterns of lines that are not compared.
         kinds: patterns of lines that are independent of all other lines. Such lines may come in
@@ -118,7 +119,7 @@ class Tolerance:
     kinds: Sequence[str] = ()
 
     def allowed_us(self, at_us: int) -> int:
-        """Return the tolerance of a time this long after the start."""
+        """Return the tolerance of a time that is `at_us` after the start."""
         return self.time_us + at_us // _DRIFT
 
     def same(self, recorded: str, emulated: str) -> bool:
@@ -130,7 +131,7 @@ class Tolerance:
         return any(fnmatchcase(text, pattern) for pattern in self.ignored)
 
     def kind(self, text: str) -> str:
-        """Return the kind within which order counts: text up to a colon, a CAN-ID, or a pattern."""
+        """Return the kind of a line (text up to a colon, CAN-ID or pattern): order counts in it."""
         for pattern in self.kinds:
             if fnmatchcase(text, pattern):
                 return pattern
@@ -142,9 +143,9 @@ class Said(NamedTuple):
     """A line or frame sent by a device.
 
     Attributes:
-        at_us: end of the line or frame, since the start of the recording.
+        at_us: time of the end of the line or frame, since the start of the recording.
         text: text of the line or frame, as in a trace.
-        line: line number in the trace, 0 without one.
+        line: line number in the trace, or 0 without a trace.
     """
 
     at_us: int
@@ -157,10 +158,10 @@ class Pair:
     """A recorded line and the corresponding line of the emulator.
 
     Attributes:
-        kind: kind of the line; the order of lines is compared within a kind.
-        recorded: None if only the emulator sent it.
-        emulated: None if the emulator did not send it.
-        difference: description of the difference; empty if equal.
+        kind: kind of the line. The order of lines is compared within a kind.
+        recorded: recorded line, or None if only the emulator sent the line.
+        emulated: line of the emulator, or None if the emulator did not send it.
+        difference: description of the difference, or empty if the lines are equal.
     """
 
     kind: str
@@ -170,14 +171,14 @@ class Pair:
 
     @property
     def at_us(self) -> int:
-        """Its time, in the recording if possible."""
+        """Time of the pair, from the recording if possible."""
         said = self.recorded or self.emulated
         assert said is not None
         return said.at_us
 
     @property
     def late_us(self) -> int:
-        """Delay of the emulator; 0 if one of the two is missing."""
+        """Delay of the emulator, or 0 if one of the two lines is missing."""
         if self.recorded is None or self.emulated is None:
             return 0
         return self.emulated.at_us - self.recorded.at_us
@@ -198,7 +199,7 @@ def compare(
         tolerance: the tolerances.
 
     Returns:
-        All lines, in order of time.
+        All lines as pairs, in order of time.
     """
     sides: dict[str, tuple[list[Said], list[Said]]] = {}
     for side, run in enumerate((recorded, emulated)):
@@ -251,7 +252,7 @@ class _Alignment:
         return self._missing(place) if old.at_us < new.at_us else self._extra(other)
 
     def _difference(self, old: Said, new: Said) -> str:
-        """Return the difference of a pair; empty if there is none."""
+        """Return the difference of a pair, or "" if there is none."""
         if self._near(old, new):
             return "the emulator answers differently"
         if not self._tolerance.same(old.text, new.text):
@@ -260,7 +261,7 @@ class _Alignment:
         return f"the emulator is {abs(late_ms):.1f} ms {'later' if late_ms > 0 else 'earlier'}"
 
     def _fits(self, place: int, other: int) -> bool:
-        """Return whether two lines are equal and at the same time."""
+        """Return whether two lines have equal text and time within the tolerances."""
         if place >= len(self._then) or other >= len(self._now):
             return False
         old, new = self._then[place], self._now[other]

@@ -48,29 +48,30 @@ class _HasParse(Protocol):
 
     @property
     def parse(self) -> Callable[[bytes], Any]:
-        """Return the fields of a frame; raise an exception if it is invalid."""
+        """Return the fields of a frame; raise an exception if the frame is invalid."""
         ...
 
 
 FrameFields = Callable[[bytes], Mapping[str, Any]] | _HasParse
-"""Describes frames: returns the fields of one by name, or raises an exception."""
+"""Function or object that returns the fields of a frame by name, or raises an exception."""
 
 _Cut = Callable[[bytes], int]
-"""Returns the length of the first piece of some bytes, 0 if it is incomplete."""
+"""Function that returns the length of the first piece of some bytes, or 0 if it is incomplete."""
 
 
 @dataclass(frozen=True, slots=True)
 class FrameFormat(Immutable):
     """Rule for splitting the bytes of a serial line into frames, and for showing them in a log.
 
-    Made by `by_gap`, `by_length`, `by_size` and `by_delimiter`.
+    The functions `by_gap`, `by_length`, `by_size` and `by_delimiter` make such a rule.
 
     Attributes:
-        cut: returns the length of the first piece of some bytes, 0 if it is incomplete.
-        gap_us: a silence of this length ends an incomplete frame; `NEVER` without a limit.
-        delimiter: the bytes after each frame, not part of it.
-        request: describes frames of the host, see `described`.
-        answer: describes frames of the device.
+        cut: function that returns the length of the first piece of some bytes, or 0 if the piece is
+            incomplete.
+        gap_us: length of a silence that ends an incomplete frame, or `NEVER` without a limit.
+        delimiter: bytes after each frame, which are not part of the frame.
+        request: description of frames of the host; see `described`.
+        answer: description of frames of the device.
     """
 
     cut: Callable[[bytes], int]
@@ -83,13 +84,14 @@ class FrameFormat(Immutable):
         """Return the same rule with descriptions, so that logs show frames field by field.
 
         Args:
-            request: describes frames of the host: a function that returns the fields of a frame by
-                name, or an object with such a method `parse`, such as a Struct of construct. It
-                raises an exception for an invalid frame.
-            answer: describes frames of the device; by default the same.
+            request: description of frames of the host: a function that returns the fields of a
+                frame by name, or an object with such a method `parse`, such as a Struct of
+                construct. It raises an exception for an invalid frame.
+            answer: description of frames of the device. The default is the description of frames of
+                the host.
 
         Returns:
-            The rule.
+            The rule with the descriptions.
         """
         return replace(self, request=request, answer=answer or request)
 
@@ -101,11 +103,11 @@ class FrameFormat(Immutable):
         """Return a frame as shown in a log.
 
         Args:
-            mark: its direction.
-            frame: its bytes.
+            mark: direction of the frame.
+            frame: bytes of the frame.
 
         Returns:
-            Its fields, or hex.
+            The fields of the frame, or the bytes in hex.
         """
         fields = self.request if mark is Mark.TO_DEVICE else self.answer
         if fields is None:
@@ -137,8 +139,8 @@ class FrameSplitter(Copyable):
         rule: the splitting rule.
 
     Attributes:
-        begun: the bytes of an incomplete frame.
-        last_us: time of the latest of these bytes.
+        begun: bytes of an incomplete frame.
+        last_us: time of the latest byte of the incomplete frame.
     """
 
     def __init__(self, rule: FrameFormat) -> None:
@@ -147,7 +149,7 @@ class FrameSplitter(Copyable):
 
     @property
     def due_us(self) -> int:
-        """When a silence ends the incomplete frame; `NEVER` without a limit."""
+        """Time at which a silence ends the incomplete frame, or `NEVER` without a limit."""
         return self.last_us + self._rule.gap_us if self.begun and self._ends else NEVER
 
     @property
@@ -159,8 +161,8 @@ class FrameSplitter(Copyable):
 
         Args:
             now_us: the present time.
-            data: bytes received since the last call; call it without bytes when `due_us` has
-                passed.
+            data: bytes received since the last call. Call the function without bytes when `due_us`
+                has passed.
 
         Returns:
             The completed frames, and pieces that are not frames.
@@ -200,7 +202,7 @@ class FrameLog:
 
     @property
     def due_us(self) -> int:
-        """When a silence ends the incomplete frame."""
+        """Time at which a silence ends the incomplete frame."""
         return self._splitter.due_us
 
     @property
@@ -210,7 +212,7 @@ class FrameLog:
 
     @property
     def gap_alone(self) -> bool:
-        """Whether silence alone ends frames, so that an unfinished one may be whole."""
+        """Whether only silence ends frames, so that an unfinished frame may be complete."""
         return self._rule.cut is _never_whole
 
     @property
@@ -234,14 +236,14 @@ def by_gap(gap: str | int) -> FrameFormat:
     """Split at silences of the line.
 
     Args:
-        gap: the silence that ends a frame, such as `"2ms"`, or in us. It must be longer than the
-            time of a byte and longer than the control period of the device.
+        gap: length of the silence that ends a frame, such as `"2ms"`, or in us. It must be longer
+            than the time of a byte and longer than the control period of the device.
 
     Returns:
         The rule.
 
     Raises:
-        ValueError: not a time above 0.
+        ValueError: the gap is not a time above 0.
 
     >>> splitter = by_gap("2ms").splitter()
     >>> splitter.push(0, b"ab"), splitter.push(1_000, b"c"), splitter.push(3_000, b"d")
@@ -257,14 +259,15 @@ def by_size(size: int, gap: str | int | None = None) -> FrameFormat:
     """Split into frames of one size.
 
     Args:
-        size: in bytes, 1 or more.
-        gap: a silence that ends an incomplete frame, such as `"20ms"`, or in us; None for no limit.
+        size: size of each frame in bytes, 1 or more.
+        gap: length of a silence that ends an incomplete frame, such as `"20ms"`, or in us, or None
+            for no limit.
 
     Returns:
         The rule.
 
     Raises:
-        ValueError: a size below 1, or not a time above 0.
+        ValueError: the size is below 1, or the gap is not a time above 0.
 
     >>> by_size(2).splitter().push(0, b"abcde")
     [b'ab', b'cd']
@@ -278,14 +281,14 @@ def by_delimiter(delimiter: bytes, gap: str | int | None = None) -> FrameFormat:
     """Split after a delimiter, which is not part of the frame.
 
     Args:
-        delimiter: the bytes that end each frame.
-        gap: a silence that ends an incomplete frame; None for no limit.
+        delimiter: bytes that end each frame.
+        gap: length of a silence that ends an incomplete frame, or None for no limit.
 
     Returns:
         The rule. A log shows printable ASCII as text and other frames in hex.
 
     Raises:
-        ValueError: an empty delimiter, or not a time above 0.
+        ValueError: the delimiter is empty, or the gap is not a time above 0.
 
     >>> by_delimiter(b"!").splitter().push(0, b"on!off!o")
     [b'on', b'off']
@@ -307,21 +310,21 @@ def by_length(  # noqa: PLR0913 - all but three by keyword
     """Split by a length field in each frame.
 
     Args:
-        header: the bytes at the start of each frame; may be empty. Bytes before it are a separate
-            piece.
-        at: position of the length, in bytes from the start of the frame.
-        extra: number of bytes of the frame that the length does not count; below 0 if the length
-            counts more bytes than the frame has.
-        size: bytes of the length, 1 to 4.
-        order: byte order of the length.
-        gap: a silence that ends an incomplete frame; None for no limit.
+        header: bytes at the start of each frame, which may be empty. Bytes before the header are a
+            separate piece.
+        at: position of the length field, in bytes from the start of the frame.
+        extra: number of bytes of the frame that the length does not count. The number is below 0 if
+            the length counts more bytes than the frame has.
+        size: size of the length field in bytes, 1 to 4.
+        order: byte order of the length field.
+        gap: length of a silence that ends an incomplete frame, or None for no limit.
 
     Returns:
         The rule. If the frame would have more than 4096 bytes, or would end before the end of its
         length field, its first byte is treated as a byte outside a frame.
 
     Raises:
-        ValueError: invalid position or size, or not a time above 0.
+        ValueError: the position or size is invalid, or the gap is not a time above 0.
 
     >>> splitter = by_length(bytes([0x55]), at=1, extra=3).splitter()
     >>> [piece.hex(" ") for piece in splitter.push(0, bytes.fromhex("00 55 02 AA BB CC 55"))]

@@ -24,13 +24,13 @@ from tickrig.wire.uart import UartSetting
 
 
 class TraceFile(NonCopyable):
-    """A trace that is written to a file; each tick is written at once, so a kill loses no tick.
+    """A trace that is written to a file. Each tick is written at once, so a kill loses no tick.
 
     If writing fails, the recording ends with one warning, and the run continues.
 
     Args:
-        path: the file; one that exists is replaced.
-        header: first line.
+        path: path of the file; an existing file is replaced.
+        header: first line of the trace.
 
     Raises:
         OSError: the file cannot be opened.
@@ -44,7 +44,7 @@ class TraceFile(NonCopyable):
 
     @property
     def error(self) -> str:
-        """Reason for the early end of the recording, empty if there was no error."""
+        """Reason for the early end of the recording, or "" if there was no error."""
         return self._file.error
 
     def hear(self, now_us: int, done: Sequence[str], received: bytes, sent: bytes) -> None:
@@ -81,10 +81,10 @@ class _Trace(Protocol[_W_contra]):
 
 
 class DeviceBefore(Generic[W]):
-    """A device in place of another, with its interface; subclasses change what passes.
+    """A device with the interface of another device; subclasses change the traffic.
 
     Args:
-        device: the other device.
+        device: the device behind this object.
     """
 
     def __init__(self, device: Device[W]) -> None:
@@ -97,7 +97,7 @@ class DeviceBefore(Generic[W]):
 
     @property
     def due_us(self) -> int:
-        """When the device is due."""
+        """Time at which the device is due."""
         return self._device.due_us  # type: ignore[no-any-return]  # a Device
 
     @property
@@ -121,7 +121,7 @@ class DeviceBefore(Generic[W]):
 
     @property
     def horizon(self) -> Horizon | None:
-        """How far the device may compute ahead."""
+        """Time up to which the device may compute ahead."""
         return getattr(self._device, "horizon", None)
 
     @horizon.setter
@@ -131,7 +131,7 @@ class DeviceBefore(Generic[W]):
 
     @property
     def accepts(self) -> frozenset[int] | None:
-        """CAN-IDs that the device listens to; None for all."""
+        """CAN-IDs that the device receives, or None for all."""
         return getattr(self._device, "accepts", None)
 
     @property
@@ -141,7 +141,7 @@ class DeviceBefore(Generic[W]):
 
     @property
     def on_accepts(self) -> list[Callable[[], None]]:
-        """Callback for a change of these two."""
+        """Callback for a change of `accepts` or `reconfigured_by`."""
         return getattr(self._device, "on_accepts", [])
 
     def bus_state(self, state: ErrorState, /) -> None:
@@ -157,9 +157,9 @@ class DeviceBefore(Generic[W]):
 class TracedDevice(DeviceBefore[W]):
     """A recorded device with the same interface as the device itself.
 
-    It records the device's traffic, changes of its `inputs`, resets, and reports of its CAN
-    controller. If the device has an `on_set`, as a node has for its objects, it also records the
-    calls of `on_set`.
+    The object records the device's traffic, changes of its `inputs`, resets, and reports of its CAN
+    controller. If the device has an `on_set`, as a node has for its objects, the calls of `on_set`
+    are recorded, too.
 
     Args:
         device: the device itself.
@@ -195,24 +195,24 @@ class TracedDevice(DeviceBefore[W]):
 
     @property
     def due_us(self) -> int:
-        """When the device is due; at once if a reset must be recorded."""
+        """Time at which the device is due, which is now if a reset must be recorded."""
         if self._done:
             return 0  # a tick that is not due changes nothing, and a replay resets where it was
         return self._device.due_us  # type: ignore[no-any-return]  # a Device, asked in each tick
 
     def bus_state(self, state: ErrorState, /) -> None:
-        """Forward a report of the CAN controller; it is recorded with the next tick."""
+        """Forward a report of the CAN controller; the report is recorded with the next tick."""
         if hasattr(self._device, "bus_state"):
             self._done.append(_BUS_STATE[state])
         super().bus_state(state)
 
     def reset(self) -> None:
-        """Reset the device; it is recorded with the next tick."""
+        """Reset the device; the reset is recorded with the next tick."""
         self._done.append(RESET)
         super().reset()
 
     def tick(self, now_us: int, rx: W, /) -> W:
-        """Tick the device and record it."""
+        """Tick the device and record the tick."""
         if self._bank is not None and self._bank.changed:
             self._look()
         done: Sequence[str] = ()
@@ -229,7 +229,7 @@ class TracedDevice(DeviceBefore[W]):
             self._seen[name] = value
 
     def _look(self) -> None:
-        """Record the changes in the bank."""
+        """Record the changes of the inputs."""
         bank = self.inputs
         for name, seen in self._seen.items():
             if (value := bank[name]) != seen:
@@ -243,14 +243,14 @@ _BUS_STATE = {state: text for text, state in BUS_STATE.items()}
 
 
 class Tick(NamedTuple):
-    """The events of a device in a tick, or (mark `~`) of a wire between ticks.
+    """The events of a device in a tick, or of a wire between ticks (with the mark `~`).
 
     Attributes:
         at_us: time of the tick.
-        name: name of the device, or the wire.
+        name: name of the device or wire.
         done: actions before the tick, such as `stick=5`.
-        received: bytes or frames.
-        sent: bytes or frames.
+        received: received bytes or frames.
+        sent: sent bytes or frames.
         mark: mark of the actions.
     """
 
@@ -262,11 +262,11 @@ class Tick(NamedTuple):
     mark: Mark = Mark.PHYSICAL
 
     def lines(self) -> Iterator[str]:
-        """Return its lines as text, without LF."""
+        """Return the lines of the tick as text, without LF."""
         return (record.encode() for record in self.records())
 
     def records(self) -> Iterator[BenchRecord]:
-        """Yield its lines."""
+        """Yield the lines of the tick."""
         at_us, name = self.at_us, self.name
         for text in self.done:
             yield BenchRecord(at_us, name, self.mark, text=text)
@@ -288,8 +288,8 @@ class TraceRecorder(Copyable):
     the recording ends with one warning, and the run continues. Copies are not recorded.
 
     Args:
-        path: the file, which is replaced; None to keep the lines for `save`.
-        header: describes the bench.
+        path: path of the file, which is replaced, or None to keep the lines for `save`.
+        header: description of the bench.
 
     Raises:
         OSError: the file cannot be opened.
@@ -316,10 +316,10 @@ class TraceRecorder(Copyable):
         self._last_us = 0
 
     def device(self, name: str, device: Device[W]) -> TracedDevice[W]:
-        """Return a recorded device, to be put on a rig instead of the given one.
+        """Return a recorded device, to be put on a rig instead of the given device.
 
         Args:
-            name: a device name in the header.
+            name: name of the device in the header.
             device: the device. It is recorded from its first tick on, including changes of its
                 `inputs` and of objects of a node that are set from the inside.
 
@@ -334,19 +334,20 @@ class TraceRecorder(Copyable):
 
         Args:
             now_us: time of the change.
-            wire: a wire name in the header.
-            text: the fault, such as `cut` or `drop=0.1`; `cut=0` for the end of the fault.
+            wire: name of the wire in the header.
+            text: text of the fault, such as `cut` or `drop=0.1`, or `cut=0` for the end of the
+                fault.
         """
         self.add(Tick(now_us, wire, (text,), mark=Mark.WIRE))
 
     @property
     def error(self) -> str:
-        """Reason for the early end of the recording, empty if there was no error."""
+        """Reason for the early end of the recording, or "" if there was no error."""
         return self._file.error if self._file else ""
 
     @property
     def keeps(self) -> bool:
-        """Whether it records in memory."""
+        """Whether the recorder keeps the recording in memory."""
         return not self._forgetful
 
     def add(self, tick: Tick) -> None:
@@ -369,7 +370,7 @@ class TraceRecorder(Copyable):
         self._ticks, self._in_memory = [], 0
 
     def lines(self, now_us: int) -> Iterator[str]:
-        """Yield the lines of the recording, as a run that lasted until now.
+        """Yield the lines of the recording up to a time.
 
         Args:
             now_us: time of the rig.
@@ -383,7 +384,7 @@ class TraceRecorder(Copyable):
         """Write the recording to a file.
 
         Args:
-            path: the file; one that exists is replaced.
+            path: path of the file; an existing file is replaced.
             now_us: time of the rig.
 
         Raises:
@@ -395,7 +396,7 @@ class TraceRecorder(Copyable):
         write_whole(path, "".join(f"{line}\n" for line in self.lines(now_us)))
 
     def close(self, now_us: int) -> None:
-        """Write the duration of the run to its file, and close it."""
+        """Write the duration of the run to the file, and close the file."""
         if self._file is not None:
             self._file.close(BenchRecord(max(now_us, self._last_us), "", Mark.END).encode())
 
@@ -417,13 +418,13 @@ class _Ticks(Immutable):
     ticks: Sequence[Tick]
 
     def lines(self) -> Iterator[str]:
-        """Yield their lines, without LF."""
+        """Yield the lines of the ticks, without LF."""
         for tick in self.ticks:
             yield from tick.lines()
 
 
 class _Spool:
-    """An append-only temporary file; if none can be written, the text stays in memory.
+    """An append-only temporary file; if the file cannot be written, the text stays in memory.
 
     Copies within the process share the part that is already written. Each copy appends to a file of
     its own.
@@ -509,20 +510,20 @@ _logger = log_of(__name__)
 
 
 class CandumpFile:
-    """A log that is written to a file; each line is written at once, so a kill loses no line.
+    """A log that is written to a file. Each line is written at once, so a kill loses no line.
 
-    If writing fails, the recording ends with one warning, and the run continues. Use its `hear` as
-    observer of a `CanWire`.
+    If writing fails, the recording ends with one warning, and the run continues. Use the method
+    `hear` as observer of a `CanWire`.
 
     Args:
-        path: the file; one that exists is replaced.
+        path: path of the file; an existing file is replaced.
         channel: name of the bus in the log.
 
     Attributes:
-        error: reason for the early end of the recording, empty if there was no error.
+        error: reason for the early end of the recording, or empty if there was no error.
 
     Raises:
-        ValueError: an empty channel, or one with blanks.
+        ValueError: the channel is empty, or has blanks.
         OSError: the file cannot be opened.
     """
 

@@ -27,13 +27,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class ReplayDifference(Generic[W]):
-    """The first tick with another output than recorded.
+    """The first tick in which the output differs from the recording.
 
     Attributes:
         at_us: time of the tick.
         recorded: recorded output.
-        replayed: output of the replay.
-        line: line of the trace, 0 without recorded output.
+        replayed: output in the replay.
+        line: line number in the trace, or 0 without recorded output.
     """
 
     at_us: int
@@ -59,15 +59,15 @@ def _play(
 ) -> list[tuple[int, W]]:
     """Repeat traffic and changes on a device; return its output with the ticks.
 
-    It behaves like a `Rig` with this device as its only station: only ticks with work are run. No
-    code reads the device between two changes, so a drive may compute ahead (`Horizon`).
+    The function behaves like a `Rig` with the device as its only station: only ticks with work are
+    run. No code reads the device between two changes, so a drive may compute ahead (`Horizon`).
 
     Args:
         device: a new device.
-        received: the traffic with its times, sorted.
-        changes: the actions on it, sorted.
+        received: traffic with its times, sorted.
+        changes: actions on the device, sorted by time.
         nothing: empty traffic.
-        until_us: the last tick.
+        until_us: time of the last tick.
     """
     sent: list[tuple[int, W]] = []
     horizon, tick_us, now_us = Horizon(), device.tick_us, 0
@@ -98,7 +98,7 @@ def _nothing() -> None:
 def _first_difference(
     recorded: Sequence[tuple[int, W, int]], replayed: Sequence[tuple[int, W]], nothing: W
 ) -> ReplayDifference[W] | None:
-    """Return the first tick with different output, None if there is none.
+    """Return the first tick with different output, or None if there is none.
 
     Args:
         recorded: recorded output, with times and lines.
@@ -120,9 +120,9 @@ class RecordedRun:
 
     Attributes:
         header: the device and its configuration.
-        records: the lines in order.
+        records: lines of the trace in order.
         ended: whether the trace contains the duration of the run. If not, the writer was killed or
-            its disk was full; the last tick may be incomplete and is left out.
+            its disk was full. The last tick may then be incomplete and is left out.
     """
 
     header: trace.Header
@@ -144,7 +144,7 @@ def read_recording(data: bytes) -> RecordedRun:
     """Read a trace; the writer may have been killed in the middle of a line.
 
     Raises:
-        TraceError: not a trace of this version, or a damaged line.
+        TraceError: the data are not a trace of this version, or a line is damaged.
     """
     first, *lines = trace.trace_text(data).split("\n")
     header = trace.parse_header(first)
@@ -156,7 +156,7 @@ def read_recording(data: bytes) -> RecordedRun:
 
 
 def replay(recording: RecordedRun, device: Emulated[bytes]) -> ReplayDifference[bytes] | None:
-    """Replay a recording on a new device; return None if its output is the same.
+    """Replay a recording on a new device; return the first difference, or None if there is none.
 
     Raises:
         TraceError: the trace names an input that the device does not have.
@@ -193,10 +193,10 @@ class BenchRecording:
     """A trace that has been read.
 
     Attributes:
-        header: describes the bench.
-        records: the lines in order.
+        header: description of the bench.
+        records: lines of the trace in order.
         ended: whether the trace contains the duration of the run. If not, the writer was killed or
-            its disk was full; the last tick may be incomplete and is left out.
+            its disk was full. The last tick may then be incomplete and is left out.
     """
 
     header: bench_header.BenchHeader
@@ -218,7 +218,7 @@ class BenchRecording:
 
     @property
     def at_port(self) -> bool:
-        """Whether its times come from a port tap at a host, not from ticks."""
+        """Whether the times come from a port tap at a host, not from ticks."""
         return self.header.place is bench_header.Place.PORT
 
     def to_pandas(self) -> pandas.DataFrame:
@@ -273,7 +273,7 @@ class BenchRecording:
         """Return the ticks at which a device had traffic or a change, in microseconds.
 
         Args:
-            name: of the device.
+            name: name of the device.
         """
         return {record.at_us for record in self.of(name)}
 
@@ -281,7 +281,7 @@ class BenchRecording:
         """Return the lines of a device.
 
         Args:
-            name: of the device.
+            name: name of the device.
         """
         return tuple(self._by_name.get(name, ()))
 
@@ -314,7 +314,7 @@ def read_trace(path: Path | str) -> BenchRecording:
         path: path of the file.
 
     Returns:
-        The recording. If its writer was killed, it ends before the last tick.
+        The recording. If its writer was killed, the recording ends before the last tick.
 
     Raises:
         OSError: the file cannot be read.
@@ -327,7 +327,7 @@ def read_bench_recording(data: bytes) -> BenchRecording:
     """Read a trace of either version; the writer may have been killed in the middle of a line.
 
     Raises:
-        TraceError: not a trace, or a damaged line.
+        TraceError: the data are not a trace, or a line is damaged.
     """
     if not data.startswith(bench_header.PREFIX.encode()):
         return _as_bench(read_recording(data))
@@ -341,7 +341,7 @@ def read_bench_recording(data: bytes) -> BenchRecording:
 
 
 def _as_bench(recording: RecordedRun) -> BenchRecording:
-    """Return the recording of one device on a serial line as that of a bench."""
+    """Return the recording of one device on a serial line as a recording of a bench."""
     name, wires = (
         recording.header.device,
         {"line": bench_header.WireEntry(bench_header.WireType.SERIAL)},
@@ -359,10 +359,10 @@ def _as_bench(recording: RecordedRun) -> BenchRecording:
 def replay_device(
     recording: BenchRecording, name: str, device: Device[Any]
 ) -> ReplayDifference[Any] | None:
-    """Replay a device of the bench on a new device; return None if the output is the same.
+    """Replay a recorded device on a new device; return the first difference, or None.
 
     Args:
-        recording: the run.
+        recording: recording of the bench.
         name: name of the device in the run.
         device: a new device.
 
@@ -375,7 +375,7 @@ def replay_device(
 
 
 def play_device(recording: BenchRecording, name: str, device: Device[Any]) -> list[tuple[int, Any]]:
-    """Replay a device of the bench on a new device; return its output with the ticks.
+    """Replay a recorded device on a new device; return the output with its ticks.
 
     Raises:
         TraceError: the trace names an input that the device does not have.
@@ -394,7 +394,7 @@ def play_device(recording: BenchRecording, name: str, device: Device[Any]) -> li
 def traffic_of(
     records: Sequence[BenchRecord], mark: trace.Mark
 ) -> Iterator[tuple[int, _Traffic, int]]:
-    """Yield the traffic of one direction: time, all data of the tick, its first line."""
+    """Yield the traffic of one direction: time, all data and first line of each tick."""
     passed = (record for record in records if record.mark is mark)
     for at_us, group in groupby(passed, key=lambda record: record.at_us):
         first, *more = group
@@ -408,7 +408,7 @@ def do(device: Any, record: BenchRecord) -> None:
     """Repeat the actions on a device.
 
     Raises:
-        TraceError: unknown input, or invalid value.
+        TraceError: an input is unknown, or a value is invalid.
     """
     try:
         if record.text == trace.RESET:

@@ -18,14 +18,14 @@ from tickrig.wire.lines import LineSplitter
 
 @dataclass(frozen=True, slots=True)
 class WireLine:
-    """One line on the wire.
+    """A line on the wire.
 
     Attributes:
-        number: counts the lines of a run from 1.
-        at_us: time of its last byte.
-        mark: its direction.
-        data: the line without its line end.
-        source: the wire or device, if there are several.
+        number: number of the line in the run, counted from 1.
+        at_us: time of the last byte of the line.
+        mark: direction of the line.
+        data: content of the line without its end.
+        source: name of the wire or device, if there are several.
     """
 
     number: int
@@ -41,7 +41,7 @@ _MOST_BEGUN: Final = 4_096
 _LINE_ENDS: Final = b"\r\n"
 
 Splitter = Callable[[int, bytes], list[bytes]]
-"""Called with received bytes and their time; returns the completed lines."""
+"""Function that gets received bytes and their time, and returns the completed lines."""
 
 
 def line_splitter(mark: Mark) -> Splitter:
@@ -55,10 +55,11 @@ class WireLog:
 
     Args:
         keep: number of lines to keep.
-        splitter: makes the splitter of each direction; by default a splitter into lines.
+        splitter: function that makes the splitter of each direction. The default is a splitter into
+            lines.
 
     Attributes:
-        listeners: called with each complete line.
+        listeners: functions that are called with each complete line.
     """
 
     def __init__(
@@ -116,10 +117,11 @@ class WireLog:
             self._wake(due_us)
 
     def unfinished(self, *, by_gap: bool = False) -> tuple[WireLine, ...]:
-        """Return the unfinished line or frame of each direction; it has no number.
+        """Return the unfinished line or frame of each direction, which has no number.
 
         Args:
-            by_gap: return instead the frames that end by silence alone; each may be complete.
+            by_gap: whether to return instead the frames that only a silence ends. Each of them may
+                be complete.
         """
         return tuple(
             WireLine(0, at_us, mark, data)
@@ -130,7 +132,7 @@ class WireLog:
     def add(
         self, at_us: int, mark: Mark, line: bytes | CanFrame | ErrorFrame, source: str = ""
     ) -> None:
-        """Add a complete line; frames are formatted on access, which saves 5 % of a busy bus."""
+        """Add a complete line; frames are formatted on access, which saves 5 % of the time."""
         self._count += 1
         whole = (self._count, at_us, mark, line, source)
         self._lines.append(whole)
@@ -138,7 +140,7 @@ class WireLog:
             listener(_written(*whole))
 
     def since(self, number: int) -> tuple[WireLine, ...]:
-        """Return the kept lines after the one with this number."""
+        """Return the kept lines after the line with a number."""
         return tuple(_written(*line) for line in self._lines if line[0] > number)
 
 

@@ -28,10 +28,10 @@ _BAUD: Final = 115_200
 _USB_BAUD: Final = 12_000_000
 
 _AHEAD_M: Final = 0.2
-"""Distance from the middle of the axle to the sensor; a choice."""
+"""Distance from the middle of the axle to the sensor, which is an arbitrary choice."""
 
 _OUTLINE_M: Final = 0.25
-"""Size of a robot as seen by others: a post around the middle of its axle; a choice."""
+"""Radius of the post by which other robots see a robot, which is an arbitrary choice."""
 
 PLACE: Final = ("x_m", "y_m", "heading_rad")
 
@@ -50,14 +50,14 @@ class MountedUrg(Mounted):
     seen as round).
 
     Args:
-        base: the base that carries it.
-        world: the surroundings.
+        base: base that carries the sensor.
+        world: surroundings of the sensor.
         others: bases that the sensor sees.
 
     Attributes:
         urg: the sensor.
-        line: its line; `b` is the host's end.
-        world: the surroundings; they may be changed.
+        line: line of the sensor. Its end `b` is the host's end.
+        world: surroundings of the sensor, which may be changed.
     """
 
     def __init__(self, base: Rh3Base, world: World, others: Sequence[Rh3Base] = ()) -> None:
@@ -87,12 +87,12 @@ class _Aboard(Coupling, Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Cart:
-    """One cart.
+    """A cart.
 
     Attributes:
         base: the emulated base.
-        chain: its components.
-        port: the base's port; faults of the wire are armed here.
+        chain: components of the cart.
+        port: port of the base, on which faults of the wire are armed.
     """
 
     base: Rh3Base
@@ -113,15 +113,16 @@ class ClosedLoop:
         parameters: the parameters of each base.
         seed: seed of random wire faults.
         dense: whether to run every tick of every base.
-        world: the surroundings. If given, each cart carries a range finder that sees them.
-        aboard: makes further loads of the first cart.
-        pace: ratio of the loop's time to real time; None for as fast as possible.
-        clock: the clock for waiting, if a pace is given.
+        world: surroundings of the carts. If they are given, each cart carries a range finder that
+            sees them.
+        aboard: function that makes further loads of the first cart.
+        pace: ratio of the loop's time to real time, or None to run as fast as possible.
+        clock: clock for waiting, if a pace is given.
 
     Attributes:
         rig: the bases on their lines.
         manager: the components.
-        carts: in the order of the parameters.
+        carts: carts in the order of the parameters.
         cart: the first cart.
         chain: the components of the first cart.
         range_finders: range finders, in the order of the carts.
@@ -166,7 +167,7 @@ class ClosedLoop:
         return self.rig.now_us
 
     def activate(self, set_id: str = "default") -> None:
-        """Activate all components, with a configuration set."""
+        """Activate all components with a configuration set."""
         for cart in self.carts:
             cart.chain.use(set_id)
             cart.chain.activate()
@@ -193,7 +194,7 @@ class ClosedLoop:
 
 
 def _range_finders(bases: Sequence[Rh3Base], world: World) -> tuple[MountedUrg, ...]:
-    """Return a range finder for each base; it also sees the other robots."""
+    """Return a range finder for each base, which also sees the other robots."""
     return tuple(
         MountedUrg(base, world, [other for other in bases if other is not base]) for base in bases
     )

@@ -22,11 +22,11 @@ _WIDE: Final = {"dataport.buffer.length": "64"}
 _STEP_US: Final = 1_000
 
 _WATCHDOG_US: Final = 500_000
-"""Silence after which it stops, as on two wheels."""
+"""Silence after which the cart stops, as a cart on two wheels does."""
 
 
 class OmniCart(RtComponent):
-    """Accepts IIS velocities with all three parts, and writes its true pose.
+    """A cart that accepts IIS velocities with all three parts, and writes its true pose.
 
     A velocity with NaN means stop.
 
@@ -83,10 +83,11 @@ class MovingControl(RtComponent):
 
     Args:
         instance_name: instance name of the component.
-        phase: phase of the common interface: 1 for RTC::TimedVelocity, 2 for IIS::TimedVelocity.
+        phase: phase of the common interface: 1 for RTC::TimedVelocity, or 2 for IIS::TimedVelocity.
 
     Attributes:
-        twist: forward and to the left in m/s, turning in rad/s; None while no command arrives.
+        twist: velocity forward and to the left in m/s, and turning rate in rad/s, or None while no
+            command arrives.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("MovingControl", "Takes IIS velocities, phase 1 or 2")
@@ -123,7 +124,7 @@ class MovingControl(RtComponent):
 
 @dataclass(frozen=True, slots=True)
 class _Robot:
-    """One robot of a convoy, by the names of its ports.
+    """A robot of a convoy, with the names of its ports.
 
     Attributes:
         position: port of the robot's self-position.
@@ -146,17 +147,17 @@ class _Robot:
 class Convoy:
     """Robots in one map frame.
 
-    The first robot keeps its planner. The others follow the commands of the ports that are
+    The first robot keeps its planner. The other robots follow the commands of the ports that are
     connected to them.
 
     Args:
         carts: first poses of the robots on two wheels.
         omni: first poses of the robots on omni wheels.
-        clock: clock of a convoy in real time; without it the convoy is in virtual time.
+        clock: clock of a convoy in real time. Without a clock the convoy is in virtual time.
 
     Attributes:
         loop: carts, their lines and the manager.
-        robots: all robots; the carts come first.
+        robots: all robots. The carts come first.
     """
 
     def __init__(
@@ -171,7 +172,7 @@ class Convoy:
         self._leaders: dict[int, int] = {}
 
     def follow(self, robot: int, leader: int) -> None:
-        """Let a robot follow another one from now on instead of the previous one."""
+        """Let a robot follow another leader from now on."""
         manager, name = self.loop.manager, f"Follower{robot}"
         if robot not in self._leaders:
             self._add_follower(robot, name)

@@ -26,7 +26,7 @@ _CRC_BYTES = 2
 
 
 class _FrameSplitter:
-    """A frame is complete when its CRC matches; other bytes before a silence stay as they are."""
+    """A splitter for which a frame is complete when its CRC matches; other bytes stay unchanged."""
 
     def __init__(self) -> None:
         self._begun, self._received_us = b"", 0
@@ -108,7 +108,7 @@ def _whole(word: str) -> int:
 
 
 def _split(register: Register, value: int) -> tuple[int, ...]:
-    """Return the registers of a number, high half first."""
+    """Return the registers of a number, with the high half first."""
     return tuple(value >> 16 * place & _WORD for place in reversed(range(register.words)))
 
 
@@ -123,7 +123,7 @@ def _config_to_trace(parameters: BaseParameters) -> Config:
 
 
 def _parameters_of(settings: Mapping[str, Any]) -> BaseParameters:
-    """Return parameters; ValueError for a value of another type or out of range."""
+    """Return parameters; raise ValueError for a value of a wrong type or out of range."""
     defaults = asdict(BaseParameters())
     for name, value in settings.items():
         wanted = (int,) if type(defaults[name]) is int else (int, float)
@@ -134,7 +134,7 @@ def _parameters_of(settings: Mapping[str, Any]) -> BaseParameters:
 
 
 def read_parameters(options: Mapping[str, Any]) -> BaseParameters:
-    """Return a base with the given options and defaults for the others.
+    """Return the parameters with the given options, and defaults for the other parameters.
 
     Raises:
         ValueError: an option is invalid. A message about a parameter names its option.
@@ -151,7 +151,7 @@ def _build_rh3(config: Config) -> Rh3Base:
     """Build a base.
 
     Raises:
-        ValueError: a parameter that a base does not have, or a value that it cannot have.
+        ValueError: a base does not have the parameter, or does not accept the value.
     """
     settings: dict[str, Any] = dict(config)
     if "ground_seed" in settings:

@@ -20,7 +20,7 @@ PARAMETERS: Final = (
     DeviceField(name="delay_ms", kind=int, unit="MS", help="Delay of a command's effect. [0]"),
     _number("noise", "Spread of a wheel's distance over the ground, as a share of it. [0]"),
 )
-"""Options of `BaseParameters`, also for the verbs of `rh3`."""
+"""Options for `BaseParameters`, which the verbs of `rh3` use, too."""
 
 FIELDS: Final = (
     DeviceField(

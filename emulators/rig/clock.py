@@ -1,4 +1,4 @@
-"""The clock of a rig in virtual time; that of this machine is `host.control.clock.RealClock`."""
+"""The clock of a rig in virtual time; `host.control.clock.RealClock` is the machine's clock."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ class Clock(Protocol):
     """Time since the rig was started, in microseconds."""
 
     def wait_until(self, t_us: int, /) -> int:
-        """Wait until `t_us`; return the delay in microseconds, 0 if on time."""
+        """Wait until `t_us`; return the delay in microseconds, which is 0 if on time."""
         ...
 
 

@@ -34,7 +34,7 @@ class Inputs(Protocol):
         ...
 
     def set(self, name: str, value: Setting) -> None:
-        """Set an input; ValueError if it does not exist or does not accept the value."""
+        """Set an input; raise ValueError if it does not exist or does not accept the value."""
 
     def check(self, name: str, value: Setting) -> Setting:
         """Return the value that `set` would store, or raise as `set` would."""
@@ -45,7 +45,7 @@ class Inputs(Protocol):
         ...
 
     def find(self, name: str, signal_type: SignalType | None = None) -> InputSignal:
-        """Return the description of an input; ValueError if there is no input of this type."""
+        """Return the description of an input; ValueError if no input has the name and type."""
         ...
 
 
@@ -68,7 +68,7 @@ class HasSignals(Protocol):
         ...
 
     def read(self, name: str, /) -> Setting:
-        """Return the present value of one output; KeyError if there is none."""
+        """Return the present value of an output; raise KeyError if the name is unknown."""
         ...
 
 
@@ -77,5 +77,5 @@ class Emulated(Device[W], HasSignals, Protocol[W]):
 
 
 def read_signal(device: HasSignals, name: str) -> Setting:
-    """Return the present value of an input or output; KeyError if there is none."""
+    """Return the present value of an input or output; raise KeyError if the name is unknown."""
     return device.inputs[name] if name in device.inputs.table else device.read(name)

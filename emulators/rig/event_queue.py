@@ -1,4 +1,4 @@
-"""A queue of what is to be done between ticks, by time and order of entering."""
+"""A queue of actions between ticks, sorted by time and order of entry."""
 
 from __future__ import annotations
 
@@ -13,31 +13,32 @@ _Action = Callable[[int], None]
 """An action, called with the time in microseconds."""
 
 _SPARE: Final = 64
-"""Number of cancelled actions that may stay in the heap, besides as many as there are others."""
+"""Number of cancelled actions that may stay in the heap, in addition to one for each valid
+action."""
 
 _Entry = tuple[int, int, Hashable, _Action]
 """Time, entry number, key and action."""
 
 
 class EventQueue(Part):
-    """Actions in order of time; those of the same time in order of entry."""
+    """Actions in order of time; actions of the same time are in order of entry."""
 
     def __init__(self) -> None:
         self._number = 0
         self._heap: list[_Entry] = []
         self._entered: dict[Hashable, int] = {}
-        """Number of the valid entry by key; others in the heap are cancelled."""
+        """Number of the valid entry by key; other entries in the heap are cancelled."""
         self.due_us = NEVER
 
     def put(self, key: Hashable, t_us: int, action: _Action) -> None:
-        """Add an action; it replaces an earlier one with the same key."""
+        """Add an action; it replaces an earlier action with the same key."""
         self._number += 1
         self._entered[key] = self._number
         heappush(self._heap, (t_us, self._number, key, action))
         self._note_due()
 
     def wake(self, key: Hashable, t_us: int) -> None:
-        """Make the rig stop at a time for its watchers; the same as `put` of an empty action."""
+        """Make the rig stop at a time for its watchers, like `put` of an empty action."""
         self.put(key, t_us, _nothing)
 
     def __getstate__(self) -> object:
@@ -49,7 +50,7 @@ class EventQueue(Part):
         restore(self, state)
 
     def drop(self, key: Hashable) -> None:
-        """Cancel an action; does nothing if there is none."""
+        """Cancel an action; do nothing if there is no action with the key."""
         if self._entered.pop(key, None) is not None:
             self._note_due()
 

@@ -45,15 +45,16 @@ class FaultArgument(Immutable):
     """An argument of a fault.
 
     Attributes:
-        name: keyword, `delay` of `delay=800ms`.
-        text: description for people.
+        name: keyword of the argument, such as `delay` in `delay=800ms`.
+        text: description as readable text.
         default: default value, in the notation of users.
-        unit: `time` for a duration (low and high in us), or the unit of a whole number, which may
-            be written in hex; empty for a plain number.
+        unit: unit of the value: `time` for a duration (`low` and `high` in us), or the unit of a
+            whole number, which may be written in hex, or empty for a plain number.
         low: smallest value.
         high: largest value.
         choices: allowed words instead of a number, if any.
-        read: reads the text of an argument with a special form; raises ValueError.
+        read: function that reads the text of an argument with a special form. It raises ValueError
+            for an invalid text.
     """
 
     name: str
@@ -67,7 +68,7 @@ class FaultArgument(Immutable):
 
     @property
     def range(self) -> str:
-        """The allowed values, for people."""
+        """The allowed values as readable text."""
         if self.choices:
             return " or ".join(self.choices)
         if self.read is not None:
@@ -80,7 +81,7 @@ class FaultArgument(Immutable):
         """Read a value: microseconds of a time, a number, a word, or what `read` returns.
 
         Raises:
-            ValueError: wrong form, or out of range.
+            ValueError: the text has a wrong form, or the value is out of range.
         """
         if self.read is not None:
             return self.read(word)
@@ -120,11 +121,11 @@ class FaultForm(Immutable):
     """Notation and description of a fault; entries of fault tables are subclasses.
 
     Attributes:
-        text: description for people.
+        text: description as readable text.
         rated: whether the fault accepts `rate=` and `count=`.
         arguments: arguments of the fault itself, in the order in which they are written without
             keywords.
-        usual_rate: the default rate.
+        usual_rate: default rate.
     """
 
     text: str
@@ -134,7 +135,7 @@ class FaultForm(Immutable):
 
     @property
     def all_arguments(self) -> tuple[FaultArgument, ...]:
-        """Its arguments, including those of each rated fault, with their defaults."""
+        """All arguments with their defaults, including the arguments of every rated fault."""
         if not self.rated:
             return self.arguments
         rate = FaultArgument(_RATE, RATE.text, f"{self.usual_rate:g}", "above 0 to 1", read=float)
@@ -146,9 +147,9 @@ class FaultArguments(Immutable):
     """The arguments after the name of a fault, with all defaults.
 
     Attributes:
-        values: values by name of the argument, as returned by its `parse`.
+        values: values by name of the argument, as returned by the argument's `parse`.
         rate: probability that the fault acts each time it could.
-        count: how often the fault acts at most; None for no limit.
+        count: largest number of actions of the fault, or None for no limit.
     """
 
     values: Mapping[str, Any] = field(default_factory=dict)
@@ -178,10 +179,10 @@ def bind_arguments(name: str, form: FaultForm, words: Sequence[str]) -> FaultArg
     Args:
         name: name of the fault, for messages.
         form: declaration of the fault.
-        words: the texts after `NAME=`, split at commas.
+        words: texts after `NAME=`, split at commas.
 
     Raises:
-        ValueError: an unknown argument, or a value out of range.
+        ValueError: an argument is unknown, or a value is out of range.
 
     >>> slow = FaultForm("", arguments=(FaultArgument("delay", "", "800ms", "time"),))
     >>> bind_arguments("slow", slow, ("5ms", "rate=0.1"))
@@ -200,7 +201,7 @@ def bind_arguments(name: str, form: FaultForm, words: Sequence[str]) -> FaultArg
 
 
 def spelled(name: str, form: FaultForm, words: Sequence[str]) -> dict[str, str]:
-    """Return the given arguments by name; ValueError as `bind_arguments`."""
+    """Return the given arguments by name; raise ValueError as `bind_arguments` does."""
     known = {each.name: each for each in form.all_arguments}
     if words and not known:
         hint = "; clear ends it" if tuple(words) == ("0",) else ""
@@ -333,10 +334,10 @@ class FaultTally(Copyable):
     """Counter of the actions of a fault, with a limit.
 
     Args:
-        count: how often it acts at most; None for no limit.
+        count: largest number of actions, or None for no limit.
 
     Attributes:
-        acted: how often it has acted.
+        acted: number of actions up to now.
     """
 
     __slots__ = ("acted", "count")
@@ -346,7 +347,7 @@ class FaultTally(Copyable):
 
     @property
     def left(self) -> int:
-        """How often it may still act."""
+        """Number of actions that are still allowed."""
         return _MOST if self.count is None else self.count - self.acted
 
     def allow(self, wanted: int = 1) -> int:
@@ -360,7 +361,7 @@ class FaultTrigger(Copyable):
     """Decides by random numbers, rate and count when a fault acts.
 
     Args:
-        chance: random generator of the trigger; the fault may also draw from it.
+        chance: random generator of the trigger, from which the fault may also draw.
         arguments: arguments of the fault, with rate and count.
         tally: counter shared by the triggers of a fault that acts in both directions.
     """
@@ -372,11 +373,11 @@ class FaultTrigger(Copyable):
         self.threshold = threshold_of(arguments.rate)
 
     def hit(self) -> bool:
-        """Return whether the fault acts this time, and count it."""
+        """Return whether the fault acts this time, and count the action."""
         return self.chance.hit(self.threshold) and bool(self.tally.allow())
 
     def hits(self, draws: int) -> list[int]:
-        """Return at which of several opportunities the fault acts, from 0, and count them."""
+        """Return the opportunities (from 0) at which the fault acts, and count the actions."""
         found = self.chance.hits(self.threshold, draws)
         return found[: self.tally.allow(len(found))]
 
@@ -384,7 +385,7 @@ class FaultTrigger(Copyable):
 # Faults of a port: each changes the traffic that passes.
 
 Fault = Callable[[int, W], W]
-"""Changes the traffic that passes at a time in us; an object with state, not a closure."""
+"""Callable that changes the traffic at a time in us: an object with state, not a closure."""
 
 
 class HoldingFault(ABC, Generic[W]):
@@ -393,7 +394,7 @@ class HoldingFault(ABC, Generic[W]):
     @property
     @abstractmethod
     def due_us(self) -> int:
-        """When `release` has traffic to return; `NEVER` if nothing is held."""
+        """Time at which `release` has traffic to return, or `NEVER` if nothing is held."""
 
     @abstractmethod
     def __call__(self, now_us: int, traffic: W, /) -> W:
@@ -401,22 +402,22 @@ class HoldingFault(ABC, Generic[W]):
 
     @abstractmethod
     def release(self, now_us: int) -> W | None:
-        """Return the traffic held until now, None if there is none."""
+        """Return the traffic to release now, or None if there is none."""
 
     is_late: ClassVar[bool] = False
-    """Whether it loses no traffic, so that no loss needs to be reported."""
+    """Whether the fault loses no traffic, so that no loss needs to be reported."""
 
     def sent(self, until_us: int) -> None:
-        """Note when the line will have sent the latest released traffic."""
+        """Record the time at which the line will have sent the latest released traffic."""
 
     def pair(self, other: HoldingFault[W]) -> None:
         """Share common state with the fault of the other direction."""
 
     def end(self) -> None:
-        """Act no more; what is held is still released at its time. Only late faults are asked."""
+        """Stop acting, but release held traffic at its time; called only for late faults."""
 
     def take_over(self, other: HoldingFault[W]) -> None:
-        """Hold what a fault of the same name holds that this one replaces."""
+        """Take over the held traffic of the fault that this fault replaces."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -424,8 +425,8 @@ class FaultType(FaultForm, Generic[W]):
     """A fault of a port that can be armed by name.
 
     Attributes:
-        make: builds the fault of one direction from its trigger and its arguments.
-        uart_error: the error that a UART sees each time the fault acts: `framing`, `parity`,
+        make: function that builds the fault of one direction from its trigger and its arguments.
+        uart_error: error that a UART detects each time the fault acts: `framing`, `parity`,
             `breaks`.
     """
 
@@ -436,19 +437,19 @@ class FaultType(FaultForm, Generic[W]):
 class FaultyPort(Copyable, Generic[W]):
     """A port that applies armed faults to its traffic, in the order of arming.
 
-    Each direction has its own random numbers, which are drawn only for traffic. So they do not
-    depend on the other direction or on ticks without traffic.
+    Each direction has its own random numbers, which are drawn only for traffic. So the numbers do
+    not depend on the other direction or on ticks without traffic.
 
     Args:
         port: the port with the traffic.
         fault_types: the faults that can be armed, by name.
-        seed: seed of its random numbers.
+        seed: seed of the random numbers.
 
     Attributes:
-        seed: seed of its random numbers; a new one applies to faults armed later.
+        seed: seed of the random numbers. A new seed applies to faults armed later.
         drawn: whether a random fault was ever armed.
-        listeners: called if the faults change traffic: with the time, the direction, the sent
-            traffic and the traffic after the faults. A twin has no listeners.
+        listeners: functions that are called if the faults change traffic, with the time, the
+            direction, the sent traffic and the traffic after the faults. A twin has no listeners.
     """
 
     def __init__(
@@ -477,11 +478,11 @@ class FaultyPort(Copyable, Generic[W]):
 
         Args:
             name: name of the fault.
-            *arguments: the texts after `NAME=`, split at commas.
+            *arguments: texts after `NAME=`, split at commas.
 
         Raises:
             KeyError: no fault has this name.
-            ValueError: an unknown argument, or a value out of range.
+            ValueError: an argument is unknown, or a value is out of range.
         """
         fault_type = self.fault_types[name]
         bound = bind_arguments(name, fault_type, arguments)
@@ -512,7 +513,7 @@ class FaultyPort(Copyable, Generic[W]):
         return self._tallies[name].acted if name in self._tallies else 0
 
     def clear(self, name: str) -> None:
-        """Clear a fault; does nothing if it is not armed.
+        """Clear a fault; do nothing if the fault is not armed.
 
         Traffic that a late fault holds still arrives at its time, and no traffic overtakes it.
         Traffic that another fault holds is lost.
@@ -526,7 +527,7 @@ class FaultyPort(Copyable, Generic[W]):
         self._forget(name)
 
     def _forget(self, name: str) -> None:
-        """Remove a fault that is cleared, once neither direction holds traffic."""
+        """Remove a cleared fault, once neither direction holds traffic."""
         both = (self._to_device, self._from_device)
         if name in self._ending:
             if any(_holds(faults[name]) for faults in both):
@@ -537,7 +538,7 @@ class FaultyPort(Copyable, Generic[W]):
 
     @property
     def due_us(self) -> int:
-        """When the next traffic arrives at the port, or a fault releases traffic."""
+        """Time at which the next traffic arrives at the port, or a fault releases traffic."""
         due_us = self._port.due_us
         for faults in (self._to_device, self._from_device):
             for fault in faults.values():
@@ -566,14 +567,14 @@ class FaultyPort(Copyable, Generic[W]):
             self._report_sent(now_us)
 
     def _report_sent(self, now_us: int) -> None:
-        """Report to holding faults when the line will have sent their released traffic."""
+        """Report to holding faults when the line will have sent the released traffic."""
         sent_us: int = getattr(self._port, "sent_us", NEVER)
         for fault in self._from_device.values():
             if isinstance(fault, HoldingFault):
                 fault.sent(now_us if sent_us == NEVER else sent_us)
 
     def use_uart(self, now_us: int, setting: UartSetting) -> None:
-        """Change the setting of the device, after the faults have passed on the traffic they hold.
+        """Change the setting of the device, after the faults have released their held traffic.
 
         Args:
             now_us: the present time.
@@ -627,7 +628,7 @@ class FaultyPort(Copyable, Generic[W]):
 
 
 def _unchanged(now_us: int, traffic: W) -> W:
-    """Pass all traffic: for the direction in which a fault does not act."""
+    """Return the traffic unchanged, for the direction in which a fault does not act."""
     return traffic
 
 

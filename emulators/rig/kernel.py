@@ -19,7 +19,7 @@ _F = TypeVar("_F", bound=Callable[..., object])
 
 
 def _load() -> Any:
-    """Return the C module, None if it was not built."""
+    """Return the C module, or None if it was not built."""
     try:
         return import_module("tickrig.emulators.rig._kernel")
     except ModuleNotFoundError:
@@ -33,7 +33,7 @@ kernel: bool = _KERNEL is not None
 
 
 def in_kernel(method: _F) -> _F:
-    """Replace a method by the kernel's function of the same name, if there is one."""
+    """Replace a method by the kernel's function of the same name, if it exists."""
     if _KERNEL is None:
         return method
     replaced: _F = _KERNEL.method(method.__qualname__, method)
@@ -46,7 +46,7 @@ def enable(wanted: bool) -> bool:
 
 
 def bits(frame: object) -> int | None:
-    """Return the number of bits of a frame counted by the kernel; None if Python must count."""
+    """Return the number of bits of a frame, or None if Python must count them."""
     counted: int | None = _KERNEL.frame_bits(frame)
     return counted
 
@@ -99,23 +99,23 @@ if TYPE_CHECKING or _KERNEL is None:
         )
 
     def run(rig: object, parts: object, until_us: int, unseen_us: int, host: object, /) -> bool:
-        """Run a rig up to a time in C, as `Rig.run_to`; return False if more work is left.
+        """Run a rig up to a time in C, as `Rig.run_to` does; return False if more work is left.
 
         Args:
             rig: the rig.
             parts: timetable, bus, event queue, horizon, watchers, hosts and stations of the rig.
-            until_us: the time.
-            unseen_us: until this time no code reads a device.
-            host: an end that waits for traffic, None if there is no such end.
+            until_us: end of the run.
+            unseen_us: time until which no code reads a device.
+            host: end that waits for traffic, or None if there is no such end.
         """
         return False
 
     def tick_stations(timetable: object, now_us: int, /) -> bool:
-        """Run the stations with work; return False if Python must do it."""
+        """Run the stations with work; return False if Python must run them."""
         return False
 
     def enter_stations(timetable: object, stations: object, /) -> bool:
-        """Enter stations that became due earlier; return False if Python must do it."""
+        """Enter stations that became due earlier; return False if Python must enter them."""
         return False
 
 else:

@@ -12,15 +12,15 @@ from tickrig.wire.uart import UartSetting
 
 
 class Port(Protocol[W]):
-    """One end of a wire. It never blocks, and gets the time as an argument."""
+    """One end of a wire. A port never blocks, and gets the time as an argument."""
 
     @property
     def due_us(self) -> int:
-        """When the next traffic will have arrived, `NEVER` if there is none."""
+        """Time at which the next traffic will have arrived, or `NEVER` if there is none."""
         ...
 
     def poll(self, now_us: int, /) -> W:
-        """Return the traffic arrived by `now_us` and not returned before, in wire order."""
+        """Return the traffic that has arrived by `now_us` since the last call, in wire order."""
         ...
 
     def send(self, now_us: int, traffic: W, /) -> None:
@@ -35,11 +35,12 @@ class LineUart(Part):
 
     Attributes:
         setting: the setting after the latest change.
-        since_us: time from which this setting applies.
-        listeners: called with `since_us` and the new setting. They are copied with the line.
-        error_listeners: called when a fault has spoiled characters: with their direction, the error
-            that a UART sees (`framing`, `parity`, `breaks`), and their number. They are copied with
-            the line.
+        since_us: time from which the present setting applies.
+        listeners: functions that are called with `since_us` and the new setting. They are copied
+            with the line.
+        error_listeners: functions that are called when a fault has spoiled characters, with the
+            direction, the error that a UART detects (`framing`, `parity`, `breaks`), and the number
+            of characters. They are copied with the line.
     """
 
     def __init__(self, setting: UartSetting) -> None:
@@ -57,15 +58,15 @@ class ByteEnd(Port[bytes], Protocol):
         ...
 
     def use_uart(self, now_us: int, setting: UartSetting) -> None:
-        """Change the setting of the device at this end, after the last stop bit it has sent."""
+        """Change the setting of the device at this end, after its last stop bit."""
 
     def withdraw(self, now_us: int) -> list[tuple[int, int]]:
-        """Remove the bytes sent from here that have not arrived; return start in ps and value."""
+        """Remove sent bytes that have not arrived; return their starts (ps) and values."""
         ...
 
     @property
     def idle_us(self) -> int:
-        """When the last byte in transit to this end will have arrived."""
+        """Time at which the last byte in transit to this end will have arrived."""
         ...
 
     @property
@@ -74,7 +75,7 @@ class ByteEnd(Port[bytes], Protocol):
         ...
 
     def arrival_us(self, count: int) -> int:
-        """Return when `count` bytes will have arrived, or when to check again; `NEVER` for none."""
+        """Return the time when `count` bytes will have arrived, or the next check, or `NEVER`."""
         ...
 
     @property
@@ -88,7 +89,7 @@ class ByteEnd(Port[bytes], Protocol):
 
     @property
     def sent_us(self) -> int:
-        """When the last byte sent from here will have passed; past or `NEVER` if it has."""
+        """Time at which the last sent byte will have passed (past or `NEVER` if it has)."""
         ...
 
     def unsent(self, now_us: int) -> int:
@@ -100,7 +101,7 @@ class ByteEnd(Port[bytes], Protocol):
 
 
 class ByteLine(Protocol):
-    """An emulated serial line with two ends or more; the device is at the first."""
+    """An emulated serial line with two ends or more; the device is at the first end."""
 
     @property
     def a(self) -> ByteEnd:
@@ -118,12 +119,12 @@ class Wire(Protocol):
 
     @property
     def due_us(self) -> int:
-        """When the next transmission ends, `NEVER` if there is none."""
+        """Time at which the next transmission ends, or `NEVER` if there is none."""
         ...
 
     @property
     def on_traffic(self) -> list[Callable[[], None]]:
-        """Callback for a transmission that may end earlier than `due_us` was."""
+        """Callback for a transmission that may end earlier than the previous `due_us`."""
         ...
 
     @property
@@ -135,7 +136,7 @@ class Wire(Protocol):
         """Advance to `now_us`, and wake the receivers."""
 
     def advance_until_received(self, until_us: int, /) -> bool:
-        """Advance until a station is woken; return False if none was by `until_us`."""
+        """Advance until a station is woken; return False if no station was woken by `until_us`."""
         ...
 
 
@@ -164,5 +165,5 @@ class Host(Protocol):
 
     @property
     def arrived_us(self) -> int:
-        """Arrival time of the waiting traffic, `NEVER` if there is none."""
+        """Arrival time of the waiting traffic, or `NEVER` if there is none."""
         ...

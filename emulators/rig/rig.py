@@ -75,16 +75,16 @@ class Coupling(Protocol):
 
     @property
     def tick_us(self) -> int:
-        """Its period; it acts at multiples of it."""
+        """Period of the coupling, which acts at multiples of the period."""
         ...
 
     @property
     def due_us(self) -> int:
-        """When it acts even if no device has work; see `Device.due_us`."""
+        """Time at which the coupling acts even if no device has work; see `Device.due_us`."""
         ...
 
     def act(self, now_us: int, /) -> None:
-        """Read outputs, set inputs."""
+        """Read outputs of devices, and set inputs."""
 
 
 # The wires of a rig: only those with traffic are asked.
@@ -103,7 +103,7 @@ class _Wires(Part):
     A wire without traffic is not advanced until `advance` is called.
 
     Args:
-        periods: the control periods in us; ticks are at their multiples.
+        periods: control periods in us. Ticks are at multiples of the periods.
     """
 
     def __init__(self, periods: Iterable[int]) -> None:
@@ -115,7 +115,7 @@ class _Wires(Part):
         return bool(self._wires)
 
     def join(self, wire: Wire) -> None:
-        """Add a wire; does nothing if it was added before."""
+        """Add a wire; do nothing if the wire was added before."""
         if wire not in self._wires:
             self._wires.append(wire)
             self._hear_of(len(self._wires) - 1, wire)
@@ -130,18 +130,18 @@ class _Wires(Part):
         self._begin(place)
 
     def _begin(self, place: int) -> None:
-        """Ask a wire from now on, because it has traffic."""
+        """Advance a wire from now on, because it has traffic."""
         if place not in self._busy:
             self._busy = tuple(sorted((*self._busy, place)))
 
     @property
     def only_bus(self) -> Any:
-        """The bus of the only wire, for the kernel; None if there are several."""
+        """The bus of the only wire, for the kernel, or None if there are several wires."""
         return getattr(self._wires[0], "_kernel_bus", None) if len(self._wires) == 1 else None
 
     @property
     def due_us(self) -> int:
-        """When the next transmission ends on one of them, `NEVER` if there is none."""
+        """Time at which the next transmission on any wire ends, or `NEVER` if there is none."""
         return min(self._dues())[0] if self._busy else NEVER
 
     def _dues(self) -> list[tuple[int, int]]:
@@ -162,14 +162,14 @@ class _Wires(Part):
             self._wires[place].advance(now_us)
 
     def advance_until_received(self, until_us: int, hosts: tuple[Host, ...] = _NOBODY) -> bool:
-        """Advance to a time, but not beyond a tick for which a station was woken.
+        """Advance to a time, but stop before a tick for which a station was woken.
 
         Args:
             until_us: the time.
-            hosts: hosts that also stop it when traffic has arrived.
+            hosts: hosts at which arriving traffic also stops the advance.
 
         Returns:
-            False if nothing else ends by then, and no station was woken.
+            False if no further transmission ends by then and no station was woken.
         """
         if not self._busy:
             return False
@@ -207,7 +207,7 @@ class _Wires(Part):
 
 
 _LATE_US: Final = 1_000
-"""A step that starts later than this counts as late."""
+"""Delay from which a step counts as late."""
 
 LATE_KEPT: Final = 1_000
 """Number of late steps whose times are kept."""
@@ -236,20 +236,22 @@ class Rig(Copyable):
     Args:
         stations: the devices, each on its port.
         bridges: connections with the outside world (real time).
-        couplings: connections of the devices besides their wires, in the order in which they act.
-        clock: by default a `VirtualClock`.
-        dense: run every tick of every device.
-        event_queue: actions between ticks; by default a new queue.
+        couplings: connections of the devices in addition to their wires, in the order in which they
+            act.
+        clock: clock of the rig, or None to use a `VirtualClock`.
+        dense: whether to run every tick of every device.
+        event_queue: actions between ticks, or None to use a new queue.
 
     Attributes:
         event_queue: actions between ticks.
         stations: the devices, each on its port.
-        acting_us: the time of the running action of the event_queue; None if no action runs.
+        acting_us: time of the running action of the event_queue, or None if no action runs.
         now_us: time since the start of the rig.
         worst_late_us: largest delay of a step.
         late_ticks: number of steps that started more than `_LATE_US` late.
-        hosts: ends at which each arrival is a separate step; a watcher handles the arrival.
-        watchers: called with the time after each step, in the order of registration.
+        hosts: ends at which each arrival is a separate step. A watcher handles the arrival.
+        watchers: functions that are called with the time after each step, in the order of
+            registration.
     """
 
     def __init__(
@@ -294,7 +296,7 @@ class Rig(Copyable):
         self._short = () if bus is None else parts
 
     def _attach(self, station: Station[Any]) -> bool:
-        """Subscribe to the wake-ups of a station's port, if it has them (`WirePort`)."""
+        """Subscribe to the wake-ups of a station's port, if the port is a `WirePort`."""
         port, device = station.port, station.device
         if not is_wire_port(port):
             return False
@@ -305,13 +307,13 @@ class Rig(Copyable):
         return True
 
     def __getstate__(self) -> object:
-        """Return the initial state of a twin: it has no hosts, and runs in virtual time."""
+        """Return the initial state of a twin, which has no hosts and runs in virtual time."""
         begun = {"_bridges": (), "_short": (), "_clock": VirtualClock(), "_jumps": not self._dense}
         now = {"_in_real_time": False, "acting_us": None}
         return state_of(self, {**begun, **now})
 
     def __setstate__(self, state: object) -> None:
-        """Restore the state of the copied rig; its ports have no devices yet."""
+        """Restore the state of the copied rig, whose ports have no devices yet."""
         restore(self, state)
         self._timetable.in_step = 0
         self._wires.hear_again()
@@ -334,7 +336,7 @@ class Rig(Copyable):
     def fork(self, *parts: Any) -> Any:
         """Return a twin of the rig: an independent copy that continues from here.
 
-        With the same input the twin behaves the same to the byte. It has the devices, wires,
+        With the same input the twin behaves the same to the byte. The twin has the devices, wires,
         faults, couplings and events of this rig. It runs in virtual time and has no connection to
         the outside: no bridge, recorder or observer.
 
@@ -343,7 +345,7 @@ class Rig(Copyable):
                 line.
 
         Returns:
-            The twin; with `parts` a tuple of the twin and of its parts.
+            The twin, or with `parts` a tuple of the twin and the copied parts.
 
         Raises:
             TypeError: an object of the rig cannot be copied, such as a pty port. The message names
@@ -363,8 +365,8 @@ class Rig(Copyable):
     def snapshot(self, *parts: object) -> MachineSnapshot:
         """Return a snapshot that restores the present state of the rig any number of times.
 
-        The snapshot restores this rig itself, so references to ends of its wires stay valid. It
-        takes a twentieth of the time of a `fork`.
+        The snapshot restores this rig itself, so references to ends of its wires stay valid. A
+        snapshot takes a twentieth of the time of a `fork`.
 
         Args:
             parts: objects to restore with the rig, such as a host.
@@ -421,10 +423,10 @@ class Rig(Copyable):
         """Run all events up to and at a time, or until traffic has arrived at a host.
 
         Args:
-            t_us: the time, since the start of the rig.
+            t_us: time since the start of the rig.
             host: the host to watch, if given.
-            unseen_us: how long after `t_us` the caller will probably not read devices or set inputs
-                between ticks. Doing so is allowed, but slower.
+            unseen_us: time after `t_us` in which the caller will probably not read devices or set
+                inputs between ticks. The caller may do so, but it is slower.
         """
         self._until_us = t_us + unseen_us if host is None else 0
         if self._short and run(self, self._short, t_us, self._until_us, host):
@@ -461,11 +463,11 @@ class Rig(Copyable):
         """Run until a condition is true.
 
         Args:
-            done: returns the condition, without side effects.
+            done: function without side effects that returns whether the condition is true.
             timeout_us: largest duration.
 
         Returns:
-            False after the time-out.
+            True if the condition is true, or False after the time-out.
         """
         deadline_us = self.now_us + timeout_us
         self._enter_due()
@@ -486,7 +488,7 @@ class Rig(Copyable):
         self._horizon.until_us = 0 if seen else min(until_us, self.event_queue.due_us - 1)
 
     def _enter_due(self) -> None:
-        """Enter stations that became due between steps: inputs set, a dictionary written."""
+        """Enter stations that became due between steps, for example because an input was set."""
         if kernel and enter_stations(self._timetable, self._woken):
             return
         for station in self._woken:
@@ -532,7 +534,7 @@ class Rig(Copyable):
                 return next_us
 
     def _happen(self, next_us: int) -> None:
-        """Run the next events: all actions of that time, else its tick."""
+        """Run the next events: all actions of the time, or else its tick."""
         timetable = self._timetable
         outer, timetable.in_step = timetable.in_step, 1
         try:
@@ -593,11 +595,11 @@ class Rig(Copyable):
             watch(now_us)
 
     def late_since(self, t_us: int) -> int:
-        """Return the largest delay of a step since a time, counting those beyond `_LATE_US`.
+        """Return the largest delay of a step since a time; delays up to `_LATE_US` do not count.
 
         Args:
-            t_us: the time. If more than `LATE_KEPT` steps were late since then, all late steps
-                count.
+            t_us: time from which late steps are counted. If more than `LATE_KEPT` steps were late
+                since then, all late steps count.
         """
         if len(self._late) == LATE_KEPT and self._late[0][0] > t_us:
             return self.worst_late_us
@@ -610,7 +612,7 @@ class Rig(Copyable):
             self._late.append((self.now_us, late_us))
 
     def _tick(self, now_us: int) -> None:
-        """Run all devices with work: compute, then send."""
+        """Run all devices with work: first compute all, then send all data."""
         sent = []
         for station in self._looked_at:
             if now_us % station.tick_us:

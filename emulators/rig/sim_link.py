@@ -13,7 +13,7 @@ class SimLink:
 
     Args:
         rig: the rig to advance.
-        end: the host's end of a serial line of that rig.
+        end: host's end of a serial line of the rig.
     """
 
     def __init__(self, rig: Rig, end: ByteEnd) -> None:
@@ -26,7 +26,7 @@ class SimLink:
         return self._rig.now_us
 
     def send(self, traffic: bytes, /) -> None:
-        """Queue bytes on the line; if its buffer is full, advance the time until they fit.
+        """Queue bytes on the line; if its buffer is full, advance the time until the bytes fit.
 
         Args:
             traffic: the bytes.
@@ -46,10 +46,10 @@ class SimLink:
         """Advance the rig until bytes have arrived.
 
         Args:
-            timeout_us: longest wait; 0 only polls.
+            timeout_us: longest wait; with 0 the call only polls.
 
         Returns:
-            The bytes, empty after the time-out.
+            The received bytes, which are empty after the time-out.
 
         Raises:
             LinkClosed: the link was closed.
@@ -74,11 +74,11 @@ class SimLink:
 class RigClock:
     """A clock whose time advances with its rig.
 
-    With it a system of RT components (`host.rtc.real_time`) and the emulated
-    devices behind its proxies run in virtual time together.
+    With this clock a system of RT components (`host.rtc.real_time`) and the emulated devices behind
+    its proxies run in virtual time together.
 
     Args:
-        rig: advanced while the caller waits.
+        rig: rig that is advanced while the caller waits.
     """
 
     def __init__(self, rig: Rig) -> None:

@@ -15,14 +15,14 @@ from tickrig.wire.instant import NEVER
 _LOG = logging.getLogger(__name__)
 
 EPOCH_S: Final = 946_684_800
-"""The clock of hosts at the start of a rig: 2000-01-01."""
+"""Time on the clock of hosts at the start of a rig: 2000-01-01."""
 
 LOOK_US: Final = 100
-"""Time added by each read of the clock, so that a loop that only reads it ends."""
+"""Time added by each read of the clock, so that a loop that only reads the clock ends."""
 
 MOST_LOOKS: Final = 10_000
-"""Largest number of polls at one instant; then the host gets an error, because it would wait
-endlessly."""
+"""Largest number of polls at one instant. After more polls the host gets an error, because it would
+wait endlessly."""
 
 _T = TypeVar("_T")
 
@@ -31,7 +31,7 @@ class OneThread(Copyable):
     """The thread in which hosts advance the virtual time.
 
     If two threads advanced the time, runs would differ. The thread is the one that makes this
-    object; for a twin, it is the thread that makes the twin.
+    object; the thread of a twin is the thread that makes the twin.
 
     Attributes:
         ident: identifier of the thread.
@@ -42,15 +42,15 @@ class OneThread(Copyable):
         self.ident, self.refused = get_ident(), ""
 
     def __setstate__(self, state: object) -> None:
-        """Continue in the thread in which it is copied."""
+        """Continue in the thread that makes the copy."""
         restore(self, state)
         self.ident = get_ident()
 
     def refusal(self, name: str, instead: str) -> str:
-        """Return why use is refused, permanently after a second thread has tried it; else "".
+        """Return why use is refused (permanently after a second thread has tried it), or "".
 
         Args:
-            name: the object in use, such as a port or a bus.
+            name: name of the object in use, such as a port or a bus.
             instead: alternative for hosts with a second thread.
         """
         if get_ident() != self.ident and not self.refused:
@@ -63,7 +63,7 @@ class OneThread(Copyable):
 
 
 class Looks(Copyable):
-    """Counter of polls without result at one instant: they take no time, so a loop hangs."""
+    """Counter of polls without result at one instant, by which an endless loop is detected."""
 
     def __init__(self) -> None:
         self._count, self._at_us = 0, NEVER
@@ -91,7 +91,7 @@ class Passing(Protocol):
 
     @property
     def time_s(self) -> float:
-        """Seconds since 1970, on its clock."""
+        """Seconds since 1970 on the clock of the object."""
         ...
 
     def wait(self, done: Callable[[], bool], timeout_s: float | None) -> bool:
@@ -118,7 +118,7 @@ class SimQueue(Generic[_T]):
         return self._items.popleft()
 
     def empty(self) -> bool:
-        """Return whether it is empty."""
+        """Return whether the queue is empty."""
         return not self._items
 
 
@@ -146,7 +146,7 @@ class SimCondition:
 
 
 class SimTime:
-    """The functions of `time` that libraries use, on another clock."""
+    """The functions of `time` that libraries use, on the clock of a rig."""
 
     def __init__(self, passing: Passing) -> None:
         self._passing = passing

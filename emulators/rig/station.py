@@ -1,4 +1,4 @@
-"""A device on a port, when it has work, and which of several have work at which tick."""
+"""A device on a port, and the timetable of the ticks at which several stations have work."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tickrig.wire.uart import UartSetting
 
 
 class WirePort(Protocol[W]):
-    """A `Port` that reports arrived traffic, so that it need not be polled.
+    """A `Port` that reports arrived traffic, so that polling is not needed.
 
     `WirePort` is not derived from `Port`, because a compiled base class has additional names.
     """
@@ -28,7 +28,7 @@ class WirePort(Protocol[W]):
         ...
 
     def attach(self, device: Device[W], wake: Callable[[int], None], /) -> None:
-        """Attach a device: call `wake` with the time when traffic has arrived for it."""
+        """Attach a device, and call `wake` with the arrival time of its traffic."""
 
 
 def is_wire_port(port: object) -> TypeGuard[WirePort[Any]]:
@@ -40,7 +40,7 @@ class Station(StationFields, Generic[W]):
     """A device on a port.
 
     Attributes:
-        at_us: its tick in the timetable of its rig.
+        at_us: tick of the station in the timetable of its rig.
     """
 
     __slots__ = ()
@@ -53,7 +53,7 @@ class Station(StationFields, Generic[W]):
         self._timetable: Timetable | None = None
 
     def stand_in(self, timetable: Timetable | None) -> None:
-        """Enter the station in a timetable on arrivals; without a timetable it is polled."""
+        """Enter the station in a timetable on arrivals, or poll its port without a timetable."""
         self._timetable = timetable
         if is_wire_port(self.port):
             self.port.attach(self.device, self._wake)
@@ -78,7 +78,7 @@ class _UartPort(Copyable, Generic[W]):
 
     @property
     def due_us(self) -> int:
-        """When the next traffic reaches the device."""
+        """Time at which the next traffic reaches the device."""
         return self._port.due_us  # type: ignore[no-any-return] # a Port
 
     def poll(self, now_us: int, /) -> W:
@@ -109,15 +109,16 @@ def next_tick_us(now_us: int, due_us: int, tick_us: int) -> int:
 
 
 class Timetable(TimetableFields):
-    """Ticks with work, soonest first, each with its stations.
+    """Ticks with work, in order of time, each with its stations.
 
-    A station has one tick, `station.at_us`. Its older entries at later ticks are ignored.
+    Each station has one tick, `station.at_us`. Older entries of the station at later ticks are
+    ignored.
 
     Attributes:
-        first_us: the soonest tick with work, `NEVER` if there is none.
+        first_us: time of the first tick with work, or `NEVER` if there is none.
         open_us: earliest time at which a tick can be entered.
-        in_step: 1 while a step of the rig is running, else 0. It is a field of this class for the
-            kernel, which saves 2 % of an SDO.
+        in_step: number 1 while a step of the rig is running, or 0. The number is a field of this
+            class for the kernel, which saves 2 % of an SDO.
     """
 
     __slots__ = ()
@@ -129,7 +130,7 @@ class Timetable(TimetableFields):
 
     @in_kernel
     def enter(self, station: Station[Any], at_us: int) -> None:
-        """Enter a station for the first tick from `at_us` on, unless it has an earlier one."""
+        """Enter a station for the first tick from `at_us` on, unless it has an earlier tick."""
         if at_us >= station.at_us:
             return
         tick_us = station.tick_us

@@ -33,7 +33,7 @@ def _build_rrc(config: Config) -> Rrc:
     """Build an RRC.
 
     Raises:
-        ValueError: a setting that an RRC does not have, or a value that it cannot have.
+        ValueError: an RRC does not have the setting, or does not accept the value.
     """
     check_config(config, _config_to_trace(RrcConfig()), "an RRC has no setting")
     settings: dict[str, Any] = dict(config)

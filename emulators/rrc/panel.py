@@ -24,7 +24,7 @@ from tickrig.host.rrc import gauges
 from tickrig.host.tui import FramedApp, KeyFooter
 
 _SendRequests = Callable[[Sequence[Object]], Awaitable[list[Object]]]
-"""Sends requests of the control socket to an emulator, and returns the answers."""
+"""Function that sends requests of the control socket to an emulator, and returns the answers."""
 
 _REFRESH_S: Final = 0.1
 _STEP_PCT: Final = 10
@@ -44,7 +44,7 @@ q       end the emulator"""
 
 _LEAST: Final = (60, 15)
 _ROOMY: Final = (80, 24)
-"""Columns and lines: minimum for the panel, and size for all of it."""
+"""Columns and lines: `_LEAST` is the minimum for the panel, `_ROOMY` shows the complete panel."""
 
 
 def _too_small(size: tuple[int, int], least: tuple[int, int]) -> Text:
@@ -63,8 +63,8 @@ class RrcPanel(FramedApp):
     smallest size is 60 x 15.
 
     Args:
-        send: sends requests to the emulator, and returns its answers.
-        ready: called when the screen is ready, to start the emulator.
+        send: function that sends requests to the emulator, and returns its answers.
+        ready: function that is called when the screen is ready, to start the emulator.
     """
 
     ENABLE_COMMAND_PALETTE = False
@@ -215,7 +215,7 @@ def _request(do: str, **fields: object) -> Object:
 # Run an emulator in a thread of its own, and the operator panel in this one.
 
 _SWITCH_S: Final = 0.000_2
-"""How long the screen may block the rig; a tick is 10 ms."""
+"""Longest time for which the screen may block the rig; a tick is 10 ms."""
 
 
 def run_panel(emulator: Emulator) -> None:

@@ -43,7 +43,7 @@ _LINE_STYLES: Final = {"EV": "bold cyan", "ER": "bold red"}
 
 _KEPT_LINES: Final = 60
 _REPORT_US: Final = 100_000
-"""How long the latest SA line is shown; one arrives each 10 ms while the status is on."""
+"""Time for which the latest SA line is shown; a line arrives every 10 ms while the status is on."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +54,7 @@ class PanelView:
         values: inputs and outputs by name.
         status: status of the run.
         lines: the latest lines on the wire except SA, as `(time, mark, text)`.
-        report: the latest SA line.
+        report: latest SA line.
     """
 
     values: Mapping[str, _Value] = field(default_factory=dict)
@@ -63,13 +63,13 @@ class PanelView:
     report: str = ""
 
     def number(self, name: str) -> int:
-        """Return a numeric value, 0 if it is not known yet."""
+        """Return a numeric value, or 0 if it is not known yet."""
         value = self.values.get(name, 0)
         return value if isinstance(value, int) else 0
 
     @property
     def decoded(self) -> StatusA | None:
-        """The latest SA line; None if there is none."""
+        """The decoded latest SA line, or None if there is none."""
         try:
             reply = parse_reply(self.report.encode())
         except WireError:
@@ -92,7 +92,7 @@ class _WireRow(NamedTuple):
 
     @property
     def is_report(self) -> bool:
-        """Whether it is one of a stream of SA lines."""
+        """Whether the line belongs to a stream of SA lines."""
         return self.mark == Mark.FROM_DEVICE and self.text.startswith("SA:")
 
 
@@ -101,7 +101,7 @@ class Observer:
 
     Attributes:
         view: the present view.
-        seen: number of the latest line on the wire; request the lines after it.
+        seen: number of the latest line on the wire. The next request asks for the lines after it.
     """
 
     def __init__(self) -> None:
@@ -125,7 +125,7 @@ class Observer:
         )
 
     def _reports(self, status: _Values, values: _Values) -> bool:
-        """Whether SA lines arrive: VR2 runs, and the latest one is recent."""
+        """Return whether SA lines arrive: VR2 runs, and the latest SA line is recent."""
         fresh = self._report.at_us + _REPORT_US > int(status["now_us"])
         return fresh and bool(values["vr2_power"])
 
@@ -154,7 +154,7 @@ _STICK_HINTS: Final = {
 
 
 def stick_hint(view: PanelView) -> str:
-    """Return whether the stick drives, or what it waits for; at most 21 columns."""
+    """Return a text of at most 21 columns: whether the stick drives, or why not."""
     state = str(view.values.get("state", ""))
     if state == "Standby" and view.number("stick_drives"):
         return "drives"
@@ -171,7 +171,7 @@ def lamps(view: PanelView) -> list[Text]:
 
 
 def load(view: PanelView) -> Text:
-    """Show the load of the RRC, and its time left."""
+    """Show the load of the RRC, and the time that is left."""
     margin_pct = view.number("margin_pct")
     style = FAULT if margin_pct < 0 else ON if margin_pct < 100 - SAFE_PCT else ""
     return Text(f"{view.number('load_pct')} %, margin {margin_pct} %", style=style)
@@ -184,7 +184,7 @@ def state_of(view: PanelView) -> Text:
 
 
 def outputs_pane(view: PanelView) -> Text:
-    """Show the work of the RRC."""
+    """Show the state and the outputs of the RRC."""
     rows = [
         Text.assemble("state  ", state_of(view)),
         Text.assemble("drive  v ", bar(view.number("out_v_pct"))),

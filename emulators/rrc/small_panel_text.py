@@ -10,7 +10,7 @@ from tickrig.host.rrc.gauges import DIM, bar, scale, signed
 
 
 def outputs_pane(view: PanelView) -> Text:
-    """Show the work of the RRC, and stick and output side by side."""
+    """Show the state of the RRC, and stick and output side by side."""
     rows = [
         Text(" ").join([panel_text.state_of(view), *panel_text.lamps(view)]),
         Text.assemble(
@@ -44,7 +44,7 @@ def controls_pane(view: PanelView) -> Text:
 
 
 def report_line(view: PanelView) -> Text:
-    """Show the latest SA line; the counters are those of speed up, down and alarm."""
+    """Show the latest SA line, with the counters of speed up, speed down and alarm."""
     if (sa := view.decoded) is None:
         return Text(view.report)
     return Text(

@@ -50,7 +50,7 @@ def _build_rtc_lite(config: Config) -> RtcLiteNode:
     """Build a node.
 
     Raises:
-        ValueError: a setting that a node does not have, or a value that it cannot have.
+        ValueError: a node does not have the setting, or does not accept the value.
     """
     defaults = _config_to_trace("echo", LiteConfig())
     check_config(config, defaults, "a node has no setting")
@@ -80,7 +80,7 @@ COMPONENTS: Final[Mapping[str, type[LiteComponent]]] = MappingProxyType(
 
 
 def _find_component(spec: str) -> type[LiteComponent]:
-    """Return the component of a name or `FILE.py:Class`.
+    """Return the component with a name, or the component of a `FILE.py:Class`.
 
     Raises:
         ValueError: the name is unknown, the file cannot be run, or the component does not fit into

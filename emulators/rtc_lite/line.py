@@ -45,7 +45,7 @@ _SHOWN: Final = {
 
 
 def frame_splitter(config: LiteConfig) -> Callable[[Mark], Splitter]:
-    """Return the factory of the splitters of each direction."""
+    """Return the function that makes the splitter of a direction."""
 
     def make(mark: Mark) -> Splitter:
         if config.framing is Framing.RTNO:
@@ -58,7 +58,7 @@ def frame_splitter(config: LiteConfig) -> Callable[[Mark], Splitter]:
 
 
 class _PacketSplitter:
-    """Shows packets of RTno without header, length and sum."""
+    """Splitter that shows packets of RTno without header, length and sum."""
 
     def __init__(self) -> None:
         self._decoder, self._received_us = RtnoPacketDecoder(), 0
@@ -75,7 +75,7 @@ class _PacketSplitter:
 
 
 def _split(receiver: LiteReceiver, at_us: int, data: bytes) -> list[bytes]:
-    """Split as a node does, with the same time-outs."""
+    """Split bytes as a node does, with the same time-outs."""
     out = [_SHOWN[LiteLinkFault.TIMEOUT]] if receiver.drop_broken_off(at_us) else []
     for at in range(0, len(data), BUFFER_BYTES):
         receiver.push(at_us, data[at : at + BUFFER_BYTES])
@@ -91,8 +91,8 @@ class MonitoredLink:
     """A `Link[bytes]` that reports each frame on another link.
 
     Args:
-        link: the other link.
-        show: called with a line of text, such as `> AE EXECUTE`.
+        link: the link whose frames are reported.
+        show: function that is called with a line of text, such as `> AE EXECUTE`.
 
     Attributes:
         shown: whether frames are reported now.
@@ -105,22 +105,22 @@ class MonitoredLink:
 
     @property
     def now_us(self) -> int:
-        """Time on the other link."""
+        """Time on the link."""
         return self._link.now_us
 
     def send(self, traffic: bytes, /) -> None:
-        """Send and report."""
+        """Send and report data."""
         self._report(Mark.TO_DEVICE, traffic)
         self._link.send(traffic)
 
     def receive(self, timeout_us: int, /) -> bytes:
-        """Receive and report."""
+        """Receive and report data."""
         data = self._link.receive(timeout_us)
         self._report(Mark.FROM_DEVICE, data)
         return data
 
     def close(self) -> None:
-        """Close the other link."""
+        """Close the link."""
         self._link.close()
 
     def _report(self, mark: Mark, data: bytes) -> None:
@@ -160,7 +160,7 @@ def _packed(body: bytes, config: LiteConfig) -> Send:
 
 
 def _value(port_type: LitePortType[Any], words: list[str]) -> bytes:
-    """Write a typed value: a word, or one for each element."""
+    """Return the bytes of a value written as one word, or as one word for each element."""
     if port_type.code in "cC":
         return port_type.encode(" ".join(words))
     values = tuple(parse_setting(word) for word in words)
@@ -185,7 +185,7 @@ class _Noise(ByteFault):
 
 
 class _LostPing:
-    """A fault without random numbers: it counts. A node sends an answer in one tick."""
+    """A fault without random numbers, which counts answers. A node sends an answer in one tick."""
 
     def __init__(self, trigger: FaultTrigger, arguments: FaultArguments) -> None:
         self._every, self._seen, self._tally = round(1 / arguments.rate), 0, trigger.tally
@@ -204,12 +204,12 @@ class RadioSettings:
     """Parameters of a radio link between host and node.
 
     Attributes:
-        latency_us: the shortest time that a packet takes.
-        jitter_us: random additional time; packets keep their order.
+        latency_us: shortest time that a packet takes.
+        jitter_us: largest random additional time. Packets keep their order.
         gap_us: silence after which a radio sends the collected bytes as one packet.
-        up_us: mean time from one dropout to the next, 0 for no dropouts. It varies randomly by
-            half.
-        dropout_us: mean duration of a dropout; it varies randomly by half.
+        up_us: mean time from one dropout to the next, or 0 for no dropouts. The time varies
+            randomly by half.
+        dropout_us: mean duration of a dropout, which varies randomly by half.
     """
 
     latency_us: int = 15_000
@@ -220,14 +220,14 @@ class RadioSettings:
 
 
 class _Dropouts:
-    """Dropouts, common to both directions."""
+    """The dropouts of a radio link, which both directions share."""
 
     def __init__(self, chance: Chance, settings: RadioSettings) -> None:
         self._chance, self._settings = chance, settings
         self._down, self._until_us = True, 0
 
     def down(self, now_us: int) -> bool:
-        """Return whether there is a dropout; times must not decrease."""
+        """Return whether there is a dropout at a time; times must not decrease between calls."""
         while self._settings.up_us and now_us >= self._until_us:
             self._down = not self._down
             mean_us = self._settings.dropout_us if self._down else self._settings.up_us
@@ -236,7 +236,7 @@ class _Dropouts:
 
 
 class Radio(HoldingFault[bytes]):
-    """One direction of a radio link: packets are late, lost at random, or lost in a dropout."""
+    """One direction of a radio link. Packets are late, lost at random, or lost in a dropout."""
 
     def __init__(
         self, settings: RadioSettings, trigger: FaultTrigger, arguments: FaultArguments
@@ -248,7 +248,7 @@ class Radio(HoldingFault[bytes]):
 
     @property
     def due_us(self) -> int:
-        """When a packet is sent or arrives."""
+        """Time at which a packet is sent or arrives."""
         leaves_us = self._taken_us + self._settings.gap_us if self._taken else NEVER
         return min(leaves_us, self._flying[0][0] if self._flying else NEVER)
 

@@ -21,9 +21,9 @@ class HostSetting:
     """Reports host settings that differ from the device's setting, once for each setting.
 
     Args:
-        read: returns the present setting of the host, such as `9600 8N1`.
-        wanted: setting of the device; empty if the device understands any host.
-        notify: called with a setting of the host that differs.
+        read: function that returns the present setting of the host, such as `9600 8N1`.
+        wanted: setting of the device, or empty if the device understands any host.
+        notify: function that is called with a setting of the host that differs.
 
     Attributes:
         differing: the present setting, if it differs from the device's.
@@ -36,10 +36,10 @@ class HostSetting:
         self.differing = ""
 
     def want(self, wanted: str) -> None:
-        """Compare with another setting after the device has changed its own.
+        """Compare hosts with a new setting, after the device has changed its setting.
 
         Args:
-            wanted: setting of the device; empty if the device understands any host.
+            wanted: setting of the device, or empty if the device understands any host.
         """
         if wanted != self._wanted:
             self._wanted, self._next_us = wanted, 0
@@ -70,11 +70,12 @@ class Bridge:
     until they fit.
 
     Args:
-        end: the host's end of the line.
-        outside: the host's port.
-        attend: called with the time instead of a poll, while the line has no room for earlier data.
-        changed: called with the setting of the device, at the start and after each change. The
-            setting is None if hosts of any setting understand the device.
+        end: host's end of the line.
+        outside: port of the host.
+        attend: function that is called with the time instead of a poll, while the line has no room
+            for earlier data.
+        changed: function that is called with the setting of the device, at the start and after each
+            change. The setting is None if hosts of any setting understand the device.
     """
 
     def __init__(
@@ -92,7 +93,7 @@ class Bridge:
 
     @property
     def due_us(self) -> int:
-        """When all bytes now on the line will have arrived at this end."""
+        """Time at which all bytes now on the line will have arrived at this end."""
         return self._end.idle_us
 
     def take_in(self, now_us: int) -> None:
@@ -129,25 +130,25 @@ class HostEnd:
     """A `ByteEnd` that reports its traffic.
 
     Args:
-        end: the other end.
-        hear: called with the time, the direction and the bytes.
+        end: the end whose traffic is reported.
+        hear: function that is called with the time, the direction and the bytes.
     """
 
     def __init__(self, end: ByteEnd, hear: Callable[[int, Mark, bytes], None]) -> None:
         self._end, self._hear = end, hear
 
     def __reduce__(self) -> tuple[Callable[[ByteEnd], ByteEnd], tuple[ByteEnd]]:
-        """Copy only the end: a twin has no listeners."""
+        """Copy only the end, because a twin has no listeners."""
         return itself, (self._end,)
 
     @property
     def due_us(self) -> int:
-        """When the next byte will have arrived here."""
+        """Time at which the next byte will have arrived here."""
         return self._end.due_us
 
     @property
     def idle_us(self) -> int:
-        """When the last byte in transit to this end will have arrived."""
+        """Time at which the last byte in transit to this end will have arrived."""
         return self._end.idle_us
 
     @property
@@ -156,7 +157,7 @@ class HostEnd:
         return self._end.coming
 
     def arrival_us(self, count: int) -> int:
-        """Return when `count` bytes will have arrived, or when to check again; `NEVER` for none."""
+        """Return the time when `count` bytes will have arrived, or the next check, or `NEVER`."""
         return self._end.arrival_us(count)
 
     @property
@@ -169,7 +170,7 @@ class HostEnd:
         self._end.use_uart(now_us, setting)
 
     def withdraw(self, now_us: int) -> list[tuple[int, int]]:
-        """Remove the host's bytes that have not arrived; return start in ps and value."""
+        """Remove the host's bytes that have not arrived; return their starts (ps) and values."""
         return self._end.withdraw(now_us)
 
     @property
@@ -183,7 +184,7 @@ class HostEnd:
 
     @property
     def sent_us(self) -> int:
-        """When the last byte of the host will have passed; past or `NEVER` if it has."""
+        """Time at which the last byte of the host will have passed (past or `NEVER` if it has)."""
         return self._end.sent_us
 
     def unsent(self, now_us: int) -> int:
@@ -201,19 +202,19 @@ class HostEnd:
         return data
 
     def send(self, now_us: int, traffic: bytes, /) -> None:
-        """Send as the host."""
+        """Send data as the host."""
         self._hear(now_us, Mark.TO_DEVICE, traffic)
         self._end.send(now_us, traffic)
 
 
 class Tap(Copyable, Generic[W]):
-    """A port with listeners: polled data go to the device, sent data come from it.
+    """A port with listeners; polled data go to the device, and sent data come from the device.
 
     The port may be the device's end of a wire, or the port of the host. A twin has no listeners.
 
     Args:
         port: the port.
-        listeners: called with the time, the direction and the traffic.
+        listeners: functions that are called with the time, the direction and the traffic.
     """
 
     def __init__(self, port: Port[W], *listeners: Callable[[int, Mark, W], None]) -> None:
@@ -222,7 +223,7 @@ class Tap(Copyable, Generic[W]):
 
     @property
     def due_us(self) -> int:
-        """When the next traffic arrives at the port."""
+        """Time at which the next traffic arrives at the port."""
         return self._port.due_us
 
     def poll(self, now_us: int, /) -> W:
@@ -239,7 +240,7 @@ class Tap(Copyable, Generic[W]):
 
     @property
     def sent_us(self) -> int:
-        """When the line will have sent the latest data; `NEVER` if it has, or if unknown."""
+        """Time at which the line will have sent the data, or `NEVER` if it has or if unknown."""
         return getattr(self._port, "sent_us", NEVER)
 
     def use_uart(self, now_us: int, setting: UartSetting) -> None:

@@ -60,7 +60,7 @@ class ByteFault:
     """A fault that hits bits, bytes, lines or frames at random.
 
     Attributes:
-        trigger: decides which of them the fault hits.
+        trigger: trigger that decides which bits, bytes, lines or frames the fault hits.
         arguments: arguments of the fault.
     """
 
@@ -125,7 +125,7 @@ class _UnitFault(ByteFault):
         return self._spoil(unit) if self.trigger.hit() else unit
 
     def _spoil(self, unit: bytes) -> bytes:
-        """Return the bytes that arrive in its place."""
+        """Return the bytes that arrive in place of a unit."""
         raise NotImplementedError
 
 
@@ -188,14 +188,14 @@ class _Late(ByteFault, HoldingFault[bytes]):
 
     @property
     def due_us(self) -> int:
-        """When the next bytes are sent."""
+        """Time at which the next bytes are sent."""
         if not self._queue:
             return NEVER
         at_us, pause_us, _ = self._queue[0]
         return max(at_us, self._free_us + pause_us) if pause_us else at_us
 
     def __call__(self, now_us: int, data: bytes, /) -> bytes:
-        """Accept bytes; return those that pass at once."""
+        """Accept bytes; return the bytes that pass at once."""
         for unit in _units(self.arguments["by"], data):
             if self.trigger.hit():
                 self._queue.extend(self._delayed(now_us, unit))
@@ -212,21 +212,21 @@ class _Late(ByteFault, HoldingFault[bytes]):
         return out or None
 
     def end(self) -> None:
-        """Act no more."""
+        """Stop delaying bytes."""
         self.trigger.tally.count = self.trigger.tally.acted
 
     def take_over(self, other: HoldingFault[bytes]) -> None:
-        """Hold what the fault holds that this one replaces."""
+        """Take over the held bytes of the fault that this fault replaces."""
         assert isinstance(other, _Late)
         self._queue, self._free_us = other._queue, other._free_us
 
     def sent(self, until_us: int) -> None:
-        """Start pauses when the line has sent the latest bytes."""
+        """Start the pauses from the time at which the line has sent the latest bytes."""
         self._free_us = max(self._free_us, until_us)
 
     @abstractmethod
     def _delayed(self, now_us: int, unit: bytes) -> list[tuple[int, int, bytes]]:
-        """Return the times of its parts."""
+        """Return the times of the parts of a unit."""
 
 
 class _Delay(_Late):
@@ -267,7 +267,7 @@ def _time(name: str, text: str, default: str) -> FaultArgument:
 
 
 def _read_keep(word: str) -> tuple[int, bool]:
-    """Read how much remains: a number, and whether it is a percentage.
+    """Read the part that remains: a number, and whether the number is a percentage.
 
     >>> _read_keep("half"), _read_keep("3"), _read_keep("90%")
     ((50, True), (3, False), (90, True))

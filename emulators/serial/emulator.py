@@ -29,7 +29,7 @@ class LineOutside(Port[bytes], Protocol):
 
     @property
     def lost(self) -> int:
-        """Bytes dropped because the host did not read."""
+        """Number of bytes dropped because the host did not read."""
         ...
 
     @property
@@ -41,7 +41,7 @@ class LineOutside(Port[bytes], Protocol):
         """Let hosts come and go without reading from them, while the line has no room."""
 
     def device_uses(self, setting: UartSetting, /) -> None:
-        """Note the present setting of the device."""
+        """Store the present setting of the device."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,11 +50,12 @@ class LineSettings:
 
     Attributes:
         baud: bit rate in bit/s.
-        faults: the wire faults that can be armed.
-        splitter: makes the splitter of one direction for the log; by default into lines.
-        wire: makes the line for a baud rate.
-        uart: whether the device has a UART. A device on USB has none and understands a host of any
-            setting.
+        faults: wire faults that can be armed.
+        splitter: function that makes the splitter of one direction for the log. The default is a
+            splitter into lines.
+        wire: function that makes the line for a baud rate.
+        uart: whether the device has a UART. A device on USB has no UART and understands a host of
+            any setting.
     """
 
     baud: int = 115_200
@@ -70,8 +71,8 @@ class Emulator(RunningEmulator):
     Args:
         name: name of the device.
         device: the device.
-        outside: the port of the host; without it the host is the caller (`send`, `log`).
-        clock: by default a `VirtualClock`.
+        outside: port of the host. Without a port the caller is the host (`send`, `log`).
+        clock: clock of the rig, or None to use a `VirtualClock`.
         seed: seed of random wire faults.
         trace: the recording.
         link: path for the host, as text.
@@ -79,7 +80,7 @@ class Emulator(RunningEmulator):
 
     Attributes:
         line: the line itself.
-        host_end: the caller's end of the line, also for a `SimLink`; its traffic is logged.
+        host_end: caller's end of the line, also for a `SimLink`. Its traffic is logged.
     """
 
     def __init__(  # noqa: PLR0913 - options, by keyword
@@ -144,7 +145,7 @@ class Emulator(RunningEmulator):
 
 
 class SerialHub(NonCopyable):
-    """Ports on one line: each receives everything that the device sends, and each may send.
+    """Ports on one line; each port receives everything that the device sends, and may send.
 
     If several hosts send at the same time, their data arrive mixed, in pieces of one poll. Hosts do
     not receive each other's data.
@@ -161,7 +162,7 @@ class SerialHub(NonCopyable):
 
     @property
     def lost(self) -> int:
-        """Bytes that a port dropped because its host did not read."""
+        """Number of bytes that a port dropped because its host did not read."""
         return sum(port.lost for port in self._ports)
 
     @property
@@ -184,6 +185,6 @@ class SerialHub(NonCopyable):
             port.device_uses(setting)
 
     def send(self, now_us: int, traffic: bytes, /) -> None:
-        """Send to every host."""
+        """Send data to every host."""
         for port in self._ports:
             port.send(now_us, traffic)

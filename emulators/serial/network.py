@@ -72,9 +72,9 @@ class ServeUrl:
     """An address to listen at, and its protocol.
 
     Attributes:
-        scheme: `rfc2217`, or `socket` for the plain bytes of the line.
-        host: name or address of this machine, an IPv6 address without brackets.
-        port: TCP port; 0 lets the system pick one.
+        scheme: `rfc2217`, or `socket` for plain bytes of the line.
+        host: name or address of this machine. An IPv6 address has no brackets.
+        port: TCP port, or 0 to let the system select a port.
     """
 
     scheme: str
@@ -91,10 +91,10 @@ def parse_serve_url(text: str) -> ServeUrl:
     """Read the address at which to serve a line.
 
     Args:
-        text: `SCHEME://[HOST:]PORT`; without a host only this machine can connect.
+        text: address as `SCHEME://[HOST:]PORT`. Without a host only this machine can connect.
 
     Raises:
-        ValueError: invalid URL; the message has the URL and the allowed form.
+        ValueError: the URL is invalid. The message has the URL and the allowed form.
 
     >>> str(parse_serve_url("rfc2217://7000")), str(parse_serve_url("socket://[::1]:0"))
     ('rfc2217://127.0.0.1:7000', 'socket://[::1]:0')
@@ -128,9 +128,9 @@ class DismissedHost:
     drop data that the host has not read yet. So data from a refused host are read and dropped.
 
     Args:
-        connection: to the host.
+        connection: connection to the host.
         now_us: the present time.
-        reason: a line of text.
+        reason: reason for the refusal, as a line of text.
     """
 
     def __init__(self, connection: socket.socket, now_us: int, reason: str) -> None:
@@ -143,7 +143,7 @@ class DismissedHost:
             connection.shutdown(socket.SHUT_WR)
 
     def is_gone(self, now_us: int) -> bool:
-        """Close the connection if the host has, or after its time; return whether it is closed."""
+        """Close the connection after the host or the time-out; return whether it is closed."""
         try:
             gone = not self._connection.recv(_DISCARDED_BYTES)
         except BlockingIOError:
@@ -164,7 +164,7 @@ class DismissedHost:
 
 READ_BYTES: Final = 1_024
 _SEND_BUFFER_BYTES: Final = 16_384
-"""Size of the kernel's buffer: data in it reach a slow host late."""
+"""Size of the kernel's buffer. Data in the buffer reach a slow host late."""
 
 LAST_WORDS_US: Final = 1_000_000
 STUCK_US: Final = 30_000_000
@@ -178,15 +178,15 @@ class HostConnection:
     `nc` at the end of its input, gets the data of one more second.
 
     Args:
-        connection: to the host.
-        buffer_bytes: bytes kept for a host that does not read.
+        connection: connection to the host.
+        buffer_bytes: largest number of bytes kept for a host that does not read.
 
     Attributes:
-        connection: to the host.
+        connection: connection to the host.
         over: whether the connection is closed.
-        mistake: reason to drop the host, if the host sent invalid data.
+        mistake: reason to drop the host, or empty unless the host sent invalid data.
         is_idle: whether no data of the host were waiting at the latest poll.
-        lost: bytes dropped because the host did not read.
+        lost: number of bytes dropped because the host did not read.
     """
 
     def __init__(self, connection: socket.socket, buffer_bytes: int) -> None:
@@ -201,16 +201,16 @@ class HostConnection:
 
     @property
     def setting(self) -> UartSetting | None:
-        """The port setting of the host; None if it cannot set one."""
+        """The port setting of the host, or None if the host cannot set the port."""
         return None
 
     def has_ended(self, now_us: int) -> bool:
-        """Whether another host may get the line: this one has stopped sending, or is stuck."""
+        """Whether another host may get the line: this host has stopped sending, or is stuck."""
         stuck = self._stuck_us is not None and now_us - self._stuck_us >= STUCK_US
         return self.over or stuck or self._last_words_us is not None
 
     def poll(self, now_us: int) -> bytes:
-        """Return part of its data; held data come first."""
+        """Return part of the data of the host; held data come first."""
         if not self._held:
             return self._look(now_us)
         data, self._held, self.is_idle = self._held, b"", False
@@ -219,13 +219,13 @@ class HostConnection:
         return data
 
     def hold(self, now_us: int) -> None:
-        """Negotiate while another host has the line, and hold part of its data."""
+        """Negotiate with the host while another host has the line, and hold part of the data."""
         if len(self._held) < READ_BYTES and not self.has_ended(now_us):
             self._held += self._look(now_us)
         self.over |= self.has_ended(now_us) and not self._held  # it has not waited
 
     def send(self, now_us: int, traffic: bytes) -> None:
-        """Send as much as fits, and buffer the rest."""
+        """Send as much data as fits, and buffer the rest."""
         if len(self._unsent) + len(traffic) > self._buffer_bytes:
             self.lost += len(traffic)
         else:
@@ -372,7 +372,7 @@ class _SafePortManager(PortManager):
 
 
 class Rfc2217Connection(HostConnection):
-    """A host that may set the port, as on a serial server; pyserial's `rfc2217://` is one.
+    """A host that may set the port, as on a serial server, such as pyserial's `rfc2217://`.
 
     The host's settings are answered and stored; the device keeps its own setting. DTR, RTS and
     break of the host have no effect. CTS, DSR, CD and RI are off. A host that sends invalid telnet
@@ -381,9 +381,9 @@ class Rfc2217Connection(HostConnection):
     Not emulated: FLOWCONTROL-SUSPEND, and purging data that are already on the line.
 
     Args:
-        connection: to the host.
-        buffer_bytes: bytes kept for a host that does not read.
-        setting: the port setting until the host changes it.
+        connection: connection to the host.
+        buffer_bytes: largest number of bytes kept for a host that does not read.
+        setting: port setting until the host changes it.
     """
 
     def __init__(self, connection: socket.socket, buffer_bytes: int, setting: UartSetting) -> None:
@@ -429,11 +429,11 @@ class Rfc2217Connection(HostConnection):
 # The host's end of a serial line, served over TCP.
 
 _RECEIVE_BUFFER_BYTES: Final = 4_096
-"""Size of the kernel's buffer: a host that writes faster than the line soon blocks, as at a real
+"""Size of the kernel's buffer. A host that writes faster than the line soon blocks, as at a real
 port."""
 
 _MAX_BAUD: Final = 4_000_000
-"""Highest rate of adapters: above it the device is on USB, and its host may use any setting."""
+"""Highest rate of adapters. Above it the device is on USB, and its host may use any setting."""
 
 MAX_DISMISSED: Final = 8
 
@@ -449,23 +449,23 @@ _log = logging.getLogger(__name__)
 
 
 class NetworkPort(NonCopyable):
-    """A `Port[bytes]` for hosts over TCP; hosts may come and go, one at a time.
+    """A `Port[bytes]` for hosts over TCP, which may come and go, one at a time.
 
     A second host is refused with a line of text, unless the present host has stopped sending, or
     has not read for 30 s. The port can decide this only after all data of the present host are on
-    the line. Until then it accepts one more host and holds a little of its data.
+    the line. Until then the port accepts one more host and holds a little of the new host's data.
 
     Without a host, data of the device are lost, as on an open line. No call blocks, and all buffers
     are bounded. There is no password: the port logs a warning if other machines can reach it.
 
     Args:
         url: address to listen at.
-        buffer_bytes: bytes kept for a host that does not read.
+        buffer_bytes: largest number of bytes kept for a host that does not read.
 
     Attributes:
-        url: URL for hosts on this machine, for pyserial, with its port.
-        address: the address at which the port listens.
-        port: TCP port number.
+        url: URL that pyserial opens on this machine, with the port number.
+        address: address at which the port listens.
+        port: number of the TCP port.
         spoken: whether a host ever sent data.
 
     Raises:
@@ -493,20 +493,20 @@ class NetworkPort(NonCopyable):
 
     @property
     def lost(self) -> int:
-        """Bytes dropped because a host did not read."""
+        """Number of bytes dropped because a host did not read."""
         return self._lost + (self._host.lost if self._host else 0)
 
     @property
     def host_setting(self) -> str:
-        """The setting of the host, such as `9600 8N1`; empty if unknown or that of the device."""
+        """The setting of the host, such as `9600 8N1`; empty if unknown or the device's."""
         return self._setting.differing if self._setting else ""
 
     def watch_setting(self, baud: int, notify: Callable[[str], None]) -> None:
         """Set the port like the device, and report hosts that change it; see `HostSetting`.
 
         Args:
-            baud: the device's bit rate in bit/s, with 8N1. A rate above 4 Mbit/s is not checked.
-            notify: called with a different setting, such as `9600 8N1`.
+            baud: bit rate of the device in bit/s, with 8N1. A rate above 4 Mbit/s is not checked.
+            notify: function that is called with a different setting, such as `9600 8N1`.
         """
         self._uart = UartSetting(baud)
         if baud <= _MAX_BAUD:
@@ -516,7 +516,8 @@ class NetworkPort(NonCopyable):
         """Sample the data between the device and a host with another setting, as UARTs would do.
 
         Args:
-            setting: setting of the device. Above 4 Mbit/s a host of any setting is understood.
+            setting: setting of the device. If the rate is above 4 Mbit/s, the device understands a
+                host of any setting.
         """
         self._uart, self._samples = setting, setting.baud <= _MAX_BAUD
         if self._setting is not None:
@@ -540,7 +541,7 @@ class NetworkPort(NonCopyable):
     def attend(self, now_us: int, /) -> None:
         """Accept and close connections, and send buffered data to hosts, without reading.
 
-        The bridge calls it instead of a poll while the line has no room for earlier data.
+        The bridge calls this method instead of a poll while the line has no room for earlier data.
         """
         if self._host is not None:
             self._host.flush(now_us)
@@ -550,7 +551,7 @@ class NetworkPort(NonCopyable):
             self._setting.look(now_us)
 
     def send(self, now_us: int, traffic: bytes, /) -> None:
-        """Send to the host, if there is one, as much as fits; buffer the rest."""
+        """Send data to the host and buffer the rest; without a host data are lost."""
         if self._host is not None:
             if (setting := self._differing) is not None:
                 traffic = _sampled(traffic, self._uart, setting)
@@ -638,7 +639,7 @@ class NetworkPort(NonCopyable):
         self._host = None
 
     def _warn(self, now_us: int, text: str) -> None:
-        """Warn, but not of each repetition."""
+        """Log a warning, but not each repetition."""
         if now_us >= self._quiet_until_us:
             self._quiet_until_us = now_us + QUIET_US
             _log.warning("%s", text)
@@ -649,7 +650,7 @@ def _sampled(data: bytes, sender: UartSetting, receiver: UartSetting) -> bytes:
 
 
 def _listen(url: ServeUrl) -> socket.socket:
-    """Return a listening socket, non-blocking; OSError names the URL."""
+    """Return a listening socket that does not block; an OSError names the URL."""
     try:
         family, kind, protocol, address = _resolve(url)
         listener = socket.socket(family, kind, protocol)

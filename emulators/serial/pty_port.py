@@ -50,7 +50,7 @@ class _PtyLink:
             raise OSError(error.errno, error.strerror, str(path)) from None
 
     def close(self) -> None:
-        """Remove the link, if it is still ours, and the note."""
+        """Remove the link, if it still belongs to this emulator, and the note."""
         if _target(self._path) == self._target:
             self._path.unlink()
         self._drop_note()
@@ -76,7 +76,7 @@ class _PtyLink:
             os.close(lock)
 
     def _make(self) -> None:
-        """Make the link, and note its owner."""
+        """Make the link, and write its owner into the note."""
         try:
             if self._is_left_over():
                 self._path.unlink()
@@ -90,7 +90,7 @@ class _PtyLink:
             raise
 
     def _is_left_over(self) -> bool:
-        """Whether the link names no terminal, ours, or that of an ended emulator."""
+        """Whether the link names no terminal, our terminal, or that of an ended emulator."""
         target = _target(self._path)
         noted = os.read(self._lock, 4_096).decode("ascii", "replace").split()
         return target is not None and (
@@ -111,11 +111,11 @@ _BAUDS: Final = {
     for name, code in vars(termios).items()
     if name[:1] == "B" and name[1:].isdigit()
 }
-"""Bit rates by their number in a termios; others have none."""
+"""Bit rates by their number in a termios; other rates have no number."""
 
 
 def _setting_of(terminal: int) -> str:
-    """Return rate, bits, parity and stop bits, as `115200 8N1`.
+    """Return rate, bits, parity and stop bits, such as `115200 8N1`.
 
     Linux keeps the bit rate, the stop bits, and odd parity. A pseudo-terminal always has 8 bits,
     and even parity looks like no parity.
@@ -137,11 +137,11 @@ class _PtyVisits(NonCopyable):
     """Wakes the emulator when a host opens or closes the terminal, or sends data.
 
     Args:
-        master: the emulator's side.
-        path: the host's side.
+        master: emulator's side of the terminal.
+        path: path of the host's side of the terminal.
 
     Attributes:
-        wakes: the descriptor to wait on. Without inotify, which exists only on Linux, it is
+        wakes: descriptor to wait on. Without inotify, which exists only on Linux, the descriptor is
             `master`.
     """
 
@@ -162,7 +162,7 @@ class _PtyVisits(NonCopyable):
             self._epoll = epoll
 
     def any(self) -> bool:
-        """Return whether a host opened or closed it since the last call."""
+        """Return whether a host opened or closed the terminal since the last call."""
         try:
             return self._inotify >= 0 and bool(os.read(self._inotify, _READ_BYTES))
         except BlockingIOError:
@@ -189,13 +189,13 @@ class PtyPort(NonCopyable):
     Hosts that lock the terminal, as with pyserial's `exclusive=True`, exclude each other.
 
     Args:
-        link: path of a symbolic link to the terminal, see `_PtyLink`; None for no link. The link of
-            a killed emulator is replaced.
-        buffer_bytes: bytes kept for a host that does not read.
+        link: path of a symbolic link to the terminal (see `_PtyLink`), or None for no link. The
+            link of a killed emulator is replaced.
+        buffer_bytes: largest number of bytes kept for a host that does not read.
 
     Attributes:
         path: the terminal, such as `/dev/pts/7`.
-        lost: bytes dropped because no host read them.
+        lost: number of bytes dropped because no host read them.
         spoken: whether a host ever sent data.
 
     Raises:
@@ -231,16 +231,16 @@ class PtyPort(NonCopyable):
 
     @property
     def host_setting(self) -> str:
-        """The setting of the host, such as `9600 8N1`; empty if unknown or that of the device."""
+        """The setting of the host, such as `9600 8N1`; empty if unknown or the device's."""
         return self._setting.differing if self._setting else ""
 
     def watch_setting(self, baud: int, notify: Callable[[str], None]) -> None:
         """Set the port like the device, and report hosts that change it; see `HostSetting`.
 
         Args:
-            baud: the device's bit rate in bit/s, with 8N1. A rate without a termios name is not
+            baud: bit rate of the device in bit/s, with 8N1. A rate without a termios name is not
                 checked.
-            notify: called with a different setting, such as `9600 8N1`.
+            notify: function that is called with a different setting, such as `9600 8N1`.
         """
         codes = [code for code, rate in _BAUDS.items() if rate == baud]
         if not codes:
@@ -251,7 +251,7 @@ class PtyPort(NonCopyable):
         self._setting = HostSetting(lambda: _setting_of(slave), _setting_of(slave), notify)
 
     def device_uses(self, setting: UartSetting) -> None:
-        """Compare hosts with the present setting of the device; a pty passes all bytes unchanged.
+        """Compare hosts with the setting of the device; a pty passes all bytes unchanged.
 
         Args:
             setting: setting of the device. A pty shows 8 data bits, and even parity as no parity.
@@ -274,12 +274,12 @@ class PtyPort(NonCopyable):
         return data
 
     def attend(self, now_us: int, /) -> None:
-        """Check the setting of the host, and send it buffered data."""
+        """Check the setting of the host, and send buffered data to the host."""
         self._look(now_us, at_once=self._visits.any())
         self._flush()
 
     def send(self, now_us: int, traffic: bytes, /) -> None:
-        """Write as much as fits; buffer the rest."""
+        """Write as much data as fits, and buffer the rest."""
         # A whole send or nothing: half a line would reach the host as another line.
         if len(self._unsent) + len(traffic) > self._buffer_bytes:
             self.lost += len(traffic)
@@ -303,7 +303,7 @@ class PtyPort(NonCopyable):
 
         A pseudo-terminal drops even parity and 7 bits. If a request of a host then changes nothing,
         glibc reports EINVAL, so the second host with such a setting would fail. Therefore CLOCAL is
-        cleared here. It has no effect on a pseudo-terminal, but hosts set it, so their requests
+        cleared here. CLOCAL has no effect on a pseudo-terminal, but hosts set it, so their requests
         always change something.
         """
         if self._setting is not None:

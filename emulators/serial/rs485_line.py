@@ -40,20 +40,21 @@ class Rs485Line(Copyable):
 
     Args:
         baud: bit rate in bit/s.
-        frame_bits: bits of a byte on the line, 10 for 8N1.
+        frame_bits: number of bits of a byte on the line, 10 for 8N1.
         buffer_bytes: size of each receiver's buffer and sender's queue.
         ends: number of stations.
         echo: whether each end also receives its own bytes.
         bursts: whether a receiver gets bytes that are sent back to back together at their end, like
-            a receiver that waits for an idle line. If False, it gets each byte separately.
+            a receiver that waits for an idle line. If false, the receiver gets each byte
+            separately.
 
     Attributes:
-        ends: the stations' ends.
-        collisions: pairs of bytes that overlapped.
-        uart: the setting of all devices.
+        ends: ends of the stations.
+        collisions: number of pairs of bytes that overlapped.
+        uart: setting of all devices.
 
     Raises:
-        ValueError: a size below 1, or fewer than two ends.
+        ValueError: a size is below 1, or there are fewer than two ends.
 
     >>> line = Rs485Line(baud=115_200)
     >>> line.a.send(0, b"who?")
@@ -99,7 +100,7 @@ class Rs485Line(Copyable):
             data: the bytes.
 
         Returns:
-            Time when the last byte has passed, in us.
+            The time at which the last byte has passed, in us.
         """
         # A burst is cut at whole microseconds once, at its end; single bytes are worked out
         # from its start.
@@ -124,7 +125,7 @@ class Rs485Line(Copyable):
             now_us: the present time.
 
         Returns:
-            Time when the byte in transit has passed, in us.
+            The time at which the byte in transit has passed, in us.
         """
         end_us = now_us
         for burst in self._air:
@@ -145,7 +146,7 @@ class Rs485Line(Copyable):
             count: number of bytes.
 
         Returns:
-            The time in us, rounded up.
+            The duration in us, rounded up.
         """
         return -(-count * self._byte_cost // self._baud)
 
@@ -153,11 +154,11 @@ class Rs485Line(Copyable):
         """Compute how many bytes of a burst a receiver can get.
 
         Args:
-            burst: bytes sent back to back.
+            burst: burst of bytes sent back to back.
             now_us: the present time.
 
         Returns:
-            Their number, including those already taken.
+            The number of bytes, including the bytes already taken.
         """
         if now_us >= burst.end_us:
             return len(burst.data)
@@ -166,10 +167,10 @@ class Rs485Line(Copyable):
         return max(0, now_us - burst.start_us) * self._baud // self._byte_cost
 
     def arrival_us(self, burst: _Burst, taken: int) -> int:
-        """Compute when a receiver can get more of a burst.
+        """Compute the time at which a receiver can get more bytes of a burst.
 
         Args:
-            burst: bytes sent back to back.
+            burst: burst of bytes sent back to back.
             taken: number of bytes taken.
 
         Returns:
@@ -181,15 +182,15 @@ class Rs485Line(Copyable):
         """Compute how many bytes are still to be sent.
 
         Args:
-            duration_us: how long their sender is busy.
+            duration_us: remaining time for which the sender is busy.
 
         Returns:
-            Their number, rounded up.
+            The number of bytes, rounded up.
         """
         return -(-max(0, duration_us) * self._baud // self._byte_cost)
 
     def _collide(self, burst: _Burst, other: _Burst) -> None:
-        """Garble the bytes of both that overlap."""
+        """Garble the overlapping bytes of two bursts."""
         for mine, start_us, end_us in self._bytes(burst):
             for theirs, from_us, to_us in self._bytes(other):
                 if start_us < to_us and from_us < end_us:
@@ -208,7 +209,7 @@ class Rs485End:
     """One station's end of an `Rs485Line`; a `Port[bytes]`.
 
     Attributes:
-        lost: bytes lost because the buffer or the queue of this end was full.
+        lost: number of bytes lost because the buffer or the queue of this end was full.
     """
 
     __slots__ = ("_buffer_bytes", "_busy_us", "_inbox", "_line", "_taken", "lost")
@@ -221,23 +222,23 @@ class Rs485End:
 
     @property
     def due_us(self) -> int:
-        """When the next bytes will be available."""
+        """Time at which the next bytes will be available."""
         if not self._inbox:
             return NEVER
         return min(map(self._line.arrival_us, self._inbox, self._taken))
 
     @property
     def idle_us(self) -> int:
-        """When the last byte in transit to this end will have arrived."""
+        """Time at which the last byte in transit to this end will have arrived."""
         return max((burst.end_us for burst in self._inbox), default=NEVER)
 
     @property
     def coming(self) -> bytes:
-        """Always empty: bytes in transit can still be garbled."""
+        """Empty, because bytes in transit can still be garbled."""
         return b""
 
     def arrival_us(self, count: int) -> int:
-        """Return when to check again, `NEVER` if nothing is in transit."""
+        """Return the time of the next check, or `NEVER` if nothing is in transit."""
         return self.due_us
 
     def room(self, now_us: int) -> int:
@@ -246,7 +247,7 @@ class Rs485End:
 
     @property
     def sent_us(self) -> int:
-        """When the last byte sent from here will have passed; past if it has."""
+        """Time at which the last byte sent from here will have passed (past if it has)."""
         return self._busy_us
 
     def unsent(self, now_us: int) -> int:
@@ -263,13 +264,13 @@ class Rs485End:
         return self._line.uart
 
     def use_uart(self, now_us: int, setting: UartSetting) -> None:
-        """Raise ValueError if it differs from that of the line: devices cannot change it."""
+        """Raise ValueError if a setting differs from the line's, which devices cannot change."""
         if setting != self._line.uart.setting:
             has = self._line.uart.setting
             raise ValueError(f"a device changes its setting to {setting}: RS-485 keeps {has}")
 
     def withdraw(self, now_us: int) -> list[tuple[int, int]]:
-        """Return nothing: the setting never changes."""
+        """Return nothing, because the setting never changes."""
         return []
 
     def poll(self, now_us: int, /) -> bytes:
@@ -281,7 +282,7 @@ class Rs485End:
         return out[: self._buffer_bytes]
 
     def send(self, now_us: int, traffic: bytes, /) -> None:
-        """Queue bytes after those that this end is still sending."""
+        """Queue bytes after the bytes that this end is still sending."""
         if not traffic:
             return
         accepted = traffic[: self.room(now_us)]

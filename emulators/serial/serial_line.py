@@ -53,15 +53,15 @@ class SerialLine(Copyable):
 
     Args:
         baud: bit rate in bit/s.
-        frame_bits: bits of a byte on the line, 10 for 8N1.
-        buffer_bytes: size of each sender's and each receiver's buffer.
+        frame_bits: number of bits of a byte on the line, 10 for 8N1.
+        buffer_bytes: size of the buffer of each sender and each receiver.
 
     Attributes:
         a: one end, such as the device's.
         b: the other end, such as the host's.
 
     Raises:
-        ValueError: an argument below 1.
+        ValueError: an argument is below 1.
 
     >>> line = SerialLine(baud=115_200)
     >>> line.a.send(0, b"OK:beep")
@@ -90,7 +90,7 @@ class LineEnd(Part):
         self._in, self._out, self.uart = incoming, outgoing, uart
 
     def use_uart(self, now_us: int, setting: UartSetting) -> None:
-        """Change the setting of the device at this end, after the last stop bit it has sent.
+        """Change the setting of the device at this end, after the last stop bit that it has sent.
 
         Args:
             now_us: the present time.
@@ -120,12 +120,12 @@ class LineEnd(Part):
 
     @property
     def due_us(self) -> int:
-        """When the next byte will have arrived here."""
+        """Time at which the next byte will have arrived here."""
         return self._in.first_us
 
     @property
     def idle_us(self) -> int:
-        """When the last byte in transit to this end will have arrived."""
+        """Time at which the last byte in transit to this end will have arrived."""
         return self._in.last_us
 
     @property
@@ -134,7 +134,7 @@ class LineEnd(Part):
         return self._in.coming
 
     def arrival_us(self, count: int) -> int:
-        """Return when `count` bytes will have arrived, or all bytes if fewer are in transit."""
+        """Return the time at which `count` bytes, or all bytes in transit, will have arrived."""
         return self._in.arrival_us(count)
 
     @property
@@ -148,7 +148,7 @@ class LineEnd(Part):
 
     @property
     def sent_us(self) -> int:
-        """When the last byte sent from here will have passed; past or `NEVER` if it has."""
+        """Time at which the last sent byte will have passed (past or `NEVER` if it has)."""
         return self._out.last_us
 
     def unsent(self, now_us: int) -> int:
@@ -164,14 +164,14 @@ class LineEnd(Part):
         return self._in.take(now_us)
 
     def send(self, now_us: int, traffic: bytes, /) -> None:
-        """Queue bytes after those that are still being sent."""
+        """Queue bytes after the bytes that are still being sent."""
         if traffic:
             self._out.put(now_us, traffic)
 
 
 @dataclass
 class _Timing(Part):
-    """How long bytes take: `byte_cost` is the bits of a byte, in millionths."""
+    """Duration of bytes; `byte_cost` is the number of bits of a byte, in millionths."""
 
     baud: int
     byte_cost: int
@@ -196,7 +196,7 @@ class _Burst(Part):
         return min(len(self.data), passed_us * self.timing.baud // self.timing.byte_cost)
 
     def arrival_us(self, count: int) -> int:
-        """Return when a number of bytes has arrived, rounded up."""
+        """Return the time at which a number of bytes has arrived, rounded up."""
         return self.start_us - (-count * self.timing.byte_cost // self.timing.baud)
 
     def forget_taken(self) -> None:
@@ -207,7 +207,7 @@ class _Burst(Part):
 
 
 class _Direction(Part):
-    """One direction of the line: only the latest burst can still be on its way."""
+    """One direction of the line. Only the latest burst can still be in transit."""
 
     __slots__ = (
         *("_buffer_bytes", "_bursts", "_from_us", "_held", "_next", "_timing"),
@@ -275,7 +275,7 @@ class _Direction(Part):
         return self.last_us
 
     def room(self, now_us: int) -> int:
-        """Return the data that fit into the sender's buffer; the receiver's may overflow later."""
+        """Return the data that fit into the sender's buffer; the receiver may overflow later."""
         free = self._buffer_bytes - self.unsent(now_us)
         # A receiver that takes nothing would let bursts pile up: both buffers together are
         # the most.

@@ -1,4 +1,4 @@
-"""The board of a node: its supply, its boot, and the system that runs on it."""
+"""The board of a node with its supply, its boot, and the system that runs on the board."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _OUTPUTS: Final = (
 
 
 class _BoardState(IntEnum):
-    """What a board does."""
+    """State of a board."""
 
     OFF = 0
     BOOTING = 1
@@ -42,7 +42,7 @@ class _SolderedLines(Protocol):
 
 
 _StartSystem = Callable[[NodeManager, ExitStack], None]
-"""Makes the system of a booted board; its contexts are exited when the supply fails."""
+"""Function that makes the system of a booted board; its contexts exit when the supply fails."""
 
 
 class Board:
@@ -53,13 +53,13 @@ class Board:
     effect.
 
     Args:
-        limits: the limits of the node.
-        start: makes its system.
-        lines: the lines that are cut together with the supply.
+        limits: limits of the node.
+        start: function that makes the system of the node.
+        lines: lines that are cut together with the supply.
 
     Attributes:
-        inputs: its inputs.
-        manager: its system while the system runs, else None.
+        inputs: inputs of the board.
+        manager: system of the board while it runs, or None.
         boots: number of boots.
     """
 
@@ -73,12 +73,12 @@ class Board:
 
     @property
     def tick_us(self) -> int:
-        """Resolution of its time."""
+        """Resolution of the board's time."""
         return self.limits.tick_us
 
     @property
     def due_us(self) -> int:
-        """The time of its next event."""
+        """The time of the board's next event."""
         if self._changed:
             return 0
         return self._up_us if self.manager is None else self.manager.due_us
@@ -89,7 +89,7 @@ class Board:
         return {output.name: output for output in _OUTPUTS}
 
     def read(self, name: str, /) -> int:
-        """Return the present value of an output; KeyError if it is unknown."""
+        """Return the present value of an output; raise KeyError if the name is unknown."""
         manager = self.manager
         if name.startswith("refused_"):
             what = name.removeprefix("refused_")
@@ -98,7 +98,7 @@ class Board:
         return {"state": self._state, "boots": self.boots, "components": components}[name]
 
     def tick(self, now_us: int, /) -> None:
-        """Advance: lose or get the supply, boot, run due events."""
+        """Advance the board: lose or get the supply, boot, run due events."""
         if self._changed:
             self._inputs_changed(now_us)
         if self._state is _BoardState.BOOTING and now_us >= self._up_us:
@@ -107,7 +107,7 @@ class Board:
             self.manager.tick(now_us)
 
     def close(self) -> None:
-        """Shut down: deactivate each component."""
+        """Shut down, and deactivate each component."""
         for component in self.manager.components if self.manager else ():
             for context in tuple(component.contexts):
                 context.close()
@@ -133,7 +133,7 @@ class Board:
         self.boots += 1
 
     def _lose(self) -> None:
-        """Switch the supply off: the system is lost."""
+        """Switch the supply off, so that the system is lost."""
         for what in _REFUSED:
             self._refused[what] += self.manager.refused[what] if self.manager else 0
         self._state, self.manager, self._up_us = _BoardState.OFF, None, NEVER

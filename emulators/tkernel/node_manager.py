@@ -30,13 +30,13 @@ class NodeLimits:
     """The limits of a node.
 
     Attributes:
-        connectors: largest number for all ports together, 1..1000.
+        connectors: largest number of connectors for all ports together, 1..1000.
         message_octets: largest size of a value as CDR, 16..1048576.
-        tick_us: period of its cyclic handlers, 1000..1000000; all periods are multiples of it.
-        boot_us: time from power-up until it answers, 0..600000000.
+        tick_us: period of the cyclic handlers, 1000..1000000. All periods are multiples of it.
+        boot_us: time from power-up until the node answers, 0..600000000.
 
     Raises:
-        ValueError: a limit out of range.
+        ValueError: a limit is out of range.
     """
 
     connectors: int = 8
@@ -81,10 +81,10 @@ class NodeLimits:
 #   the thread of the manager.
 
 HOST: Final = "tkernel"
-"""Its naming context."""
+"""Naming context of the node."""
 
 _RATE_HZ: Final = 100.0
-"""Default period of components: the shortest one."""
+"""Default rate of components, which is the highest rate."""
 
 _INTERFACE: Final = "dataport.interface_type"
 _CORBA_CDR: Final = "corba_cdr"
@@ -129,7 +129,7 @@ class NodeManager(Manager):
         rate_hz: float = _RATE_HZ,
         context: ExecutionContext | None = None,
     ) -> RtComponent:
-        """Create a component, by default at 100 Hz; see `Manager.create`."""
+        """Create a component, by default with a rate of 100 Hz; see `Manager.create`."""
         return super().create(type_name, instance_name, rate_hz, context)
 
     def add(
@@ -138,8 +138,8 @@ class NodeManager(Manager):
         """Add a component within the limits; see `Manager.add`.
 
         Raises:
-            RtcRefused: its period is not a multiple of the node's tick, or `Manager.add` refuses
-                it.
+            RtcRefused: the period of the component is not a multiple of the node's tick, or
+                `Manager.add` refuses the component.
         """
         name = component.instance_name
         wanted = ExecutionContext(rate_hz) if context is None else context
@@ -161,12 +161,12 @@ class NodeManager(Manager):
         name: str = "",
         connector_id: str = "",
     ) -> ConnectorProfile:
-        """Connect two ports, by default with CDR; see `Manager.connect`."""
+        """Connect two ports, by default by CDR; see `Manager.connect`."""
         stated = {_INTERFACE: _CORBA_CDR, **(properties or {})}
         return super().connect(first, second, stated, name=name, connector_id=connector_id)
 
     def admit(self, connector: ConnectorBase, /) -> None:
-        """Raise RtcRefused unless its ports may have this additional connector."""
+        """Raise RtcRefused unless the ports of a connector may have this additional connector."""
         if len(connector.ports) == 2 and not connector.joins_components:
             return  # an observer's
         way, properties = " to ".join(connector.profile.ports), connector.profile.properties
@@ -211,7 +211,7 @@ class NodeManager(Manager):
         }
 
     def _refused_period(self, name: str, period_us: int) -> str:
-        """Return the reason to refuse a period, empty if it is allowed."""
+        """Return the reason to refuse a period, or "" if the period is allowed."""
         tick_us = self.limits.tick_us
         if not period_us % tick_us:
             return ""
@@ -251,9 +251,9 @@ class BoardLines:
     """The lines and sources that components of a board open. All of them can be cut.
 
     Args:
-        open_urg: opens the line of a range finder.
-        open_reader: opens the line of a ucode reader.
-        open_source: makes the client of the resolution service.
+        open_urg: function that opens the line of a range finder.
+        open_reader: function that opens the line of a ucode reader.
+        open_source: function that makes the client of the resolution service.
     """
 
     def __init__(
@@ -294,13 +294,13 @@ def add_range_finder(manager: NodeManager, lines: BoardLines, device: str) -> No
 def add_position_detection(
     manager: NodeManager, lines: BoardLines, device: str, service: str = ""
 ) -> None:
-    """Add, connect and activate reader, settlement and interpretation.
+    """Add, connect and activate the components of reader, settlement and interpretation.
 
     Args:
         manager: the manager of the node.
-        lines: opens the lines of the components.
+        lines: object that opens the lines of the components.
         device: name of the reader's line.
-        service: address of the resolution service; by default the one that the component has.
+        service: address of the resolution service. The default is the address in the component.
     """
     reader = manager.add(InfraredRaysReader(READER, lines.open_reader))
     reader.configuration.set("DeviceFileName", device)

@@ -16,13 +16,13 @@ class Operated:
 
     Args:
         name: name of the object.
-        thing: the object with its inputs and outputs.
-        stop: called when a request ends the run.
-        status: returns additional data for the request `status`.
+        thing: object with its inputs and outputs.
+        stop: function that is called when a request ends the run.
+        status: function that returns additional data for the request `status`.
 
     Attributes:
-        operator: executes the actions.
-        now_us: the present time, from `tick`.
+        operator: operator that executes the actions.
+        now_us: present time, from `tick`.
     """
 
     def __init__(
@@ -38,7 +38,7 @@ class Operated:
 
     @property
     def due_us(self) -> int:
-        """The time of the next action; `NEVER` if there is none."""
+        """The time of the next action, or `NEVER` if there is none."""
         return self._events.due_us
 
     @property
@@ -55,12 +55,12 @@ class Operated:
         """Schedule faults.
 
         Raises:
-            ValueError: an invalid fault.
+            ValueError: a fault is invalid.
         """
         for spec in faults:
             self.operator.fault(self.now_us, spec)
 
     def status(self) -> Mapping[str, object]:
-        """Return its status."""
+        """Return the status of the object."""
         faults = list(self.operator.active_faults)
         return {"now_us": self.now_us, "faults": faults, **self._more()}

@@ -30,9 +30,9 @@ class _Response:
     """An answer of HTTP.
 
     Attributes:
-        status: its code.
-        text: its body.
-        delay_us: additional delay.
+        status: status code of the answer.
+        text: body of the answer.
+        delay_us: additional delay in us.
     """
 
     status: int
@@ -41,15 +41,15 @@ class _Response:
 
 
 class ResolutionService:
-    """Answers `/ucodes/UCODE` with an address, `/contents/NAME` with JSON; it does no I/O.
+    """Answers `/ucodes/UCODE` with an address, and `/contents/NAME` with JSON, without any I/O.
 
     Args:
         table: ucodes and contents.
-        base: its own address, such as `http://127.0.0.1:8640`.
+        base: address of the service, such as `http://127.0.0.1:8640`.
 
     Attributes:
-        table: ucodes and contents; it may be changed.
-        inputs: its faults.
+        table: ucodes and contents, which may be changed.
+        inputs: faults of the service, as inputs.
     """
 
     tick_us: Final = 1_000
@@ -70,7 +70,7 @@ class ResolutionService:
         return not self.inputs["unreachable"]
 
     def read(self, name: str, /) -> int:
-        """Return the present value of an output; KeyError if it is unknown."""
+        """Return the present value of an output; raise KeyError if the name is unknown."""
         return self._counts[name]
 
     def respond(self, path: str) -> _Response:
@@ -97,7 +97,7 @@ class ResolutionService:
 # A resolution service in virtual time: answers come after a latency.
 
 _LATENCY_US: Final = 4_000
-"""Round-trip time of an answer; a choice."""
+"""Round-trip time of an answer, which is an arbitrary choice."""
 
 _TIMEOUT_US: Final = 1_000_000
 """The time-out of `HttpSource`."""
@@ -106,7 +106,7 @@ _TIMEOUT_US: Final = 1_000_000
 class SimSource:
     """A `Source` for a service in the same process.
 
-    As with HTTP, requests are sent one after the other; a failed connection is reported at once.
+    As with HTTP, requests are sent one after the other. A failed connection is reported at once.
 
     Args:
         service: the service.
@@ -130,11 +130,11 @@ class SimSource:
         return ended
 
     def close(self) -> None:
-        """Stop."""
+        """Stop the source."""
         self._due.clear()
 
     def _fetch(self, address: str) -> tuple[int, Fetched]:
-        """Return the duration and the answer."""
+        """Return the duration and the answer of a request."""
         service = self._service
         if not service.reachable or not address.startswith(f"{service.base}/"):
             why = f"{address}: connection refused"

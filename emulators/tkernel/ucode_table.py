@@ -29,7 +29,7 @@ class UcodeTable:
     """Ucodes and contents of a service.
 
     Attributes:
-        ucodes: the target of each ucode: a name of `contents`, or an address.
+        ucodes: targets by ucode. The target is a name of `contents`, or an address.
         contents: JSON texts by name.
     """
 
@@ -47,7 +47,7 @@ def parse_table(text: str) -> UcodeTable:
     """Read a table.
 
     Raises:
-        ValueError: invalid table; the message is one line.
+        ValueError: the table is invalid. The message is one line.
 
     >>> sorted(parse_table(EXAMPLE).contents)
     ['door', 'lift']
@@ -65,7 +65,7 @@ def parse_table(text: str) -> UcodeTable:
 def _taken(
     section: Section | None, take: Callable[[str, object], str]
 ) -> Iterator[tuple[str, str]]:
-    """Yield the keys of a section with their values; report invalid ones."""
+    """Yield the keys of a section with their values; report invalid keys and values."""
     if section is None:
         return
     for key, value in section.values.items():

@@ -22,13 +22,13 @@ from tickrig.emulators.urg.fields import FIELDS, USB_BAUD
 from tickrig.host.text.trace import Config, Mark
 
 _USUAL_BAUD: Final = 115_200
-"""Line setting of a host, without meaning on USB."""
+"""Baud rate that a host sets, which has no meaning on USB."""
 
 _BUFFER_BYTES: Final = 16_384
-"""Buffer size: room for several whole scans."""
+"""Size of the buffer, which has room for several whole scans."""
 
 _OLD_SCIP: Final = "2.0"
-"""The protocol at the start of traces without one."""
+"""The protocol at the start of traces that do not name a protocol."""
 
 
 def _config_to_trace(parameters: UrgParameters, world: World) -> Config:
@@ -48,7 +48,7 @@ def build_urg(config: Config) -> Urg:
     """Build a sensor.
 
     Raises:
-        ValueError: a setting that a sensor does not have, or a value that it cannot have.
+        ValueError: a sensor does not have the setting, or does not accept the value.
     """
     defaults = {**_config_to_trace(UrgParameters(), World()), "scip": _OLD_SCIP}
     check_config(config, defaults, "a sensor has no setting", typed=False)
@@ -76,7 +76,7 @@ def _rs232_baud(baud: int) -> int | None:
 
 
 def _parse_wall(text: str) -> Wall:
-    """Read `X1,Y1,X2,Y2`; ValueError if it is not a wall.
+    """Read `X1,Y1,X2,Y2`; raise ValueError if the text is not a wall.
 
     >>> _parse_wall("1,-1,1,1")
     Wall(x1_m=1.0, y1_m=-1.0, x2_m=1.0, y2_m=1.0)
@@ -85,12 +85,12 @@ def _parse_wall(text: str) -> Wall:
 
 
 def _parse_post(text: str) -> Post:
-    """Read `X,Y,RADIUS`; ValueError if it is not a post."""
+    """Read `X,Y,RADIUS`; raise ValueError if the text is not a post."""
     return Post(*_parse_numbers(text, 3, "a post is X,Y,RADIUS in m"))
 
 
 def _parse_numbers(text: str, count: int, form: str) -> tuple[float, ...]:
-    """Read comma-separated numbers; ValueError with the form if the number of values is wrong."""
+    """Read comma-separated numbers; raise ValueError with the form if the count is wrong."""
     try:
         numbers = tuple(float(word) for word in text.split(","))
     except ValueError:

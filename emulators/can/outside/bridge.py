@@ -23,7 +23,7 @@ class CanBridge:
 
     Args:
         end: an end of the wire without a station.
-        outside: the port outside.
+        outside: port of the outside world.
     """
 
     def __init__(self, end: CanEnd, outside: Port[Frames]) -> None:
@@ -53,11 +53,11 @@ class CanBridge:
 
 
 class CountingPort(Port[Frames], Protocol):
-    """A bus outside that counts the frames it could not accept."""
+    """An outside bus that counts the frames it could not accept."""
 
     @property
     def lost(self) -> int:
-        """Number of frames."""
+        """Number of frames that could not be accepted."""
         ...
 
 
@@ -78,15 +78,15 @@ class PortBefore:
 
     @property
     def due_us(self) -> int:
-        """When the next traffic arrives."""
+        """Arrival time of the next traffic."""
         return self._port.due_us
 
     def poll(self, now_us: int, /) -> Frames:
-        """Read what others have sent."""
+        """Read the frames that other nodes have sent."""
         return self._port.poll(now_us)
 
     def send(self, now_us: int, traffic: Frames, /) -> None:
-        """Send."""
+        """Send frames."""
         self._port.send(now_us, traffic)
 
 
@@ -102,11 +102,11 @@ class WithoutEcho(PortBefore):
         self._echo = EchoFilter()
 
     def poll(self, now_us: int, /) -> Frames:
-        """Read what others have sent."""
+        """Read the frames that other nodes have sent."""
         self._echo.expire(now_us)
         return tuple(frame for frame in super().poll(now_us) if not self._echo.take(frame))
 
     def send(self, now_us: int, traffic: Frames, /) -> None:
-        """Send, and note the expected echo."""
+        """Send frames, and record them as expected echo."""
         self._echo.sent(now_us, traffic)
         super().send(now_us, traffic)

@@ -30,15 +30,16 @@ class CanBusPort(NonCopyable):
     order. Frames that do not fit into the queue are dropped and counted.
 
     Args:
-        bus: an open bus, without other readers.
-        name: its name for messages.
+        bus: open bus, which has no other readers.
+        name: name of the bus in messages.
         queue_frames: size of the queue.
-        gone: called with a text when the bus can no longer be read; returns the exception to raise.
+        gone: function that is called with a text when the bus can no longer be read. It returns the
+            exception to raise.
 
     Attributes:
-        lost: frames dropped because the adapter did not accept them.
+        lost: number of frames dropped because the adapter did not accept them.
         errors: number of received error frames.
-        reads: reads the bus, and counts the frames that its driver could not read.
+        reads: object that reads the bus, and counts the frames that its driver could not read.
     """
 
     why_not_copied = "it is a bus of this machine"
@@ -59,7 +60,7 @@ class CanBusPort(NonCopyable):
 
     @property
     def failed(self) -> str:
-        """Reason why the adapter last failed to send or read, empty if there was no error."""
+        """Reason why the adapter last failed to send or read, or "" if there was no error."""
         return self.reads.last or self._failed
 
     def poll(self, now_us: int, /) -> Frames:
@@ -82,7 +83,7 @@ class CanBusPort(NonCopyable):
         return tuple(frames)
 
     def send(self, now_us: int, traffic: Frames, /) -> None:
-        """Send as much as the adapter accepts; queue the rest."""
+        """Send the frames that the adapter accepts; queue the other frames."""
         room = self._queue_frames - len(self._unsent)
         self.lost += max(0, len(traffic) - room)
         self._unsent += traffic[:room]
@@ -102,7 +103,7 @@ class CanBusPort(NonCopyable):
             self._note(reason_of(error))
 
     def _note(self, failed: str) -> None:
-        """Warn once, not in every tick."""
+        """Record a failure, and log one warning instead of one in every tick."""
         if failed and not self._failed:
             _logger.warning("%s: %s; what it does not take is kept", self._name, failed)
         self._failed = failed

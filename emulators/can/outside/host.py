@@ -14,7 +14,7 @@ from tickrig.wire.can import CanFrame, ErrorFrame, Frames
 from tickrig.wire.instant import NEVER
 
 _CHUNK_US: Final = 1_000_000
-"""How far the rig runs at once without a timeout."""
+"""Time that the rig runs at once if there is no timeout."""
 
 
 _INSTEAD: Final = (
@@ -26,11 +26,11 @@ _LOOKING: Final = "give recv or receive a timeout, or sleep, with the fixture be
 
 
 class Repeat:
-    """Frames that are sent in turn, one per period, like the periodic task of a driver.
+    """Frames that are sent in turn, one frame per period, like the periodic task of a driver.
 
     Attributes:
-        frames: the frames, effective from the next time on.
-        due_us: when the next frame is sent, `NEVER` after `stop`.
+        frames: the frames. New frames are used from the next period on.
+        due_us: time at which the next frame is sent, or `NEVER` after `stop`.
     """
 
     def __init__(self, frames: Frames, period_us: int, due_us: int) -> None:
@@ -54,9 +54,9 @@ class CanHost:
 
     Args:
         rig: the rig to advance.
-        end: an end of one of its buses without a station.
-        thread: the thread that uses it; by default the one that makes it.
-        hears_own: whether it also receives its own frames, after they have been on the bus.
+        end: end of a bus of the rig, without a station.
+        thread: thread that uses the link, or None for the thread that makes the link.
+        hears_own: whether the host also receives its own frames, after they have been on the bus.
     """
 
     def __init__(
@@ -86,13 +86,13 @@ class CanHost:
             self._end.send(self._rig.now_us, traffic)
 
     def is_own(self, at_us: int) -> bool:
-        """Return whether the frame that ended at a time was sent here; called once for each."""
+        """Return whether this host sent the frame that ended at a time; called once per frame."""
         own = at_us in self._own
         self._own.discard(at_us)
         return own
 
     def repeat(self, frames: Frames, period_us: int) -> Repeat:
-        """Send a frame now and one in each period, in turn, until it is stopped.
+        """Send the frames in turn, one now and one in each period, until the repeat is stopped.
 
         The frames are sent whenever any code advances the rig's time.
         """
@@ -118,11 +118,11 @@ class CanHost:
         return self._rig.now_us, received
 
     def take(self, timeout_us: int | None) -> tuple[int, CanFrame] | None:
-        """Wait until a frame has arrived; return it with its time, None after the timeout.
+        """Wait until a frame has arrived; return time and frame, or None after the timeout.
 
         Raises:
             LinkClosed: the link was closed.
-            LinkError: a second thread uses it, or a polling loop would never end.
+            LinkError: a second thread uses the link, or a polling loop would never end.
             LinkTimeout: there is no timeout, and no event is left that could end the wait.
         """
         if self._closed or self._thread.ident != get_ident() or self._thread.refused:
@@ -150,7 +150,7 @@ class CanHost:
             self._hears_own = False
 
     def _put(self, now_us: int, traffic: Frames) -> None:
-        """Queue frames, and note the accepted ones if they are to be received."""
+        """Queue frames, and record the accepted frames if the host receives its own frames."""
         lost = self._end.lost
         self._end.send(now_us, traffic)
         if self._hears_own:
@@ -172,7 +172,7 @@ class CanHost:
             raise LinkError(refusal)
 
     def _chunk_us(self) -> int:
-        """Return how far the rig runs without a timeout."""
+        """Return the time that the rig runs at once if there is no timeout."""
         if self._rig.next_us == NEVER:
             raise LinkTimeout("nothing will ever happen on this bus, and no timeout was given")
         return self._rig.next_us + _CHUNK_US

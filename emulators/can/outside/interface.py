@@ -59,7 +59,7 @@ class _CanChannels:
             del self._channels[name]
 
     def open(self, name: str, *, hears_own: bool = False) -> CanHost:
-        """Connect one more host to a bus.
+        """Connect another host to a bus.
 
         Args:
             name: name of the bus.
@@ -88,12 +88,12 @@ class TickrigBus(can.BusABC):
     or run in real time.
 
     Args:
-        channel: a name that `CHANNELS` offers.
-        can_filters: as for any bus.
+        channel: name that `CHANNELS` offers.
+        can_filters: filters, as for any bus of python-can.
         receive_own_messages: whether the host also receives its own messages, with `is_rx` False,
             after they have been on the bus.
-        listen_only: must be False.
-        options: options of other interfaces (bitrate, ...) are ignored.
+        listen_only: flag that must be False.
+        options: options of other interfaces (bitrate, ...), which are ignored.
 
     Raises:
         can.CanInitializationError: no rig has this name, or `listen_only` is set.
@@ -165,7 +165,7 @@ class TickrigBus(can.BusABC):
 
 
 class _Periodic(ModifiableCyclicTaskABC):
-    """Messages that are sent in turn, one per period of the rig's time."""
+    """Messages that are sent in turn, one message per period of the rig's time."""
 
     def __init__(
         self, host: CanHost, messages: Sequence[can.Message] | can.Message, period_s: float
@@ -178,7 +178,7 @@ class _Periodic(ModifiableCyclicTaskABC):
         self._repeat.stop()
 
     def modify_data(self, messages: Sequence[can.Message] | can.Message) -> None:
-        """Send other data from the next time on."""
+        """Send other data from the next period on."""
         super().modify_data(messages)
         self._repeat.frames = self._frames()
 
@@ -187,7 +187,7 @@ class _Periodic(ModifiableCyclicTaskABC):
 
 
 def _frame_of(message: can.Message) -> CanFrame:
-    """Return a frame; CanOperationError if it is not a valid frame for the bus."""
+    """Return the frame of a message; raise CanOperationError if the bus cannot send it."""
     frame = to_frame(message)
     if frame is None:
         raise can.CanOperationError("error frames and CAN FD are not emulated")

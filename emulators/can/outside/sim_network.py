@@ -37,7 +37,7 @@ def retime(target: object, names: _Names, library: str) -> None:
     the clock reads the real clock.
 
     Args:
-        target: the object; its class must not have slots.
+        target: the object, whose class must not have slots.
         names: replacements of the names.
         library: name of the package whose classes are changed.
     """
@@ -67,7 +67,7 @@ def _members(cls: type) -> dict[str, tuple[type, object]]:
 
 
 def _copy(member: object, names: _Names) -> object | None:
-    """Return a copy of a function or property that uses one of the names, else None."""
+    """Return a copy of a function or property that uses one of the names, or None."""
     if isinstance(member, FunctionType):
         return _copy_function(member, names) if _uses(member, names) else None
     if isinstance(member, property):
@@ -113,7 +113,7 @@ class SimNetwork(canopen.Network):
 
     Args:
         rig: the rig.
-        end: an end of its bus without a station.
+        end: end of a bus of the rig, without a station.
 
     Attributes:
         host: the host's link, for single frames.
@@ -208,7 +208,7 @@ class SimNetwork(canopen.Network):
                 self._adopt(pdo)
 
     def _adopt(self, target: object) -> None:
-        """Replace the conditions and queues of a library object, once."""
+        """Replace the conditions and queues of a library object, if not yet replaced."""
         bases = {base.__module__.partition(".")[0] for base in type(target).__mro__}
         if _LIBRARY not in bases or id(target) in self._adopted:
             return
@@ -228,11 +228,11 @@ class _SimPeriodic(canopen.network.PeriodicMessageTask):
         self._repeat = repeat
 
     def stop(self) -> None:
-        """Stop sending it."""
+        """Stop sending the frame."""
         self._repeat.stop()
 
     def update(self, data: _Data) -> None:
-        """Send other data from the next time on."""
+        """Send other data from the next period on."""
         (frame,) = self._repeat.frames
         self._repeat.frames = (frame._replace(data=bytes(data or ())),)
 

@@ -1,4 +1,4 @@
-"""The slaves of a bus.yml: made of their EDS files as the master of the file expects them."""
+"""The slaves of a bus.yml, made from their EDS files as the master of the file expects them."""
 
 from __future__ import annotations
 
@@ -31,8 +31,7 @@ _TRAVEL_M: Final = 0.01
 """Default travel of a carriage per turn of the shaft."""
 _BEYOND_RAD: Final = 0.01
 _BEYOND_M: Final = 0.001
-"""Distance of the switches beyond the limits of a URDF, so that a joint at its limit presses
-none."""
+"""Distance of the switches beyond the limits of a URDF. A joint at its limit presses no switch."""
 _SECOND_AXIS: Final = 0x800
 """Offset of the objects of each further axis (CiA 402-1)."""
 _SAME_UNITS: Final = 0.001
@@ -46,11 +45,11 @@ class _BusNode:
     """A slave.
 
     Attributes:
-        name: name of its section.
-        node_id: 1..127.
-        line: line of its section.
-        description: its description, with its initial inputs.
-        about: what it moves, for people; empty if nothing.
+        name: name of the section of the slave.
+        node_id: node-ID 1..127.
+        line: line number of the section.
+        description: description of the device, with its initial inputs.
+        about: text about what the slave moves, or empty if it moves nothing.
     """
 
     name: str
@@ -61,7 +60,7 @@ class _BusNode:
 
 
 def _modes_listed(dictionary: Dictionary) -> frozenset[int]:
-    """Return the modes that 6502h of a dictionary lists; all modes if it lists none."""
+    """Return the modes that 6502h of a dictionary lists, or all modes if it lists no mode."""
     entry = dictionary.find(indices.SUPPORTED_MODES)
     listed = entry.number if entry else 0
     known = (number for number in MODES if number > 0)
@@ -69,17 +68,17 @@ def _modes_listed(dictionary: Dictionary) -> frozenset[int]:
 
 
 class _NodeMaker:
-    """Makes the slaves of one file.
+    """Makes the slaves of a bus.yml.
 
     Args:
         bus: the file.
-        robot: the joints of the robot, None if there is no description of them.
+        robot: joints of the robot, or None if there is no description of them.
         cache: cache of EDS files.
-        mistakes: collects errors.
-        profile: a name of `choices.PROFILES`, for nodes without a profile.
+        mistakes: list that collects errors.
+        profile: profile for nodes without a profile, which is a name of `choices.PROFILES`.
 
     Attributes:
-        remarks: warnings.
+        remarks: list of warnings.
         added: objects added to nodes whose EDS lacks them.
     """
 
@@ -115,7 +114,7 @@ class _NodeMaker:
             )
 
     def _joints_of(self, robot: Urdf) -> Iterator[tuple[str, UrdfJoint]]:
-        """Yield the joints of the robot by the name of their node."""
+        """Yield the joints of the robot with the name of their node."""
         by_id = {slave.node_id: name for name, slave in self._bus.slaves.items()}
         for joint in robot.joints:
             name = joint.device_name or by_id.get(joint.node_id or 0, "")
@@ -152,7 +151,7 @@ class _NodeMaker:
         return _BusNode(slave.name, slave.node_id, slave.place.line, description, about)
 
     def _identified(self, slave: BusSlave, dictionary: Dictionary) -> Dictionary:
-        """Return the dictionary with the identity of the file; 0 leaves a value unchanged."""
+        """Return the dictionary with the identity in the file; a 0 changes nothing."""
         identity = slave.identity
         wanted = {
             (_IDENTITY, 1): identity.vendor_id,
@@ -166,7 +165,7 @@ class _NodeMaker:
         )
 
     def _check_axes(self, slave: BusSlave, dictionary: Dictionary) -> None:
-        """Report a drive of several axes, because the profile has one; warn of unused ones."""
+        """Report a drive of several axes, because the profile has one axis; warn of unused axes."""
         second = indices.CONTROLWORD + _SECOND_AXIS
         if slave.num_channels > 1:
             text = "a drive of several axes (CiA 402-1) is not emulated"
@@ -197,7 +196,7 @@ class _NodeMaker:
                 self._mistakes.append(FileMistake(keys.places[name], text))
 
     def _joint(self, slave: BusSlave, keys: node_keys.NodeKeys) -> joint_drive.JointDrive:
-        """Return the motion of a node: from its keys, else the robot, else the driver's scale."""
+        """Return the motion of a node, from its keys, or the robot, or the driver's scale."""
         scale = slave.channels[0].scale_pos_to_dev if slave.channels else joint_drive.UNITS
         found: dict[str, Any] = {"units": abs(scale) or joint_drive.UNITS}
         if robot := self._joints.get(slave.name):
@@ -226,7 +225,7 @@ class _NodeMaker:
         dictionary: Dictionary,
         joint: joint_drive.JointDrive,
     ) -> Dictionary:
-        """Return the objects of a drive, and warn of those missing in its EDS."""
+        """Return the objects of a drive, and warn of objects that are missing in its EDS."""
         listed = _modes_listed(dictionary)
         modes = keys.modes or listed | self._asked_for(slave, listed)
         wanted = modes if keys.modes else modes - listed
@@ -309,8 +308,8 @@ class BusNodes:
     """The slaves of a bus.
 
     Attributes:
-        nodes: in the order of the file.
-        remarks: warnings, one line each.
+        nodes: slaves in the order of the file.
+        remarks: warnings, one per line.
     """
 
     nodes: tuple[_BusNode, ...]
@@ -326,14 +325,15 @@ def read_bus(
     """Read a bus.yml and the files it names, and make its slaves once.
 
     Args:
-        path: the bus.yml.
-        urdf: the robot with the joints; by default the robot named in `options: tickrig:`.
+        path: path of the bus.yml.
+        urdf: URDF of the robot with the joints, or None for the robot that `options: tickrig:`
+            names.
         cache: cache of EDS files and slaves.
-        profile: a name of `choices.PROFILES`, for nodes without a profile.
+        profile: profile for nodes without a profile, which is a name of `choices.PROFILES`.
 
     Raises:
         OSError: the bus.yml or the URDF cannot be read.
-        BusMistakesError: all errors.
+        BusMistakesError: the files have errors; the exception has all of them.
     """
     cache = cache or eds.EdsCache()
     versions, found = cache.others.get((path, urdf, profile), ({}, None))
@@ -348,10 +348,10 @@ def read_bus(
 
 
 def check_nodes(bus: BusFile) -> tuple[RuleFinding, ...]:
-    """Return errors and warnings that are not those of the file: in `tickrig:`, the robot, ...
+    """Return the errors and warnings that `BusFile` does not find: in `tickrig:`, the robot, ...
 
     Args:
-        bus: the file; without slaves there is nothing to check.
+        bus: content of the file. Without slaves there is nothing to check.
     """
     if not bus.slaves:
         return ()
@@ -412,7 +412,7 @@ def _said(one: Any) -> str:
 
 
 def _robot(bus: BusFile, urdf: Path | None) -> Urdf | None:
-    """Return the named robot, None without one."""
+    """Return the robot that the file or the argument names, or None without a robot."""
     if urdf is not None:
         return read_urdf(urdf)
     item = bus.options.extra.get(node_keys.URDF)

@@ -47,22 +47,22 @@ _Defaults = Mapping[tuple[int, int], int]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointDrive:
-    """The drive of a joint; None for values that are not given.
+    """The drive of a joint; values that are not given are None.
 
     Attributes:
-        motor: name of `servo.presets.PRESETS`.
-        gear_ratio: turns of the motor per turn of the shaft.
+        motor: name of the motor in `servo.presets.PRESETS`.
+        gear_ratio: number of turns of the motor per turn of the shaft.
         gear_efficiency: share of the power of an external torque that the gear transmits.
         friction_nm: dry friction at the shaft.
-        inertia_kg_m2: permanent inertia on the shaft; the loops are tuned to it.
-        supply_v: supply of the power stage.
-        encoder_counts: quadrature counts per turn of the motor.
-        max_torque: largest torque of the shaft for one second, in Nm; in N for a carriage.
-        max_velocity: largest velocity of the shaft, in rad/s; in m/s for a carriage. lower, upper:
-            positions of the limit switches, in rad; in m for a carriage.
-        home: range in which the home switch is pressed, in rad; in m for a carriage.
-        travel_m: travel of a carriage per turn of the shaft; None if the joint turns.
-        units: position units per radian or metre.
+        inertia_kg_m2: permanent inertia on the shaft, to which the loops are tuned.
+        supply_v: supply voltage of the power stage.
+        encoder_counts: number of quadrature counts per turn of the motor.
+        max_torque: largest torque of the shaft for one second, in Nm, or in N for a carriage.
+        max_velocity: largest velocity of the shaft, in rad/s, or in m/s for a carriage.
+        lower, upper: positions of the limit switches, in rad, or in m for a carriage.
+        home: range in which the home switch is pressed, in rad, or in m for a carriage.
+        travel_m: travel of a carriage per turn of the shaft, or None if the joint turns.
+        units: number of position units per radian or metre.
     """
 
     motor: str = _MOTOR
@@ -104,7 +104,7 @@ class JointDrive:
 
     @property
     def start(self) -> dict[str, float]:
-        """The physical inputs of the drive with other than the usual values."""
+        """Physical inputs of the drive whose values differ from the usual values."""
         degrees = 360 / self.per_turn
         found = {"supply_v": self.servo.stage.supply_v}
         if self.lower is not None:
@@ -123,7 +123,7 @@ class JointDrive:
         return "rad" if self.travel_m is None else "m"
 
     def about(self, dictionary: Dictionary) -> str:
-        """Return a description of it with these objects, for people."""
+        """Return a readable description of the drive with the objects of a dictionary."""
         servo, unit = self.servo, self.unit
         turn = self.per_turn / (2 * pi)
         torque = peak_torque_nm(servo) * servo.gear.efficiency / turn
@@ -136,7 +136,7 @@ class JointDrive:
         return ", ".join([*words, f"{self.units_of(dictionary):.6g} units a {unit}"])
 
     def units_of(self, dictionary: Dictionary) -> float:
-        """Return the position units per radian or metre of these objects."""
+        """Return the position units per radian or metre of the objects of a dictionary."""
         per_position = self._settings(dictionary).units.per_position
         return self._counts_per_unit / abs(per_position)
 
@@ -235,7 +235,7 @@ NAMES: Final = {
     9: "csv",
     10: "cst",
 }
-"""Abbreviations of the modes of operation (CiA 402), by the number in 6060h."""
+"""Abbreviations of the modes of operation (CiA 402), by number in 6060h."""
 
 
 _PROFILE: Final = (indices.PROFILE_ACCELERATION, indices.PROFILE_DECELERATION)
@@ -265,7 +265,7 @@ _NEEDED: Final = {
     9: (indices.TARGET_VELOCITY, indices.INTERPOLATION_PERIOD),
     10: _TORQUE,
 }
-"""Objects without which a master cannot use a mode, by its number."""
+"""Objects without which a master cannot use a mode, by number of the mode."""
 
 
 _NEVER_ZERO: Final = frozenset(
@@ -278,13 +278,13 @@ _NEVER_ZERO: Final = frozenset(
         *(indices.MAX_DECELERATION, indices.POSITIVE_TORQUE_LIMIT, indices.NEGATIVE_TORQUE_LIMIT),
     }
 )
-"""Objects for which 0 means no motion: a 0 in a file counts as not given."""
+"""Objects for which 0 means no motion. A 0 in a file therefore counts as no value."""
 
 
 def complete(
     dictionary: Dictionary, modes: Collection[int], added: Collection[int], defaults: _Defaults
 ) -> Dictionary:
-    """Return the dictionary of a drive, with missing values filled in and missing objects added.
+    """Return the dictionary of a drive with missing values filled in and missing objects added.
 
     Args:
         dictionary: the dictionary of the drive's EDS.

@@ -1,4 +1,4 @@
-"""`tickrig:` in a node of a bus.yml: its motor, gear and switches, its modes and inputs.
+"""`tickrig:` in a node of a bus.yml: the motor, gear, switches, modes and inputs of the node.
 
 >>> from tickrig.host.text.document import FilePlace, Item
 >>> value = Item(100, FilePlace("bus.yml", 7), "100")
@@ -24,7 +24,7 @@ from tickrig.host.text.values import Setting
 
 
 class BusMistakesError(ValueError):
-    """Files from which no slaves can be made.
+    """The files have errors, so that no slaves can be made.
 
     Attributes:
         mistakes: all errors, by file and line.
@@ -37,7 +37,7 @@ class BusMistakesError(ValueError):
 
 _ALL: Final = "all"
 URDF: Final = "urdf"
-"""A key of `options`: the robot with the joints."""
+"""Key of `options` for the robot with the joints."""
 
 _MOST: Final = 1e6
 
@@ -47,12 +47,12 @@ class NodeKeys:
     """The settings of a node under `tickrig:`.
 
     Attributes:
-        joint: attributes of `JointDrive`, by name.
-        modes: numbers of the node's modes of operation; None for the modes in its files.
-        profile: a name of `choices.PROFILES`, None for `auto`.
+        joint: attributes of `JointDrive` by name.
+        modes: numbers of the node's modes of operation, or None to use the modes in its files.
+        profile: name of `choices.PROFILES`, or None for `auto`.
         configured: whether the node starts with the values that its master writes to it.
-        start: initial inputs, by name.
-        places: position of each key and each input.
+        start: initial inputs by name.
+        places: positions of the keys and inputs in the file.
     """
 
     joint: Mapping[str, Any] = field(default_factory=dict)
@@ -219,12 +219,12 @@ _ARGUMENTS: Final = {
 def read_keys(
     layers: tuple[Mapping[str, Item], ...], where: str, mistakes: list[FileMistake]
 ) -> NodeKeys:
-    """Read the mappings `tickrig:` of a node; if several have a key, the first one is used.
+    """Read the mappings `tickrig:` of a node. If several mappings have a key, the first is used.
 
     Args:
         layers: the mapping of the node, then the mappings of all nodes.
         where: name of the node, for mistakes.
-        mistakes: collects errors.
+        mistakes: list that collects errors.
     """
     found: dict[str, Any] = {}
     places: dict[str, FilePlace] = {}

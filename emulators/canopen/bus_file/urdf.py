@@ -31,7 +31,8 @@ _MOST_BYTES: Final = 32_000_000
 _XACRO_TAGS: Final = ("macro", "include", "property", "arg")
 _XACRO: Final = "xacro a.urdf.xacro > a.urdf expands it"
 LEAST, MOST = 1e-9, 1e9
-"""Bounds of limits and reductions, in rad, m, Nm, N and their rates; far from any real joint."""
+"""Bounds of limits and reductions, in rad, m, Nm, N and their rates. They are far from any real
+joint."""
 
 _NODE_ID: Final = re.compile("[0-9]{1,9}")
 _LIMITS: Final = ("lower", "upper", "velocity", "effort")
@@ -47,15 +48,15 @@ class UrdfJoint:
     Attributes:
         name: name of the joint.
         place: place of the joint in `<ros2_control>`.
-        device_name: name of the node in bus.yml, empty if missing.
-        node_id: node-ID of the node, None if missing.
+        device_name: name of the node in bus.yml, or empty if missing.
+        node_id: node-ID of the node, or None if missing.
         kind: `revolute`, `continuous` or `prismatic`.
-        lower: lower limit of the position in rad, or m; None if unlimited.
-        upper: upper limit of the position in rad, or m; None if unlimited.
-        velocity: largest velocity in rad/s, or m/s; None if missing.
-        effort: largest effort in Nm, or N; None if missing.
-        reduction: turns, or rad per m, of the actuator per turn, or m, of the joint; None if
-            missing.
+        lower: lower limit of the position in rad or m, or None if unlimited.
+        upper: upper limit of the position in rad or m, or None if unlimited.
+        velocity: largest velocity in rad/s or m/s, or None if missing.
+        effort: largest effort in Nm or N, or None if missing.
+        reduction: reduction of the actuator, or None if missing: number of turns of the actuator,
+            or rad per m, for each turn, or m, of the joint.
     """
 
     name: str
@@ -87,8 +88,8 @@ def read_urdf(path: Path) -> Urdf:
     """Read a file.
 
     Raises:
-        OSError: it cannot be read.
-        BusMistakesError: all errors in it.
+        OSError: the file cannot be read.
+        BusMistakesError: the file has errors; the exception has all of them.
     """
     with path.open("rb") as file:
         return parse_urdf(file.read(_MOST_BYTES + 1), str(path))
@@ -113,7 +114,7 @@ def _named(element: Element, *names: str) -> Iterator[Element]:
 
 
 def _name(element: Element) -> str:
-    """Return its attribute `name`."""
+    """Return the attribute `name` of an element."""
     return element.attributes.get("name", "")
 
 
@@ -125,7 +126,7 @@ class _Reader:
         self._mistakes: list[FileMistake] = []
 
     def read(self, robot: Element) -> Urdf:
-        """Read all joints; BusMistakesError with all errors."""
+        """Read all joints; raise BusMistakesError with all errors."""
         if robot.name != "robot":
             self._wrong(robot, f"<{robot.name}> is no <robot>")
         for each in itertools.islice(_named(robot, *_XACRO_TAGS), 1):
@@ -145,7 +146,7 @@ class _Reader:
     def _joint(
         self, element: Element, shape: Element | None, reductions: Mapping[str, float]
     ) -> UrdfJoint | None:
-        """Return a joint of `<ros2_control>`; None if it has no device on a CANopen bus."""
+        """Return a joint of `<ros2_control>`, or None if it has no device on a CANopen bus."""
         values = {_name(each): each for each in _named(element, "param")}
         device, node = values.get("device_name"), values.get("node_id")
         if device is None and node is None:
@@ -169,7 +170,7 @@ class _Reader:
         )
 
     def _limits(self, shape: Element, kind: str) -> dict[str, float]:
-        """Return the values of `<limit>`; an empty range, and 0 for the others, mean no limit."""
+        """Return the values of `<limit>`; an empty range, or velocity or effort 0, is no limit."""
         found: dict[str, float] = {}
         for limit in _named(shape, "limit"):
             for key in _LIMITS:
@@ -192,7 +193,7 @@ class _Reader:
         return found
 
     def _reductions(self, robot: Element) -> Iterator[tuple[str, float]]:
-        """Yield the reduction of each joint with a transmission, of the robot or of its control."""
+        """Yield the reduction of each joint with a transmission in the robot or in its control."""
         for owner in (robot, *_named(robot, "ros2_control")):
             for transmission in _named(owner, "transmission"):
                 parts = (transmission, *_named(transmission, "joint", "actuator"))

@@ -34,16 +34,16 @@ class MotionOptions:
     """The options that all verbs have.
 
     Attributes:
-        set_id: configuration set.
-        device: a serial port, None for an emulated base in virtual time.
-        baud: its bit rate.
+        set_id: name of the configuration set.
+        device: serial port, or None for an emulated base in virtual time.
+        baud: bit rate of the serial port in bit/s.
         any_device: whether to drive the device without a check of its type.
-        pace: ratio of virtual time to real time, None for as fast as possible.
-        conf: Odometry.conf.
-        show_map: draw the track while it runs.
+        pace: ratio of virtual time to real time, or None to run as fast as possible.
+        conf: content of Odometry.conf.
+        show_map: whether to draw the track during the run.
         base: parameters of the emulated base.
         plot: file for a picture.
-        clock: the clock for waiting, in real time and with a pace.
+        clock: clock for waiting, in real time and with a pace.
         room_m: width and depth of a room around the origin. If given, an emulated base carries a
             range finder.
     """
@@ -97,15 +97,15 @@ def _add_scanner(loop: ClosedLoop, eye: MountedUrg) -> None:
 
 
 class _SerialBaseConnection:
-    """A `BaseConnection` in real time, over a serial port: a base, or `rh3-emu`.
+    """A `BaseConnection` in real time over a serial port, to a base or to `rh3-emu`.
 
     Args:
-        url: value of DeviceFileName; a path or a pyserial URL.
+        url: value of DeviceFileName, which is a path or a pyserial URL.
         baud: bit rate in bit/s.
-        clock: the clock for waiting.
+        clock: clock for waiting.
 
     Attributes:
-        chain: its components.
+        chain: components of the cart.
     """
 
     def __init__(self, url: str, baud: int, clock: RealClock | None = None) -> None:

@@ -24,7 +24,7 @@ from tickrig.host.cli.options import (
 _WORK: Final = "tickrig.emulators.rh3.commands.motion_verbs"
 
 _COORDINATES: Final = {"ignore_unknown_options": True}
-"""So that `-1` is a number and no option."""
+"""Settings with which `-1` is a number, not an option."""
 
 _SHARED: Final[Decorator] = add_options(
     click.option(
@@ -71,8 +71,8 @@ _PLOT: Final[Decorator] = click.option(
 def main() -> None:
     """Drive a cart of Reference Hardware 3: six components over a base.
 
-    The base is emulated, in virtual time; with --device it is real hardware or
-    rh3-emu, in real time. Ctrl-C stops it.
+    The base is emulated in virtual time. With --device the base is real hardware or rh3-emu, in
+    real time. Ctrl-C stops the cart.
 
     \b
     rh3 goto 1 0.5 1.57 --set tuned --plot track.svg
@@ -106,7 +106,7 @@ def goto(x: float, y: float, theta: float, **options: Any) -> None:
 @_SHARED
 @works_in(f"{_WORK}:go_along")
 def along_path(file: Path, **options: Any) -> None:
-    """Drive along the points of FILE: lines with x, y in metres, and a heading in radians.
+    """Drive along the points of FILE, whose lines have x, y in metres, and a heading in radians.
 
     Only the heading of the last point counts.
 
@@ -125,8 +125,8 @@ def along_path(file: Path, **options: Any) -> None:
 def square(runs: int | None, side: float | None, save: Path | None, **options: Any) -> None:
     """Drive squares in both directions (UMBmark), and calibrate the odometry by them.
 
-    After each square the true position of the cart is measured: it is known for an emulated base;
-    with --device you enter it.
+    After each square the true position of the cart is measured. For an emulated base the position
+    is known. With --device you enter the position.
 
     \b
     rh3 square --tread-m 0.459 --save Odometry.conf
@@ -156,7 +156,7 @@ def serve(**options: Any) -> None:
     """Run the six components in real time until Ctrl-C, for you and other programs.
 
     PositionInput reads the commands that you type: goal X Y DEG, path FILE, path X Y, X Y DEG, path
-    alone for a square of 1 m, end. Metres and degrees; FILE has radians.
+    alone for a square of 1 m, end. The units are metres and degrees, but radians in FILE.
 
     \b
     printf 'goal 1 0 90\\npath 0 0, 1 1\\n' | rh3 serve

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 _TOPICS: Final = Path(__file__).with_name("topics.toml").read_text("utf-8")
 
 _SCAN: Final = Path(__file__).with_name("scan_topic.toml").read_text("utf-8")
-"""Topics with a range finder."""
+"""Topics of a cart with a range finder."""
 
 
 # A run as a picture: path, cross-track error and velocities; needs the extra `plot`.
@@ -85,7 +85,7 @@ def _beside_mm(line: Pose | None, pose: Pose) -> float:
 
 
 class _RunStopped(Exception):  # noqa: N818 - no error
-    """The user ended the run."""
+    """The user has ended the run."""
 
 
 class _RunWatcher:
@@ -140,7 +140,7 @@ def _watched(options: MotionOptions, points: Sequence[Pose]) -> Iterator[_RunWat
 
 
 class SquarePlan(NamedTuple):
-    """Number of squares in each direction, and their size."""
+    """Number and size of the squares in each direction."""
 
     runs: int
     side_m: float
@@ -153,12 +153,12 @@ class SquarePlan(NamedTuple):
 
 
 class _Squares:
-    """Squares of one run of `rh3`, each with a cart at the origin.
+    """Squares of one run of `rh3`; each square starts with a cart at the origin.
 
     Args:
         options: the options.
         size: number and size of the squares.
-        watcher: receives each sample.
+        watcher: function that receives each sample.
 
     Attributes:
         latest: the connection of the latest square.
@@ -169,7 +169,7 @@ class _Squares:
         self.latest: BaseConnection | None = None
 
     def run(self, wheels: Wheels | None = None) -> Umbmark:
-        """Drive squares, with other radii and axle if given."""
+        """Drive squares, with the given radii and axle or with the usual ones."""
         try:
             return run_umbmark(
                 lambda number: self._begin(wheels),
@@ -207,7 +207,7 @@ class _Squares:
 
 
 def run_squares(options: MotionOptions, size: SquarePlan, save: Path | None) -> None:
-    """Drive squares, calibrate, drive them again, and print both results."""
+    """Drive squares, calibrate, drive the squares again, and print the results of both runs."""
     with _watched(options, size.corners) as watcher:
         squares = _Squares(options, size, watcher)
         try:

@@ -58,12 +58,12 @@ class ServedCart:
 
     Args:
         connection: the cart, with its components.
-        clock: the clock for waiting.
+        clock: clock for waiting.
 
     Attributes:
-        running: False once `stop` was called.
-        after_tick: called with the time in us after each period.
-        server: the control socket, None without one.
+        running: whether the cart runs, which is false once `stop` was called.
+        after_tick: functions that are called with the time in us after each period.
+        server: control socket, or None without a control socket.
     """
 
     def __init__(self, connection: BaseConnection, clock: CartClock) -> None:
@@ -82,7 +82,7 @@ class ServedCart:
         return self._clock.worst_late_us
 
     def attach(self, calls: CallQueue) -> None:
-        """Run the calls of other threads while it waits."""
+        """Run the calls of other threads while the cart waits."""
         if self.server is not None:
             self.server.attach(calls, calls.make)
         else:
@@ -101,11 +101,11 @@ class ServedCart:
 
 
 class CartControl(SystemControl):
-    """Answers requests about a cart: those of a system, and the commands of PositionInput.
+    """Answers requests about a cart: requests of a system, and commands of PositionInput.
 
     Args:
         connection: the cart. It must not be advanced while a request is answered.
-        cart: advances the cart.
+        cart: object that advances the cart.
     """
 
     def __init__(self, connection: BaseConnection, cart: ServedCart) -> None:
@@ -158,7 +158,7 @@ def _pose(value: object, least: int) -> Pose:
 
 
 def serve_cart(options: MotionOptions, engines: EngineOptions, control: Path | None = None) -> None:
-    """Run a cart until Ctrl-C, or until a peer ends it; then deactivate its components.
+    """Run a cart until Ctrl-C or until a peer ends the run, then deactivate its components.
 
     Lines typed on standard input are commands of PositionInput. When standard input ends and
     no other program can reach the cart, the run ends after the last command.

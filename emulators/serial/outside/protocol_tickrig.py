@@ -8,14 +8,14 @@ from tickrig.emulators.serial.outside.sim_serial import SimSerial
 
 
 class Serial(SimSerial):
-    """The port of a URL, made by `serial.serial_for_url`.
+    """The port of a URL, which `serial.serial_for_url` makes.
 
     The name in the URL is looked up when the port is opened. As with any pyserial port, the default
     setting is 9600 8N1, whatever the device uses. `?mismatch=errors` or `?mismatch=refuse` selects
     the effect of a different setting. Without it, the code that offers the name selects the effect.
 
     Args:
-        port: the URL, opened at once; None to open the port later.
+        port: URL, which is opened at once, or None to open the port later.
         options: options of `serial.Serial`.
     """
 

@@ -44,8 +44,9 @@ class _SerialPorts:
         """Allow a line to be opened as `tickrig://NAME`, for the duration of a `with` block.
 
         Args:
-            name: the name, valid in a URL: without `?`, `#` and spaces. pyserial keeps its case.
-            side: the host's side of the line.
+            name: name that is valid in a URL: without `?`, `#` and spaces. pyserial keeps upper and
+                lower case.
+            side: host's side of the line.
 
         Yields:
             The host's side.
@@ -68,10 +69,10 @@ class _SerialPorts:
         """Return the host's side of a line, and the `mismatch` of the URL.
 
         Args:
-            url: such as `tickrig://rrc?mismatch=refuse`.
+            url: URL such as `tickrig://rrc?mismatch=refuse`.
 
         Raises:
-            SerialException: invalid URL, or no rig offers the name.
+            SerialException: the URL is invalid, or no rig offers the name.
         """
         name, mismatch = _parse_url(url)
         if name not in self._sides:
@@ -81,13 +82,13 @@ class _SerialPorts:
 
 
 def _parse_url(url: str) -> tuple[str, Mismatch | None]:
-    """Return the name in a URL, and its `mismatch`.
+    """Return the name and the `mismatch` in a URL.
 
     Args:
-        url: such as `tickrig://rrc?mismatch=refuse`.
+        url: URL such as `tickrig://rrc?mismatch=refuse`.
 
     Raises:
-        SerialException: invalid URL.
+        SerialException: the URL is invalid.
 
     >>> _parse_url("tickrig://rrc"), _parse_url("tickrig://rrc?mismatch=refuse")
     (('rrc', None), ('rrc', 'refuse'))
@@ -101,4 +102,4 @@ def _parse_url(url: str) -> tuple[str, Mismatch | None]:
 
 
 SERIAL_PORTS: Final = _SerialPorts()
-"""The lines behind `tickrig://`."""
+"""The lines that are offered as `tickrig://NAME`."""

@@ -33,9 +33,9 @@ class UartErrors:
     """Counters of characters with errors, each counted once, as in Linux (`TIOCGICOUNT`).
 
     Attributes:
-        framing: the line was 0 where a stop bit should have been.
-        parity: the parity bit was wrong.
-        breaks: the line was 0 for a whole character.
+        framing: number of characters with a 0 in place of a stop bit.
+        parity: number of characters with a wrong parity bit.
+        breaks: number of breaks, in which the line was 0 for a whole character.
     """
 
     framing: int = 0
@@ -46,7 +46,7 @@ class UartErrors:
         """Count a character if it has an error.
 
         Args:
-            character: as received.
+            character: received character.
         """
         if character.line_break:
             self.breaks += 1
@@ -63,16 +63,16 @@ class ModemLines(Copyable):
     """Modem lines of a host: DTR and RTS, which it sets, and CTS, DSR, RI and CD, which it reads.
 
     No device of tickrig has such lines. The host reads the same values as from a USB adapter with
-    open pins: off, because the inputs of FT232R, CP2102 and CH340 are pulled up. If your device has
-    such lines, set the values for the host.
+    open pins. The values are off, because the inputs of FT232R, CP2102 and CH340 are pulled up. If
+    your device has such lines, set the values for the host.
 
     Attributes:
-        dtr: Data Terminal Ready, set by the host; off while its port is closed.
-        rts: Request To Send, set by the host; off while its port is closed.
+        dtr: Data Terminal Ready, set by the host. It is off while the port is closed.
+        rts: Request To Send, set by the host. It is off while the port is closed.
         dsr: Data Set Ready, read by the host.
         ri: Ring Indicator, read by the host.
         cd: Carrier Detect, read by the host.
-        cts_changed: called when `cts` has been set, because bytes may wait for it.
+        cts_changed: function that is called when `cts` was set, because bytes may wait for it.
     """
 
     def __init__(self) -> None:
@@ -82,7 +82,7 @@ class ModemLines(Copyable):
 
     @property
     def cts(self) -> bool:
-        """Clear To Send, read by the host; a port with `rtscts` sends only while it is on."""
+        """Clear To Send, read by the host; a port with `rtscts` sends only while CTS is on."""
         return self._cts
 
     @cts.setter
@@ -99,13 +99,13 @@ class HostReceiver(Copyable):
     """Receives bytes of a device from a line, sampled by a UART with the host's setting.
 
     If the host's setting differs from the device's, a character may end within a byte of the
-    device. It is available when that byte has passed. A character with an error is delivered like
-    any other character and counted, as Linux and Windows do for pyserial.
+    device. The character is available when that byte has passed. A character with an error is
+    delivered like any other character and counted, as Linux and Windows do for pyserial.
 
     Args:
         end: the host's end of the line.
         device: the device's setting.
-        garbled: called with the time when bytes of another setting are sampled.
+        garbled: function that is called with the time when bytes of another setting are sampled.
 
     Attributes:
         errors: counters of characters with errors.
@@ -140,7 +140,7 @@ class HostReceiver(Copyable):
 
         Args:
             setting: the host's setting.
-            now_us: the present time; all earlier characters have been read.
+            now_us: present time, by which all earlier characters have been read.
         """
         same, self._setting = setting == self._device, setting
         self._uart = None if same else UartReceiver(setting, now_us * PS_PER_US)
@@ -148,7 +148,7 @@ class HostReceiver(Copyable):
 
     @property
     def due_us(self) -> int:
-        """When there will be a character, or something to check."""
+        """Time of the next character or the next check."""
         due_us = self._end.due_us
         if self._uart is None:
             return due_us
@@ -164,7 +164,7 @@ class HostReceiver(Copyable):
         return self._end.coming if self._uart is None else b""
 
     def arrival_us(self, count: int) -> int:
-        """Return when `count` characters will be available, or when to check again.
+        """Return the time at which `count` characters will be available, or of the next check.
 
         Args:
             count: number of characters, at least 1.
@@ -224,17 +224,18 @@ class HostTransmitter(Copyable):
     are counted, but not reported to the device.
 
     Args:
-        event_queue: event queue of the rig; characters arrive between the rig's ticks.
+        event_queue: event queue of the rig. Characters arrive between the rig's ticks.
         end: the host's end of the line.
         device: the device's setting.
         lines: modem lines with the CTS that the transmitter may have to wait for.
-        garbled: called with the time when bytes are sent that the device samples differently.
+        garbled: function that is called with the time when bytes are sent that the device samples
+            differently.
 
     Attributes:
-        setting: the host's setting for bytes that are sent from now on.
+        setting: setting of the host for bytes that are sent from now on.
         waits_for_cts: whether sending waits while CTS is off.
         suspended: whether sending waits until the host resumes its output.
-        held: the bytes that wait for CTS or for the host.
+        held: bytes that wait for CTS or for the host.
         errors: number of characters that the device received with an error.
     """
 
@@ -265,7 +266,7 @@ class HostTransmitter(Copyable):
 
     @property
     def sent_us(self) -> int:
-        """When the last byte will have passed; past or `NEVER` if it has."""
+        """Time at which the last byte will have passed (past or `NEVER` if it has)."""
         if self.held:
             return NEVER
         sampled_us, line_us = -(-self._free_ps // PS_PER_US), self._end.sent_us
@@ -380,7 +381,7 @@ class HostTransmitter(Copyable):
         self._come_back(now_us)
 
     def _begin(self, start_ps: int, value: int, setting: UartSetting) -> None:
-        """Put a character on the line; in a break it is lost."""
+        """Put a character on the line; during a break the character is lost."""
         free = self._break_us == NEVER
         self._listen(free, start_ps)
         for level, until_ps in setting.levels(value, start_ps):
@@ -417,7 +418,7 @@ class HostTransmitter(Copyable):
 _LOG = logging.getLogger(__name__)
 
 LONGEST_US: Final = 3_600_000_000
-"""A wait without a timeout ends with an exception after an hour."""
+"""Longest wait without a timeout (an hour), which then ends with an exception."""
 
 _INSTEAD: Final = "read and write in the thread that made the rig"
 
@@ -430,10 +431,10 @@ _LOOKING: Final = "read with a timeout, or let time.sleep be that of the rig"
 
 
 class HostWaits(Copyable):
-    """Steps a rig while a host waits, only in the thread that made this object.
+    """Steps a rig while a host waits, but only in the thread that made this object.
 
     Args:
-        rig: the rig.
+        rig: rig with the line.
     """
 
     def __init__(self, rig: Rig) -> None:
@@ -445,7 +446,7 @@ class HostWaits(Copyable):
         """Raise SerialException, permanently, if a second thread uses a port.
 
         Args:
-            name: the port.
+            name: name of the port.
         """
         if threading.current_thread().name.startswith("asyncio"):  # of an event loop's executor
             raise SerialException(f"{name}: {NO_ASYNCIO}")
@@ -453,10 +454,10 @@ class HostWaits(Copyable):
             raise SerialException(refusal)
 
     def deadline_us(self, timeout_s: float | None) -> int:
-        """Return the end of a timeout that starts now; without a timeout, the time for `give_up`.
+        """Return the end of a timeout that starts now, or the time for `give_up` without a timeout.
 
         Args:
-            timeout_s: the timeout in seconds, None if there is none.
+            timeout_s: timeout in seconds, or None for no timeout.
         """
         return self.rig.now_us + (LONGEST_US if timeout_s is None else round(timeout_s * 1e6))
 
@@ -464,7 +465,7 @@ class HostWaits(Copyable):
         """Raise SerialException if there was no timeout, because the host would wait endlessly.
 
         Args:
-            timeout_s: the expired timeout.
+            timeout_s: expired timeout in seconds, or None if there was no timeout.
         """
         if timeout_s is None:
             raise SerialException("nothing came for an hour, and no timeout was given")
@@ -473,7 +474,8 @@ class HostWaits(Copyable):
         """Count a poll without result.
 
         Raises:
-            SerialException: too many polls at one instant, because the host would wait endlessly.
+            SerialException: there were too many polls at one instant, so that the host would wait
+                endlessly.
         """
         if refusal := self._looks.refusal(self.rig.now_us, _LOOKING):
             raise SerialException(refusal)
@@ -484,9 +486,9 @@ class HostWaits(Copyable):
         """Advance the time until an event is due.
 
         Args:
-            until_us: latest time.
-            due_us: returns the time of the event, `NEVER` if unknown.
-            done: returns whether to end the wait at once.
+            until_us: latest end of the wait.
+            due_us: function that returns the time of the event, or `NEVER` if unknown.
+            done: function that returns whether to end the wait at once.
         """
         rig = self.rig
         at_us = due_us()
@@ -501,26 +503,27 @@ Mismatch = Literal["errors", "refuse"]
 
 
 class SerialSide(Copyable):
-    """The host's side of a serial line: the adapter that a program opens as a port.
+    """The host's side of a serial line, like an adapter that a program opens as a port.
 
     The hosts must run in the thread that makes this object. No other thread can advance the time.
 
     Args:
         rig: the rig that advances while a host waits.
-        end: the host's end of the line, such as `line.b` or `emulator.host_end`.
-        device: the device's setting, by default 115200 8N1. None if the device has no UART (as on
-            USB) and understands a host of any setting.
-        mismatch: `"errors"` if a host with another setting sends and receives wrong characters, as
-            with real UARTs; `"refuse"` to raise at once.
+        end: host's end of the line, such as `line.b` or `emulator.host_end`.
+        device: setting of the device, by default 115200 8N1. None means that the device has no UART
+            (as on USB) and understands a host of any setting.
+        mismatch: effect of a different setting. With `"errors"` the host sends and receives wrong
+            characters, as with real UARTs. With `"refuse"` an exception is raised at once.
 
     Attributes:
-        setting: the host's setting.
+        setting: setting of the host.
         modem_lines: modem lines of the host.
-        receiver: the receiver of the host; its `errors` are those of the host's UART.
-        transmitter: the transmitter of the host; its `errors` are those of the device's UART.
+        receiver: receiver of the host. Its `errors` are the errors of the host's UART.
+        transmitter: transmitter of the host. Its `errors` are the errors of the device's UART.
         waits: the waits of the host.
         in_use: whether a port is open here.
-        listeners: called with the time and a text when bytes pass between different settings.
+        listeners: functions that are called with the time and a text when bytes pass between
+            different settings.
     """
 
     def __init__(
@@ -549,7 +552,7 @@ class SerialSide(Copyable):
         end.uart.error_listeners.append(self._spoiled)
 
     def _spoiled(self, mark: Mark, error: str, count: int) -> None:
-        """Count what a fault of the line has spoiled; without a parity bit none is wrong."""
+        """Count characters that a line fault has spoiled; parity errors need a parity bit."""
         if self.device is None or (error == "parity" and self.device.parity == "N"):
             return
         to_device = mark is Mark.TO_DEVICE
@@ -557,7 +560,7 @@ class SerialSide(Copyable):
         setattr(errors, error, getattr(errors, error) + count)
 
     def _report_mismatch(self, now_us: int) -> None:
-        """Call the listeners, once until one of both settings changes."""
+        """Call the listeners, but only once until one of the two settings changes."""
         text = f"the host is set to {self.setting}, the device to {self.device}"
         if text != self._reported:
             self._reported = text

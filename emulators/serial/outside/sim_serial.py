@@ -43,8 +43,8 @@ class _SimPort(SerialBase):
     """Base of `SimSerial` without the transfer of bytes.
 
     Attributes:
-        side: the host's side of the line, as soon as it is known.
-        mismatch: effect of a different setting; None for the `mismatch` of `side`.
+        side: host's side of the line, as soon as it is known.
+        mismatch: effect of a different setting, or None to use the `mismatch` of `side`.
     """
 
     side: SerialSide | None = None
@@ -52,12 +52,12 @@ class _SimPort(SerialBase):
     is_open = False
 
     def _begin(self, *positional: Any, **options: Any) -> None:
-        """Make a port with settings, not yet open."""
+        """Make a port with settings, which is not open yet."""
         self._input = bytearray()
         super().__init__(None, *positional, **options)
 
     def __reduce_ex__(self, protocol: object, /) -> tuple[Any, ...]:
-        """Copy it with its rig; `rig.fork(port)` does so."""
+        """Copy the port with its rig, as `rig.fork(port)` does."""
         return copyreg.__newobj__, (type(self),), vars(self)  # type: ignore[attr-defined]
 
     def __deepcopy__(self, memo: dict[int, Any]) -> _SimPort:
@@ -90,7 +90,7 @@ class _SimPort(SerialBase):
         self.reset_input_buffer()
 
     def close(self) -> None:
-        """Close the port; DTR and RTS go off, a break ends, and sent data still arrive."""
+        """Close the port. DTR and RTS go off, a break ends, and sent data still arrive."""
         if not self.is_open or self.side is None:
             return
         self.is_open = self.side.in_use = False
@@ -183,7 +183,7 @@ class _SimPort(SerialBase):
         """Send XON or XOFF to the device.
 
         Args:
-            enable: XON if true, else XOFF.
+            enable: whether to send XON. If false, XOFF is sent.
         """
         side = self._side()
         side.transmitter.send(side.rig.now_us, XON if enable else XOFF)
@@ -193,10 +193,10 @@ class _SimPort(SerialBase):
         warnings.warn("nonblocking() has no effect", DeprecationWarning, stacklevel=2)
 
     def set_low_latency_mode(self, low_latency_settings: bool) -> None:
-        """Do nothing: a byte is available when its stop bit has passed.
+        """Do nothing, because a byte is available as soon as its stop bit has passed.
 
         Args:
-            low_latency_settings: as in pyserial.
+            low_latency_settings: mode, as in pyserial.
         """
         self._side()
 
@@ -206,7 +206,8 @@ class _SimPort(SerialBase):
 
 
 _INPUT_BYTES: Final = 4_096
-"""Input buffer for a host that does not read; more bytes wait in the line, then are lost."""
+"""Size of the input buffer for a host that does not read. More bytes wait in the line, and are then
+lost."""
 
 _ROOM_BYTES: Final = 256
 """Largest room in the buffer for which a write waits at once."""
@@ -223,23 +224,23 @@ class SimSerial(_SimPort):
 
     Other calls take no time. If operating systems differ, the port behaves as on Linux, where
     pyserial ignores `inter_byte_timeout`. With `rtscts` no bytes are sent before CTS is on; data
-    accepted while CTS was on are still sent.
+    that were accepted while CTS was on are still sent.
 
     Not emulated: XON and XOFF, DSR and DTR as flow control, RS485 modes (the emulated line turns
     round automatically). These settings can be set, without effect.
 
     Args:
         side: the host's side of the line.
-        options: options of `serial.Serial`: `timeout`, `baudrate`, ... Baud rate and frame default
-            to the device's.
+        options: options of `serial.Serial`: `timeout`, `baudrate`, ... The defaults of baud rate
+            and frame are those of the device.
 
     Attributes:
-        side: the host's side of the line.
-        mismatch: effect of a different setting; None for the `mismatch` of `side`.
+        side: host's side of the line.
+        mismatch: effect of a different setting, or None to use the `mismatch` of `side`.
 
     Raises:
         SerialException: another port is open on the line, or the setting is refused.
-        ValueError: a setting that no UART has.
+        ValueError: no UART has the setting.
     """
 
     _own: tuple[str | None, SerialSide | None] = None, None  # the line that it was made with
@@ -298,7 +299,7 @@ class SimSerial(_SimPort):
             size: largest number of bytes.
 
         Returns:
-            That many bytes, or fewer after the timeout or `cancel_read`.
+            The bytes, which are fewer than `size` after the timeout or `cancel_read`.
 
         Raises:
             SerialException: the port is closed, or there is no timeout and no byte arrived for an
@@ -331,10 +332,10 @@ class SimSerial(_SimPort):
         return bytes(data)
 
     def readline(self, size: int | None = -1, /) -> bytes:
-        """Read until a line ends; the timeout applies to each byte.
+        """Read until the end of a line; the timeout applies to each byte.
 
         Args:
-            size: largest number of bytes; -1 for any number.
+            size: largest number of bytes, or -1 for any number.
         """
         if size is not None and size >= 0:
             return super().readline(size)
@@ -354,7 +355,7 @@ class SimSerial(_SimPort):
         """Read until a sequence has arrived or the timeout has expired.
 
         Args:
-            expected: the sequence; text never matches, as with pyserial.
+            expected: sequence of bytes. A text never matches, as with pyserial.
             size: largest number of bytes.
         """
         side = self._side()
@@ -419,8 +420,8 @@ class SimSerial(_SimPort):
             data: the bytes.
 
         Returns:
-            The number of accepted bytes: all, except with a `write_timeout` of 0 or after
-            `cancel_write`.
+            The number of accepted bytes. All bytes are accepted, except with a `write_timeout` of 0
+            or after `cancel_write`.
 
         Raises:
             SerialTimeoutException: the timeout has expired. Some bytes may have been accepted.
@@ -461,7 +462,7 @@ class SimSerial(_SimPort):
         side.transmitter.drop_unsent(side.rig.now_us)
 
     def _room_us(self, side: SerialSide, wanted: int) -> int:
-        """Return when there will be room for more, `NEVER` before CTS is on."""
+        """Return the time at which there will be more room, or `NEVER` before CTS is on."""
         now_us, transmitter = side.rig.now_us, side.transmitter
         sent_us, unsent = transmitter.sent_us, transmitter.unsent(now_us)
         if not unsent or sent_us == NEVER:
@@ -477,7 +478,7 @@ class SimSerial(_SimPort):
         """Hold the line at 0 for a duration, which advances the time.
 
         Args:
-            duration: in seconds.
+            duration: duration in seconds.
         """
         side = self._side()
         self.break_condition = True

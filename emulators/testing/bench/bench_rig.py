@@ -487,10 +487,12 @@ class BenchRig(RunningEmulator):
 
     Args:
         name: name of the bench.
-        state: state of the bench. link: address for hosts, as text.
+        state: state of the bench.
+        link: address for hosts, as text.
 
     Attributes:
-        state: state of the bench. journal: journal of the traffic and the actions.
+        state: state of the bench.
+        journal: journal of the traffic and the actions.
         orders: scheduled faults, except those of a control socket.
         ports: ports of hosts in real time, by name of the line.
     """

@@ -30,16 +30,16 @@ class LineMount(Copyable):
     """Devices on a serial line; only on RS485 several devices share a line.
 
     Args:
-        name: of the line.
+        name: name of the line.
         settings: parameters of the line.
-        line: the line, if it is not made from `settings`. Its ends belong to the devices, except
-            `line.b`, which is the host's.
+        line: the line, if it is not made from `settings`. The ends of the line belong to the
+            devices, except `line.b`, which is the host's end.
 
     Attributes:
         line: the line.
-        devices: by name.
-        entries: the trace entry of each device.
-        tap: traffic at the first device's end, after faults of the line.
+        devices: devices by name.
+        entries: trace entries by name of the device.
+        tap: traffic at the end of the first device, after faults of the line.
     """
 
     def __init__(self, name: str, settings: LineSettings, line: ByteLine | None = None) -> None:
@@ -57,13 +57,13 @@ class LineMount(Copyable):
         """Put a device on the line.
 
         Args:
-            name: of the device.
+            name: name of the device.
             device: the device.
             entry: trace entry of the device, if it can be rebuilt.
-            seed: of random faults at its end.
+            seed: seed of random faults at the device's end.
 
         Raises:
-            ValueError: the line has no end for it.
+            ValueError: the line has no end for the device.
         """
         if not self._free:
             raise ValueError(f"{self.name} has no end for {name}: it is for {len(self.devices)}")
@@ -110,15 +110,15 @@ class BusMount(Copyable):
     without a host.
 
     Args:
-        name: of the bus.
-        bit_rate: in bit/s.
-        seed: of its random faults.
+        name: name of the bus.
+        bit_rate: bit rate in bit/s.
+        seed: seed of random faults on the bus.
 
     Attributes:
         wire: the bus.
-        nodes: by name.
-        node_faults: by the name of the node, the object on which its faults are armed.
-        entries: the trace entry of each.
+        nodes: nodes by name.
+        node_faults: objects on which faults of a node are armed, by name of the node.
+        entries: trace entries by name of the node.
     """
 
     def __init__(self, name: str, bit_rate: int = BIT_RATE, seed: int = 0) -> None:
@@ -132,7 +132,7 @@ class BusMount(Copyable):
         """Put a slave on the bus.
 
         Args:
-            name: of the node.
+            name: name of the node.
             slave: the slave.
             entry: trace entry of the slave, if it can be rebuilt.
         """

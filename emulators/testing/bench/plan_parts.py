@@ -56,8 +56,8 @@ def parts_of(plan: RigPlan) -> Parts:
     """Make the devices of a rig file and put them on their wires.
 
     Raises:
-        ValueError: a device cannot be made, for example because its EDS is unreadable; unknown
-            options of its type; an invalid signal.
+        ValueError: a device cannot be made, for example because its EDS is unreadable. A device
+            type does not know an option. A signal is invalid.
     """
     alone = len(plan.wires) == 1
     stores: dict[Path, StoreFile] = {}
@@ -85,7 +85,7 @@ def _settings_of(start: Mapping[str, Setting | SignalSpec]) -> dict[str, Setting
 
 
 def _signals(plan: RigPlan) -> dict[str, SignalSpec]:
-    """Return the signals by their target, `DEVICE/INPUT`, or by their names."""
+    """Return the signals by target `DEVICE/INPUT`, or by name."""
     return {**plan.signals} | {
         f"{device.name}/{name}": value
         for device in plan.devices.values()
@@ -95,7 +95,7 @@ def _signals(plan: RigPlan) -> dict[str, SignalSpec]:
 
 
 def _begin_faults(plan: RigPlan, rig: BenchRig) -> None:
-    """Schedule the faults; ValueError for an unknown fault or invalid arguments."""
+    """Schedule the faults; raise ValueError for an unknown fault or invalid arguments."""
     for fault in plan.faults:
         name = rig.state.full_fault_name(fault.owner, fault.spec.name)
         order = FaultOrder(replace(fault.spec, name=name), 0)
@@ -118,7 +118,7 @@ def _line(wire: WirePlan, devices: Sequence[DevicePlan], seed: int) -> LineMount
 def _settings(
     wire: WirePlan, made: Sequence[ConfiguredDevice]
 ) -> tuple[LineSettings, ByteLine | None]:
-    """Return the parameters of a line, and the line if its device does not make it."""
+    """Return the parameters of a line, and the line itself unless the device makes the line."""
     settings = made[0].type.line
     settings = replace(settings, baud=wire.bit_rate or settings.baud)
     if not wire.given:
@@ -155,8 +155,8 @@ def _slave_of(
     """Return a slave and its trace entry; add its store file to `stores`.
 
     Raises:
-        ValueError: its file cannot be read.
-        _NoNodeIdError: it has no node-ID.
+        ValueError: the file of the device cannot be read.
+        _NoNodeIdError: the device has no node-ID.
     """
     kind = Path(device.type) if device.kind is DeviceKind.EDS else device.type
     description = late.describe(eds_cache(), kind, device.profile or AUTO)
@@ -195,12 +195,12 @@ def rig_of(
     Args:
         parts: the devices on their wires.
         plan: further settings: faults, and store files of nodes.
-        outside: connections for hosts; without them the time is virtual.
+        outside: connections for hosts. Without connections the time is virtual.
         trace: the file of the recording.
-        keeps: whether to record the run in memory, without a file.
+        keeps: whether to record the run in memory if there is no file.
 
     Raises:
-        ValueError: an invalid input, signal or fault.
+        ValueError: an input, signal or fault is invalid.
         OSError: the file of the trace cannot be opened.
     """
     state = RigState(
@@ -224,8 +224,8 @@ _BUS: Final = "can"
 
 BenchedDevice = Emulated[bytes] | CanopenSlave | DeviceType | str
 """A device, a device type, or a text like `type` in rig files: the name of a device type or of a
-CANopen model, an EDS or DCF file, or `FILE.py:Class`. The last three may have a node-ID in front:
-`5=drive.eds`."""
+CANopen model, an EDS or DCF file, or `FILE.py:Class`. A model, an EDS or DCF file, or a class may
+have a node-ID in front: `5=drive.eds`."""
 
 _NODE: Final = re.compile(r"[0-9]+=")
 
@@ -236,17 +236,19 @@ def mounts_of(
     line: LineSettings | None = None,
     sdo_timeout_us: int | None = None,
 ) -> list[Mount]:
-    """Put each serial device on a line of its own, and all nodes on one CAN bus.
+    """Put each serial device on a separate line, and all nodes on one CAN bus.
 
     Args:
-        devices: by name.
-        seed: of all random numbers.
-        line: parameters of the serial lines; by default those of their type, or 115 200 8N1.
-        sdo_timeout_us: time-out of the SDO servers of all nodes; None to keep their own.
+        devices: devices by name.
+        seed: seed of all random numbers.
+        line: parameters of the serial lines. The default is the parameters of the device type, or
+            115 200 8N1.
+        sdo_timeout_us: time-out of the SDO servers of all nodes, or None to keep the time-outs of
+            the nodes.
 
     Raises:
-        ValueError: an object that is neither a device nor a device type; a time-out of 0, or a
-            time-out without a node.
+        ValueError: an object is neither a device nor a device type. The time-out is 0, or there is
+            a time-out but no node.
     """
     mounts: dict[str, Mount] = {}
     for name, device in devices.items():
@@ -284,9 +286,10 @@ def named_device(text: str, folder: Path, name: str = "") -> DevicePlan:
     """Return the device or type named by a text, like the `type` of a rig file.
 
     Args:
-        text: a name or file; a CANopen device may have its node-ID in front: `5=drive.eds`.
+        text: name or file of the device. A CANopen device may have its node-ID in front:
+            `5=drive.eds`.
         folder: folder of the files.
-        name: of the device.
+        name: name of the device.
 
     Raises:
         ValueError: the text does not name a device.
@@ -338,7 +341,7 @@ class _Made(NamedTuple):
 
 
 def _of_type(device: Emulated[bytes] | DeviceType | str, seed: int) -> _Made:
-    """Return the given device, or one made by its type."""
+    """Return the given device, or a device made by the given type."""
     if isinstance(device, str):
         made = configure(device, {}, seed)
         return _Made(made.device, made.type.line, made.type.name, made.config)

@@ -1,4 +1,4 @@
-"""Devices of a bench in the header of a trace, and rebuilt from it."""
+"""Devices of a bench in the header of a trace, and devices rebuilt from the header."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ def node_entry(
     Args:
         wire: name of the bus.
         slave: the slave.
-        device: its source: EDS or DCF, the name of a model, or `FILE.py:Class`; empty for its own
-            model name.
-        profile: of `choices.PROFILES`, for a file.
+        device: source of the device: EDS or DCF, name of a model, or `FILE.py:Class`. If it is
+            empty, the source is the model name of the slave.
+        profile: profile for a file, which is one of `choices.PROFILES`.
         files: further source files.
 
     Raises:

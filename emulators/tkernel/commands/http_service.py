@@ -32,8 +32,8 @@ class HttpService:
     """Serves a service in its own threads, as long as it is reachable.
 
     Args:
-        service: the service; its `base` becomes the address of this server.
-        port: on loopback; 0 selects a free one.
+        service: the service, whose `base` becomes the address of this server.
+        port: number of the port on loopback, or 0 to select a free port.
 
     Attributes:
         url: address of the server.
@@ -50,7 +50,7 @@ class HttpService:
         service.base = self.url = f"http://{_LOOPBACK}:{self._port}"
 
     def follow(self) -> None:
-        """Listen unless the fault `unreachable` is active; call it periodically.
+        """Listen unless the fault `unreachable` is active; call this method periodically.
 
         If another program has taken the port, a message is logged and the port is tried again.
         """
@@ -63,7 +63,7 @@ class HttpService:
                 _LOG.warning("port %d cannot be had again: %s", self._port, error)
 
     def close(self) -> None:
-        """Stop; late answers are not sent."""
+        """Stop the server; late answers are not sent."""
         self._closing.set()
         self._hang_up()
 
@@ -100,7 +100,7 @@ class _Handler(BaseHTTPRequestHandler):
     timeout = _IDLE_S
 
     def do_GET(self) -> None:
-        """Answer, with a delay if the fault `slow` is active."""
+        """Answer a request, with a delay if the fault `slow` is active."""
         with self.lock:
             response = self.service.respond(self.path)
         if self.closing.wait(response.delay_us / 1e6):
@@ -120,11 +120,11 @@ class _Handler(BaseHTTPRequestHandler):
 # Run a resolution service for its command line.
 
 _LOOK_US = 20_000
-"""Period at which it checks its faults."""
+"""Period at which the server checks its faults."""
 
 
 def _read_table(path: Path) -> UcodeTable:
-    """Read the table of a file; Refused if it is invalid."""
+    """Read the table of a file; raise Refused if the table is invalid."""
     try:
         return parse_table(path.read_text("utf-8"))
     except OSError as error:
@@ -136,7 +136,7 @@ def _read_table(path: Path) -> UcodeTable:
 def run_service(
     table: Path | None, *, port: int, control: Path | None, faults: tuple[str, ...], example: bool
 ) -> None:
-    """Serve until it is stopped; or print an example table.
+    """Serve until a request ends the service, or print an example table.
 
     Raises:
         Refused: the options cannot be carried out.

@@ -38,9 +38,10 @@ from tickrig.host.cli.options import PATH, HarmlessCommand, version_option, work
 def main(**options: Any) -> None:
     """Emulate a board with OpenRTM on T-Kernel, until Ctrl-C.
 
-    Its RT components are those of Figs. 122 and 123 of the NEDO report, or of a SYSTEM file. It has
-    the limits of a small board: requests beyond them are refused with a message. Until it has
-    booted it does not answer; a power cut loses everything except files.
+    The RT components of the board are those of Figs. 122 and 123 of the NEDO report, or those of a
+    SYSTEM file. The board has the limits of a small board: requests beyond them are refused with a
+    message. The board does not answer until it has booted. A power cut loses everything except
+    files.
 
     \b
     urg-emu --link /tmp/urg --room 4,3

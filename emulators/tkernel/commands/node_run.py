@@ -34,12 +34,12 @@ from tickrig.host.rtc.ucode.infrared_rays_reader import OPEN_SERIAL
 
 _JOIN_ENGINES: Final = "tickrig.host.rtc.engines.engines_joined:engines_joined"
 _NAMES: Final = f"{node_manager.HOST}.host_cxt/%n.rtc"
-"""Naming context of its components in a name server."""
+"""Naming context of the components of the node in a name server."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _NodeOptions:
-    """The command line of `tkernel-emu`."""
+    """The options of `tkernel-emu`."""
 
     system: Path | None = None
     urg: str | None = None
@@ -53,7 +53,7 @@ class _NodeOptions:
 
 
 def run_node(connectors: int, message_octets: int, tick: str, boot: str, **options: Any) -> None:
-    """Run the node of a command line; Refused if its options are invalid."""
+    """Run the node of a command line; raise Refused if the options are invalid."""
     engines = take_engines(options)
     tick_us, boot_us = time_us("--tick", tick), time_us("--boot", boot)
     try:
@@ -76,7 +76,7 @@ class _Door:
 
 
 class _Boot:
-    """A boot, as seen by a control socket: the runner of the system, and its delays."""
+    """A boot for a control socket, with the runner of the system and its delays."""
 
     def __init__(self, runner: RealTime) -> None:
         self._runner, self.after_tick = runner, list[Callable[[int], None]]()
@@ -102,10 +102,10 @@ class _Boot:
 
 
 class _NodeRun:
-    """One run of the command; its board may boot many times.
+    """A run of the command, in which the board may boot many times.
 
     Args:
-        options: the command line.
+        options: options of the command line.
     """
 
     def __init__(self, options: _NodeOptions) -> None:
@@ -124,7 +124,7 @@ class _NodeRun:
         schedule.add_item(self._board)
 
     def run(self) -> None:
-        """Run until it is stopped.
+        """Run until a request or Ctrl-C ends the run.
 
         Raises:
             Refused: the system cannot run on this node, or a socket cannot be opened.
@@ -191,7 +191,7 @@ class _NodeRun:
         return lambda calls: server.attach(calls, calls.make)
 
     def _serve(self, wait_us: int) -> None:
-        """Serve requests of all servers; the board first, which waits for the next tick."""
+        """Serve requests of all servers; the board's server comes first and waits for the tick."""
         open_doors = [door.serve for door in (self._system_door, self._operator_door) if door.serve]
         for serve in open_doors[1:]:
             serve(0)

@@ -31,8 +31,9 @@ from tickrig.host.cli.options import PATH, HarmlessCommand, version_option, work
 def main(**options: Any) -> None:
     """Serve a TABLE of ucodes over HTTP on loopback, until Ctrl-C.
 
-    GET /ucodes/UCODE answers with the address of its information, GET /contents/NAME with that
-    information, 404 if there is none. Its faults have names.
+    GET /ucodes/UCODE answers with the address of the information of a ucode. GET /contents/NAME
+    answers with the information. The status is 404 if there is none. The faults of the service have
+    names.
 
     \b
     ucode-resolver --example > places.toml

@@ -27,7 +27,7 @@ def build_reader(config: Config) -> UcodeReader:
     """Build a reader.
 
     Raises:
-        ValueError: a setting that a reader does not have, or a value that it cannot have.
+        ValueError: a reader does not have the setting, or does not accept the value.
     """
     defaults = _config_to_trace(ReaderParameters(), ())
     check_config(config, defaults, "a reader has no setting", typed=False)
@@ -40,7 +40,7 @@ def build_reader(config: Config) -> UcodeReader:
 
 
 def _parse_marker(text: str) -> Marker:
-    """Read `UCODE,X,Y`; ValueError if it is not a marker.
+    """Read `UCODE,X,Y`; raise ValueError if the text is not a marker.
 
     >>> _parse_marker("00001c00000000000001000000000001,1,-0.5").y_m
     -0.5

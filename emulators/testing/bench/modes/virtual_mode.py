@@ -189,16 +189,16 @@ def _free(name: str, taken: tuple[str, ...]) -> str:
 
 _LOOK_US: Final = 1_000
 _LOOKS: Final = 10_000
-"""Period for checking a condition in long waits; else each millisecond."""
+"""Period for checking a condition in long waits. In short waits the period is a millisecond."""
 
 _EXACT: Final = Tolerances(stick_pct=0, time_us=0)
 
 
 class VirtualMode(EmulatedMode):
-    """A `BenchMode` with the time of its rig, advanced by waits.
+    """A `BenchMode` in the virtual time of its rig, which waits advance.
 
     Args:
-        rig: the rig.
+        rig: rig with the devices.
     """
 
     name = "virtual"
