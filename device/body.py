@@ -19,9 +19,9 @@ class Pose(Immutable):
     """A position and heading on a plane.
 
     Attributes:
-        x_m: metres.
-        y_m: metres, to the left of x.
-        heading_rad: from x towards y, not wrapped.
+        x_m: position in x, in metres.
+        y_m: position in y, which is to the left of x, in metres.
+        heading_rad: angle from x towards y, in radians. The angle is not wrapped.
     """
 
     x_m: float = 0.0
@@ -53,7 +53,7 @@ class Pose(Immutable):
 def arc(
     place: tuple[float, float, float], left_m: float, right_m: float, tread_m: float
 ) -> tuple[float, float, float]:
-    """Return x, y and heading after an arc; `Pose.moved` in plain numbers, for each step."""
+    """Return x, y and heading after an arc, like `Pose.moved` but with plain numbers (faster)."""
     x_m, y_m, heading_rad = place
     turn_rad = (right_m - left_m) / tread_m
     half_rad = turn_rad / 2
@@ -89,9 +89,9 @@ class Contact:
     Attributes:
         radius_m: radius of the wheel.
         mass_kg: share of the body's mass that the wheel carries.
-        friction: coefficient, None if the wheel never slips.
+        friction: coefficient of friction, or None if the wheel never slips.
         speed_m_s: speed of the ground below the wheel.
-        slip_m_s: speed of the rim beyond the ground's speed, 0 with grip.
+        slip_m_s: speed of the rim relative to the ground, which is 0 with grip.
     """
 
     radius_m: float
@@ -144,11 +144,12 @@ class BodyParameters(Immutable):
         kind: kind of body, a key of `SIDES`.
         wheel_radius_m: radius of each wheel.
         tread_m: distance between left and right wheels.
-        mass_kg: mass on the driven wheels; each carries the same share.
-        friction: coefficient between wheels and ground, None if they never slip.
+        mass_kg: mass on the driven wheels. Each wheel carries the same share.
+        friction: coefficient of friction between wheels and ground, or None if the wheels never
+            slip.
 
     Raises:
-        ValueError: unknown kind, or a length or mass out of range.
+        ValueError: the kind is unknown, or a length or mass is out of range.
     """
 
     kind: str
@@ -178,9 +179,9 @@ class BodyParameters(Immutable):
 class WheeledBody(Copyable):
     """A differential drive, or a skid steer whose sides move as the mean of their wheels.
 
-    In each step it moves as far as its wheels have turned since the previous step, on an exact arc.
-    Its mass lies above the wheels, at half the tread to each side. So each wheel feels mass /
-    number of wheels x radius squared, both straight on and in a turn.
+    In each step the body moves as far as its wheels have turned since the previous step, on an
+    exact arc. The mass of the body lies above the wheels, at half the tread to each side. So each
+    wheel feels mass / number of wheels x radius squared, both straight on and in a turn.
 
     Not emulated: castors, the force that turns the wheels of a skid steer sideways, rolling
     resistance, slopes, collisions.
@@ -189,10 +190,10 @@ class WheeledBody(Copyable):
         parameters: dimensions, mass and friction.
 
     Attributes:
-        pose: position and heading of the body; may be set.
-        speed_m_s: forward, in the latest step.
-        turn_rad_s: to the left, in the latest step.
-        contacts: its wheels on the ground, by name.
+        pose: position and heading of the body, which may be set.
+        speed_m_s: forward speed in the latest step.
+        turn_rad_s: turning speed to the left in the latest step.
+        contacts: wheels on the ground, by name.
     """
 
     def __init__(self, parameters: BodyParameters) -> None:
@@ -206,7 +207,7 @@ class WheeledBody(Copyable):
         self._angles = dict.fromkeys(parameters.wheels, 0.0)
 
     def step(self, angles_rad: Mapping[str, float]) -> None:
-        """Advance by one step in which the wheels have turned to these angles."""
+        """Advance by one step in which the wheels have turned to the given angles."""
         ways = {}
         for name, contact in self.contacts.items():
             ways[name] = contact.roll(angles_rad[name] - self._angles[name], STEP_S)
@@ -242,11 +243,12 @@ def _mean(values: Sequence[float]) -> float:
 _OMNI_STEP_S: Final = 1e-3
 
 _BEARINGS: Final = (pi / 3, pi, -pi / 3)
-"""Bearings of the wheels, from the front to the left; each rolls at right angles to its bearing."""
+"""Bearings of the wheels, from the front to the left. Each wheel rolls at right angles to its
+bearing."""
 
 
 class Velocity(NamedTuple):
-    """In the frame of the body: m/s forward, m/s to the left, rad/s to the left."""
+    """Velocity in the frame of the body: forward (m/s), to the left (m/s), turning left (rad/s)."""
 
     vx: float = 0.0
     vy: float = 0.0
@@ -259,12 +261,12 @@ class OmniParameters(Immutable):
 
     Attributes:
         wheel_radius_m: radius of each wheel.
-        base_radius_m: from the middle to each wheel.
+        base_radius_m: distance from the middle to each wheel.
         response_s: time constant of the wheels' speed.
-        most_rad_s: the highest speed of a wheel.
+        most_rad_s: highest speed of a wheel.
 
     Raises:
-        ValueError: a number that is not above 0.
+        ValueError: a number is not above 0.
     """
 
     wheel_radius_m: float = 0.05
@@ -279,7 +281,7 @@ class OmniParameters(Immutable):
                 raise ValueError(f"{name} {value} is not above 0 and below 1000")
 
     def wheel_speeds(self, velocity: Velocity) -> tuple[float, ...]:
-        """Return the speeds of the wheels in rad/s; if one is too fast, all are scaled down."""
+        """Return the speeds of the wheels in rad/s; if a wheel is too fast, all are scaled down."""
         vx, vy, turn = velocity.vx, velocity.vy, velocity.w * self.base_radius_m
         rims = (vy * cos(at) - vx * sin(at) + turn for at in _BEARINGS)
         speeds = tuple(rim / self.wheel_radius_m for rim in rims)
@@ -287,7 +289,7 @@ class OmniParameters(Immutable):
         return tuple(speed * share for speed in speeds)
 
     def velocity(self, speeds: tuple[float, ...]) -> Velocity:
-        """Return the velocity of the body for these wheel speeds.
+        """Return the velocity of the body for given wheel speeds.
 
         >>> omni = OmniParameters()
         >>> [round(n, 6) for n in omni.velocity(omni.wheel_speeds(Velocity(0.1, -0.2, 0.3)))]
@@ -308,8 +310,8 @@ class OmniBody(Copyable):
 
     Attributes:
         parameters: dimensions and response.
-        pose: position and heading of the body; may be set.
-        velocity: in the latest step.
+        pose: position and heading of the body, which may be set.
+        velocity: velocity of the body in the latest step.
     """
 
     parameters: OmniParameters = field(default_factory=OmniParameters)

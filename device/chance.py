@@ -17,8 +17,8 @@ class Chance(Part):
     """A seeded generator of integers (SplitMix64: Steele, Lea, Flood 2014).
 
     Args:
-        seed: the seed of the run.
-        stream: name of one of its independent streams.
+        seed: seed of the run.
+        stream: name of an independent stream of random numbers.
 
     >>> Chance(0).draw() == 0xE220_A839_7B1D_CDAF  # the authors' first number for seed 0
     True
@@ -45,10 +45,10 @@ class Chance(Part):
         return self.draw() < threshold
 
     def hits(self, threshold: int, draws: int) -> list[int]:
-        """Draw several times as `hit` does; return the numbers of the draws that hit, from 0.
+        """Draw several times as `hit` does; return the indices of the draws that hit, from 0.
 
         Args:
-            threshold: the value of `threshold_of`.
+            threshold: value of `threshold_of`.
             draws: number of draws, 0 or more.
         """
         found: list[int] = []
@@ -68,7 +68,7 @@ class Chance(Part):
 
 @cache
 def _lanes(count: int) -> tuple[int, int, int]:
-    """Return 1, the steps of the state and a mask of 64 bits, for some lanes of 128 bits."""
+    """Return the number 1, the state's steps and a mask of 64 bits, in lanes of 128 bits each."""
     places = [128 * at for at in range(count)]
     ones = sum(1 << place for place in places)
     gammas = sum(((at + 1) * _GOLDEN_GAMMA & _MASK) << place for at, place in enumerate(places))

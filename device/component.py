@@ -31,7 +31,7 @@ class DeviceReturnCode(IntEnum):
 
 
 ERROR: Final = DeviceReturnCode.RTC_ERROR
-"""Return codes of a failed callback."""
+"""Return codes that mean that a callback has failed."""
 
 Result = DeviceReturnCode | None
 """Return value of a callback; None means success."""
@@ -94,7 +94,7 @@ class CallbackRunner(Generic[C]):
 
     Attributes:
         component: the component.
-        latest: name of the callback that ran last, empty before the first.
+        latest: name of the callback that ran last, or empty before the first callback.
         calls: number of callbacks that ran.
         executed: number of `on_execute` callbacks among these calls.
     """
@@ -116,11 +116,12 @@ class CallbackRunner(Generic[C]):
 class Timer:
     """A timer as execution context (RTC-Lite type 22h, DeviceRTC).
 
-    Its periods are counted from its start, so it does not drift. Missed periods are skipped.
+    The periods are counted from the start of the timer, so the timer does not drift. Missed periods
+    are skipped.
 
     Attributes:
-        rate_hz: periods a second; a new rate applies from the next start.
-        due_us: when the next period ends, `NEVER` while it is stopped.
+        rate_hz: number of periods in a second. A new rate applies from the next start.
+        due_us: time at which the next period ends, or `NEVER` while the timer is stopped.
     """
 
     rate_hz: int
@@ -169,7 +170,7 @@ def declared(owner: type, kind: type[P]) -> Iterator[tuple[str, P]]:
 
 
 def shown(value: Any) -> float | str:
-    """Return the value of a port as an output: booleans as numbers, sequences as text."""
+    """Return the value of a port as an output, with booleans as numbers and sequences as text."""
     if isinstance(value, tuple):
         return " ".join(str(shown(element)) for element in value)
     return int(value) if isinstance(value, bool) else value

@@ -14,7 +14,7 @@ class Device(Protocol[W]):
 
     @property
     def tick_us(self) -> int:
-        """The control period in microseconds; ticks fall on its multiples."""
+        """The control period in microseconds; ticks are at multiples of the period."""
         ...
 
     @property
@@ -39,7 +39,7 @@ class Device(Protocol[W]):
 
         Args:
             now_us: time since the rig was started, a multiple of `tick_us`.
-            rx: traffic that arrived since the last tick, in wire order.
+            rx: traffic that has arrived since the last tick, in wire order.
 
         Returns:
             The traffic that the device sends in this tick, in wire order. The device answers bad
@@ -53,10 +53,10 @@ class UartDevice(Device[bytes], Protocol):
 
     @property
     def uart(self) -> UartSetting | None:
-        """The setting of its UART after the latest tick or `reset`; None without a UART.
+        """The setting of the UART after the latest tick or `reset`, or None without a UART.
 
         The result of a tick is still sent with the setting that was valid before that tick. The new
         setting applies after the last stop bit of that result. From then on the device also
-        receives with it.
+        receives with the new setting.
         """
         ...

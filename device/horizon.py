@@ -12,9 +12,9 @@ class Horizon(Part):
     """Time limits of a rig, shared with its devices that have an attribute `horizon`.
 
     Attributes:
-        passed_us: all ticks up to this time are done.
-        until_us: up to this time only the traffic of a device is observed. Nothing reads the device
-            between its ticks, except an action of the event queue.
+        passed_us: time up to which all ticks are done.
+        until_us: time up to which only the traffic of a device is observed. Nothing reads the
+            device between its ticks, except an action of the event queue.
     """
 
     passed_us: int = 0

@@ -22,15 +22,15 @@ class Register(Immutable):
     """A number that a master can read.
 
     Attributes:
-        address: address of its first register.
-        name: name in the device.
+        address: address of the first register of the number.
+        name: name of the number in the device.
         text: description with the unit.
         words: number of registers, 1 or 2.
-        signed: in two's complement.
+        signed: whether the number is in two's complement.
         low: smallest value that a master may write.
         high: largest value that a master may write.
         initial: value after power-up.
-        writable: whether a master may write it.
+        writable: whether a master may write the number.
     """
 
     address: int
@@ -51,8 +51,9 @@ class Registers(Part):
     address.
 
     Args:
-        table: the numbers.
-        measured: functions that compute their numbers each time a master reads them.
+        table: description of the numbers.
+        measured: functions by name of a number. A function computes the number each time a master
+            reads it.
     """
 
     def __init__(
@@ -91,7 +92,7 @@ class Registers(Part):
         self._latest_read = (first, count)
 
     def read(self, first: int, count: int) -> list[int]:
-        """Return registers; Refusal if one does not exist."""
+        """Return registers; raise Refusal if a register does not exist."""
         self.check(first, count)
         values = {name: self[name] for name in dict(self._places)}
         return [values[name] >> shift & 0xFFFF for name, shift in self._places]
@@ -149,14 +150,14 @@ class ModbusSlave(Copyable):
 
     Args:
         registers: the registers.
-        written: called with the numbers that a master wrote, by name.
+        written: function that is called with the numbers that a master wrote, by name.
         address: address of this slave, 1..247.
         silence_us: length of the silence that ends a frame.
 
     Attributes:
-        served: requests for this slave that were answered or executed.
-        garbled: frames with a wrong length or CRC.
-        last_request_us: when the last request for this slave was served.
+        served: number of requests for this slave that were answered or executed.
+        garbled: number of frames with a wrong length or CRC.
+        last_request_us: time at which the last request for this slave was served.
     """
 
     def __init__(

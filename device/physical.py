@@ -37,15 +37,15 @@ class InputSignal(Immutable):
 
     Attributes:
         name: name in scenario files and panels.
-        text: description for people.
-        type: level, button, text or fault.
+        text: description as readable text.
+        type: type of the input: level, button, text or fault.
         low: smallest value.
         high: largest value.
-        unit: unit of the value, empty for a plain number.
+        unit: unit of the value, or empty for a plain number.
         initial: value at the start of the rig.
-        real: whether the input accepts fractions; a device keeps such an input in a `QuantityBank`.
-        counts: three numbers of the converter: the counts of its object at `low`, the counts at
-            `high`, and the counts of one step; empty without a converter.
+        real: whether the input accepts fractions. A device keeps such an input in a `QuantityBank`.
+        counts: three numbers of the converter, or empty without a converter: counts of its object
+            at `low`, counts at `high`, and counts of one step.
     """
 
     name: str
@@ -65,8 +65,8 @@ class OutputSignal(Immutable):
 
     Attributes:
         name: name in scenario files and panels.
-        text: description for people.
-        unit: unit of the value, empty for a plain number.
+        text: description as readable text.
+        unit: unit of the value, or empty for a plain number.
     """
 
     name: str
@@ -83,11 +83,11 @@ class QuantityBank:
     Args:
         table: the inputs.
         groups: names that set several inputs together, such as `stick`.
-        on_change: called after each change.
+        on_change: function that is called after each change.
 
     Attributes:
         table: the inputs by name, in order of declaration.
-        groups: names that set several inputs together.
+        groups: names of inputs that are set together, by name of the group.
         changed: whether an input was set since the device last checked.
 
     >>> bank = QuantityBank([InputSignal("supply_v", "supply", high=15, initial=12.5, real=True)])
@@ -110,7 +110,7 @@ class QuantityBank:
         self._on_change, self.changed = on_change, True
 
     def __setitem__(self, name: str, value: object) -> None:
-        """Raise TypeError: an input is set by `set`, which checks the value."""
+        """Raise TypeError, because an input is set by `set`, which checks the value."""
         raise TypeError(f"an input is set by a call: bank.set({name!r}, {value!r})")
 
     def __getitem__(self, name: str) -> int | float:
@@ -121,11 +121,12 @@ class QuantityBank:
         """Set an input.
 
         Args:
-            name: of the input.
+            name: name of the input.
             value: the new value, in its unit and range.
 
         Raises:
-            ValueError: unknown input, wrong kind of number, or value out of range.
+            ValueError: the input is unknown, or the value is a wrong kind of number or out of
+                range.
         """
         self._values[name] = self.check(name, value)
         self.changed = True
@@ -136,14 +137,14 @@ class QuantityBank:
         """Check a value without setting it.
 
         Args:
-            name: of the input.
+            name: name of the input.
             value: the value to check.
 
         Returns:
             The value that `set` would store.
 
         Raises:
-            ValueError: as `set`.
+            ValueError: the input is unknown, or `set` would refuse the value.
         """
         item = self.find(name)
         whole = isinstance(value, int) and not isinstance(value, bool)
@@ -160,10 +161,10 @@ class QuantityBank:
         """List the inputs of a type.
 
         Args:
-            signal_type: the type.
+            signal_type: type of the inputs.
 
         Returns:
-            Their names, in order of declaration.
+            The names of the inputs, in order of declaration.
         """
         return tuple(item.name for item in self.table.values() if item.type is signal_type)
 
@@ -171,14 +172,14 @@ class QuantityBank:
         """Look up the description of an input.
 
         Args:
-            name: of the input.
+            name: name of the input.
             signal_type: required type, if given.
 
         Returns:
-            The description.
+            The description of the input.
 
         Raises:
-            ValueError: unknown input, or another type.
+            ValueError: the input is unknown, or has another type.
         """
         item = self.table.get(name)
         if item is None or signal_type not in (None, item.type):
@@ -197,11 +198,11 @@ class InputBank(QuantityBank):
     Args:
         table: the inputs.
         groups: names that set several inputs together, such as `stick`.
-        on_change: called after each change.
+        on_change: function that is called after each change.
 
     Attributes:
         table: the inputs by name, in order of declaration.
-        groups: names that set several inputs together.
+        groups: names of inputs that are set together, by name of the group.
         changed: whether an input was set since the device last checked.
 
     Raises:

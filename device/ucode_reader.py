@@ -23,11 +23,11 @@ class ReaderParameters(Immutable):
     """Parameters of a reader.
 
     Attributes:
-        range_m: range at which it receives a marker, 0.1..99.
-        cone_deg: full angle of reception around its heading, 1..360.
+        range_m: range at which the reader receives a marker, 0.1..99.
+        cone_deg: full angle of reception around the heading of the reader, 1..360.
 
     Raises:
-        ValueError: a value out of range.
+        ValueError: a value is out of range.
     """
 
     range_m: float = 3.0
@@ -49,12 +49,12 @@ class Marker(Immutable):
     """A marker that sends its ucode in all directions, on a flat floor.
 
     Attributes:
-        ucode: 128 bits, 32 hex digits in capitals.
-        x_m: position along x.
-        y_m: position to the left of x.
+        ucode: ucode of 128 bits, as 32 hex digits in capitals.
+        x_m: position in x.
+        y_m: position in y, which is to the left of x.
 
     Raises:
-        ValueError: invalid ucode or position.
+        ValueError: the ucode or the position is invalid.
     """
 
     ucode: str
@@ -75,7 +75,7 @@ class Reception(Immutable):
 
     Attributes:
         ucode: the received ucode.
-        level: signal level: 100 % at the reader, falling to 1 % at the end of the range.
+        level: signal level, which is 100 % at the reader and falls to 1 % at the end of the range.
     """
 
     ucode: str
@@ -85,7 +85,7 @@ class Reception(Immutable):
 def receive(
     markers: Sequence[Marker], pose: Pose, parameters: ReaderParameters, share: float = 1.0
 ) -> tuple[Reception, ...]:
-    """Return the markers that a reader receives, the nearest first.
+    """Return the markers that a reader receives, with the nearest marker first.
 
     Not emulated: walls, which infra-red light does not pass; markers that disturb one another;
     reflections.
@@ -94,7 +94,7 @@ def receive(
         markers: the sending markers.
         pose: pose of the reader.
         parameters: range and cone of the reader.
-        share: share of the range that remains, such as behind a dirty window, 0..1.
+        share: share of the range that remains, for example behind a dirty window, 0..1.
     """
     range_m, half_rad = parameters.range_m * share, radians(parameters.cone_deg) / 2
     found = []
@@ -138,11 +138,11 @@ OUTPUTS: Final = (
 
 _TICK_US: Final = 1_000
 _BOOT_US: Final = 200_000
-"""Time from power-up to the first line; bytes received before are lost."""
+"""Time from power-up to the first line. Bytes that are received before are lost."""
 
 _ROUND_US: Final = 100_000
 MOST_RECEIVED: Final = 6
-"""Largest number of markers in a round: as many lines as fit at 38400 bit/s."""
+"""Largest number of markers in a round, whose lines fit into the round at 38400 bit/s."""
 
 _VERSION: Final = 1
 _DIRTY_SHARE: Final = 0.5
@@ -151,9 +151,9 @@ _DIRTY_SHARE: Final = 0.5
 class UcodeReader(Copyable):
     """A reader; a `Device[bytes]`.
 
-    It listens in rounds of 100 ms. At the end of each round it sends a line for each received
-    marker, the nearest first and six at most. Then it sends a line that ends the round. The pose of
-    the reader at the end of the round applies.
+    The reader receives in rounds of 100 ms. At the end of each round it sends a line for each
+    received marker, with the nearest marker first and at most six lines. Then it sends a line that
+    ends the round. The pose of the reader at the end of the round applies.
 
     The report (3.4.43.3 (4), Fig. 123) shows the reader but no protocol. The lines and all numbers
     are our choice.
@@ -161,13 +161,13 @@ class UcodeReader(Copyable):
     Not emulated: walls, markers that disturb one another, bits of the light.
 
     Args:
-        parameters: of the reader.
-        markers: the markers in its environment, 1000 at most.
+        parameters: parameters of the reader.
+        markers: markers in the environment of the reader, at most 1000.
 
     Attributes:
-        type_name: name of its device type, for traces.
-        inputs: its physical inputs, see `INPUTS`.
-        markers: the markers in its environment; changes apply from the next round.
+        type_name: name of the device type, for traces.
+        inputs: physical inputs; see `INPUTS`.
+        markers: markers in the environment of the reader. Changes apply from the next round.
     """
 
     type_name: ClassVar[str] = "ucode-reader"
@@ -183,7 +183,7 @@ class UcodeReader(Copyable):
 
     @property
     def tick_us(self) -> int:
-        """Resolution of its time."""
+        """Resolution of the reader's time."""
         return _TICK_US
 
     @property
@@ -219,10 +219,10 @@ class UcodeReader(Copyable):
         """Return the present value of an output.
 
         Args:
-            name: one of `outputs`.
+            name: name of an output in `outputs`.
 
         Returns:
-            Its value.
+            The value of the output.
 
         Raises:
             KeyError: there is no output of that name.
@@ -230,14 +230,14 @@ class UcodeReader(Copyable):
         return _READ[name](self)
 
     def tick(self, now_us: int, rx: bytes, /) -> bytes:
-        """Receive the bytes that arrived, and advance to now.
+        """Receive the bytes that have arrived, and advance to now.
 
         Args:
             now_us: time since the rig was started, a multiple of `tick_us`.
-            rx: the bytes that arrived since the latest tick.
+            rx: bytes that have arrived since the latest tick.
 
         Returns:
-            The bytes that it sends in this tick.
+            The bytes that the reader sends in this tick.
         """
         if self.inputs.changed:
             self._inputs_changed()
@@ -272,7 +272,7 @@ class UcodeReader(Copyable):
         self._lines.clear()
 
     def _begin(self, now_us: int) -> bytes:
-        """After booting, send the identification and listen."""
+        """Send the identification after booting, and start to receive."""
         self._booting = False
         self._listen(now_us)
         return self._identification()

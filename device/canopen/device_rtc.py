@@ -26,11 +26,12 @@ class CanopenPort(Generic[T]):
     """Base of both kinds of ports.
 
     Args:
-        name: a letter, then up to 31 letters, digits and underscores.
-        port_type: type of its values; `SHORT.sequence(4)` makes a port of four.
-        cob_id: CAN-ID of its PDO; None for the CAN-ID of the pre-defined connection set, which
-            only the first four ports of each direction have. Without a CAN-ID the PDO is off.
-        transport: None selects a PDO if the type fits into one PDO, else SDO.
+        name: name of the port: a letter, then up to 31 letters, digits and underscores.
+        port_type: type of the values. `SHORT.sequence(4)` makes a port of four values.
+        cob_id: CAN-ID of the PDO, or None to use the CAN-ID of the pre-defined connection set,
+            which only the first four ports of each direction have. Without a CAN-ID the PDO is off.
+        transport: transport of the values. None selects a PDO if the type fits into one PDO, or
+            else SDO.
     """
 
     direction: ClassVar[rtc_canopen.PortDirection]
@@ -48,7 +49,7 @@ class CanopenPort(Generic[T]):
         self.entries: Sequence[Entry] = ()
 
     def join(self, entries: Sequence[Entry], event: Callable[[Entry], None]) -> None:
-        """Keep the value of the port in these objects; `event` sends the TPDOs of an object."""
+        """Keep the value of the port in the given objects; `event` sends the TPDOs of an object."""
         self.entries, self._event = entries, event
 
     @property
@@ -68,20 +69,21 @@ class CanopenInPort(CanopenPort[T]):
     """A port that the bus writes, by RPDO or SDO, and the component reads.
 
     Attributes:
-        is_new: whether the bus has written it since the latest read, even with the same value.
+        is_new: whether the bus has written the port since the latest read, even with the same
+            value.
     """
 
     direction: ClassVar[rtc_canopen.PortDirection] = rtc_canopen.PortDirection.IN
     is_new: bool = False
 
     def join(self, entries: Sequence[Entry], event: Callable[[Entry], None]) -> None:
-        """Keep the value of the port in these objects, and record each write."""
+        """Keep the value of the port in the given objects, and record each write."""
         super().join(entries, event)
         for entry in entries:
             entry.written = self._on_written
 
     def read(self) -> T:
-        """Return the present value; it is no longer new."""
+        """Return the present value, which is then no longer new."""
         self.is_new = False
         return self.value
 
@@ -98,10 +100,10 @@ class CanopenOutPort(CanopenPort[T]):
     direction: ClassVar[rtc_canopen.PortDirection] = rtc_canopen.PortDirection.OUT
 
     def write(self, value: T) -> None:
-        """Set the value; it is sent in the state Active, even if it has not changed.
+        """Set the value, which is sent in the state Active even if it has not changed.
 
         Raises:
-            ValueError: the value is not one of the port's type.
+            ValueError: the value does not have the type of the port.
         """
         for entry, data in zip(self.entries, self.port_type.encode(value), strict=True):
             entry.assign(data)
@@ -118,17 +120,16 @@ class CanopenComponent(DeviceComponent):
     component, as power-on does.
 
     Attributes:
-        type_name: type of the component; `RtcProfile` describes this and the next five
-            attributes.
+        type_name: type of the component. `RtcProfile` describes this attribute and the next five.
         version: version of the component, such as 1.0.
         vendor: maker of the component.
         category: category of the component.
-        rate_hz: how often `on_execute`, `error_check` and `on_error` run (DECISION K12).
-        product_code: value of 1018h:02; 0 derives it from the type name.
+        rate_hz: rate at which `on_execute`, `error_check` and `on_error` run (DECISION K12).
+        product_code: value of 1018h:02. 0 derives the value from the type name.
         strict_cia301: whether NMT commands leave the state Error as in CiA 301 (DECISION K9).
 
     Raises:
-        ValueError: invalid profile or ports.
+        ValueError: the profile or a port is invalid.
 
     >>> from tickrig.device.canopen.device_rtc import CanopenInPort, CanopenOutPort
     >>> from tickrig.wire.rtc_canopen import LONG
@@ -156,7 +157,7 @@ class CanopenComponent(DeviceComponent):
 
     @classmethod
     def profile(cls) -> rtc_canopen.RtcProfile:
-        """Return the profile of the component; ValueError if it is invalid."""
+        """Return the profile of the component; raise ValueError if it is invalid."""
         try:
             return rtc_canopen.RtcProfile(
                 type_name=cls.type_name,
@@ -175,7 +176,7 @@ class CanopenComponent(DeviceComponent):
 
 
 class CanopenEcho(CanopenComponent):
-    """One in-port, one out-port, both Long."""
+    """A component with one in-port and one out-port, both of type Long."""
 
     type_name = "Echo"
     vendor = "tickrig"
@@ -214,7 +215,7 @@ _STATES: Final = {
     NmtState.OPERATIONAL: RtcState.ACTIVE,
     NmtState.STOPPED: RtcState.ERROR,
 }
-"""Table 3, for an initialized component."""
+"""States of an initialized component by NMT state (Table 3)."""
 
 _ACTIVITIES: Final = {
     RtcState.INACTIVE: "error_check",
@@ -286,10 +287,10 @@ class CanopenLifeCycle(CallbackRunner[CanopenComponent]):
 
     Args:
         node: the slave.
-        make: makes a component, joined to the dictionary.
+        make: function that makes a component, which is joined to the dictionary.
 
     Attributes:
-        component: the present component; a reset of the node makes a new one.
+        component: present component. A reset of the node makes a new component.
     """
 
     def __init__(self, node: CanopenSlave, make: Callable[[], CanopenComponent]) -> None:
@@ -310,7 +311,7 @@ class CanopenLifeCycle(CallbackRunner[CanopenComponent]):
 
     @property
     def activity(self) -> str:
-        """Name of the periodic callback of the present state, empty if there is none."""
+        """Name of the periodic callback of the present state, or "" if there is none."""
         name = _ACTIVITIES.get(self.state, "")
         own = name and getattr(type(self.component), name) is not getattr(CanopenComponent, name)
         return name if own else ""
@@ -351,7 +352,7 @@ class CanopenLifeCycle(CallbackRunner[CanopenComponent]):
             self._node.enter(NmtState.STOPPED)
 
     def finalize(self) -> None:
-        """End (M11): the node is silent until its supply has been cut."""
+        """End the component (M11); the node is then silent until its supply has been cut."""
         if self.state in _ENDING:
             self._call_all(_ENDING[self.state])
             self._finalized = True
@@ -374,18 +375,18 @@ _INPUTS: Final = (
         SignalType.BUTTON,
     ),
 )
-"""Every DeviceRTC has these; a component may add its own."""
+"""Physical inputs of every DeviceRTC; a component may add inputs."""
 
 _OUTPUTS: Final = (
     OutputSignal("rtc_state", "Created, Inactive, Active, Error or Finalized"),
     OutputSignal("callback", "the callback that ran last"),
     OutputSignal("executed", "how often on_execute ran"),
 )
-"""Every DeviceRTC has these; each port adds its value as in.NAME or out.NAME."""
+"""Physical outputs of every DeviceRTC; each port adds its value as in.NAME or out.NAME."""
 
 
 def _inputs_of(kind: type[CanopenComponent]) -> tuple[InputSignal, ...]:
-    """Return the physical inputs of a component; ValueError if two have the same name."""
+    """Return the physical inputs of a component; raise ValueError if two have the same name."""
     table = (*_INPUTS, *kind.physical)
     name, count = Counter(item.name for item in table).most_common(1)[0]
     if count > 1:
@@ -405,7 +406,7 @@ def _outputs_of(component: CanopenComponent) -> dict[str, OutputSignal]:
 
 
 def _text_of(life: CanopenLifeCycle, name: str) -> float | str:
-    """Return the present value of an output; KeyError if there is none."""
+    """Return the present value of an output; raise KeyError if the name is unknown."""
     match name:
         case "rtc_state":
             return life.state.value
@@ -428,15 +429,15 @@ class DeviceRtc(Application):
     Not emulated: service ports, configuration sets, several components on one node.
 
     Args:
-        node: the slave; its dictionary is that of the component.
-        slot: its place in the order of a tick.
+        node: the slave, whose dictionary is the dictionary of the component.
+        slot: place of the application in the order of a tick.
         kind: the component.
 
     Attributes:
         life: the life cycle, with the component.
 
     Raises:
-        ValueError: invalid physical inputs.
+        ValueError: a physical input is invalid.
     """
 
     def __init__(self, node: CanopenSlave, slot: int, kind: type[CanopenComponent]) -> None:
@@ -453,10 +454,10 @@ class DeviceRtc(Application):
         """Return an output as the latest tick left it.
 
         Args:
-            name: one of `outputs`.
+            name: name of an output in `outputs`.
 
         Returns:
-            Its value.
+            The value of the output.
 
         Raises:
             KeyError: there is no output of that name.
@@ -501,7 +502,7 @@ class DeviceRtc(Application):
 
 
 def make_dictionary(kind: type[CanopenComponent]) -> Dictionary:
-    """Make the objects of a component; ValueError if its profile is invalid."""
+    """Make the objects of a component; raise ValueError if its profile is invalid."""
     table = rtc_canopen.object_table(kind.profile())
     return Dictionary(table, table.objects)
 
@@ -518,10 +519,10 @@ def make_device_rtc(
 
     Args:
         kind: the component.
-        node_id: 1..127, or 255 for a slave that waits for LSS.
+        node_id: node-ID 1..127, or 255 for a slave that waits for LSS.
         nonvolatile: memory kept from an earlier run.
 
     Raises:
-        ValueError: invalid component or node-ID.
+        ValueError: the component or the node-ID is invalid.
     """
     return make_slave(make_dictionary(kind), node_id, nonvolatile, application_of(kind))

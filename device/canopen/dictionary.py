@@ -30,7 +30,7 @@ class SdoAbort(Exception):  # noqa: N818 - the standard's word
 
 
 def whole_number(value: Value) -> int:
-    """Return a value that must be an integer; SdoAbort if it is not."""
+    """Return a value that must be an integer; raise SdoAbort if it is not."""
     if not isinstance(value, int):
         raise SdoAbort(AbortCode.PARAMETER_INCOMPATIBLE)
     return value
@@ -89,14 +89,15 @@ class Entry(Part):
         description: name, type, access and limits; shared with other slaves.
 
     Attributes:
-        description: as given.
+        description: description of the entry, as given.
         data: the present value as bytes.
-        guard: called with a value that comes over the bus; raises SdoAbort to refuse it.
-        written: called after a value came over the bus.
-        source: returns the bytes to read instead of `data`; may raise SdoAbort.
-        measured: whether `source` can be called at any time: it returns a measured value, never
-            raises and has no side effects.
-        watchers: called whenever the value has changed, by the bus or by the device.
+        guard: function that is called with a value that comes over the bus. It raises SdoAbort to
+            refuse the value.
+        written: function that is called after a value has come over the bus.
+        source: function that returns the bytes to read instead of `data`. It may raise SdoAbort.
+        measured: whether `source` can be called at any time, because it returns a measured value,
+            never raises and has no side effects.
+        watchers: functions that are called whenever the bus or the device has changed the value.
         takes_commands: whether writes are commands such as "save". Then only the guard checks a
             write, because the limits apply to the value read.
     """
@@ -116,7 +117,7 @@ class Entry(Part):
         self.watchers: tuple[OnEntry, ...] = ()
 
     def __repr__(self) -> str:
-        """Return its name for a log line."""
+        """Return the name of the entry for a log line."""
         return repr(self.description)
 
     @property
@@ -141,7 +142,7 @@ class Entry(Part):
 
     @property
     def size(self) -> int:
-        """Size in bytes, 0 where it varies."""
+        """Size in bytes, or 0 if the size varies."""
         return self.description.size
 
     @property
@@ -195,11 +196,11 @@ class Entry(Part):
             self.written(self)
 
     def present(self) -> bytes:
-        """Return the bytes to read now; SdoAbort if the owner has no value."""
+        """Return the bytes to read now; raise SdoAbort if the owner has no value."""
         return self.data if self.source is None else self.source(self)
 
     def upload(self) -> bytes:
-        """Read over the bus; SdoAbort if access is not allowed."""
+        """Read the value over the bus; raise SdoAbort if access is not allowed."""
         if not self.description.readable:
             raise SdoAbort(AbortCode.WRITE_ONLY)
         return self.present()
@@ -210,7 +211,7 @@ class Entry(Part):
             raise SdoAbort(AbortCode.READ_ONLY)
 
     def check_size(self, size: int) -> None:
-        """Raise SdoAbort if this number of bytes does not fit the type."""
+        """Raise SdoAbort if the number of bytes does not fit the type."""
         if size > (self.size or self.description.max_bytes):
             raise SdoAbort(AbortCode.TOO_LONG)
         if size < self.size:
@@ -222,7 +223,7 @@ class Entry(Part):
             self.guard(self, self.data_type.decode(data))
 
     def download(self, data: bytes) -> None:
-        """Write over the bus; SdoAbort if access, size, range or the owner forbids it."""
+        """Write the value over the bus; SdoAbort if access, size, range or the owner forbids it."""
         self.check_writable()
         self.check_size(len(data))
         value = self.data_type.decode(data)
@@ -235,7 +236,7 @@ class Entry(Part):
         self.force(data)
 
     def receive(self, data: bytes) -> None:
-        """Write from a PDO: drop a refused value without notifying any callback."""
+        """Write a value from a PDO; drop a refused value without calling any callback."""
         try:
             self.download(data)
         except SdoAbort:
@@ -258,16 +259,16 @@ class DictionaryDescription(Immutable):
     """The constant part of a dictionary; all slaves of one type share it.
 
     Args:
-        entries: in any order; they are kept sorted.
+        entries: entries in any order, which are kept sorted.
         objects: names and kinds of arrays and records; a variable has the name of its entry.
 
     Raises:
         ValueError: two entries have the same index and sub-index.
 
     Attributes:
-        entries: sorted by index and sub-index.
+        entries: entries, sorted by index and sub-index.
         objects: names and kinds by index, sorted.
-        places: position among the entries by index << 8 | sub-index.
+        places: positions of the entries. The key is index << 8 | sub-index.
         spans: positions of all entries of an object, by index.
         elements: positions of the entries from sub-index 1 on without a gap, by index.
     """
@@ -302,11 +303,11 @@ class DictionaryDescription(Immutable):
 
 
 class Dictionary(Part):
-    """The entries of one slave: its own values, and a shared description.
+    """The entries of one slave, with own values and a shared description.
 
     Args:
-        entries: in any order, kept sorted; or the description of another dictionary.
-        objects: names and kinds of arrays and records; a variable has the name of its entry.
+        entries: entries in any order, or the description of another dictionary.
+        objects: names and kinds of arrays and records. A variable has the name of its entry.
 
     Raises:
         ValueError: two entries have the same index and sub-index.
@@ -345,7 +346,7 @@ class Dictionary(Part):
         """Restrict SDO access to some objects, as in a boot loader.
 
         Args:
-            only: their indices; None for all objects.
+            only: indices of the objects, or None for all objects.
         """
         self._only = only
         self.by_multiplexer.clear()
@@ -373,7 +374,7 @@ class Dictionary(Part):
         return at[0] << 8 | at[1] in self._places
 
     def __getitem__(self, at: tuple[int, int]) -> Entry:
-        """Return the entry at (index, sub-index); KeyError if there is none."""
+        """Return the entry at (index, sub-index); raise KeyError if there is none."""
         entry = self.find(*at)
         if entry is None:
             raise KeyError(f"{at[0]:04X}h:{at[1]:02X} is not in the dictionary")
@@ -383,11 +384,11 @@ class Dictionary(Part):
         """Look an entry up.
 
         Args:
-            index: of the object, 0x0000..0xFFFF.
+            index: index of the object, 0x0000..0xFFFF.
             sub: sub-index, 0x00..0xFF.
 
         Returns:
-            The entry, None if there is none.
+            The entry, or None if there is none.
         """
         place = self._places.get(index << 8 | sub)
         return None if place is None else self._entries[place]
@@ -396,7 +397,7 @@ class Dictionary(Part):
         """Look up the entry of a multiplexer.
 
         Args:
-            multiplexer: three bytes, the index with its low byte first and the sub-index.
+            multiplexer: three bytes: the index with its low byte first, and the sub-index.
 
         Returns:
             The entry.
@@ -420,10 +421,10 @@ class Dictionary(Part):
         """List the entries of an object.
 
         Args:
-            index: of the object.
+            index: index of the object.
 
         Returns:
-            All of them, sorted; none if there is no such object.
+            The entries, sorted by sub-index. The result is empty if there is no such object.
         """
         span = self.description.spans.get(index)
         return [] if span is None else self._entries[span]
@@ -443,11 +444,11 @@ class Dictionary(Part):
         """List the elements of an array.
 
         Args:
-            index: of the object.
+            index: index of the object.
             most: largest number of elements.
 
         Returns:
-            Its entries from sub-index 1 on, up to the first gap.
+            The entries of the object from sub-index 1 on, up to the first gap.
         """
         places = self.description.elements.get(index)
         return [] if places is None else self._entries[places][:most]
@@ -470,17 +471,17 @@ def _takes_part(cob_id: int) -> bool:
 
 
 def check_emcy_cob_id(entry: Entry, value: Value) -> None:
-    """Guard 1014h and 1028h: see `_check`."""
+    """Check a value for 1014h or 1028h; see `_check`."""
     _check(entry, value, _NOT_EMCY, is_valid)
 
 
 def check_sdo_cob_id(entry: Entry, value: Value) -> None:
-    """Guard 1201h to 127Fh: see `_check`."""
+    """Check a value for 1201h to 127Fh; see `_check`."""
     _check(entry, value, _NOT_SDO, is_valid)
 
 
 def check_time_cob_id(entry: Entry, value: Value) -> None:
-    """Guard 1012h: see `_check`."""
+    """Check a value for 1012h; see `_check`."""
     _check(entry, value, _NOT_SDO, _takes_part)
 
 
@@ -489,9 +490,11 @@ def _check(entry: Entry, value: Value, unknown: int, in_use: Callable[[int], boo
 
     These COB-IDs are invalid:
 
-    - one with bits that are neither flags nor an 11-bit CAN-ID (29-bit CAN-IDs are not emulated)
-    - one that is in use and has a restricted CAN-ID
-    - one in use with another CAN-ID than the old COB-ID, if the old one is in use, too
+    - a COB-ID with bits that are neither flags nor an 11-bit CAN-ID (29-bit CAN-IDs are not
+      emulated)
+    - a COB-ID that is in use and has a restricted CAN-ID
+    - a COB-ID that is in use and has another CAN-ID than the old COB-ID, if the old COB-ID is in
+      use, too
     """
     cob_id, old = value if isinstance(value, int) else unknown, entry.number
     can_id = cob_id & CAN_ID_MASK

@@ -61,7 +61,7 @@ _ERROR_BEHAVIOUR: Final = 0x1029
 _COMMUNICATION_ERROR: Final = 1
 OUTPUT_ERROR: Final = 2
 INPUT_ERROR: Final = 3
-"""Sub-indices; output and input errors are those of CiA 401."""
+"""Sub-indices of 1029h; the sub-indices of output and input errors are those of CiA 401."""
 
 
 class _Behaviour(IntEnum):
@@ -143,7 +143,7 @@ _COB_ID_EMCY: Final = 0x1014
 _INHIBIT_TIME_EMCY: Final = 0x1015
 
 _QUEUE_LENGTH: Final = 16
-"""EMCY messages that wait; more are lost, as in a real device."""
+"""Largest number of waiting EMCY messages; more messages are lost, as in a real device."""
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
@@ -267,7 +267,7 @@ class _ErrorHistory(Part):
                 field.source = self._read
 
     def note(self, code: int, text: bytes) -> None:
-        """Insert an error at the top; drop the oldest one if all fields are full."""
+        """Insert an error at the top; drop the oldest error if all fields are full."""
         if self._count is None or not self._fields:
             return
         count = min(self._count.number + 1, len(self._fields))
@@ -306,7 +306,7 @@ class EmcyConsumer(Service):
 
     Attributes:
         latest: the latest EMCY of each node since the reset.
-        on_emcy: called with the node-ID and the message.
+        on_emcy: function that is called with the node-ID and the message.
     """
 
     def __init__(self, node: CanopenSlave, slot: int) -> None:
@@ -363,7 +363,7 @@ class ErrorStateEmcy(Service):
     Not emulated: the recovery of the controller itself.
 
     Attributes:
-        state: what the controller reported last.
+        state: state that the controller has reported last.
     """
 
     def __init__(self, node: CanopenSlave, slot: int) -> None:
@@ -375,7 +375,7 @@ class ErrorStateEmcy(Service):
         self.state = ErrorState.ACTIVE
 
     def booted(self) -> None:
-        """Report error-passive again after the boot-up message if it still applies."""
+        """Report error-passive again after the boot-up message, if the state still applies."""
         if self.state is ErrorState.PASSIVE:
             self.schedule(self.node.now_us + 1)
 

@@ -39,14 +39,14 @@ _Test = tuple[int, Callable[[int, int], bool]]
 """A part of the LSS address, and the comparison with the number in a message."""
 
 SELECTIVE: Final[tuple[_Test, ...]] = ((0, eq), (1, eq), (2, eq), (3, eq))
-"""Switch state selective: the whole LSS address."""
+"""Tests for "switch state selective": the whole LSS address."""
 
 _IDENTIFY: Final[tuple[_Test, ...]] = ((0, eq), (1, eq), (2, le), (2, ge), (3, le), (3, ge))
-"""Identify remote slave: revision and serial number in a range, bounds included."""
+"""Tests for "identify remote slave": revision and serial number in a range, bounds included."""
 
 
 class MessageSequence(Part):
-    """One request that consists of several messages; a wrong or missing message cancels it.
+    """A request that consists of several messages. A wrong or missing message cancels the request.
 
     Args:
         tests: one test for each message, in the order of the messages.
@@ -56,7 +56,7 @@ class MessageSequence(Part):
         self._tests, self._step = tests, 0
 
     def take(self, step: int, address: LssAddress, number: int) -> bool:
-        """Take a message; return whether it was the last one and all of them match."""
+        """Handle a message; return whether it was the last message and all messages match."""
         # 40h vendor, 41h product, 42h revision, 43h serial number. Message 40h starts the request
         # again. A message that does not match or is out of order cancels the request until the
         # next 40h.
@@ -71,13 +71,13 @@ class MessageSequence(Part):
 
 
 class FastScanner(Part):
-    """Follows a fastscan: one part of the LSS address after the other."""
+    """Follows a fastscan, one part of the LSS address after the other."""
 
     def __init__(self) -> None:
         self._sub = 0
 
     def take(self, request: FastScan, address: LssAddress) -> LssMode | None:
-        """Take a request; return the state after it if it is answered, else None."""
+        """Handle a request; return the next state if the request is answered, or None."""
         if request.bit_check == FASTSCAN_RESET:
             self._sub = 0
             return LssMode.WAITING
@@ -95,7 +95,7 @@ class FastScanner(Part):
     def _advance(self, request: FastScan) -> LssMode | None:
         """Continue with the next part.
 
-        A next part that comes before the present one means that the scan found all parts.
+        If the next part comes before the present part, the scan has found all parts.
         """
         if request.next_sub > _MAX_SUB:
             return None
@@ -106,9 +106,9 @@ class FastScanner(Part):
 class LssSlave(Service):
     """Obeys the LSS master, in every NMT state.
 
-    A new node-ID takes effect at the next reset. An unconfigured slave boots with it when LSS
-    returns to the waiting state. A node-ID that is not stored is lost at power-off. Any reset
-    returns LSS to the waiting state.
+    A new node-ID takes effect at the next reset. An unconfigured slave boots with the new node-ID
+    when LSS returns to the waiting state. A node-ID that is not stored is lost at power-off. Any
+    reset returns LSS to the waiting state.
 
     Selective switching and fastscan work only in the waiting state. Fastscan and "identify
     non-configured" work only in a slave that has neither an active nor a pending node-ID. A new
@@ -145,7 +145,7 @@ class LssSlave(Service):
             yield LSS_MASTER_COB_ID, self._receive
 
     def reconfigured_by(self, state: NmtState) -> Iterator[int]:
-        """Return the CAN-ID of the LSS master: a slave that receives its node-ID boots."""
+        """Return the CAN-ID of the LSS master, because a slave that receives a node-ID boots."""
         return (can_id for can_id, _ in self.handlers(state))
 
     def tick(self, now_us: int) -> None:

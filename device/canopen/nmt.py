@@ -24,12 +24,12 @@ _NEXT_STATE: Final = {
     nmt.NmtCommand.STOP: nmt.NmtState.STOPPED,
     nmt.NmtCommand.ENTER_PRE_OPERATIONAL: nmt.NmtState.PRE_OPERATIONAL,
 }
-"""Next states, the same from every state but Initialising (CiA 301, NMT state diagram)."""
+"""Next states by command, for every state except Initialising (CiA 301, NMT state diagram)."""
 
 _NMT_STARTUP: Final = 0x1F80
 _SELF_START_MASK: Final = 0b1101
 _SELF_START: Final = 0b1000
-"""1F80h of a slave that starts itself (CiA 302-2)."""
+"""Value of 1F80h of a slave that starts itself (CiA 302-2)."""
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
@@ -37,7 +37,7 @@ class NmtSlave(Service):
     """Obeys the NMT master."""
 
     def booted(self) -> None:
-        """Send the boot-up message and enter Pre-operational, or Operational by itself."""
+        """Send the boot-up message, and enter Pre-operational, or Operational if self-starting."""
         if not self.node.boots():
             return
         self.node.send(
@@ -56,7 +56,7 @@ class NmtSlave(Service):
             yield nmt.NMT_COB_ID, self._receive
 
     def reconfigured_by(self, state: nmt.NmtState) -> Iterator[int]:
-        """Return the CAN-ID of the NMT master: the state determines the CAN-IDs to listen to."""
+        """Return the CAN-ID of the NMT master; the NMT state determines the received CAN-IDs."""
         return (can_id for can_id, _ in self.handlers(state))
 
     def _receive(self, frame: CanFrame) -> None:
@@ -86,7 +86,7 @@ class NmtSlave(Service):
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class HeartbeatProducer(Service):
-    """Sends the NMT state each producer heartbeat time.
+    """Sends the NMT state once in each producer heartbeat time.
 
     The boot-up message counts as the first heartbeat. A write to the heartbeat time, over the bus
     or by the device itself, restarts the period: the next heartbeat follows one period later.
@@ -122,7 +122,7 @@ class HeartbeatProducer(Service):
         self._begin()
 
     def _begin(self) -> None:
-        """Start the period in the next tick or this one; not before the boot-up message."""
+        """Start the period in this tick or the next one, but not before the boot-up message."""
         # While the node initialises the values of a reset arrive here, too; `booted` begins
         # then.
         if self.node.state is not nmt.NmtState.INITIALISING:
@@ -159,7 +159,7 @@ class NodeGuarding(Service):
 
     @property
     def life_time_us(self) -> int:
-        """The node life time, 0 if life guarding is off."""
+        """The node life time, or 0 if life guarding is off."""
         if self._guard_time is None or self._factor is None:
             return 0
         return self._guard_time.number * self._factor.number * 1_000
@@ -218,15 +218,16 @@ class Monitor(Part):
     """Monitors the heartbeat of one node.
 
     Args:
-        consumer: the service that it belongs to.
-        value: an entry of 1016h: node-ID in bits 16 to 23, time in ms below.
+        consumer: service that the monitor belongs to.
+        value: value of an entry of 1016h, with the node-ID in bits 16 to 23 and the time in ms
+            below.
 
     Attributes:
-        node_id: the monitored node.
+        node_id: node-ID of the monitored node.
         period_us: the consumer heartbeat time.
         watch: the monitoring state.
-        nmt_state: the NMT state that the node sent last; None before its first heartbeat.
-        deadline_us: time from which its heartbeat is late.
+        nmt_state: NMT state that the node has sent last, or None before its first heartbeat.
+        deadline_us: time from which the heartbeat of the node is late.
     """
 
     __slots__ = ("_consumer", "deadline_us", "nmt_state", "node_id", "period_us", "watch")

@@ -24,10 +24,10 @@ SAVE: Final = int.from_bytes(b"save", "little")
 LOAD: Final = int.from_bytes(b"load", "little")
 
 _ON_COMMAND: Final = b"\x01"
-"""Value of both objects unless the device has a default: bit 0, on command."""
+"""Value of 1010h and 1011h if the device has no default: bit 0, on command."""
 
 ALL, COMMUNICATION, APPLICATION = 1, 2, 3
-"""Sub-indices."""
+"""Sub-indices of the parameter groups."""
 
 _AREAS: Final = {
     ALL: range(0x1_0000),
@@ -48,15 +48,14 @@ class ParameterStore(Service):
     an object that the bus may read and write, except domains and process outputs (objects for
     RPDOs only). Default values are not stored, so that COB-IDs continue to follow the node-ID.
 
-    "load" takes effect at the next reset of the node; for 1000h to 1FFFh, a reset of
-    communication is enough. Another signature is refused with 0800 0020h. Storing works in every
-    NMT state in which SDOs work, regardless of the value that the objects have when read: that
-    value is their default.
+    "load" takes effect at the next reset of the node. For 1000h to 1FFFh, a reset of communication
+    is enough. A wrong signature is refused with 0800 0020h. Storing works in every NMT state in
+    which SDOs work, regardless of the value that is read from the objects, which is their default.
 
     Not emulated: the time that storing takes, failing memory, automatic saving.
 
     Attributes:
-        volatile: indices that are never stored; a device profile may add to them.
+        volatile: indices that are never stored. A device profile may add indices.
     """
 
     def __init__(self, node: CanopenSlave, slot: int) -> None:
@@ -111,7 +110,7 @@ class ParameterStore(Service):
 
 
 def _show_capability(entry: Entry) -> None:
-    """Restore the value to read; the signature was only a command."""
+    """Restore the value that is read, because the signature was only a command."""
     given = entry.description
     entry.assign(given.default if given.has_default else _ON_COMMAND.ljust(entry.size, b"\0"))
 
@@ -126,7 +125,7 @@ _CONTROL: Final = 0x1F51
 _IDENTIFICATION: Final = 0x1F56
 _FLASH_STATUS: Final = 0x1F57
 _PROGRAM: Final = 1
-"""Sub-index of the one program."""
+"""Sub-index of the only program."""
 
 _OBJECTS: Final = frozenset(
     (
@@ -206,7 +205,7 @@ class BootLoader(Part):
         return self.runs or command is not NmtCommand.START
 
     def _check(self, entry: Entry, value: Value) -> None:
-        """Refuse an unknown command, or one that does not fit the state."""
+        """Refuse an unknown command, or a command that does not fit the state."""
         if value not in ProgramCommand.__members__.values():
             raise SdoAbort(AbortCode.VALUE_RANGE)
         starts = value in (ProgramCommand.START, ProgramCommand.RESET)

@@ -111,12 +111,12 @@ _REQUESTED: Final = SPECIFIER | TOGGLE
 _UPLOAD_SEGMENT: Final = int(ClientCommand.UPLOAD_SEGMENT)
 _DOWNLOAD_SEGMENT: Final = int(ClientCommand.DOWNLOAD_SEGMENT)
 _HEADS: Final = {toggle: bytes([toggle]) for toggle in (0, TOGGLE)}
-"""First byte of an uploaded segment, by its toggle bit; not for the last segment."""
+"""First byte of an uploaded segment by toggle bit, except for the last segment."""
 _TAKEN: Final = {
     toggle: bytes([ServerCommand.DOWNLOAD_SEGMENT | toggle]) + bytes(SEGMENT_BYTES)
     for toggle in (0, TOGGLE)
 }
-"""Response to a downloaded segment, by its toggle bit."""
+"""Response to a downloaded segment by toggle bit."""
 
 
 class _DownloadSize(Part):
@@ -131,8 +131,8 @@ class _DownloadSize(Part):
         SdoAbort: the entry is not writable, or the announced size does not fit.
 
     Attributes:
-        announced: as given.
-        most: largest number of bytes; `check` raises the reason if there are more.
+        announced: number of bytes that the client announces, as given.
+        most: largest number of bytes. `check` raises the reason if there are more.
     """
 
     def __init__(self, server: SdoServer, entry: Entry, announced: int | None) -> None:
@@ -147,7 +147,7 @@ class _DownloadSize(Part):
         self.most = min(self._long, self._free)
 
     def check(self, size: int) -> None:
-        """Raise SdoAbort if the size exceeds the announced one, or does not fit."""
+        """Raise SdoAbort if the size exceeds the announced size, or does not fit."""
         if size > self._long:
             raise SdoAbort(AbortCode.TOO_LONG)
         if size > self._free:
@@ -155,7 +155,7 @@ class _DownloadSize(Part):
 
 
 class _SegmentedUpload(Part):
-    """Uploads a value in segments, as it was at the first request."""
+    """Uploads a value in segments; the value is that of the first request."""
 
     def __init__(self, server: SdoServer, data: bytes) -> None:
         self._server, self._data = server, data
@@ -217,7 +217,7 @@ class SegmentedDownload(Part):
             self._server.go_on()
 
     def _commit(self) -> None:
-        """Write the received data; SdoAbort if there is too little, or the object refuses it."""
+        """Write the received data; SdoAbort if data are missing, or the object refuses them."""
         if len(self._data) < (self._size.announced or 0):
             raise SdoAbort(AbortCode.TOO_SHORT)
         self._entry.download(bytes(self._data))
@@ -266,7 +266,7 @@ class _BlockDownload(Part):
             self._end_block(head, request)
 
     def _end_block(self, head: int, request: bytes) -> None:
-        """Handle the last segment of a block, or drop one that is out of sequence."""
+        """Handle the last segment of a block, or drop a segment that is out of sequence."""
         seqno = head & BLOCK_SEQNO
         if seqno == self._in_sequence + 1:
             self._in_sequence = seqno
@@ -455,7 +455,7 @@ class SdoServer(Part):
 
     Args:
         node: the slave.
-        wake: schedules a check of `due_us`.
+        wake: function that schedules a check of `due_us`.
         limits: limits that CiA 301 leaves to the device.
 
     Attributes:
@@ -463,7 +463,7 @@ class SdoServer(Part):
         response_id: CAN-ID from server to client.
         block_size: number of segments in a block that the server offers for block download,
             1..127.
-        due_us: when the transfer times out.
+        due_us: time at which the transfer times out.
     """
 
     def __init__(self, node: CanopenSlave, wake: Callable[[int], None], limits: SdoLimits) -> None:
@@ -517,7 +517,7 @@ class SdoServer(Part):
         self.initiate(request)
 
     def free_bytes(self, entry: Entry) -> int:
-        """Return the memory that all other strings and domains leave for this one."""
+        """Return the memory that the other strings and domains leave for an entry."""
         others = (one for one in self.node.dictionary if not one.size and one is not entry)
         return self._memory_bytes - sum(len(one.data) for one in others)
 
@@ -611,7 +611,7 @@ _SERVER_TO_CLIENT: Final = 2
 
 
 class _Additional(NamedTuple):
-    """A server with its two COB-IDs."""
+    """An additional server with its two COB-IDs."""
 
     server: SdoServer
     request: Entry
@@ -630,7 +630,7 @@ class _Additional(NamedTuple):
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class SdoServers(Service):
-    """The default server and the additional ones.
+    """The default server and the additional servers.
 
     The default server exists even without 1200h. If 1200h exists, it is read-only and always
     shows the COB-IDs of the default server. An additional server is active when both its COB-IDs
@@ -641,8 +641,8 @@ class SdoServers(Service):
     Not emulated: 29-bit CAN-IDs, a check of two servers on one CAN-ID.
 
     Attributes:
-        default: the server of 1200h.
-        limits: limits of all its servers.
+        default: server of 1200h.
+        limits: limits of all servers.
     """
 
     def __init__(self, node: CanopenSlave, slot: int, limits: SdoLimits = USUAL) -> None:
@@ -665,7 +665,7 @@ class SdoServers(Service):
         """Apply other limits from the next request on.
 
         Args:
-            limits: the new ones.
+            limits: new limits.
         """
         self.limits = limits
         for server in self.servers:

@@ -80,15 +80,15 @@ from tickrig.wire.instant import NEVER
 
 @dataclass(slots=True)
 class Nonvolatile:
-    """The non-volatile memory of one slave; an emulator may keep it in a file.
+    """The non-volatile memory of a slave, which an emulator may keep in a file.
 
     Attributes:
-        parameters: stored values by index << 8 | sub-index (1010h).
-        node_id: node-ID stored by LSS, None if none was.
-        bit_rate_index: bit timing index stored by LSS, None if none was.
-        version: counts every change, so that an emulator knows when to write its file.
-        program: the downloaded program (1F50h), empty if it was cleared; None for the built-in
-            program.
+        parameters: stored values as bytes (1010h). The key is index << 8 | sub-index.
+        node_id: node-ID stored by LSS, or None if LSS has stored none.
+        bit_rate_index: bit timing index stored by LSS, or None if LSS has stored none.
+        version: number of changes up to now, by which an emulator knows when to write its file.
+        program: downloaded program (1F50h), which is empty if it was cleared, or None for the
+            built-in program.
     """
 
     parameters: dict[int, bytes] = field(default_factory=dict)
@@ -112,15 +112,16 @@ ALWAYS = (NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL, NmtState.STOPPED)
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class Service(Copyable):
-    """One communication service: SDO server, PDOs, SYNC, ...
+    """A communication service: SDO server, PDOs, SYNC, ...
 
     A service finds its objects in the dictionary when it is made and attaches its callbacks to them
     (`Entry.guard`, `written`, `source`). A missing object disables the service.
 
     Attributes:
-        node: the slave that it belongs to.
-        slot: its place in the order of a tick.
-        asked_us: when its `tick` is due; `NEVER` if it is not scheduled. `schedule` sets it.
+        node: slave that the service belongs to.
+        slot: place of the service in the order of a tick.
+        asked_us: time at which `tick` is due, or `NEVER` if it is not scheduled. `schedule` sets
+            this time.
     """
 
     __slots__ = ("asked_us", "node", "slot")
@@ -130,16 +131,16 @@ class Service(Copyable):
 
     @classmethod
     def of(cls, node: CanopenSlave) -> Self:
-        """Look this service up in a slave.
+        """Look up the service of this class in a slave.
 
         Args:
             node: the slave.
 
         Returns:
-            Its first service of this class.
+            The first service of this class in the slave.
 
         Raises:
-            StopIteration: it has none.
+            StopIteration: the slave has no service of this class.
         """
         return next(service for service in node.services if isinstance(service, cls))
 
@@ -147,7 +148,7 @@ class Service(Copyable):
         """Reset the state that only a power cut resets."""
 
     def start(self) -> None:
-        """Restart after Reset communication; the dictionary holds power-on values."""
+        """Restart after Reset communication, when the dictionary holds power-on values."""
 
     def booted(self) -> None:
         """Act at the end of Initialising, in a slave that has a node-ID."""
@@ -156,7 +157,7 @@ class Service(Copyable):
         """Yield the CAN-IDs of the data frames to receive, with their handlers.
 
         Args:
-            state: the NMT state.
+            state: present NMT state.
 
         Yields:
             CAN-IDs, each with the handler of its frames.
@@ -167,7 +168,7 @@ class Service(Copyable):
         """Yield the CAN-IDs of the remote frames to receive, with their handlers.
 
         Args:
-            state: the NMT state.
+            state: present NMT state.
 
         Yields:
             CAN-IDs, each with the handler of its frames.
@@ -180,10 +181,10 @@ class Service(Copyable):
         An acceptance filter passes all frames after such a frame.
 
         Args:
-            state: the NMT state.
+            state: present NMT state.
 
         Yields:
-            CAN-IDs.
+            CAN-IDs of the frames.
         """
         return iter(())
 
@@ -191,12 +192,12 @@ class Service(Copyable):
         """React to a change of the NMT state, after it has happened.
 
         Args:
-            old: the state before.
+            old: state before the change.
             new: the present state.
         """
 
     def emergency(self, code: int, register: int, text: bytes) -> None:
-        """React to an error; `CanopenSlave.emergency` has the same arguments.
+        """React to an error, which has the arguments of `CanopenSlave.emergency`.
 
         Args:
             code: emergency error code.
@@ -209,17 +210,17 @@ class Service(Copyable):
 
         Args:
             code: emergency error code.
-            text: its manufacturer-specific bytes; None for all errors of this code.
+            text: manufacturer-specific bytes of the error, or None for all errors with this code.
         """
 
     def communication_error(self) -> None:
         """React to a lost heartbeat, a life guarding event or bus-off (CiA 301, 1029h:01)."""
 
     def bus_state(self, state: ErrorState) -> None:
-        """React to the CAN controller's fault confinement.
+        """React to a change of the CAN controller's error state.
 
         Args:
-            state: error active, error passive or bus-off.
+            state: new state: error active, error passive or bus-off.
         """
 
     def tick(self, now_us: int) -> None:
@@ -233,7 +234,7 @@ class Service(Copyable):
         """Update the CAN-IDs that the node listens to; the watcher of a COB-ID calls it.
 
         Args:
-            entry: the COB-ID, which has changed.
+            entry: entry of the COB-ID, which has changed.
         """
         self.node.rewire()
 
@@ -241,7 +242,7 @@ class Service(Copyable):
         """Request a call of `tick`; it replaces the previous request.
 
         Args:
-            due_us: when; `NEVER` for not at all.
+            due_us: time of the call, or `NEVER` for no call.
         """
         self.node.await_tick(self, due_us)
 
@@ -255,7 +256,7 @@ _shared: Final[Callable[[frozenset[int]], frozenset[int]]] = lru_cache(frozenset
 
 
 def _frame_handlers(services: Iterable[Service], state: NmtState) -> dict[int, Handler]:
-    """Return the handlers by CAN-ID, those of remote frames by `REMOTE | CAN-ID`."""
+    """Return the handlers by CAN-ID, or by `REMOTE | CAN-ID` for remote frames."""
     handlers: dict[int, Handler] = {}
     for service in services:
         for can_id, handler in service.handlers(state):
@@ -268,7 +269,7 @@ def _frame_handlers(services: Iterable[Service], state: NmtState) -> dict[int, H
 
 
 class _Both(NamedTuple):
-    """Two handlers of one CAN-ID: two services may listen to it."""
+    """Two handlers of one CAN-ID, which two services receive."""
 
     first: Handler
     second: Handler
@@ -288,8 +289,8 @@ COMMUNICATION_AREA: Final = range(0x1000, 0x2000)
 
 _slot = attrgetter("slot")
 _priority = itemgetter(0)
-"""Priority of a data frame: its CAN-ID. Frames of one tick leave sorted by it, as from the
-mailboxes of a CAN controller; on the wire `emulators/can/arbitration.py` decides."""
+"""Priority of a data frame: its CAN-ID. Frames of one tick are sorted by priority, as in the
+mailboxes of a CAN controller. On the wire `emulators/can/arbitration.py` decides."""
 
 ServiceMaker = Callable[["CanopenSlave", int], Service]
 
@@ -305,42 +306,45 @@ class CanopenSlave(Copyable):
 
     Args:
         dictionary: the objects; they determine the services.
-        node_id: 1..127, or `UNCONFIGURED`. A node-ID that LSS has stored takes precedence.
+        node_id: node-ID 1..127, or `UNCONFIGURED`. A node-ID that LSS has stored takes precedence.
         services: factories of the services, in the order of a tick.
-        nonvolatile: the memory that survives a power cycle.
+        nonvolatile: memory that survives a power cycle.
 
     Raises:
-        ValueError: invalid node-ID.
+        ValueError: the node-ID is invalid.
 
     Attributes:
-        dictionary: its objects.
-        services: its services, in the order of a tick.
-        node_id: the active node-ID.
-        configured_id: the node-ID that was passed to the constructor.
-        pending_id: the node-ID that takes effect at the next reset (CiA 305).
-        state: NMT state.
+        dictionary: objects of the slave.
+        services: services of the slave, in the order of a tick.
+        node_id: active node-ID.
+        configured_id: node-ID that was passed to the constructor.
+        pending_id: node-ID that takes effect at the next reset (CiA 305).
+        state: present NMT state.
         now_us: time of the latest tick.
-        due_us: when the next service is due.
-        accepts: CAN-IDs that it listens to, for the acceptance filter of a wire. None stands for
-            all CAN-IDs, from power-on or a reset until the first tick.
+        due_us: time at which the next service is due.
+        accepts: CAN-IDs that the slave receives, for the acceptance filter of a wire. None stands
+            for all CAN-IDs, from power-on or a reset until the first tick.
         reconfigured_by: CAN-IDs of the frames that may change `accepts` when handled.
-        on_accepts: called when `accepts` or `reconfigured_by` has changed.
-        time_of_day: the TIME stamp that was received last; None before the first one.
-        silent_until_us: the slave sends nothing before this time, while LSS switches the bit
-            rate.
-        on_state: called with the old and the new state on each change of the NMT state.
-        on_sync: called with the counter of each SYNC, or with 0 if the SYNC has no counter.
-        on_bit_rate: called with the bit rate in bit/s that LSS has switched to.
-        sync_handlers: called like `on_sync`, for parts of the slave: RPDOs, TPDOs, then the
+        on_accepts: function that is called when `accepts` or `reconfigured_by` has changed.
+        time_of_day: TIME stamp that was received last, or None before the first one.
+        silent_until_us: time before which the slave sends nothing, while LSS switches the bit rate.
+        on_state: functions that are called with the old and the new state on each change of the NMT
+            state.
+        on_sync: functions that are called with the counter of each SYNC, or with 0 if the SYNC has
+            no counter.
+        on_bit_rate: functions that are called with the bit rate in bit/s that LSS has switched to.
+        sync_handlers: functions that are called like `on_sync`, for parts of the slave: RPDOs,
+            TPDOs, then the application.
+        watch_handlers: functions that are called when a TPDO begins to watch objects, for the
             application.
-        watch_handlers: called when a TPDO begins to watch objects, for the application.
-        horizon: how far its application may compute ahead. None (no rig) means that it works tick
-            by tick.
-        model: name of its model for traces; empty if it has none.
-        boots: called at the end of Initialising; returns whether the node boots or stays in
-            Initialising.
-        admits: called before each NMT command; returns whether the command is carried out.
-        entered: called like `on_state`, but before it; for parts of the slave.
+        horizon: time limits up to which the application may compute ahead. None (no rig) means that
+            the application works tick by tick.
+        model: name of the model for traces, or empty if the slave has no model.
+        boots: function that is called at the end of Initialising. It returns whether the node boots
+            or stays in Initialising.
+        admits: function that is called before each NMT command. It returns whether the command is
+            carried out.
+        entered: functions that are called like `on_state`, but earlier, for parts of the slave.
     """
 
     __slots__ = (  # each slave's attributes lie in one place then, for 1,016 of them 5 %
@@ -390,7 +394,7 @@ class CanopenSlave(Copyable):
         return TICK_US
 
     def reset(self) -> None:
-        """Lose power; the next tick is the first one after power-on."""
+        """Lose power; the next tick is the first tick after power-on."""
         self._powered = False
         self.due_us = 0
         self._listen_to(None)
@@ -400,10 +404,10 @@ class CanopenSlave(Copyable):
 
         Args:
             now_us: time since the rig was started, a multiple of `tick_us`.
-            rx: the frames that arrived since the latest tick.
+            rx: frames that have arrived since the latest tick.
 
         Returns:
-            The frames that it sends in this tick.
+            The frames that the slave sends in this tick.
         """
         self.now_us = now_us
         if not self._powered:
@@ -432,8 +436,8 @@ class CanopenSlave(Copyable):
         """Send a data frame in this tick.
 
         Args:
-            can_id: 11-bit CAN-ID, 0x000..0x7FF.
-            data: 0 to 8 bytes.
+            can_id: CAN-ID of 11 bits, 0x000..0x7FF.
+            data: data of 0 to 8 bytes.
         """
         self._out += (data_frame(can_id, data),)
 
@@ -441,7 +445,7 @@ class CanopenSlave(Copyable):
         """Send an existing frame in this tick.
 
         Args:
-            frame: a data frame.
+            frame: data frame to send.
         """
         self._out += (frame,)
 
@@ -452,8 +456,9 @@ class CanopenSlave(Copyable):
 
         Args:
             code: emergency error code; see `EmcyCode`.
-            register: bits of the error register 1001h; the generic bit is set automatically.
-            text: manufacturer-specific bytes, up to 5; errors of one code may differ in them.
+            register: bits of the error register 1001h. The generic bit is set automatically.
+            text: manufacturer-specific bytes, up to 5. Errors with the same code may differ in
+                these bytes.
         """
         if self._powered:
             for service in self.services:
@@ -464,7 +469,8 @@ class CanopenSlave(Copyable):
 
         Args:
             code: emergency error code, as it was raised.
-            text: the bytes with which it was raised; None clears all errors of this code.
+            text: manufacturer-specific bytes with which the error was raised, or None to clear all
+                errors with this code.
         """
         for service in self.services:
             service.emergency_clear(code, text)
@@ -478,7 +484,7 @@ class CanopenSlave(Copyable):
         """Apply a state of the CAN controller; called by the owner of the controller.
 
         Args:
-            state: error active, error passive or bus-off.
+            state: new state: error active, error passive or bus-off.
         """
         if self._powered:
             for service in self.services:
@@ -493,8 +499,8 @@ class CanopenSlave(Copyable):
         """Schedule the `tick` of a service by its slot.
 
         Args:
-            slot: the place of the service.
-            due_us: when; `NEVER` for not at all.
+            slot: place of the service in the order of a tick.
+            due_us: time of the call, or `NEVER` for no call.
         """
         self.await_tick(self.services[slot], due_us)
 
@@ -502,8 +508,8 @@ class CanopenSlave(Copyable):
         """Schedule the `tick` of a service; `schedule` does so by its slot.
 
         Args:
-            service: one of the slave.
-            due_us: when; `NEVER` for not at all.
+            service: service of the slave.
+            due_us: time of the call, or `NEVER` for no call.
         """
         before, service.asked_us = service.asked_us, due_us
         if due_us < NEVER and service not in self._asking:
@@ -531,7 +537,7 @@ class CanopenSlave(Copyable):
         """Change the NMT state; services and application are notified.
 
         Args:
-            state: the new state; the present state has no effect.
+            state: new state. The present state has no effect.
         """
         old, self.state = self.state, state
         if old is state:
@@ -597,7 +603,7 @@ class CanopenSlave(Copyable):
             handler(frame)
 
     def _run_due(self, now_us: int, first: int = 0) -> None:
-        """Run the due services in their order; most have never requested a tick."""
+        """Run the due services in their order; most services have never requested a tick."""
         asking = self._asking
         for service in asking:
             if service.asked_us <= now_us and service.slot >= first:
@@ -610,7 +616,7 @@ class CanopenSlave(Copyable):
             self.due_us = self._first_due()
 
     def _first_due(self) -> int:
-        """Return when the first service is due, among those that have ever requested a tick."""
+        """Return the time of the first due service, among services that have requested a tick."""
         first_us = NEVER
         for service in self._asking:
             first_us = min(first_us, service.asked_us)
@@ -646,8 +652,8 @@ class Application(Service):
     `node.sync_handlers`. It reports errors by `node.emergency`.
 
     Attributes:
-        inputs: physical inputs of the device; `has_inputs` makes them.
-        outputs: its physical outputs; `read` returns their values.
+        inputs: physical inputs of the device. `has_inputs` makes them.
+        outputs: physical outputs of the device. `read` returns their values.
     """
 
     def __init__(self, node: CanopenSlave, slot: int) -> None:
@@ -662,7 +668,7 @@ class Application(Service):
 
         Args:
             table: the inputs.
-            groups: names of several inputs that are set together.
+            groups: names of inputs that are set together, by name of the group.
         """
         self.inputs = QuantityBank(table, groups, self.request)
 
@@ -670,10 +676,10 @@ class Application(Service):
         """Return the present value of a physical output.
 
         Args:
-            name: one of `outputs`.
+            name: name of an output in `outputs`.
 
         Returns:
-            Its present value.
+            The present value of the output.
 
         Raises:
             KeyError: there is no output of that name.
@@ -690,25 +696,25 @@ class Application(Service):
     def without_power(self, now_us: int) -> int:
         """Advance the time while the supply is cut: moving parts coast.
 
-        Called in the first tick without power, and when a physical input was set.
+        The method is called in the first tick without power, and when a physical input was set.
 
         Args:
             now_us: time of the tick.
 
         Returns:
-            The time of the next call, `NEVER` if nothing changes by itself.
+            The time of the next call, or `NEVER` if nothing changes by itself.
         """
         return NEVER
 
     def request(self) -> None:
-        """Request `on_execute` in this tick; between two ticks, in the next one."""
+        """Request `on_execute` in this tick, or between two ticks in the next tick."""
         self.schedule(self.node.now_us)
 
     def watch(self, entries: Iterable[Entry]) -> None:
-        """Request `on_execute` whenever one of these objects has changed.
+        """Request `on_execute` whenever one of the given objects has changed.
 
         Args:
-            entries: the objects.
+            entries: objects to watch.
         """
         changed = self._object_changed
         for entry in entries:
@@ -723,5 +729,5 @@ class Application(Service):
 
 
 def number_of(entry: Entry | None, default: int) -> int:
-    """Return the number in an object, the default if the device has no such object."""
+    """Return the number in an object, or the default if the device has no such object."""
     return default if entry is None else entry.number

@@ -48,7 +48,7 @@ SERVICES: Final[tuple[ServiceMaker, ...]] = (
     # Last: the heartbeat shows the state that the tick has led to.
     HeartbeatProducer,
 )
-"""NMT, SYNC, RPDO, SDO, application, TPDO, EMCY, heartbeat."""
+"""Factories of the services in order: NMT, SYNC, RPDO, SDO, application, TPDO, EMCY, heartbeat."""
 
 
 def make_slave(
@@ -62,17 +62,17 @@ def make_slave(
 
     Args:
         dictionary: the objects, with default values.
-        node_id: 1..127, or 255 for a slave that waits for LSS.
+        node_id: node-ID 1..127, or 255 for a slave that waits for LSS.
         nonvolatile: memory kept from an earlier run.
-        application: factory of the application, such as a device profile; None for no
+        application: factory of the application, such as a device profile, or None for no
             application.
-        sdo: limits of its SDO servers.
+        sdo: limits of the SDO servers.
 
     Returns:
-        A slave that boots in its first tick; put it on a `CanWire` in a `Station`.
+        A slave that boots in its first tick. Put the slave on a `CanWire` in a `Station`.
 
     Raises:
-        ValueError: invalid node-ID.
+        ValueError: the node-ID is invalid.
     """
     own: dict[ServiceMaker, ServiceMaker] = {
         Application: application,

@@ -28,7 +28,7 @@ _NOT_IN_A_CAN_ID: Final = nmt.EXTENDED | 0x1FFF_F800
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class Sync(Service):
-    """Consumes SYNC, and produces it if bit 30 of 1005h is set and 1006h is not 0.
+    """Consumes SYNC, and produces SYNC if bit 30 of 1005h is set and 1006h is not 0.
 
     `node.on_sync` is called for each SYNC, including the slave's own, in the order of the frames
     of a tick. A SYNC whose length does not fit 1019h is ignored and raises EMCY 8240h, which the
@@ -61,17 +61,17 @@ class Sync(Service):
 
     @property
     def can_id(self) -> int:
-        """The CAN-ID, 0 if SYNC is neither consumed nor produced."""
+        """The CAN-ID, or 0 if SYNC is neither consumed nor produced."""
         return self._cob_id.number & nmt.CAN_ID_MASK if self._cob_id is not None else 0
 
     @property
     def period_us(self) -> int:
-        """The communication cycle period, 0 for none."""
+        """The communication cycle period, or 0 for none."""
         return self._period.number if self._period is not None else 0
 
     @property
     def overflow(self) -> int:
-        """The greatest counter, 0 if SYNC carries none."""
+        """The greatest counter, or 0 if SYNC carries no counter."""
         return self._overflow.number if self._overflow is not None else 0
 
     @property
@@ -94,7 +94,7 @@ class Sync(Service):
             yield self.can_id, self._receive
 
     def tick(self, now_us: int) -> None:
-        """Send SYNC and act on it, or start the period."""
+        """Send SYNC and act on the SYNC, or start the period."""
         if self._due_us == NEVER:
             self._due_us = now_us + self.period_us
             self.schedule(self._due_us)
@@ -143,7 +143,7 @@ class Sync(Service):
         self.schedule(self.node.now_us if running else NEVER)
 
     def _check_cob_id(self, entry: Entry, value: Value) -> None:
-        """Refuse an invalid CAN-ID, and any change while it produces."""
+        """Refuse an invalid CAN-ID, and any change while the slave produces SYNC."""
         cob_id = whole_number(value)
         can_id, producer = cob_id & nmt.CAN_ID_MASK, bool(cob_id & nmt.FLAG_30)
         if cob_id & _NOT_IN_A_CAN_ID or nmt.is_restricted(can_id):
@@ -186,7 +186,7 @@ class TimeStamp(Service):
 
     @property
     def now(self) -> TimeOfDay | None:
-        """The time of day, None until it is set."""
+        """The time of day, or None until it is set."""
         latest = self.node.time_of_day
         return None if latest is None else latest.after(self.node.now_us - self._set_us)
 
@@ -200,7 +200,7 @@ class TimeStamp(Service):
         """Set the clock in the next tick; also send TIME if 1012h and the NMT state allow it.
 
         Raises:
-            FieldError: invalid time.
+            FieldError: the time is invalid.
         """
         self._ordered = time.checked()
         self.schedule(self.node.now_us)

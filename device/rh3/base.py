@@ -63,13 +63,13 @@ class Ground(Part):
     Not emulated: castors, slopes, walls; a slipping wheel turns as easily as before.
 
     Args:
-        parameters: of the base.
+        parameters: parameters of the base.
 
     Attributes:
-        speed_m_s: forward, in the latest step.
-        turn_rad_s: to the left, in the latest step.
-        left: the left wheel's contact.
-        right: the right wheel's contact.
+        speed_m_s: forward speed in the latest step.
+        turn_rad_s: turning speed to the left in the latest step.
+        left: contact of the left wheel with the ground.
+        right: contact of the right wheel with the ground.
     """
 
     def __init__(self, parameters: BaseParameters) -> None:
@@ -83,7 +83,7 @@ class Ground(Part):
 
     @property
     def pose(self) -> Pose:
-        """Pose of the middle of the axle; it may be set."""
+        """Pose of the middle of the axle, which may be set."""
         return Pose(*self._place)
 
     @pose.setter
@@ -99,8 +99,8 @@ class Ground(Part):
         """Advance by some milliseconds.
 
         Args:
-            lefts: counts by which the left wheel turned in each millisecond.
-            rights: counts by which the right wheel turned in each millisecond.
+            lefts: numbers of counts by which the left wheel turned in each millisecond.
+            rights: numbers of counts by which the right wheel turned in each millisecond.
         """
         left, right, tread_m, place = self.left, self.right, self._tread_m, self._place
         grips, noise, left_m, right_m = self._grips, self._noise, 0.0, 0.0
@@ -121,7 +121,7 @@ class Ground(Part):
         self.turn_rad_s = (right_m - left_m) / tread_m / _STEP_S
 
     def _roughened(self, way_m: float) -> float:
-        """Return a distance with the noise of the ground: uniform and independent in each step."""
+        """Return a distance with the ground's noise, uniform and independent in each step."""
         if not way_m:
             return 0.0
         return way_m * (1 + self._noise * (self._chance.draw() / _HALF - 1))
@@ -131,16 +131,16 @@ _Pair = tuple[float, float]
 
 
 class BaseState(NamedTuple):
-    """Observable state of a base; pairs are left and right unless stated otherwise.
+    """Observable state of a base; pairs are for the left and right wheel unless stated otherwise.
 
     Attributes:
         pose: pose of the middle of the axle.
-        speed: m/s forward, rad/s to the left.
-        travel: counts of the wheels.
-        slip: m/s.
-        torque: per mille.
-        status: as in the register.
-        frames: requests served, frames garbled.
+        speed: speed forward in m/s, and turning speed to the left in rad/s.
+        travel: encoder counts of the wheels.
+        slip: slip of the wheels in m/s.
+        torque: torque of the motors in per mille.
+        status: status, as in the register.
+        frames: number of served requests, and number of garbled frames.
     """
 
     pose: Pose
@@ -168,7 +168,7 @@ _READ: Final[Mapping[str, Callable[[BaseState], float]]] = {
     "served": lambda state: state.frames[0],
     "garbled": lambda state: state.frames[1],
 }
-"""Functions for the outputs, by their names in `driver.OUTPUTS`."""
+"""Functions that return the outputs, by name in `driver.OUTPUTS`."""
 
 
 _TICK_US: Final = 1_000
@@ -189,14 +189,14 @@ class Rh3Base(Copyable):
     Not emulated: the library libsvm, battery, heat, the outline of the robot.
 
     Args:
-        parameters: of the base.
+        parameters: parameters of the base.
 
     Attributes:
-        type_name: name of its device type, for traces.
-        inputs: its physical inputs, see `driver.INPUTS`.
-        ground: its motion over the ground; its pose may be set.
-        sides: left and right wheel with their loops.
-        slave: its end of the line.
+        type_name: name of the device type, for traces.
+        inputs: physical inputs; see `driver.INPUTS`.
+        ground: motion of the base over the ground. The pose may be set.
+        sides: left and right wheel with their control loops.
+        slave: Modbus slave of the base on the line.
     """
 
     type_name: ClassVar[str] = "rh3-base"
@@ -234,7 +234,7 @@ class Rh3Base(Copyable):
 
     @property
     def status(self) -> int:
-        """Status register of the driver; 0 without supply."""
+        """Status register of the driver, which is 0 without supply."""
         return self._driver.status if self._on else 0
 
     def reset(self) -> None:
@@ -245,10 +245,10 @@ class Rh3Base(Copyable):
         """Return an output as the latest tick left it.
 
         Args:
-            name: one of `outputs`.
+            name: name of an output in `outputs`.
 
         Returns:
-            Its value.
+            The value of the output.
 
         Raises:
             KeyError: there is no output of that name.
@@ -260,10 +260,10 @@ class Rh3Base(Copyable):
 
         Args:
             now_us: time since the rig was started, a multiple of `tick_us`.
-            rx: the bytes that arrived since the latest tick.
+            rx: bytes that have arrived since the latest tick.
 
         Returns:
-            The bytes that it sends in this tick.
+            The bytes that the base sends in this tick.
         """
         heard, before_us = self.slave.due_us <= now_us, now_us - _TICK_US
         # Events of this tick must find the base in the state at the end of the previous

@@ -18,9 +18,10 @@ from tickrig.wire.modbus import DEVICE_ID, VERSION, Address, Command, Fault, Mod
 
 _INT32: Final = range(-(2**31), 2**31)
 _SPEED_LIMIT: Final = round(10 * COUNTS_PER_RAD)
-"""Counts/s: Velocity_limit 10.0 of the specification, taken as rad/s of the wheel."""
+"""Speed limit in counts/s: Velocity_limit 10.0 of the specification, taken as rad/s of the
+wheel."""
 _ACCELERATION_LIMIT: Final = round(50 * COUNTS_PER_RAD)
-"""Counts/s2: Acceleration_limit 50.0, taken as rad/s2 of the wheel."""
+"""Acceleration limit in counts/s2: Acceleration_limit 50.0, taken as rad/s2 of the wheel."""
 _MOST_GAIN: Final = 32_767
 
 
@@ -137,7 +138,7 @@ OUTPUTS: Final = (
 
 _TARGETS: Final = frozenset(f"target_{what}_{s}" for what in ("speed", "position") for s in _SIDES)
 ENABLED, MOVING, FAULT, WATCHDOG, CLIPPED, EMERGENCY_STOP, BUMPER = (int(bit) for bit in Status)
-"""Plain numbers, because a flag takes ten times as long."""
+"""Bits of the status, as plain numbers because an enum flag takes ten times as long."""
 
 _STEP_US: Final = 1_000
 
@@ -145,7 +146,7 @@ _Pair = tuple[list[float], list[float]]
 """Speeds of the left and right wheel in each millisecond."""
 
 _DELAYED: Final = _TARGETS | {"mode", "command"}
-"""An order that takes effect after the delay."""
+"""Registers whose orders take effect after the delay."""
 
 
 class Driver(Part):
@@ -154,16 +155,16 @@ class Driver(Part):
     A fault of one wheel switches both wheels off and shorts the motors. The fault stays until it is
     cleared and its cause is gone. If a master is silent for `watchdog_ms` while the base moves, the
     driver stops the base on the ramp. A new target starts the base again. The driver ignores an
-    order to enable that it cannot execute; the status shows this.
+    order to enable that it cannot execute. The status then shows that the driver is not enabled.
 
     Args:
-        parameters: of the base.
-        inputs: its physical inputs.
+        parameters: parameters of the base.
+        inputs: physical inputs of the base.
 
     Attributes:
-        now_us: the present time; set it before any other call.
-        registers: the registers of the master.
-        sides: left and right wheel with their loops.
+        now_us: present time, which must be set before any other call.
+        registers: registers of the master.
+        sides: left and right wheel with their control loops.
     """
 
     def __init__(self, parameters: BaseParameters, inputs: QuantityBank) -> None:
@@ -218,14 +219,15 @@ class Driver(Part):
             self._waiting.append((self.now_us + self._delay_us, values))
 
     def step(self, last_request_us: int, until_us: int) -> _Pair:
-        """Run the millisecond of `now_us`, and the uneventful ones after it.
+        """Run the millisecond of `now_us`, and the uneventful milliseconds after it.
 
         Args:
             last_request_us: time of the latest request.
-            until_us: the last millisecond; `now_us` becomes the last one that was run.
+            until_us: time of the last millisecond. `now_us` becomes the time of the last
+                millisecond that was run.
 
         Returns:
-            The speeds of the wheels in each millisecond, counts/ms.
+            The speeds of the wheels in each millisecond, in counts/ms.
         """
         if self._waiting:
             self._take_waiting()
@@ -253,7 +255,7 @@ class Driver(Part):
         )
 
     def coast(self) -> _Pair:
-        """Run a millisecond without supply: a relay shorts the motors."""
+        """Run a millisecond without supply, in which a relay shorts the motors."""
         left, right = self.sides
         return left.coast(shorted=True), right.coast(shorted=True)
 

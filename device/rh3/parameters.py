@@ -10,14 +10,14 @@ from tickrig.device.twin import Immutable
 from tickrig.wire.modbus import ADDRESSES
 
 _GEAR_RATIO: Final = 74.91
-"""Turns of the motor per turn of the wheel (RH3 functional specification, RefHardRh3)."""
+"""Number of motor turns per turn of the wheel (RH3 functional specification, RefHardRh3)."""
 ENCODER_COUNTS: Final = 2_000
-"""Counts per turn of the motor (same source)."""
+"""Number of counts per turn of the motor (same source)."""
 COUNTS_PER_RAD: Final = _GEAR_RATIO * ENCODER_COUNTS / tau
-"""Counts per radian of the wheel: 23 844.6."""
+"""Number of counts per radian of the wheel: 23 844.6."""
 
 _DEFAULT_GAIN: Final = 10
-"""gain_VP for which the speed loop has its time constant."""
+"""Value of gain_VP for which the speed loop has its time constant."""
 PER_MILLE: Final = 1_000.0
 
 
@@ -27,23 +27,25 @@ class BaseParameters(Immutable):
 
     Attributes:
         address: address of the driver on the line, 1..247.
-        radius_left_m: effective radius of the left wheel; 0.0995 is the calibrated radius of the
-            specification.
+        radius_left_m: effective radius of the left wheel. The calibrated radius of the
+            specification is 0.0995.
         radius_right_m: effective radius of the right wheel.
-        tread_m: effective distance between the wheels; 0.464 is the calibrated one.
-        mass_kg: mass of the robot; a choice, because the specification gives no mass.
-        friction: coefficient between wheels and ground, None if they never slip.
+        tread_m: effective distance between the wheels. The calibrated distance is 0.464.
+        mass_kg: mass of the robot, which is our choice because the specification gives no mass.
+        friction: coefficient of friction between wheels and ground, or None if the wheels never
+            slip.
         response_s: time constant of the speed loop at the default gains without load.
         delay_ms: time from the arrival of a command to its effect.
-        rated_nm: torque at a wheel at 1000 per mille; a choice.
-        rated_ma: current at that torque; a choice.
-        friction_nm: friction of a motor with its gear; the driver compensates it while the motor
+        rated_nm: torque at a wheel at 1000 per mille, which is our choice.
+        rated_ma: current at the rated torque, which is our choice.
+        friction_nm: friction of a motor with its gear. The driver compensates it while the motor
             moves.
-        noise: spread of the distance that a wheel moves over the ground, as a share of it.
+        noise: spread of the distance that a wheel moves over the ground, as a share of the
+            distance.
         seed: seed of the noise.
 
     Raises:
-        ValueError: a number out of range.
+        ValueError: a number is out of range.
     """
 
     address: int = 1
@@ -75,9 +77,9 @@ class BaseParameters(Immutable):
 
     @property
     def agility(self) -> float:
-        """Counts/ms gained in a millisecond by a per mille of torque."""
+        """Speed in counts/ms that a per mille of torque adds in a millisecond."""
         return 1 / (_DEFAULT_GAIN * max(1.0, self.response_s * 1_000))
 
     def per_mille(self, torque_nm: float) -> float:
-        """Return a torque at a wheel in per mille of the rated one."""
+        """Return a torque at a wheel in per mille of the rated torque."""
         return torque_nm / self.rated_nm * PER_MILLE

@@ -1,4 +1,4 @@
-"""One wheel as its driver sees it: loops, counter and faults."""
+"""A wheel with its control loops, counter and faults in the driver."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _SLOW: Final = 0.5
 """Speed in counts/ms below which friction can hold a wheel."""
 
 _BRAKE: Final = 500.0
-"""Braking torque of the shorted motor, per mille; a choice."""
+"""Braking torque of the shorted motor in per mille, which is our choice."""
 
 
 class _Wheel(Part):
@@ -28,15 +28,15 @@ class _Wheel(Part):
     heat.
 
     Args:
-        parameters: of the base.
+        parameters: parameters of the base.
 
     Attributes:
-        travel: counts since the start of the rig, with fractions.
-        speed: counts/ms.
-        load: torque against forward motion, per mille.
+        travel: number of counts since the start of the rig, with fractions.
+        speed: speed in counts/ms.
+        load: torque against forward motion, in per mille.
         jammed: whether something holds the wheel.
-        friction: torque that it takes to turn the wheel, per mille.
-        agility: speed gained per millisecond and per mille of torque, counts/ms.
+        friction: torque that is needed to turn the wheel, in per mille.
+        agility: speed in counts/ms that a per mille of torque adds in a millisecond.
     """
 
     def __init__(self, parameters: BaseParameters) -> None:
@@ -79,10 +79,10 @@ _DEADBAND: Final = 1
 
 
 class _PositionLoop(Part):
-    """A PID loop from counts to counts/ms, with gains P in 1/s, I in 1/s2, D plain.
+    """A PID loop from counts to counts/ms, with gains P in 1/s, I in 1/s2, and D without unit.
 
     Args:
-        registers: the registers that hold its gains and limits.
+        registers: registers that hold the gains and limits.
     """
 
     def __init__(self, registers: Registers) -> None:
@@ -97,7 +97,7 @@ class _PositionLoop(Part):
         """Return the speed for the next millisecond.
 
         Args:
-            error: counts to go.
+            error: number of counts to go.
         """
         if abs(error) <= _DEADBAND:
             self.begin()
@@ -117,7 +117,7 @@ class _PositionLoop(Part):
 
 
 _INTEGRAL_LIMIT: Final = 10_000.0
-"""Limit of the integral in counts; a choice."""
+"""Limit of the integral in counts, which is our choice."""
 
 
 class _SpeedLoop(Part):
@@ -127,13 +127,13 @@ class _SpeedLoop(Part):
     to the rated torque. Friction is compensated while the target moves.
 
     Args:
-        registers: the registers that hold its gains and limits.
+        registers: registers that hold the gains and limits.
 
     Attributes:
-        reference: the target after its ramp, counts/ms.
-        torque: torque of the latest millisecond, per mille.
-        limit: the highest speed, counts/ms.
-        counted: counts of the latest millisecond.
+        reference: target after its ramp, in counts/ms.
+        torque: torque of the latest millisecond, in per mille.
+        limit: highest speed, in counts/ms.
+        counted: number of counts in the latest millisecond.
         stalled_ms: time for which full torque has not moved the wheel.
     """
 
@@ -155,15 +155,15 @@ class _SpeedLoop(Part):
 
     @property
     def settled(self) -> bool:
-        """Whether a step towards standstill, without counts in it, leaves everything unchanged."""
+        """Whether a step towards standstill without counts leaves everything unchanged."""
         return not (self.reference or self._error or self._change or self.counted)
 
     def drive(self, wheel: _Wheel, target: float, steps: int) -> list[float]:
-        """Run a wheel for some milliseconds; return its speed in each, counts/ms.
+        """Run a wheel for some milliseconds; return its speed in each millisecond, in counts/ms.
 
         Args:
-            wheel: with its load and faults.
-            target: counts/ms.
+            wheel: wheel with its load and faults.
+            target: target speed in counts/ms.
             steps: number of milliseconds.
         """
         # one loop over locals takes half the time of a call for each part
@@ -208,7 +208,7 @@ class _SpeedLoop(Part):
 
 
 STALL_MS: Final = 500
-"""Time for which full torque may leave the wheel unmoved; a choice."""
+"""Time for which full torque may leave the wheel unmoved, which is our choice."""
 
 _INT32: Final = 2**32
 
@@ -219,15 +219,16 @@ class Side(Part):
     Args:
         name: `left` or `right`.
         backward_bit: bit of this side in the register `direction`.
-        parameters: of the base.
-        registers: of the driver.
+        parameters: parameters of the base.
+        registers: registers of the driver.
 
     Attributes:
-        name: `left` or `right`.
-        wheel: the mechanics.
-        fault: the reason for which the side was switched off.
-        clipped: whether its target was above the speed limit.
-        stalled: full torque has not moved the wheel for too long, and this is not handled yet.
+        name: name of the side: `left` or `right`.
+        wheel: mechanics of the wheel.
+        fault: reason for which the side was switched off.
+        clipped: whether the target was above the speed limit.
+        stalled: whether full torque has not moved the wheel for too long, and this is not handled
+            yet.
     """
 
     def __init__(
@@ -301,7 +302,7 @@ class Side(Part):
 
     @property
     def torque(self) -> float:
-        """Torque of the motor, per mille of the rated one."""
+        """Torque of the motor in per mille of the rated torque."""
         return self._speed_loop.torque
 
     @property
@@ -333,12 +334,13 @@ class Side(Part):
             self.stalled = False
 
     def drive(self, steps: int, *, stop: bool, to_position: bool) -> list[float]:
-        """Run towards the targets; return the speed in each millisecond, counts/ms.
+        """Run towards the targets; return the speed in each millisecond, in counts/ms.
 
         Args:
-            steps: number of milliseconds; 1 towards a position, or while it is `stalling`.
+            steps: number of milliseconds, which is 1 towards a position, or while the wheel is
+                `stalling`.
             stop: whether the target is standstill.
-            to_position: whether the target is a position; otherwise it is a speed.
+            to_position: whether the target is a position. Otherwise the target is a speed.
         """
         loop, wheel, limit = self._speed_loop, self.wheel, self._speed_loop.limit
         if stop:
@@ -369,7 +371,7 @@ class Side(Part):
         return [wheel.speed]
 
     def _signed(self, value: int) -> int:
-        """Negate a number if the wheel is configured to run backward; wrap it to 32 bits."""
+        """Negate a number if the wheel is configured to run backward, and wrap it to 32 bits."""
         # Only this place handles the direction bits (002Bh): for targets on their way in and for
         # measured values on their way out. The result is cut to 32 bits, because the position
         # register wraps as the counter of a driver does.

@@ -43,7 +43,7 @@ _RUNNING_FAULTS: Final = {
     "vr2_fault": RrcEvent.BY_SYSTEM_ERROR,
     "bus_unplugged": RrcEvent.BY_NO_COMMUNICATION,
 }
-"""Event names of faults that have lasted (condition 8, DECISION R25)."""
+"""Event names by fault, for faults that have lasted (condition 8, DECISION R25)."""
 
 _POWER_ON_FAULTS: Final = {
     "bus_noise": RrcEvent.POWER_ON_ERROR1,
@@ -51,7 +51,8 @@ _POWER_ON_FAULTS: Final = {
     "power_module_fault": RrcEvent.POWER_ON_ERROR2,
     "vr2_fault": RrcEvent.POWER_ON_ERROR2,
 }
-"""Effect of each fault on a power-on. The manual gives two causes without assigning them."""
+"""Effect of each fault on a power-on. The manual lists two causes, but does not assign them to
+faults."""
 
 OUTPUTS: Final = {
     output.name: output
@@ -81,7 +82,7 @@ OUTPUTS: Final = {
 
 
 def new_inputs() -> InputBank:
-    """Return the inputs of a new RRC: supplied, everything at rest, battery full."""
+    """Return the inputs of a new RRC with supply, full battery and everything at rest."""
     return InputBank(INPUTS, groups={"stick": ("stick_v_pct", "stick_w_pct")})
 
 
@@ -101,7 +102,7 @@ class LoadAccount:
     such tick.
 
     Attributes:
-        backlog_pct: work that is left over.
+        backlog_pct: work that is left over, in per cent of a period.
         extra_pct: work that a physical input adds, in per cent of a period.
         settled: whether a period without traffic leaves this account unchanged.
     """
@@ -130,7 +131,7 @@ class LoadAccount:
         Args:
             line_feeds: received line feeds.
             overflows: number of overflows of the receive buffer, plus one for each 256 further
-                bytes discarded.
+                discarded bytes.
             replies: number of lines sent, except overflow errors and the status line.
             status: whether a status line was sent.
             extra_pct: work that a physical input adds, in per cent of a period.
@@ -189,7 +190,7 @@ class Buzzer:
 
         Args:
             tick: number of the tick.
-            alarm_since: tick at which the automatic alarm started, None without one.
+            alarm_since: tick at which the automatic alarm started, or None without an alarm.
         """
         while self._phases and tick >= self._phases[0][0]:
             self._phases.popleft()
@@ -208,7 +209,7 @@ class Buzzer:
 
 
 class Step(NamedTuple):
-    """Result of a tick: an event to send, a transition to make."""
+    """Result of a tick: an event to send, or a transition to make."""
 
     event: str | None = None
     move: Move | None = None
@@ -222,7 +223,7 @@ class PowerSequence:
     """Watches power button, faults and time.
 
     Attributes:
-        config: durations and names.
+        config: configuration with durations and names.
     """
 
     config: RrcConfig
@@ -237,7 +238,7 @@ class PowerSequence:
         self._faults.clear()
 
     def step(self, state: RrcState, tick: int, inputs: InputBank) -> Step:
-        """Check the physical inputs, once a tick; Initialize does not see the button yet."""
+        """Check the physical inputs, once a tick; in Initialize the button has no effect yet."""
         if state is RrcState.INITIALIZE and self._since is not None:
             return self._waiting(state, tick - self._since, inputs)
         # An edge counts, not a level: a button that is held from one state into the next acts once.

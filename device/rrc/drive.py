@@ -17,7 +17,7 @@ from tickrig.wire.rrc.commands import Joystick, Limit
 _SPEED_MODES: Final = range(1, 6)
 
 _BUTTON_MODES: Final = {(0, 0): 0, (1, 0): 1, (0, 1): 2, (1, 1): 3}
-"""Reverse mode by held buttons, (down, up), when alarm is pressed (RRC manual, last page)."""
+"""Reverse modes by held buttons (down, up) when alarm is pressed (RRC manual, last page)."""
 
 
 def count_button_edges(inputs: InputBank, settings: Settings) -> bool:
@@ -28,7 +28,7 @@ def count_button_edges(inputs: InputBank, settings: Settings) -> bool:
     on (DECISION R23).
 
     Returns:
-        Whether the alarm button has just been pressed.
+        True if the alarm button has just been pressed.
     """
     up, down = inputs["speed_up_button"], inputs["speed_down_button"]
     if settings.speed_up_count & 1 != up:
@@ -61,7 +61,7 @@ _RESET_TICKS: Final = 20
 
 
 class Gear(Enum):
-    """The imitated gear."""
+    """Gears of the imitated gear change."""
 
     NEUTRAL = "N"
     FORWARD = "F"
@@ -74,7 +74,7 @@ class Gearbox:
 
     Attributes:
         gear: the gear after the latest tick.
-        reversed_at: tick at which gear R was chosen; the automatic alarm counts from it.
+        reversed_at: tick at which gear R was chosen. The automatic alarm counts from this tick.
         resets_at: tick at which the gear is disengaged if the stick stays in neutral.
     """
 
@@ -93,10 +93,10 @@ class Gearbox:
 
         Args:
             tick: number of the tick.
-            mode: reverse mode, from #7 or the buttons.
-            stick: translation and rotation as received; they choose the gear.
-            shaped: translation and rotation after shaping; they drive the motors (DECISION R18).
-            knobs: #8 to #10.
+            mode: reverse mode, from #7 of the command or from the buttons.
+            stick: translation and rotation as received, which choose the gear.
+            shaped: translation and rotation after shaping, which drive the motors (DECISION R18).
+            knobs: values #8 to #10 of the command `joystick`.
         """
         v_pct, w_pct = shaped
         if mode == 0:
@@ -120,7 +120,7 @@ class Gearbox:
         return _fade(v_pct, angle, knobs.fade_deg), turn * _fade(w_pct, angle, knobs.fade_deg)
 
     def _rests(self, tick: int, stick: tuple[int, int], neutral_pct: int) -> bool:
-        """Whether the stick is in neutral; the gear is disengaged if it stays there."""
+        """Return whether the stick is in neutral; if it stays there, disengage the gear."""
         if stick[0] ** 2 + stick[1] ** 2 > neutral_pct**2:
             self.resets_at = None
             return False
@@ -140,7 +140,7 @@ class Gearbox:
 
 
 def _angle_deg(stick: tuple[int, int]) -> float:
-    """Return the stick's angle: 0 straight back, 90 sideways, 180 forward (DECISION R17)."""
+    """Return the stick's angle (DECISION R17): 0 is straight back, 90 sideways, 180 forward."""
     v_pct, w_pct = stick
     return degrees(atan2(abs(w_pct), -v_pct))
 
@@ -168,7 +168,7 @@ def _shape_table(low_pct: int, high_pct: int, exponent: int) -> tuple[int, ...]:
     Args:
         low_pct: largest value that counts as 0, 0..99 %.
         high_pct: smallest value that counts as 100 %, above `low_pct`, at most 100 %.
-        exponent: 0..15; the power is 1 + 0.1 * exponent.
+        exponent: exponent 0..15. The power is 1 + 0.1 * exponent.
     """
     span, power = high_pct - low_pct, 1 + 0.1 * exponent
     positions = [min(max(a - low_pct, 0), span) / span for a in range(101)]
@@ -178,7 +178,7 @@ def _shape_table(low_pct: int, high_pct: int, exponent: int) -> tuple[int, ...]:
 
 
 def shape(value_pct: int, low_pct: int, high_pct: int, exponent: int) -> int:
-    """Shape one axis, -100..100 %; the sign is kept (RRC manual, `joystick` #1 to #6).
+    """Shape one axis, -100..100 %, and keep the sign (RRC manual, `joystick` #1 to #6).
 
     >>> shape(-50, 0, 100, 5)
     -35
@@ -188,7 +188,7 @@ def shape(value_pct: int, low_pct: int, high_pct: int, exponent: int) -> int:
 
 
 def apply_limits(v_pct: int, w_pct: int, limit: Limit) -> tuple[int, int]:
-    """Return translation and rotation within the limits, signs kept (RRC manual, `limit`).
+    """Return translation and rotation within the limits, with their signs (RRC manual, `limit`).
 
     First each input is limited to its own limit. Then both values are multiplied by one common
     factor, which keeps the direction. It is the smallest of the factors that the limits of sum,
@@ -264,7 +264,7 @@ class Drive:
 
 
 def _driving_mode(state: RrcState, settings: Settings) -> int | None:
-    """Return the reverse mode in which the stick drives, None if it does not."""
+    """Return the reverse mode in which the stick drives, or None if it does not drive."""
     if state is RrcState.LIMIT:
         # This is #7 of the `joystick` command, never the mode that the buttons chose: the buttons'
         # mode counts only in Standby (R8).

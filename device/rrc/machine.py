@@ -83,11 +83,11 @@ from tickrig.wire.rrc.replies import StatusA as Status
 class ReceiveBuffer:
     """Received bytes that wait to be processed, split into lines (DECISION R27).
 
-    A byte that does not fit drops all waiting bytes. The buffer then discards this byte and all
-    following ones up to the next LF.
+    If a byte does not fit, the buffer drops all waiting bytes. It then discards this byte and all
+    following bytes up to the next LF.
 
     Attributes:
-        size: capacity in bytes, line ends included.
+        size: capacity in bytes, including line ends.
         overflows: number of overflows.
         thrown_blocks: number of further blocks of `size` bytes discarded from such a line.
     """
@@ -139,7 +139,7 @@ class ReceiveBuffer:
 
 
 def _read_line(line: bytes, *, check_wanted: bool) -> Command | replies.Refusal | None:
-    """Return the command of a line without LF, its refusal (DECISION R11), or None if empty."""
+    """Return the command of a line, or its refusal (DECISION R11), or None if the line is empty."""
     # One CR before the LF is removed, because terminals send CR LF (R11). A person who presses
     # Enter sends an empty line; it has no reply.
     message = line.removesuffix(b"\r")
@@ -177,9 +177,9 @@ class Rrc(Copyable):
     serial driver.
 
     Attributes:
-        config: durations, names and sizes.
-        inputs: its physical inputs, see `board.INPUTS`.
-        state: state in the manual's state diagram.
+        config: configuration with durations, names and sizes.
+        inputs: physical inputs; see `board.INPUTS`.
+        state: state in the state diagram of the manual.
     """
 
     config: RrcConfig = field(default_factory=RrcConfig)
@@ -205,7 +205,7 @@ class Rrc(Copyable):
 
     @property
     def type_name(self) -> str:
-        """Name of its device type, for traces."""
+        """Name of the device type, for traces."""
         return "rrc"
 
     @property
@@ -240,10 +240,10 @@ class Rrc(Copyable):
         """Return an output as the latest tick left it.
 
         Args:
-            name: one of `outputs`.
+            name: name of an output in `outputs`.
 
         Returns:
-            Its value.
+            The value of the output.
 
         Raises:
             KeyError: there is no output of that name.
@@ -262,10 +262,10 @@ class Rrc(Copyable):
 
         Args:
             now_us: time since the rig was started, a multiple of `tick_us`.
-            rx: the bytes that arrived since the latest tick.
+            rx: bytes that have arrived since the latest tick.
 
         Returns:
-            The bytes that it sends in this tick.
+            The bytes that the RRC sends in this tick.
         """
         tick = now_us // TICK_US
         self.inputs.changed = False
@@ -354,7 +354,7 @@ class Rrc(Copyable):
             self._reply(replies.Refusal(request.name.decode()))
 
     def _obey(self, command: cmd.Command, tick: int) -> bool:
-        """Execute a command; return False if this state does not allow it (DECISION R10)."""
+        """Execute a command; return False if the state does not allow it (DECISION R10)."""
         move = _MOVES.get(type(command))
         if move is not None and not self._move(move, tick):
             return False
@@ -395,7 +395,7 @@ class Rrc(Copyable):
 
     @property
     def _rolls(self) -> bool:
-        """Whether the vehicle changes in each tick: it moves, or VR2 drains the battery."""
+        """Return whether the vehicle changes in each tick: it moves, or VR2 drains the battery."""
         return self.config.vehicle and (self.state in POWERED_ON or self._vehicle.moving)
 
     def _roll(self) -> None:
@@ -463,7 +463,7 @@ class Rrc(Copyable):
         self._drive, self._buzzer = Drive(), Buzzer()
 
     def _next_due(self, tick: int) -> int:
-        """Return the next tick in which anything happens without input; `NEVER` if nothing does."""
+        """Return the next tick in which anything happens without input, or `NEVER`."""
         settings, running = self._settings, self.state in POWERED_ON
         busy = self._buffer or not self._load.settled or (settings.status and running)
         busy = busy or self._rolls
@@ -498,4 +498,4 @@ _READERS: Final[dict[str, Callable[[Rrc], int | str]]] = {
     "heading_mrad": lambda rrc: round(rrc._vehicle.heading_mrad),
     "battery_permille": lambda rrc: round(rrc._vehicle.charge * 1_000),
 }
-"""Functions of `Rrc.read` for each of `outputs`; only the requested signal is computed."""
+"""Functions of `Rrc.read`, by name of the output; only the requested output is computed."""

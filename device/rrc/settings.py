@@ -37,7 +37,7 @@ class RrcState(Enum):
 
 
 class Move(Enum):
-    """Events that change the state of the RRC."""
+    """Transitions between the states of the RRC."""
 
     INITIALIZED = auto()
     POWER_ON_FAILED = auto()
@@ -83,26 +83,26 @@ class RrcConfig(Immutable):
     """Configuration of an emulated RRC. Times are in ticks of 10 ms.
 
     Attributes:
-        device_name: answer of `device`.
-        version: answer of `version`.
-        date: answer of `date`.
-        power_on_event: `PowerOnTrigger` as in the field, or `PowerOn` as in the
+        device_name: answer to `device`.
+        version: answer to `version`.
+        date: answer to `date`.
+        power_on_event: name of the event: `PowerOnTrigger` as in the field, or `PowerOn` as in the
             manual's event table (DECISION R7).
         power_on_fail_target: target of transition 3 (DECISION R3).
         initialize_ticks: length of Initialize (DECISION R6).
-        power_on_ticks: from the power button to the result (DECISION R6).
-        power_on_timeout_ticks: from the power button to `PowerOnTimeout` (DECISION R6).
-        button_off_ticks: from the power button to `PowerOffFinished` (DECISION R6).
-        forced_off_ticks: from the power button to `PowerOffFinished` after a forced stop
+        power_on_ticks: time from the power button to the result (DECISION R6).
+        power_on_timeout_ticks: time from the power button to `PowerOnTimeout` (DECISION R6).
+        button_off_ticks: time from the power button to `PowerOffFinished` (DECISION R6).
+        forced_off_ticks: time from the power button to `PowerOffFinished` after a forced stop
             (DECISION R6).
-        fault_hold_ticks: how long a fault must last to be detected (DECISION R25).
+        fault_hold_ticks: time that a fault must last to be detected (DECISION R25).
         buffer_bytes: size of the receive buffer (DECISION R27).
         overtime: whether too much work stops VR2 (DECISION R27).
         vehicle: whether VR2 drives a vehicle, with speed, distance and battery.
-        battery_wh: capacity of its battery, Wh.
+        battery_wh: capacity of the battery, in Wh.
 
     Raises:
-        ValueError: a time, size or battery below 1, or an event name that is not in the manual.
+        ValueError: a time, size or battery is below 1, or an event name is not in the manual.
     """
 
     device_name: str = "RRC"
@@ -144,23 +144,25 @@ _PLAIN_STICK: Final = Joystick()
 
 @dataclass(slots=True)
 class Settings:
-    """Settings of the RRC, fresh at each pass through Initialize (RRC manual, notes).
+    """Settings of the RRC, which Initialize resets to their defaults (RRC manual, notes).
 
     Attributes:
-        stable: stablemode: CHECK is required, OK is omitted.
-        status: SA lines are sent.
-        watchdog_ticks: time without a correct command that stops VR2, 0 for never.
-        speed_mode: 1 (slowest) to 5.
-        speed_locked: the controller's speed buttons have no effect.
+        stable: whether stablemode is on: CHECK is required, and OK is omitted.
+        status: whether SA lines are sent.
+        watchdog_ticks: time without a correct command after which VR2 is stopped, or 0 for never.
+        speed_mode: speed mode from 1 (slowest) to 5.
+        speed_locked: whether the speed buttons of the controller have no effect.
         limit: limits of limit mode.
         output: values of output mode.
-        joystick: stick shaping.
-        button_mode: reverse mode that the buttons chose in Standby; None if the stick does not
+        joystick: parameters of the stick shaping.
+        button_mode: reverse mode that the buttons chose in Standby, or None if the stick does not
             drive in Standby.
-        speed_up_count: counter of the speed-up button in SA, 0..15; odd while the button is
-            pressed.
-        speed_down_count: counter of the speed-down button, likewise.
-        alarm_count: counter of the alarm button, likewise.
+        speed_up_count: counter of the speed-up button in SA, 0..15. The counter is odd while the
+            button is pressed.
+        speed_down_count: counter of the speed-down button in SA, 0..15. The counter is odd while
+            the button is pressed.
+        alarm_count: counter of the alarm button in SA, 0..15. The counter is odd while the button
+            is pressed.
     """
 
     stable: bool = False

@@ -24,7 +24,7 @@ _BRAKING_MM_S2: Final = 3_000.0
 """Deceleration by the brakes, which are applied while VR2 is off."""
 
 _TURN_PER_SPEED: Final = 3.0
-"""mrad/s² of turning for each mm/s² of translation."""
+"""Ratio of the turning acceleration in mrad/s² to the translation's acceleration in mm/s²."""
 
 _IDLE_W: Final = 10.0
 _ROLLING_N: Final = 30.0
@@ -39,17 +39,17 @@ _GAUGE_TOP: Final = 10
 
 @dataclass(slots=True)
 class Vehicle:
-    """Speed, way and battery of the vehicle, period by period.
+    """Speed, path and battery of the vehicle, computed period by period.
 
     Args:
         battery_wh: capacity of the battery.
 
     Attributes:
         gauge: level that the physical input has set on the battery gauge, 1..10.
-        speed_mm_s: true speed, forward positive.
-        turn_mrad_s: true turning speed, to the right positive.
-        distance_mm: distance along its path; backing counts negative.
-        heading_mrad: how far it has turned to the right.
+        speed_mm_s: true speed, which is positive forward.
+        turn_mrad_s: true turning speed, which is positive to the right.
+        distance_mm: distance along the path. Backing counts negative.
+        heading_mrad: angle by which the vehicle has turned to the right.
         charge: charge of the battery, 0..1.
     """
 
@@ -63,7 +63,7 @@ class Vehicle:
 
     @property
     def moving(self) -> bool:
-        """Whether it is still moving."""
+        """Whether the vehicle is still moving."""
         return self.speed_mm_s != 0.0 or self.turn_mrad_s != 0.0
 
     @property
@@ -81,8 +81,8 @@ class Vehicle:
 
         Args:
             out_pct: translation and rotation for the motors.
-            speed_mode: 1..5.
-            running: whether VR2 is on; otherwise the brakes are on.
+            speed_mode: speed mode, 1..5.
+            running: whether VR2 is on. Otherwise the brakes are on.
         """
         v_pct, w_pct = out_pct if self.charge > 0.0 else (0, 0)
         top_mm_s = _TOP_MM_S[speed_mode - 1] * (_BACKING if v_pct < 0 else 1.0)

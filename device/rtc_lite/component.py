@@ -29,9 +29,9 @@ class LitePort(Generic[T]):
     """Base of both kinds of ports.
 
     Args:
-        name: 1 to 15 printable ASCII characters.
-        port_type: type of its values.
-        most: the largest number of elements of a sequence; by default the number that fits into a
+        name: name of 1 to 15 printable ASCII characters.
+        port_type: type of the values.
+        most: largest number of elements of a sequence. The default is the number that fits into a
             frame.
 
     Attributes:
@@ -85,10 +85,10 @@ class LiteOutPort(LitePort[T]):
     """A port that the component writes; new values go to the proxy."""
 
     def write(self, value: T) -> bool:
-        """Store a value; if it does not fit, return False and keep the previous value.
+        """Store a value; if the value does not fit, return False and keep the previous value.
 
         Raises:
-            ValueError: the value is not one of the port's type.
+            ValueError: the value does not have the type of the port.
         """
         data = self.port_type.encode(value)
         if not self.fits(data):
@@ -112,9 +112,9 @@ class LiteComponent(DeviceComponent):
     The callbacks are those of Table 1 of the paper.
 
     Attributes:
-        type_name: type of the component, 1 to 15 characters.
-        in_ports: the in-ports by name, in order of declaration.
-        out_ports: the out-ports.
+        type_name: type of the component, with 1 to 15 characters.
+        in_ports: in-ports by name, in order of declaration.
+        out_ports: out-ports by name, in order of declaration.
 
     Raises:
         ValueError: the type name is missing, an input accepts fractions, or the component does not
@@ -152,7 +152,7 @@ class LiteComponent(DeviceComponent):
         """Handle the start of the proxy's execution context; called only if defined."""
 
     def on_shutdown(self) -> Result:
-        """Handle its stop; called only if defined."""
+        """Handle the stop of the proxy's execution context; called only if defined."""
 
 
 def _check_ports(kind: str, ports: Iterable[LitePort[Any]]) -> None:
@@ -171,7 +171,7 @@ def _is_in(port: LitePort[Any]) -> bool:
 
 
 class LiteEcho(LiteComponent):
-    """One in-port, one out-port, both TimedLong."""
+    """A component with one in-port and one out-port, both of type TimedLong."""
 
     type_name = "Echo0"
     inlet = LiteInPort("in", LONG)
@@ -190,6 +190,6 @@ class LiteA(LiteEcho):
 
 
 class LiteB(LiteEcho):
-    """The second one."""
+    """The second RTC-Lite component of the paper's experiments (DECISION L16)."""
 
     type_name = "LiteB"

@@ -12,7 +12,7 @@ from tickrig.wire.rtc_lite.codes import LiteCommand, LiteState, LiteStatus
 
 
 class LiteTransition(NamedTuple):
-    """Effect of a command: allowed state, callback and next state."""
+    """Effect of a command, with the allowed state, the callback and the next state."""
 
     begin: LiteState
     callback: str
@@ -59,7 +59,7 @@ class LiteLifeCycle(CallbackRunner[LiteComponent]):
     """Runs the callbacks of a component, and tracks its state.
 
     Attributes:
-        state: its state.
+        state: state of the component.
     """
 
     def __init__(self, component: LiteComponent) -> None:

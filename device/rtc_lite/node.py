@@ -71,13 +71,13 @@ from tickrig.wire.rtc_lite.rtno import RtnoDecoder, encode_packet
 
 BUFFER_BYTES: Final = 64
 GAP_US: Final = 100_000
-"""Silence inside a frame after which it is dropped."""
+"""Length of a silence inside a frame after which the frame is dropped."""
 SILENCE_US: Final = 20_000
-"""Silence that a receiver needs after a frame of unknown length."""
+"""Length of the silence that a receiver needs after a frame of unknown length."""
 
 
 class RequestDecoder(Protocol):
-    """`Decoder` or `RtnoDecoder`."""
+    """Interface of `Decoder` and `RtnoDecoder`."""
 
     lost: bool
 
@@ -99,8 +99,8 @@ class LiteReceiver:
     """The receiver of the line.
 
     Attributes:
-        decoder: reads the frames.
-        dropped: bytes dropped because the buffer was full.
+        decoder: decoder that reads the frames.
+        dropped: number of bytes dropped because the buffer was full.
     """
 
     decoder: RequestDecoder
@@ -110,7 +110,7 @@ class LiteReceiver:
 
     @property
     def due_us(self) -> int:
-        """When an incomplete frame is dropped."""
+        """Time at which an incomplete frame is dropped."""
         return self._received_us + GAP_US if self.decoder.begun else NEVER
 
     def push(self, now_us: int, data: bytes) -> None:
@@ -154,7 +154,7 @@ INPUTS: Final = (
         "slow_answer", "the processor is busy elsewhere: each answer is late", SignalType.FAULT
     ),
 )
-"""Inputs of every node; a component may add its own."""
+"""Inputs of every node; a component may add inputs."""
 
 _OUTPUTS: Final = (
     OutputSignal("state", "state of the component: Off, Created, Inactive, Active, Error, None"),
@@ -181,7 +181,7 @@ def _new_inputs(component: LiteComponent) -> InputBank:
 
 
 def _output_table(component: LiteComponent) -> dict[str, OutputSignal]:
-    """Return the outputs of a node: its own, and the ports as `in.NAME` and `out.NAME`."""
+    """Return the outputs of a node, including its ports as `in.NAME` and `out.NAME`."""
     ports = [
         *(
             OutputSignal(f"in.{name.decode()}", "value of this in-port")
@@ -196,7 +196,7 @@ def _output_table(component: LiteComponent) -> dict[str, OutputSignal]:
 
 
 def _port_text(component: LiteComponent, name: str) -> float | str:
-    """Return the value of the port `in.NAME` or `out.NAME`; KeyError if the port does not exist."""
+    """Return the value of the port `in.NAME` or `out.NAME`; KeyError if there is no such port."""
     side, _, port = name.partition(".")
     ports: dict[str, Mapping[bytes, LitePort[Any]]] = {
         "in": component.in_ports,
@@ -206,7 +206,7 @@ def _port_text(component: LiteComponent, name: str) -> float | str:
 
 
 TICK_US: Final = 1_000
-"""Period of the main loop of the device; a choice, because the paper gives no period."""
+"""Period of the main loop of the device, which is our choice because the paper gives no period."""
 
 _TIMED: Final = (LiteState.ACTIVE, LiteState.ERROR)
 """States in which the timer of the device runs."""
@@ -217,22 +217,22 @@ class RtcLiteNode(Copyable):
     """A PIC with an RTC-Lite component (Suzuki et al., RSJ 2007); a `Device[bytes]`.
 
     In each tick the node processes bytes from the line, time-outs, requests in order, and the
-    timer. A callback takes effect at once. With a dead time its answer comes late. Until then the
-    node only fills its receive buffer of 64 bytes.
+    timer. A callback takes effect at once. If the node has a dead time, the answer comes late.
+    Until then the node only fills its receive buffer of 64 bytes.
 
     Not emulated: service ports, configuration sets, the baud rate generator, framing errors of the
     UART, a watchdog, sleep.
 
     Args:
-        make: factory of the component, called at the start and at each power-up.
-        config: framing, execution context, rates.
+        make: factory of the component, which is called at the start and at each power-up.
+        config: configuration with framing, execution context and rates.
 
     Attributes:
-        type_name: name of its device type, for traces.
-        inputs: its physical inputs, see `INPUTS`.
+        type_name: name of the device type, for traces.
+        inputs: physical inputs; see `INPUTS`.
 
     Raises:
-        ValueError: a component that does not fit into a PIC.
+        ValueError: the component does not fit into a PIC.
     """
 
     type_name: ClassVar[str] = "rtc-lite"
@@ -268,7 +268,7 @@ class RtcLiteNode(Copyable):
 
     @property
     def component(self) -> LiteComponent:
-        """The present component; a power cut makes a new one."""
+        """The present component; a power cut makes a new component."""
         return self._life.component
 
     @property
@@ -293,10 +293,10 @@ class RtcLiteNode(Copyable):
         """Return an output as the latest tick left it.
 
         Args:
-            name: one of `outputs`.
+            name: name of an output in `outputs`.
 
         Returns:
-            Its value.
+            The value of the output.
 
         Raises:
             KeyError: there is no output of that name.
@@ -315,10 +315,10 @@ class RtcLiteNode(Copyable):
 
         Args:
             now_us: time since the rig was started, a multiple of `tick_us`.
-            rx: the bytes that arrived since the latest tick.
+            rx: bytes that have arrived since the latest tick.
 
         Returns:
-            The bytes that it sends in this tick.
+            The bytes that the node sends in this tick.
         """
         if self.inputs["power_cut"]:
             if self._on:

@@ -16,7 +16,7 @@ from tickrig.wire.rtc_lite.frame import WITH_FIELDS, Checksum, Framing, LiteFram
 # Configuration: differences between nodes, and points that the paper leaves open.
 
 _RATE_HZ: Final = range(1, 1_001)
-"""Rates possible with a tick of 1 ms."""
+"""Rates that are possible with a tick of 1 ms."""
 DEFAULT_RATE_HZ: Final = 10
 
 
@@ -25,14 +25,14 @@ class LiteConfig(Immutable):
     """Configuration of an emulated node.
 
     Attributes:
-        framing: frames of RTC-Lite, or packets of RTno (bridge mode).
-        checksum: algorithm of the checksum (DECISION L5); packets of RTno always use `sum8`.
+        framing: framing of the line: frames of RTC-Lite, or packets of RTno (bridge mode).
+        checksum: algorithm of the checksum (DECISION L5). Packets of RTno always use `sum8`.
         context: the execution context.
-        rate_hz: rate of the timer, 1..1000 Hz, until the proxy sets another.
+        rate_hz: rate of the timer, 1..1000 Hz, until the proxy sets another rate.
         slow_answer_us: delay of each answer by the fault `slow_answer`.
 
     Raises:
-        ValueError: a rate or a delay out of range.
+        ValueError: a rate or a delay is out of range.
     """
 
     framing: Framing = Framing.LITE

@@ -18,14 +18,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class MotorParameters(Immutable):
-    """A permanent-magnet motor, brushed or brushless, seen as one winding.
+    """A permanent-magnet motor, brushed or brushless, modelled as one winding.
 
     Attributes:
         resistance_ohm: terminal resistance at 25 degC.
         inductance_h: terminal inductance.
         torque_constant_nm_a: torque per current, and back-EMF per speed (V s/rad).
         inertia_kg_m2: inertia of the rotor.
-        coulomb_nm: dry friction of the rotor; more than 0, so that it comes to rest.
+        coulomb_nm: dry friction of the rotor, which is more than 0 so that the rotor comes to rest.
         viscous_nm_s: friction that grows with the speed, per rad/s.
         winding_housing_k_w: thermal resistance from the winding to the housing.
         housing_ambient_k_w: thermal resistance from the housing to the air.
@@ -55,12 +55,12 @@ class PowerStage(Immutable):
     """A four-quadrant stage of ideal switches.
 
     Attributes:
-        continuous_a: current that it carries permanently.
-        peak_a: current that it never exceeds.
-        peak_s: how long it carries the peak current.
+        continuous_a: current that the stage carries permanently.
+        peak_a: current that the stage never exceeds.
+        peak_s: time for which the stage carries the peak current.
         duty_max: largest part of the supply that reaches the winding.
-        supply_v: supply at the start.
-        supply_min_v: below this the switches stay open.
+        supply_v: supply voltage at the start.
+        supply_min_v: supply voltage below which the switches stay open.
     """
 
     continuous_a: float
@@ -83,8 +83,8 @@ class GearParameters(Immutable):
     """A gear without play, with the inertia and friction of its output shaft.
 
     Attributes:
-        ratio: turns of the motor per turn of the output shaft.
-        efficiency: share of the power of an external torque that it transmits.
+        ratio: number of motor turns per turn of the output shaft.
+        efficiency: share of the power of an external torque that the gear transmits.
         inertia_kg_m2: inertia at the output shaft, without the motor's own inertia.
         coulomb_nm: dry friction at the output shaft.
     """
@@ -102,11 +102,12 @@ class GearParameters(Immutable):
 
 @dataclass(frozen=True, slots=True)
 class Encoders(Immutable):
-    """The incremental encoder of the motor, and an absolute one of the output shaft.
+    """The incremental encoder of the motor, and an absolute encoder of the output shaft.
 
     Attributes:
-        counts_per_turn: quadrature counts per turn of the motor.
-        gear_counts_per_turn: counts of the absolute encoder; 0 if the servo has none.
+        counts_per_turn: number of quadrature counts per turn of the motor.
+        gear_counts_per_turn: number of counts of the absolute encoder per turn, or 0 if the servo
+            has none.
     """
 
     counts_per_turn: int
@@ -122,7 +123,8 @@ class LoopGains(Immutable):
 
     Attributes:
         velocity_rad_s: natural frequency of the velocity loop.
-        damping: damping of the velocity loop; 1.5 leaves 0.47 at ten times the inertia.
+        damping: damping of the velocity loop. A damping of 1.5 becomes 0.47 at ten times the
+            inertia.
         position_rad_s: bandwidth of the position loop.
     """
 
@@ -156,7 +158,7 @@ class ServoParameters(Immutable):
 
 
 def _require_positive(table: DataclassInstance, zero: tuple[str, ...] = ()) -> None:
-    """Check that all numbers of a table are above 0; those named in `zero` may be 0.
+    """Check that all numbers of a table are above 0; the numbers named in `zero` may be 0.
 
     Raises:
         ValueError: a number is out of range.
@@ -282,7 +284,7 @@ def of_size(servo: ServoParameters, size: float) -> ServoParameters:
 
     Args:
         servo: the parameters of one servo.
-        size: number of servos, above 0; a fraction gives a smaller servo.
+        size: number of servos, above 0. A fraction gives a smaller servo.
     """
     motor, stage, gear = servo.motor, servo.stage, servo.gear
     return replace(

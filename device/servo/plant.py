@@ -36,14 +36,15 @@ class Discretisation(Immutable):
     voltage multiply (current before, speed before, voltage, torque).
 
     Attributes:
-        speed: speed after the step, current led, rad/s.
-        angle: angle that the shaft turns in the step, current led, rad.
-        voltage: constant voltage that ends at a current after the step, V.
-        current_u: current after the step, voltage constant, A.
-        speed_u: speed after the step, voltage constant, rad/s.
-        angle_u: angle that the shaft turns in the step, voltage constant, rad.
-        square_u: weights of (di^2, di dw, dw^2) in the integral of the squared current;
-            di and dw are distances from the state to which a constant voltage leads.
+        speed: row for the speed after the step with a led current, in rad/s.
+        angle: row for the angle by which the shaft turns in the step with a led current, in rad.
+        voltage: row for the constant voltage that leads to a given current after the step, in V.
+        current_u: row for the current after the step with a constant voltage, in A.
+        speed_u: row for the speed after the step with a constant voltage, in rad/s.
+        angle_u: row for the angle by which the shaft turns in the step with a constant voltage, in
+            rad.
+        square_u: weights of (di^2, di dw, dw^2) in the integral of the squared current. di and dw
+            are distances from the state to which a constant voltage leads.
     """
 
     speed: Row
@@ -120,10 +121,10 @@ def _square(
     """Solve the Lyapunov equation of the squared current over one step.
 
     Args:
-        current: effect of current and speed on the slope of the current.
-        speed: effect of current and speed on the slope of the speed.
+        current: effects of current and speed on the slope of the current.
+        speed: effects of current and speed on the slope of the speed.
         i: share of the current that is left after a step.
-        w: change of the current by the speed in that step.
+        w: change of the current by the speed in the step.
     """
     (a, b), (c, d) = current, speed
     s11, s12, s22 = i * i - 1, i * w, w * w
@@ -167,11 +168,11 @@ class Plant(Part):
     Attributes:
         current_a: current in the winding.
         speed_rad_s: speed of the motor.
-        position: angle of the motor, counts.
-        blocked: the shaft is held.
+        position: angle of the motor, in counts.
+        blocked: whether the shaft is held.
         load_nm: external torque at the motor shaft, before the loss of the gear.
-        friction_nm: bounds of the friction: the torque against forward motion, and against backward
-            motion.
+        friction_nm: bounds of the friction: torque against forward motion, and torque against
+            backward motion.
         inertia_kg_m2: present inertia at the motor shaft.
         resistance_ohm: present resistance of the winding.
         losses: energies since the start.
@@ -220,7 +221,7 @@ class Plant(Part):
         return k, el, b, self._counts_per_rad
 
     def shape(self, inertia_kg_m2: float, resistance_ohm: float) -> None:
-        """Set another inertia or resistance; the speed is unchanged."""
+        """Set another inertia or resistance, without changing the speed."""
         self.inertia_kg_m2, self.resistance_ohm = inertia_kg_m2, resistance_ohm
         self._step = discretise(self._motor, resistance_ohm, inertia_kg_m2)
         self._left = exp(-resistance_ohm * STEP_S / self._motor.inductance_h)
@@ -248,7 +249,7 @@ class Plant(Part):
         self.blocked = blocked
 
     def open(self) -> None:
-        """Run one step with the winding open; remaining current decays in the diodes."""
+        """Run one step with the winding open, in which a remaining current decays in the diodes."""
         # The energy of the inductance, L i^2 / 2, becomes heat at once; no step models its decay.
         self.losses.copper_j += self._motor.inductance_h * self.current_a**2 / 2
         self.current_a = 0.0
@@ -260,7 +261,7 @@ class Plant(Part):
         self._turn(speed, a1 * w + a3 * (m + friction), friction)
 
     def drive(self, current_a: float, limit_v: float) -> int:
-        """Run one step towards a current; return how the voltage cut it: -1, 0, 1."""
+        """Run one step towards a current; return how the voltage limits it: -1, 0 or 1."""
         # Standstill is handled separately: winding alone, without back-EMF. The general step uses
         # one friction for the whole step; with it the shaft would end at speed 0, but its angle
         # would creep during the step.
@@ -286,7 +287,7 @@ class Plant(Part):
         return 0
 
     def _drive_constant(self, current_a: float, limit_v: float, friction: float) -> int:
-        """Run a step at the constant voltage that leads to a current, or the nearest one."""
+        """Run a step at the constant voltage that leads to a current, or at the nearest voltage."""
         step, i, w, m = self._step, self.current_a, self.speed_rad_s, self.load_nm
         v0, v1, v2, v3 = step.voltage
         u, cut = _within(v0 * i + v1 * w + v2 * current_a + v3 * (m + friction), limit_v)
@@ -303,7 +304,7 @@ class Plant(Part):
         return cut
 
     def _stay(self, current_a: float, limit_v: float) -> int | None:
-        """Run a step at standstill; None if the shaft would not stay at rest."""
+        """Run a step at standstill; return None if the shaft would not stay at rest."""
         i, r, left = self.current_a, self.resistance_ohm, self._left
         slope_v = self._motor.inductance_h * abs(current_a - i) / STEP_S
         straight, cut, u = r * max(abs(i), abs(current_a)) + slope_v <= limit_v, 0, 0.0

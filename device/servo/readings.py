@@ -17,7 +17,7 @@ HOTTEST_C: Final = 1_000.0  # no motor is left beyond this, and no model
 
 
 _Temperatures = tuple[float, float]
-"""Temperatures of the winding and the housing of a motor, degC."""
+"""Temperatures of the winding and the housing of a motor, in degC."""
 
 
 class ThermalModel(Part):
@@ -45,12 +45,12 @@ class ThermalModel(Part):
     def after(
         self, start: _Temperatures, seconds: float, square_a2: float, ambient_c: float
     ) -> _Temperatures:
-        """Return the temperatures some time later.
+        """Return the temperatures after some time.
 
         Args:
-            start: temperatures now.
-            seconds: how much later, 0 or more.
-            square_a2: mean square of the current in this time, A^2.
+            start: present temperatures.
+            seconds: time from now, 0 or more.
+            square_a2: mean square of the current in this time, in A^2.
             ambient_c: temperature of the air.
         """
         motor, (winding, housing), (winding_c, housing_c) = self._motor, self._capacities, start
@@ -95,7 +95,7 @@ class I2t(Part):
 
     Attributes:
         filled_a2s: used part of the budget.
-        reduced: only the continuous current is allowed.
+        reduced: whether only the continuous current is allowed.
     """
 
     __slots__ = ("_budget_a2s", "_continuous_a2", "_stage", "filled_a2s", "reduced")
@@ -154,11 +154,11 @@ class Heat(Part):
     """Temperatures and I2t budget of a servo, from the squared current.
 
     Attributes:
-        since_us: the instant of the latest computation.
-        temperatures: temperatures at that instant.
-        winding_dc: temperature of the winding at that instant, 0.1 degC.
-        ambient_c: temperature of the air since that instant.
-        i2t: the overload of the power stage.
+        since_us: time of the latest computation.
+        temperatures: temperatures at the time of the latest computation.
+        winding_dc: temperature of the winding at the time of the latest computation, in 0.1 degC.
+        ambient_c: temperature of the air since the latest computation.
+        i2t: overload protection of the power stage.
     """
 
     __slots__ = (
@@ -204,7 +204,7 @@ class Heat(Part):
             self._warm(self._after(seconds, square_a2s / seconds), now_us)
 
     def rest(self, now_us: int, current_a: float) -> None:
-        """Advance the time with a constant current, to exactly the temperatures of `at`."""
+        """Advance the time with a constant current; the temperatures are exactly those of `at`."""
         seconds = (now_us - self.since_us) / 1_000_000
         self.i2t.pass_time(seconds, current_a**2 * seconds)
         self._warm(self.at(now_us, current_a), now_us)
@@ -214,7 +214,7 @@ class Heat(Part):
         self.winding_dc = round(temperatures[0] * 10)  # once in 20 ticks: 6 % of a drive's tick
 
     def at(self, now_us: int, current_a: float) -> _Temperatures:
-        """Return the temperatures at an instant, the current constant until then."""
+        """Return the temperatures at an instant, if the current is constant until then."""
         return self._after((now_us - self.since_us) / 1_000_000, current_a**2)
 
     def bears(self, current_a: float) -> bool:
@@ -237,10 +237,10 @@ class Heat(Part):
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class ServoSettings(Copyable):
-    """Attributes that call `changed` when set to another value.
+    """Attributes that call `changed` when they are set to another value.
 
     Attributes:
-        supply_mv: the supply of the power stage in millivolts; `supply_v` sets it.
+        supply_mv: supply of the power stage in millivolts, which `supply_v` sets.
     """
 
     __slots__ = (
@@ -255,7 +255,7 @@ class ServoSettings(Copyable):
         self._blocked, self._phase_open, self._current_limit_a = False, False, inf
 
     def changed(self) -> None:
-        """Apply the settings after one has changed."""
+        """Apply the settings after a setting has changed."""
 
     @property
     def supply_v(self) -> float:
@@ -380,12 +380,12 @@ class Readings(ServoSettings):
 
     @property
     def velocity_counts_s(self) -> int:
-        """Velocity of the motor, counts/s; 0 while the encoder is unplugged."""
+        """Velocity of the motor in counts/s, which is 0 while the encoder is unplugged."""
         return 0 if self.encoder_unplugged else round(self._plant.velocity_counts_s)
 
     @property
     def gear_counts(self) -> int:
-        """Angle by the absolute encoder of the output shaft, all turns counted; 0 without one."""
+        """Angle by the absolute encoder of the output shaft with all turns, or 0 without it."""
         return floor(self.shaft_deg / 360.0 * self.parameters.encoders.gear_counts_per_turn)
 
     @property
@@ -413,7 +413,7 @@ class Readings(ServoSettings):
 
     @property
     def shaft_deg(self) -> float:
-        """Angle of the output shaft, all turns counted."""
+        """Angle of the output shaft, with all turns counted."""
         return self._plant.position * self._degrees_per_count
 
     @property

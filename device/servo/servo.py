@@ -71,7 +71,7 @@ class _Loops(Part):
 
     Attributes:
         integral_a: share of the integral in the current.
-        cut: direction in which the latest demand was cut: -1, 1, or 0 if it was not cut.
+        cut: direction in which the latest demand was cut: -1 or 1, or 0 if it was not cut.
     """
 
     __slots__ = (
@@ -99,14 +99,14 @@ class _Loops(Part):
 
     @property
     def gains(self) -> tuple[float, float, float, float, float, float]:
-        """For `RunAhead`: rad per count; gains of position, integral, error, speed, friction."""
+        """Rad per count, and gains of position, integral, error, speed, friction, for `RunAhead`."""
         proportional, viscous, dry = self._proportional, self._viscous, self._dry
         return self._rad, self._position, self._integral, proportional, viscous, dry
 
     def follow(
         self, position: float, counts: int, velocity: float, acceleration: float, speed: float
     ) -> float:
-        """Return the current for a demanded position, A."""
+        """Return the current for a demanded position, in A."""
         # The encoder cannot resolve an error below one count. Without this case the integral would
         # push against friction permanently, and the servo would never rest.
         error = position - counts
@@ -115,12 +115,12 @@ class _Loops(Part):
         return self.turn(velocity + self._position * error, acceleration, speed)
 
     def turn(self, velocity: float, acceleration: float, speed: float) -> float:
-        """Return the current for a demanded velocity, A.
+        """Return the current for a demanded velocity, in A.
 
         Args:
-            velocity: demand, counts/s.
-            acceleration: demand, counts/s^2.
-            speed: measured speed of the motor, rad/s.
+            velocity: demanded velocity, in counts/s.
+            acceleration: demanded acceleration, in counts/s^2.
+            speed: measured speed of the motor, in rad/s.
         """
         wanted = velocity * self._rad
         error = wanted - speed
@@ -141,12 +141,12 @@ class Line(Part):
     """Position demands on a straight line to a goal, and standstill there.
 
     Attributes:
-        position: the present demand, counts.
-        velocity: the present demand, counts/s.
-        goal: end of the line, counts.
+        position: present demanded position, in counts.
+        velocity: present demanded velocity, in counts/s.
+        goal: position at the end of the line, in counts.
         left: number of steps up to the goal.
-        added: velocity that is demanded in addition to that of the line, counts/s.
-        most: largest velocity of the line, counts/s; a run ends before a step that needs more.
+        added: velocity that is demanded in addition to the velocity of the line, in counts/s.
+        most: largest velocity of the line, in counts/s. A run ends before a step that needs more.
     """
 
     __slots__ = ("added", "goal", "left", "most", "position", "velocity")
@@ -184,12 +184,12 @@ class RunAhead(Part):
 
     Attributes:
         steps: number of steps.
-        counts: position that the encoder shows, counts.
-        demand: demanded position, counts, and demanded velocity, counts/s, after these steps.
-        motion: position of the motor, counts; its speed, rad/s; current in the winding, A; integral
-            of the velocity loop, A.
-        losses: energy from the power stage since the start, J; heat of the winding, J;
-            heat of friction, J; integral of the squared current, A^2 s.
+        counts: position that the encoder shows, in counts.
+        demand: demanded position (counts) and demanded velocity (counts/s) after these steps.
+        motion: position of the motor (counts), speed of the motor (rad/s), current in the winding
+            (A), and integral of the velocity loop (A).
+        losses: energy from the power stage since the start (J), heat of the winding (J), heat of
+            friction (J), and integral of the squared current (A^2 s).
         heat: temperatures and I2t budget of the servo.
     """
 
@@ -208,7 +208,7 @@ _SLOW_US: Final = 20_000  # between two looks at heat and overload
 
 
 class _Demand(Enum):
-    """Kind of demand on the motor."""
+    """Kinds of demand on the motor."""
 
     NOTHING = "nothing"
     CURRENT = "current"
@@ -228,16 +228,17 @@ class Servo(Readings):
     the supply gives and takes any current.
 
     Attributes:
-        supply_v: supply of the power stage.
-        load_nm: external torque at the output shaft; positive drives it forward.
+        supply_v: supply voltage of the power stage.
+        load_nm: external torque at the output shaft. A positive torque drives the shaft forward.
         load_kg_m2: additional inertia at the output shaft.
-        blocked: the shaft is held.
-        encoder_unplugged: the count is frozen, and motion is lost.
-        phase_open: no current can flow.
+        blocked: whether the shaft is held.
+        encoder_unplugged: whether the encoder is unplugged: the count is frozen, and motion is
+            lost.
+        phase_open: whether a phase is open, so that no current can flow.
         ambient_c: temperature of the air.
-        current_limit_a: limit of the drive; the limit of the stage may be lower.
-        counts: position of the motor.
-        current_limited: whether limit or voltage cut the demand in the latest step.
+        current_limit_a: current limit of the drive. The limit of the stage may be lower.
+        counts: position of the motor, in counts.
+        current_limited: whether the limit or the voltage cut the demand in the latest step.
         resting: whether nothing changes without a new demand or input.
         now_us: time of the latest control step.
     """
@@ -269,7 +270,7 @@ class Servo(Readings):
         self._want(_Demand.CURRENT, (current_a, 0.0, 0.0))
 
     def drive_velocity(self, velocity: float, acceleration: float = 0.0) -> None:
-        """Drive at a velocity, counts/s; the acceleration, counts/s^2, is fed forward."""
+        """Drive at a velocity in counts/s; the acceleration in counts/s^2 is fed forward."""
         self._want(_Demand.VELOCITY, (0.0, velocity, acceleration))
 
     def drive_position(
@@ -278,9 +279,9 @@ class Servo(Readings):
         """Drive to a position; velocity and acceleration are fed forward.
 
         Args:
-            position: demanded position now, counts; fractions are accepted.
-            velocity: demanded velocity now, counts/s.
-            acceleration: demanded acceleration in the next millisecond, counts/s^2.
+            position: demanded position now, in counts. Fractions are accepted.
+            velocity: demanded velocity now, in counts/s.
+            acceleration: demanded acceleration in the next millisecond, in counts/s^2.
         """
         self._want(_Demand.POSITION, (position, velocity, acceleration))
 
@@ -309,9 +310,9 @@ class Servo(Readings):
         of the run.
 
         Args:
-            line: the demands, without acceleration, beginning with the present one.
+            line: demands without acceleration, beginning with the present demand.
             most_steps: largest number of steps.
-            bounds: the bounds of the run.
+            bounds: bounds of the run.
         """
         # one loop over locals takes half the time of calls
         plant, loops, heat = self._plant, self._loops, self._heat

@@ -18,8 +18,8 @@ class Immutable:
     Copies within the process share the description. A pickle contains it by value.
 
     Attributes:
-        shared_by_twins: always true; classes of wire/ have this attribute instead of this base
-            class.
+        shared_by_twins: flag that is always true. Classes of wire/ have this attribute instead of
+            this base class.
     """
 
     __slots__ = ()
@@ -44,7 +44,7 @@ class Immutable:
 
 @mypyc_attr(serializable=True)
 class Part:
-    """A part of a machine, copied with it."""
+    """A part of a machine, which is copied with the machine."""
 
     __slots__ = ()
 
@@ -72,7 +72,7 @@ class Copyable:
         raise TypeError(f"{type(self).__name__} cannot be copied by copy.copy: use copy.deepcopy")
 
     def __deepcopy__(self: T, memo: dict[int, Any]) -> T:
-        """Return a twin; twins of one deepcopy share what their originals share."""
+        """Return a twin; twins of one deepcopy share the parts that their originals share."""
         return twin(self, memo)
 
 
@@ -81,14 +81,14 @@ class NonCopyable:
     """An object bound to its process; `copy.copy`, `deepcopy`, `pickle` and `twin` raise.
 
     Attributes:
-        why_not_copied: the reason, for people.
+        why_not_copied: reason as readable text.
     """
 
     __slots__ = ()
     why_not_copied: ClassVar[str] = "the copy would act on the original; make a new one"
 
     def __reduce_ex__(self, protocol: SupportsIndex, /) -> NoReturn:
-        """Raise TypeError; all ways of copying call this."""
+        """Raise TypeError; all ways of copying call this method."""
         name = type(self).__name__
         raise TypeError(f"{name} cannot be copied or pickled: {self.why_not_copied}")
 

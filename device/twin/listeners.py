@@ -19,7 +19,7 @@ class Listeners(list[T]):
 
 
 class Cache(dict[K, T]):
-    """A cache of computed values. A twin starts with an empty one."""
+    """A cache of computed values. A twin starts with an empty cache."""
 
     __slots__ = ()
 

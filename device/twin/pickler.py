@@ -45,15 +45,15 @@ _NOTHING: Final[Mapping[str, object]] = {}
 
 
 def state_of(machine: object, begun: Mapping[str, object] = _NOTHING) -> Any:
-    """Return the initial state of a twin; for `__getstate__`, also of compiled classes.
+    """Return the initial state of a twin; `__getstate__` uses it, also in compiled classes.
 
     Args:
         machine: the machine to copy.
         begun: attributes with fixed values in a twin.
 
     Returns:
-        Its attributes by name. If some are not in its `__dict__`, a pair: the attributes in
-        `__dict__`, and the others.
+        The attributes of the machine by name. If some attributes are not in its `__dict__`, the
+        result is a pair: the attributes in `__dict__`, and the other attributes.
     """
     state: Any
     compiled = getattr(type(machine), "__mypyc_attrs__", None)
@@ -72,7 +72,7 @@ def state_of(machine: object, begun: Mapping[str, object] = _NOTHING) -> Any:
 
 
 def restore(machine: object, state: Any) -> None:
-    """Set the state that `state_of` returned; for `__setstate__`."""
+    """Set the state that `state_of` has returned; `__setstate__` uses this function."""
     attributes, others = state if isinstance(state, tuple) else (state, {})
     for name, value in {**(attributes or {}), **others}.items():
         object.__setattr__(machine, name, value)  # also of what is frozen
@@ -84,8 +84,8 @@ def twin(machine: T, memo: dict[int, Any] | None = None) -> T:
     `Immutable` parts are shared.
 
     Args:
-        machine: the machine to copy, with everything it refers to.
-        memo: the copies by `id`, from an enclosing `copy.deepcopy`.
+        machine: machine to copy, with everything that it refers to.
+        memo: copies by `id`, from an enclosing `copy.deepcopy`.
 
     Raises:
         TypeError: an object in the machine is bound to its process, or is a closure or a lambda.
@@ -139,5 +139,5 @@ class _Unpickler(pickle.Unpickler):
 
 
 def _shared(place: int) -> NoReturn:
-    """Placeholder in a stream for the shared objects, which only the writing process has."""
+    """Raise an error; the shared objects of a stream exist only in the writing process."""
     raise TypeError(f"item {place} of a twin was shared within its process")

@@ -60,7 +60,7 @@ from tickrig.device.twin.copyable import NonCopyable
 # attribute.
 
 _PutBack = Callable[[], object]
-"""Restores one object."""
+"""Function that restores one object."""
 
 _LEFT: Final = (
     *(int, str, bytes, float, complex, type(None), range, slice, type(...)),
@@ -68,16 +68,16 @@ _LEFT: Final = (
     *(operator.attrgetter, operator.itemgetter, operator.methodcaller, property),
     *(weakref.ref, FrameType),
 )
-"""Types that never change, or belong to the process: not restored."""
+"""Types of objects that are not restored, because they never change or belong to the process."""
 
 _NEVER_CHANGES: Final[tuple[type, ...]] = (
     *(tuple, frozenset, MethodType, BuiltinFunctionType, MethodWrapperType, partial),
     *(MappingProxyType, type({}.keys()), type({}.values()), type({}.items())),
 )
-"""Types that never change themselves, but refer to objects that do."""
+"""Types whose objects never change, but refer to objects that may change."""
 
 _LEFT_MODULES: Final = {"_thread", "datetime", "logging"}
-"""Modules whose objects are not restored: locks, times, loggers."""
+"""Modules whose objects (locks, times, loggers) are not restored."""
 
 _HEAP_TYPE: Final = 1 << 9
 """Type flag of a class written in Python."""
@@ -95,7 +95,7 @@ class MachineSnapshot:
     visited. Not restored: classes, modules, functions except their closures, loggers, locks.
 
     Args:
-        machines: devices, wires, rigs, hosts, with everything they refer to.
+        machines: devices, wires, rigs and hosts, with everything that they refer to.
 
     Raises:
         TypeError: an object in a machine cannot be restored, such as a file or a port of this
@@ -113,7 +113,7 @@ class MachineSnapshot:
         self._put_back: tuple[_PutBack, ...] = tuple(_Walk().through(machines))
 
     def restore(self) -> None:
-        """Restore the state; may be called repeatedly.
+        """Restore the state; the method may be called repeatedly.
 
         Raises:
             TypeError: a generator has advanced since the snapshot, which cannot be undone.
@@ -164,7 +164,7 @@ class _Walk:
             yield from self._attributes(item)
 
     def _contents(self, item: Any, owner: str) -> Iterator[_PutBack]:
-        """Yield the restore function of a container; TypeError if it cannot be restored."""
+        """Yield the restore function of a container; raise TypeError if it cannot be restored."""
         if isinstance(item, dict):
             kept = dict(item)
             self._find(item, (*kept, *kept.values()))
@@ -240,7 +240,7 @@ def _forget(item: object, name: str) -> None:
 
 
 def _content_of(cell: CellType) -> object:
-    """Return the content of a cell; the cell itself if it is empty."""
+    """Return the content of a cell, or the cell itself if it is empty."""
     try:
         content: object = cell.cell_contents
     except ValueError:
@@ -249,7 +249,7 @@ def _content_of(cell: CellType) -> object:
 
 
 def _place_of(item: Any) -> int:
-    """Return the position of a generator or coroutine, -2 if it has ended."""
+    """Return the position of a generator or coroutine, or -2 if it has ended."""
     frame = item.gi_frame if isinstance(item, GeneratorType) else item.cr_frame
     return -2 if frame is None else int(frame.f_lasti)
 

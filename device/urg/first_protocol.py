@@ -21,11 +21,11 @@ CONDITION: Final[Mapping[str, str]] = {
     status.LASER_TROUBLE: "Laser trouble.",
     status.MOTOR_TROUBLE: "Motor trouble.",
 }
-"""Texts by status; the texts of faults are our choice."""
+"""Texts by status. The texts of faults are our choice."""
 
 
 def _first_version(serial: str) -> Mapping[str, str]:
-    """Return the answer to V in SCIP 1.1 (HokuyoAIST; a recording in regilo)."""
+    """Return the answer to V in SCIP 1.1 (from HokuyoAIST, and a recording in regilo)."""
     return {
         "VEND": "Hokuyo Automatic Co.,Ltd.",
         "PROD": "SOKUIKI Sensor URG-04LX",
@@ -53,11 +53,12 @@ _BIT_RATES: Final = (19_200, 38_400, 57_600, 115_200, 250_000, 500_000, 750_000)
 
 @dataclass(slots=True)
 class Settings:
-    """Bit rate and sensitivity; the sensitivity is only reported.
+    """Bit rate and sensitivity. The sensitivity is only reported.
 
     Attributes:
-        rate: bit rate of RS-232C in bit/s; on USB the sensor only reports it.
-        sensitive: whether the sensor measures in the sensitive mode; no effect on the emulation.
+        rate: bit rate of RS-232C in bit/s. On USB the sensor only reports this rate.
+        sensitive: whether the sensor measures in the sensitive mode, which has no effect on the
+            emulation.
         first_rate: bit rate after power-up.
     """
 
@@ -104,7 +105,7 @@ _RATE_KEPT: Final = "03"
 
 
 class Sensor(Protocol):
-    """The sensor that the commands act on: the server of SCIP 2.0."""
+    """The sensor that the commands act on, which is the server of SCIP 2.0."""
 
     @property
     def serial(self) -> str:
@@ -127,7 +128,7 @@ class Sensor(Protocol):
         """Switch to SCIP 2.0."""
 
     def measure(self, capture: Capture) -> bytes | None:
-        """Return the answer with the latest scan; empty if it follows later, None if none will."""
+        """Return the answer with the latest scan, or empty if it follows later, or None."""
         ...
 
 
@@ -139,7 +140,7 @@ class Capture(Immutable):
         line: the command as received.
         first: first step to send.
         last: last step to send.
-        cluster: number of steps for each sent number.
+        cluster: number of steps for each number in the answer.
     """
 
     line: bytes
@@ -155,7 +156,7 @@ class Capture(Immutable):
         return encode_reply(self.line, SCIP1_OK, lines)
 
     def refuse(self, code: str) -> bytes:
-        """Return the answer that there will be no scan."""
+        """Return the answer that no scan will follow."""
         return encode_reply(self.line, ERROR)
 
 

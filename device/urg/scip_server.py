@@ -60,11 +60,11 @@ from tickrig.wire.instant import NEVER
 # Reasons to refuse a command (SCIP 2.0, sensor commands and response to invalid commands).
 
 _NOT_A_NUMBER = ("01", "02", "03", "06", "07")
-"""Starting step, end step, cluster count, scan interval, number of scans."""
+"""Statuses for starting step, end step, cluster count, scan interval, number of scans."""
 
 
 def _refusal(command: scip.Command, *, adjusting: bool) -> str:
-    """Return the status for an invalid or untimely command; empty if it is valid."""
+    """Return the status for an invalid or untimely command, or "" if the command is valid."""
     if command.symbol not in scip.SIZES:
         return status.UNKNOWN
     # The semicolon is part of `string`; the 16 letters of SCIP 2.0 follow it.
@@ -81,7 +81,7 @@ def _refusal(command: scip.Command, *, adjusting: bool) -> str:
 
 
 def _flaw(command: scip.Command) -> str:
-    """Return the status that refuses the parameters of MD, MS, GD or GS; empty if valid."""
+    """Return the status that refuses the parameters of MD, MS, GD or GS, or "" if valid."""
     # GD and GS have three fields, MD and MS five; the codes follow the order of the fields.
     for text, code in zip(command.fields, _NOT_A_NUMBER, strict=False):
         if not text.isdecimal():
@@ -99,11 +99,11 @@ _TURN_US_RPM = 60_000_000
 
 @dataclass(slots=True)
 class _Rotation:
-    """The rotation: one scan per turn, without drift.
+    """The rotation of the mirror, with one scan per turn and without drift.
 
     Attributes:
-        speed_rpm: turns per minute.
-        level: parameter of CR, 0..10; each level reduces the speed by 1 %.
+        speed_rpm: number of turns per minute.
+        level: parameter of CR, 0..10. Each level reduces the speed by 1 %.
         began_us: start of the first scan at this speed.
     """
 
@@ -113,7 +113,7 @@ class _Rotation:
 
     @property
     def present_rpm(self) -> int:
-        """Turns per minute at the level."""
+        """Number of turns per minute at the present level."""
         return self.speed_rpm * (100 - self.level) // 100
 
     @property
@@ -142,7 +142,7 @@ class _Rotation:
 # Requested measurements: one scan, or continuous scans.
 
 _WIDEST = {2: 0xFFF, 3: 0x3_FFFF}
-"""Largest distance by number of characters; larger distances read as this."""
+"""Largest distance by number of characters. Larger distances are sent as this value."""
 
 
 @dataclass(slots=True)
@@ -150,9 +150,9 @@ class Stream:
     """A command that measures.
 
     Attributes:
-        command: the command as received; it is valid.
-        begins_us: scans that end before this time do not count for the command.
-        left: number of remaining scans, 0 if endless.
+        command: command as received, which is valid.
+        begins_us: time from which scans count for the command. Scans that end before do not count.
+        left: number of remaining scans, or 0 if endless.
         skipped: number of scans still to be skipped.
     """
 
@@ -163,7 +163,7 @@ class Stream:
 
     @property
     def endless(self) -> bool:
-        """Whether it continues until it is stopped."""
+        """Whether the command continues until it is stopped."""
         return self.command.fields[-1] == "00"
 
     def reply(self, view: View, code: str, echo: bytes) -> bytes:
@@ -223,13 +223,13 @@ class ScipServer(Part):
     Not emulated: DB, the firmware update mode, the statuses 21..49 and 98 of a self-test.
 
     Args:
-        parameters: of the sensor.
+        parameters: parameters of the sensor.
 
     Attributes:
         laser: whether the laser is on.
         settings: bit rate and sensitivity.
         rotation: rotation of the mirror.
-        trouble: status of the fault, empty without a fault.
+        trouble: status of the fault, or empty without a fault.
         served: number of commands that were answered.
         scans: number of measured scans.
         due_us: end of the present scan.
@@ -292,14 +292,14 @@ class ScipServer(Part):
         return scip.Reply(command.echo, code, lines).encode()
 
     def fail(self, code: str) -> bytes:
-        """Stop because of a fault; answer waiting requests with its status."""
+        """Stop because of a fault; answer waiting requests with the status of the fault."""
         self.trouble = code
         waiting = [stream for stream in (self._waiting, self._running) if stream]
         self.stop()
         return b"".join(stream.refuse(code) for stream in waiting)
 
     def end_scan(self, pose: Pose, world: World) -> bytes:
-        """End the present scan; return the answers for it."""
+        """End the present scan; return the answers for the scan."""
         ended_us, period_us = self.due_us, self.rotation.period_us
         self.due_us += period_us
         time_ms = self._timer(ended_us - period_us)
@@ -330,7 +330,7 @@ class ScipServer(Part):
         self._switched = True
 
     def measure(self, capture: Stream | Capture) -> bytes | None:
-        """Return the answer with the latest scan; empty if it follows later, None if none will."""
+        """Return the answer with the latest scan, or empty if it follows later, or None."""
         if not self.laser or self._waiting is not None:
             return None
         if self._latest is not None:

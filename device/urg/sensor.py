@@ -58,9 +58,9 @@ _TICK_US: Final = 1_000
 class Urg(Copyable):
     """A URG-04LX on USB or RS-232C; a `UartDevice`.
 
-    In each tick it processes physical inputs, the end of a scan, and commands, in this order. A
-    scan is taken from the pose of the sensor at the end of the scan. Its time stamp is the time at
-    its start.
+    In each tick the sensor processes physical inputs, the end of a scan, and commands, in this
+    order. A scan is taken from the pose of the sensor at the end of the scan. Its time stamp is the
+    time at its start.
 
     On RS-232C the reply to SS still has the old bit rate; everything after the reply has the new
     one. RS and a power cut restore the first bit rate.
@@ -69,13 +69,13 @@ class Urg(Copyable):
     missing parts of the protocol.
 
     Args:
-        parameters: of the sensor.
-        world: its surroundings.
+        parameters: parameters of the sensor.
+        world: surroundings of the sensor.
 
     Attributes:
-        type_name: name of its device type, for traces.
-        inputs: its physical inputs, see `INPUTS`.
-        world: its surroundings; changes apply from the next scan.
+        type_name: name of the device type, for traces.
+        inputs: physical inputs; see `INPUTS`.
+        world: surroundings of the sensor. Changes apply from the next scan.
     """
 
     type_name: ClassVar[str] = "urg"
@@ -89,7 +89,7 @@ class Urg(Copyable):
 
     @property
     def tick_us(self) -> int:
-        """Resolution of its time."""
+        """Resolution of the sensor's time."""
         return _TICK_US
 
     @property
@@ -101,7 +101,7 @@ class Urg(Copyable):
 
     @property
     def uart(self) -> UartSetting | None:
-        """The setting of its RS-232C line; None on USB."""
+        """The setting of the RS-232C line, or None on USB."""
         if self.parameters.rs232_baud is None:
             return None
         return UartSetting(self._server.settings.rate)
@@ -118,13 +118,13 @@ class Urg(Copyable):
 
     @property
     def surroundings(self) -> World:
-        """The world, with the person in it."""
+        """The world with the person in it."""
         x_m, y_m, radius_m = (self.inputs[name] for name in _GROUPS["post"])
         return self.world.with_posts(Post(x_m, y_m, radius_m)) if radius_m else self.world
 
     @property
     def _switches(self) -> tuple[float, ...]:
-        """The inputs that act at once; poses are read when a scan ends."""
+        """Return the inputs that act at once; poses are read when a scan ends."""
         inputs = self.inputs
         return inputs["power_cut"], inputs["laser_broken"], inputs["motor_jammed"]
 
@@ -136,10 +136,10 @@ class Urg(Copyable):
         """Return an output as the latest tick left it.
 
         Args:
-            name: one of `outputs`.
+            name: name of an output in `outputs`.
 
         Returns:
-            Its value.
+            The value of the output.
 
         Raises:
             KeyError: there is no output of that name.
@@ -147,14 +147,14 @@ class Urg(Copyable):
         return _READ[name](self)
 
     def tick(self, now_us: int, rx: bytes, /) -> bytes:
-        """Receive the bytes that arrived, and advance to now.
+        """Receive the bytes that have arrived, and advance to now.
 
         Args:
             now_us: time since the rig was started, a multiple of `tick_us`.
-            rx: the bytes that arrived since the latest tick.
+            rx: bytes that have arrived since the latest tick.
 
         Returns:
-            The bytes that it sends in this tick.
+            The bytes that the sensor sends in this tick.
         """
         if self._restarted:
             self._power_up(now_us)

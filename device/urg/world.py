@@ -25,7 +25,7 @@ LAST_STEP: Final = 768
 """The highest step in a request (SCIP 2.0, measurement direction and points)."""
 
 BIT_RATE: Final = 19_200
-"""Of RS-232C after power-up; on USB it means nothing."""
+"""Bit rate of RS-232C after power-up, which has no meaning on USB."""
 
 
 _PROTOCOLS: Final = ("1.1", "2.0")
@@ -37,15 +37,15 @@ class UrgParameters(Immutable):
     """Parameters of a sensor.
 
     Attributes:
-        serial: its serial number, letters and digits.
+        serial: serial number of letters and digits.
         noise: share of the accuracy (10 mm below 1 m, 1 % above), 0..1.
         seed: seed of the noise.
-        scip: the protocol after power-up: 1.1 as in the URG-04LX, whose laser is then on; 2.0 as in
+        scip: protocol after power-up: 1.1 as in the URG-04LX, whose laser is then on, or 2.0 as in
             sensors such as the URG-04LX-UG01, whose laser is then off.
-        rs232_baud: bit rate of its RS-232C line after power-up, in bit/s; None on USB.
+        rs232_baud: bit rate of the RS-232C line after power-up, in bit/s, or None on USB.
 
     Raises:
-        ValueError: a value out of range.
+        ValueError: a value is out of range.
     """
 
     serial: str = "H0614967"
@@ -87,13 +87,13 @@ class Wall(Immutable):
     y2_m: float
 
     def __post_init__(self) -> None:
-        """Raise ValueError if it is not a wall."""
+        """Raise ValueError if the numbers are not a wall."""
         ends = (self.x1_m, self.y1_m, self.x2_m, self.y2_m)
         if not all(map(isfinite, ends)) or ends[:2] == ends[2:]:
             raise ValueError(f"a wall has two places that are not the same, got {ends}")
 
     def distances_m(self, x_m: float, y_m: float, rays: _Rays) -> list[float]:
-        """Return the distance along each ray to the wall, infinity if it does not meet the wall."""
+        """Return the distance along each ray to the wall, or infinity if it misses the wall."""
         wall_x, wall_y = self.x2_m - self.x1_m, self.y2_m - self.y1_m
         off_x, off_y = self.x1_m - x_m, self.y1_m - y_m
         area = off_x * wall_y - off_y * wall_x
@@ -109,20 +109,20 @@ class Wall(Immutable):
 
 @dataclass(frozen=True, slots=True)
 class Post(Immutable):
-    """A round post; a radius of 0 means no post."""
+    """A round post. A radius of 0 means no post."""
 
     x_m: float
     y_m: float
     radius_m: float
 
     def __post_init__(self) -> None:
-        """Raise ValueError if it is not a post."""
+        """Raise ValueError if the numbers are not a post."""
         numbers = (self.x_m, self.y_m, self.radius_m)
         if not all(map(isfinite, numbers)) or self.radius_m < 0:
             raise ValueError(f"a post has a place and a radius of 0 or more, got {numbers}")
 
     def distances_m(self, x_m: float, y_m: float, rays: _Rays) -> list[float]:
-        """Return the distance along each ray to the post, infinity if it does not meet the post."""
+        """Return the distance along each ray to the post, or infinity if it misses the post."""
         # d = (off . ray) is the distance along the ray to the point nearest to the axis. (off x
         # ray) is the distance of this point from the axis.
         off_x, off_y, most = self.x_m - x_m, self.y_m - y_m, self.radius_m**2
@@ -162,14 +162,14 @@ class World(Immutable):
         return World(self.walls, (*self.posts, *posts))
 
     def clearance_m(self, x_m: float, y_m: float) -> float:
-        """Return the distance from a position to the nearest object, infinity in an empty world."""
+        """Return the distance to the nearest object, or infinity in an empty world."""
         posts = (hypot(p.x_m - x_m, p.y_m - y_m) - p.radius_m for p in self.posts if p.radius_m)
         walls = (_off_wall_m(wall, x_m, y_m) for wall in self.walls)
         return min((*posts, *walls), default=inf)
 
 
 def room(width_m: float, depth_m: float) -> World:
-    """Return four walls around the origin; ValueError if a size is not above 0."""
+    """Return four walls around the origin; raise ValueError if a size is not above 0."""
     if not (width_m > 0 and depth_m > 0):
         raise ValueError(f"a room has a width and a depth above 0, got {width_m}, {depth_m}")
     x_m, y_m = width_m / 2, depth_m / 2
@@ -197,21 +197,21 @@ def _off_wall_m(wall: Wall, x_m: float, y_m: float) -> float:
 # beams certainly meet it and which may meet it; both are computed as in `World.distances_m`.
 
 _BLUR: Final = 1e-6
-"""Distance, relative to its size, below which an object is computed for all beams."""
+"""Distance, relative to the size of an object, below which it is computed for all beams."""
 
 _Span = tuple[int, int]
-"""The first beam and the one after the last."""
+"""The first beam, and the beam after the last."""
 
 
 class Beams(Part):
     """Beams from a position, evenly spaced to the left.
 
     Args:
-        x_m: position of the sensor.
-        y_m: position of the sensor.
-        rays: directions of the beams, each `tau / turn` after the previous one.
-        first_rad: direction of the first beam; within 2e6.
-        turn: number of beams in a full turn; `rays` has at most this number.
+        x_m: position of the sensor in x.
+        y_m: position of the sensor in y.
+        rays: directions of the beams. Each direction is `tau / turn` after the previous one.
+        first_rad: direction of the first beam, within 2e6.
+        turn: number of beams in a full turn. `rays` has at most this number.
     """
 
     def __init__(self, x_m: float, y_m: float, rays: _Rays, first_rad: float, turn: int) -> None:
@@ -220,7 +220,7 @@ class Beams(Part):
         self._ways_m = [inf] * len(self._rays)
 
     def cast_m(self, world: World) -> list[float]:
-        """Return the distance along each beam to the first object, infinity if it meets none."""
+        """Return the distance along each beam to the first object, or infinity if there is none."""
         self._ways_m = [inf] * len(self._rays)
         for wall in world.walls:
             self._meet_wall(wall)
@@ -273,7 +273,7 @@ class Beams(Part):
         return first, first + width_rad / tau * self._turn
 
     def _here(self, span: _Span) -> Iterator[_Span]:
-        """Yield the parts of a span within our beams; the span may be counted in any turn."""
+        """Yield the parts of a span within the beams; the span may be counted in any turn."""
         # A span is counted from the first beam, modulo a turn. It may begin before the first of our
         # beams or end after the last one.
         for turns in (-self._turn, 0, self._turn):
@@ -312,7 +312,7 @@ class _NoDistance(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class View(Immutable):
-    """A scan; rays are cast when their distances are requested.
+    """A scan, whose rays are cast when their distances are requested.
 
     Not emulated: motion of the sensor during a scan; angle of incidence, colour and gloss of
     objects; beams wider than a line.
@@ -399,12 +399,12 @@ def _off_rad(kind: Specification, steps: range) -> tuple[float, ...]:
 
 @lru_cache(maxsize=8)  # a robot that stands or goes straight: a third of the time of a scan
 def _rays(kind: Specification, steps: range, heading_rad: float) -> tuple[_Rays, float]:
-    """Return the directions of the beams of steps, and the angle of the first."""
+    """Return the directions of the beams of steps, and the angle of the first beam."""
     angles_rad = [heading_rad + off_rad for off_rad in _off_rad(kind, steps)]
     return rays_of(angles_rad), angles_rad[0] if angles_rad else 0.0
 
 
 def _least_of_each(ways_m: Sequence[float], cluster: int) -> list[float]:
-    """Return the least of each whole cluster."""
+    """Return the least number of each whole cluster."""
     end = len(ways_m) - len(ways_m) % cluster
     return list(map(min, *(ways_m[at:end:cluster] for at in range(cluster))))

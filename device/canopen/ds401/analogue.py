@@ -29,13 +29,13 @@ class Converter(Immutable):
         unit: unit of the quantity, for display.
         low: smallest quantity.
         high: largest quantity.
-        high_raw: converter steps at the quantity `high`.
-        low_raw: converter steps at the quantity `low`.
+        high_raw: number of converter steps at the quantity `high`.
+        low_raw: number of converter steps at the quantity `low`.
         shift: number of bits by which the counts are left-shifted in the object (CiA 401).
         width: number of bits of the object that contains the counts.
 
     Raises:
-        ValueError: an empty range, or counts that the object cannot hold.
+        ValueError: the range is empty, or the object cannot hold the counts.
     """
 
     suffix: str
@@ -66,7 +66,7 @@ class Converter(Immutable):
         return floor(self.low_raw + part * (self.high_raw - self.low_raw) + 0.5) << self.shift
 
     def quantity(self, counts: int) -> float:
-        """Return the quantity of these counts, limited to the range."""
+        """Return the quantity for counts, limited to the range."""
         part = ((counts >> self.shift) - self.low_raw) / (self.high_raw - self.low_raw)
         return self.low + min(max(part, 0.0), 1.0) * (self.high - self.low)
 
@@ -77,13 +77,13 @@ _REAL32_MAX: Final = (2 - 2.0**-23) * 2.0**127
 
 
 def _quantity(entry: Entry | None, default: float = 0) -> float:
-    """Return the number in an object; the default if the object or its number is missing."""
+    """Return the number in an object, or the default if the object or its number is missing."""
     value = default if entry is None else entry.value
     return value if isinstance(value, int | float) else default
 
 
 def _factor(entry: Entry | None) -> float:
-    """Return a scaling; 0 counts as 1, because many EDS files leave it so."""
+    """Return a scaling; 0 counts as 1, because many EDS files have a 0."""
     return _quantity(entry, 1) or 1
 
 
@@ -97,7 +97,7 @@ def _limited(value: float, limits: tuple[int, int]) -> int:
 
 
 def _show(entry: Entry, value: float) -> None:
-    """Put a number into an object, limited to what its data type holds."""
+    """Put a number into an object, limited to the range of its data type."""
     if entry.data_type.is_integer:
         entry.value = _limited(value, entry.data_type.limits)
     else:
@@ -105,7 +105,7 @@ def _show(entry: Entry, value: float) -> None:
 
 
 class _AnalogueChannel(Part):
-    """One channel: its objects, its converter, its scaling.
+    """A channel with its objects, its converter and its scaling.
 
     The widest integer object contains the counts; narrower objects contain their upper bits. A
     REAL32 object contains the physical quantity if the channel has a converter. Without a
@@ -113,15 +113,15 @@ class _AnalogueChannel(Part):
     Scaled value = value x scaling + offset.
 
     Args:
-        prefix: `ai` or `ao`.
-        number: 1..254.
+        prefix: prefix of the name: `ai` or `ao`.
+        number: number of the channel, 1..254.
         converter: None for plain counts.
 
     Attributes:
         name: name of the physical input or output.
-        integers: integer objects, the narrowest first.
-        real: the REAL32 object, None if there is none.
-        converter: see above.
+        integers: integer objects, sorted by width with the narrowest first.
+        real: REAL32 object, or None if there is none.
+        converter: converter of the channel, as given.
     """
 
     def __init__(
@@ -183,7 +183,7 @@ class _AnalogueChannel(Part):
 class _EventRule(Part):
     """The limits and deltas of one channel, as integers or as REAL32.
 
-    Each bit of the interrupt trigger selection (6421h) is an event of its own:
+    Each bit of the interrupt trigger selection (6421h) enables a separate event:
 
     | bit | event                                                                  |
     |-----|------------------------------------------------------------------------|
@@ -199,8 +199,8 @@ class _EventRule(Part):
     Args:
         dictionary: the objects of the device.
         number: number of the channel.
-        index: index of the upper limit; the other four objects follow it.
-        entry: the value to check.
+        index: index of the upper limit. The other four objects follow it.
+        entry: entry with the value to check.
 
     Attributes:
         there: whether the device has one of the five objects for the channel.
@@ -218,7 +218,7 @@ class _EventRule(Part):
         self._sent = self._seen = _quantity(self._entry)
 
     def sent(self) -> None:
-        """Note that the value is on the bus."""
+        """Record that the value is on the bus."""
         self._sent = _quantity(self._entry)
 
     def judge(self, trigger: int) -> bool:
@@ -278,9 +278,9 @@ class AnalogueInput(Part):
     event.
 
     Attributes:
-        number: 1..254.
-        channel: its objects.
-        entries: the entries that contain its value.
+        number: number of the channel, 1..254.
+        channel: objects and scaling of the channel.
+        entries: entries that contain the value of the channel.
     """
 
     def __init__(self, dictionary: Dictionary, number: int, converter: Converter | None) -> None:
@@ -337,7 +337,7 @@ class AnalogueInput(Part):
             rule.begin()
 
     def sent(self) -> None:
-        """Note that the present value is on the bus."""
+        """Record that the present value is on the bus."""
         for rule in self._rules:
             rule.sent()
 
@@ -387,13 +387,13 @@ class AnalogueOutput(Part):
     """Drives one output channel.
 
     Integer error values are right-aligned: they are in the unit of the object and limited to its
-    range. If several objects contain the value of the channel, the one that changed last is used;
-    the others keep their values. A NaN or infinity leaves the output unchanged.
+    range. If several objects contain the value of the channel, the object that changed last is
+    used. The other objects keep their values. A NaN or infinity leaves the output unchanged.
 
     Attributes:
-        number: 1..254.
-        channel: its objects.
-        level: the physical value.
+        number: number of the channel, 1..254.
+        channel: objects and scaling of the channel.
+        level: physical value of the output.
         failed: whether the error value is output instead of the written value.
     """
 

@@ -32,7 +32,7 @@ class _View(NamedTuple):
 
     Attributes:
         entry: the element.
-        lines: its lines, as a mask among all lines.
+        lines: lines of the element, as a mask among all lines.
         shift: number of lines before the first line of the element.
     """
 
@@ -41,11 +41,11 @@ class _View(NamedTuple):
     shift: int
 
     def into(self, bits: int) -> int:
-        """Return the bits with those of the element replaced."""
+        """Return the bits of all lines, with the bits of the element replaced."""
         return bits & ~self.lines | self.entry.number << self.shift & self.lines
 
     def out_of(self, bits: int) -> bytes:
-        """Return the value of the element for these bits."""
+        """Return the value of the element for the bits of all lines."""
         return ((bits & self.lines) >> self.shift).to_bytes(self.entry.size, "little")
 
 
@@ -58,11 +58,11 @@ class _Bits(Part):
     Args:
         dictionary: the objects of the device.
         family: the indices of the objects in the family.
-        default: 0 or -1, for lines without an object.
+        default: value 0 or -1 for lines without an object.
 
     Attributes:
-        value: the bits.
-        changed: called with an element that the bus has changed.
+        value: bits of all lines.
+        changed: function that is called with an element that the bus has changed.
     """
 
     def __init__(self, dictionary: Dictionary, family: DigitalObjects, default: int = 0) -> None:
@@ -87,7 +87,7 @@ class _Bits(Part):
             view.entry.assign(view.out_of(value))
 
     def entries(self, lines: int) -> list[Entry]:
-        """Return the elements that contain one of these lines."""
+        """Return the elements that contain one of the given lines."""
         return [view.entry for view in self.views if view.lines & lines]
 
     def _follow(self, entry: Entry) -> None:
@@ -124,7 +124,7 @@ class DigitalInputs(Part):
     """All digital inputs of a module; line 1 is the lowest bit.
 
     Attributes:
-        value: what the bus reads.
+        value: bits that the bus reads.
         lines: number of lines.
     """
 
@@ -166,7 +166,7 @@ class DigitalInputs(Part):
         return self.value.entries(events)
 
     def _pass(self, level: int, now_us: int) -> None:
-        """Accept unfiltered lines at once, and filtered ones when they have been stable."""
+        """Accept unfiltered lines at once, and filtered lines when they have been stable."""
         changed, self._level = level ^ self._level, level
         differing = level ^ self._passed
         for line in _ones(changed & differing):
@@ -192,9 +192,9 @@ class DigitalOutputs(Part):
     A line whose bit in the filter mask is 0 keeps its level.
 
     Attributes:
-        value: what the bus writes.
+        value: bits that the bus writes.
         lines: number of lines.
-        level: the physical lines.
+        level: levels of the physical lines.
     """
 
     def __init__(self, dictionary: Dictionary) -> None:

@@ -47,19 +47,19 @@ ANALOGUE_INTERRUPT_ENABLE: Final = 0x6423
 INTERRUPT_TRIGGER: Final = 0x6421
 INTERRUPT_SOURCE: Final = 0x6422
 DEFAULT_TRIGGER: Final = 7
-"""Limits and delta (6421h)."""
+"""Default of 6421h: limits and delta."""
 
 
 class AnalogueObjects(NamedTuple):
     """The indices of analogue channels of one direction.
 
     Attributes:
-        integers: values of 8, 16 and 32 bit.
-        real: value as REAL32.
-        real_offset: added to the value as REAL32.
-        real_scaling: factor before the offset is added.
-        integer_offset: added to an integer value.
-        integer_scaling: factor before the offset is added.
+        integers: indices of the values of 8, 16 and 32 bit.
+        real: index of the value as REAL32.
+        real_offset: index of the number that is added to the value as REAL32.
+        real_scaling: index of the factor of the value as REAL32, which applies before the offset.
+        integer_offset: index of the number that is added to an integer value.
+        integer_scaling: index of the factor of an integer value, which applies before the offset.
     """
 
     integers: tuple[int, int, int]
@@ -77,7 +77,7 @@ ANALOGUE_OUTPUT: Final = AnalogueObjects(
     (0x6410, 0x6411, 0x6412), 0x6413, 0x6441, 0x6442, 0x6446, 0x6447
 )
 INTEGER_LIMITS: Final = 0x6424
-"""Upper limit; after it lower limit, delta, negative delta, positive delta."""
+"""Index of the upper limit. The lower limit, delta, negative delta and positive delta follow it."""
 REAL_LIMITS: Final = 0x6429
 """The limits and deltas as REAL32 objects."""
 ANALOGUE_ERROR_MODE: Final = 0x6443
@@ -115,7 +115,7 @@ def elements(dictionary: Dictionary, index: int) -> Iterator[tuple[int, Entry]]:
 
 
 def find_number(dictionary: Dictionary, index: int, sub: int) -> Entry | None:
-    """Return an entry that is a number, None if there is none."""
+    """Return an entry that is a number, or None if there is none."""
     entry = dictionary.find(index, sub)
     return entry if entry is not None and _is_number(entry) else None
 

@@ -62,7 +62,7 @@ from tickrig.wire.canopen.nmt import NmtState
 # Faults that a module detects in itself and reports.
 
 _NO_BEHAVIOUR: Final = 0
-"""1029h does not apply."""
+"""Sub-index for faults to which 1029h does not apply."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +72,7 @@ class _DeviceFault(Immutable):
     Attributes:
         name: name of the physical input.
         text: description for display.
-        code: emergency error code.
+        code: emergency error code of the fault.
         register: bits of the error register.
         behaviour: sub-index of 1029h that determines the NMT state.
         stops_outputs: whether outputs go to their error values.
@@ -118,14 +118,14 @@ _INTERNAL_FAILURE: Final = _DeviceFault(
 
 
 class _FaultDetector(Part):
-    """Detects faults and their end: sends EMCY, and applies 1029h.
+    """Detects faults and the end of faults, sends EMCY, and applies 1029h.
 
     Args:
         node: the slave that reports the faults.
         faults: the faults that the module can have.
 
     Attributes:
-        faults: see above.
+        faults: faults that the module can have, as given.
     """
 
     def __init__(self, node: CanopenSlave, faults: Sequence[_DeviceFault]) -> None:
@@ -145,7 +145,7 @@ class _FaultDetector(Part):
         """Report new faults and faults that have ended.
 
         Returns:
-            Whether a new fault stops the outputs.
+            True if a new fault stops the outputs.
         """
         before = self._present
         self._present = [fault for fault in self.faults if inputs[fault.name]]
@@ -185,7 +185,7 @@ def _digital_input_names(lines: int) -> tuple[str, ...]:
 
 
 def digital_inputs(names: Sequence[str]) -> Iterator[InputSignal]:
-    """Yield the digital inputs; 1 is high."""
+    """Yield the digital inputs, for which 1 is high."""
     for line, name in enumerate(names, 1):
         yield InputSignal(name, f"digital input {line}")
 
@@ -231,13 +231,13 @@ class Ds401(Application):
 
     Args:
         node: the slave.
-        slot: its place in the order of a tick.
+        slot: place of the application in the order of a tick.
         inputs: converters of the analogue inputs, starting with the first input. Inputs without a
             converter use plain counts.
         outputs: converters of the analogue outputs, in the same way.
 
     Attributes:
-        analogue_inputs: its analogue inputs.
+        analogue_inputs: analogue inputs of the module.
     """
 
     def __init__(
@@ -300,10 +300,10 @@ class Ds401(Application):
         """Return an output as the latest tick left it.
 
         Args:
-            name: one of `outputs`.
+            name: name of an output in `outputs`.
 
         Returns:
-            Its value.
+            The value of the output.
 
         Raises:
             KeyError: there is no output of that name.

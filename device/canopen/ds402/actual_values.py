@@ -74,12 +74,12 @@ MEASURES: Final[Mapping[int, Measure]] = {
 class ActualValues(Part):
     """The actual values of the objects that the device has, as the latest tick left them.
 
-    An object is computed when it is read; objects with watchers are computed in each tick. A bus
-    reads two of thirteen objects every 10 ms. (This allows 1.5 times as many drives.)
+    An object is computed when it is read. Objects with watchers are computed in each tick. A bus
+    reads only two of thirteen objects every 10 ms, so 1.5 times as many drives are possible.
 
     Args:
-        drive: the drive; its `measures` compute the values.
-        dictionary: contains the objects.
+        drive: drive whose `measures` compute the values.
+        dictionary: dictionary that contains the objects.
 
     Attributes:
         watched: objects with watchers, which are called on each change.
@@ -94,7 +94,7 @@ class ActualValues(Part):
         self._kept, self.watched = True, False
 
     def keep(self) -> None:
-        """Write all values before something changes; they stay valid until the end of the tick."""
+        """Write all values before a change; the values stay valid until the end of the tick."""
         if not self._kept:
             for entry in self._entries:
                 entry.assign(self._encoded(entry))

@@ -17,7 +17,7 @@ from tickrig.wire.canopen.drive import DriveState
 
 
 class Command(Enum):
-    """Commands of a controlword; switch on also means disable operation."""
+    """Commands of a controlword. The command "switch on" also means "disable operation"."""
 
     SHUTDOWN = auto()
     SWITCH_ON = auto()
@@ -58,7 +58,7 @@ NEXT_STATE: Final = {
     (_QUICK_STOP, Command.DISABLE_VOLTAGE): _SOD,  # 12
     (_QUICK_STOP, Command.ENABLE_OPERATION): _ENABLED,  # 16, if 605Ah lets it stay
 }
-"""The drive, a fault or the reset of a fault makes transitions 0, 1, 13, 14 and 15."""
+"""Next state by state and command; the drive or a fault makes transitions 0, 1 and 13 to 15."""
 
 _POWERED: Final = (_ENABLED, _QUICK_STOP, DriveState.FAULT_REACTION_ACTIVE)
 """States in which the motor may have torque."""
@@ -71,7 +71,7 @@ _RAMPS: Final = {
 
 
 def command_of(controlword: int) -> Command | None:
-    """Return the command of a controlword, None if there is none.
+    """Return the command of a controlword, or None if there is none.
 
     >>> command_of(0x0006), command_of(0x0080)
     (<Command.SHUTDOWN: 1>, None)
@@ -86,8 +86,8 @@ class Automaton(Part):
     """Brakes before transitions 5 and 8 if their option codes require it.
 
     Args:
-        stopping: brakes according to the option codes.
-        begin_mode: begins the chosen mode of operation.
+        stopping: object that brakes according to the option codes.
+        begin_mode: function that begins the chosen mode of operation.
 
     Attributes:
         state: the present state.
@@ -144,7 +144,7 @@ class Automaton(Part):
         """Run one control period in the present state.
 
         Args:
-            operate: runs one control period of the mode of operation.
+            operate: function that runs one control period of the mode of operation.
             now_us: the time.
 
         Returns:
@@ -194,7 +194,7 @@ class Automaton(Part):
 # Supervision of a drive: its supply, its motor and the following error.
 
 _OPEN_PHASE_SHARE: Final = 0.05
-"""Below this share of the current limit no current flows."""
+"""Share of the current limit below which no current counts as flowing."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -202,11 +202,11 @@ class Bounds(Immutable):
     """Limits within which a drive reports no fault.
 
     Attributes:
-        supply_mv: lowest and highest supply.
+        supply_mv: lowest and highest supply voltage, in mV.
         winding_dc: highest temperature of the winding, in 0.1 degC.
         winding_warning_dc: temperature of the winding from which the drive warns, in
             0.1 degC.
-        stall_us: how long the motor may stand at a limit although motion is demanded.
+        stall_us: time for which the motor may stand at a limit although motion is demanded, in us.
     """
 
     supply_mv: tuple[int, int] = (9_000, 36_000)
@@ -242,7 +242,7 @@ class Supervision(Part):
         return self._axis.motor.winding_dc >= self.bounds.winding_warning_dc
 
     def present(self, *, powered: bool) -> list[ErrorCode]:
-        """Return the faults whose cause is present; a short circuit needs power to be seen."""
+        """Return the faults whose cause is present; a short circuit is detected only with power."""
         motor, bounds = self._axis.motor, self.bounds
         supply_mv, (lowest_mv, highest_mv) = motor.supply_mv, bounds.supply_mv
         found = [code for code in self.wired if powered or code is not ErrorCode.OVER_CURRENT]

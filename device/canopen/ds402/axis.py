@@ -33,10 +33,10 @@ class Reference(Part):
     starts.
 
     Attributes:
-        position: counts of the motor's encoder.
-        velocity: counts per second.
-        acceleration: counts per second per second, for the feed-forward.
-        current_a: amperes.
+        position: position in counts of the motor's encoder.
+        velocity: velocity in counts per second.
+        acceleration: acceleration in counts per second per second, for the feed-forward.
+        current_a: current in amperes.
     """
 
     __slots__ = ("acceleration", "current_a", "position", "velocity")
@@ -48,9 +48,9 @@ class Reference(Part):
         """Make a step towards a velocity; return whether it is reached.
 
         Args:
-            velocity: counts per second.
-            acceleration: acceleration of a step away from zero, positive.
-            deceleration: acceleration of a step towards zero, positive.
+            velocity: target velocity in counts per second.
+            acceleration: acceleration of a step away from zero, as a positive number.
+            deceleration: acceleration of a step towards zero, as a positive number.
         """
         before = self.velocity
         braking = abs(velocity) < abs(before) or velocity * before < 0
@@ -80,7 +80,7 @@ class Motor(Protocol):
     """A motor with power stage, encoder and control loops; see `device.servo.servo.Servo`.
 
     Attributes:
-        current_limit_a: the current that the drive allows.
+        current_limit_a: current that the drive allows.
     """
 
     current_limit_a: float
@@ -129,15 +129,15 @@ class Motor(Protocol):
         """Switch the power stage off."""
 
     def drive_current(self, current_a: float) -> None:
-        """Drive this current."""
+        """Drive a current."""
 
     def drive_velocity(self, velocity: float, acceleration: float = 0.0) -> None:
-        """Drive at this velocity, in counts per second."""
+        """Drive at a velocity, in counts per second."""
 
     def drive_position(
         self, position: float, velocity: float = 0.0, acceleration: float = 0.0
     ) -> None:
-        """Drive to this position, in counts."""
+        """Drive to a position, in counts."""
 
     def step_to(self, now_us: int) -> None:
         """Advance the time."""
@@ -149,8 +149,8 @@ _COUNTS_S2_PER_A: Final = 1_000.0
 class IdealMotor(Part):
     """A motor that reaches each demanded position and velocity at once.
 
-    When the motor is released, it stops at once. A current accelerates it like a mass without
-    friction: 1 A gives 1000 counts per second per second.
+    When the motor is released, it stops at once. A current accelerates the motor like a mass
+    without friction: 1 A gives 1000 counts per second per second.
 
     Not emulated: load, temperature, limits of current and voltage.
     """
@@ -193,7 +193,7 @@ class IdealMotor(Part):
 
     @property
     def resting(self) -> bool:
-        """Whether it stands and no current accelerates it."""
+        """Whether the motor stands and no current accelerates it."""
         return self._velocity == 0 and self._current_a == 0
 
     def release(self) -> None:
@@ -205,13 +205,13 @@ class IdealMotor(Part):
         self._current_a, self._moves_by_itself = current_a, True
 
     def drive_velocity(self, velocity: float, acceleration: float = 0.0) -> None:
-        """Turn at this velocity."""
+        """Turn at a velocity."""
         self._velocity, self._current_a, self._moves_by_itself = velocity, 0.0, True
 
     def drive_position(
         self, position: float, velocity: float = 0.0, acceleration: float = 0.0
     ) -> None:
-        """Move to this position."""
+        """Move to a position."""
         self._position, self._velocity, self._current_a = position, velocity, 0.0
         self._moves_by_itself = False
 
@@ -227,7 +227,8 @@ class IdealMotor(Part):
 # The moved axis: its motor, its zero and its range.
 
 _STANDSTILL_TURNS_S: Final = 0.5
-"""Below this speed the motor counts as standing: the encoder cannot resolve less in a tick."""
+"""Speed below which the motor counts as standing, because the encoder cannot resolve it in a
+tick."""
 
 
 class Axis(Part):
@@ -238,9 +239,9 @@ class Axis(Part):
     Attributes:
         motor: the motor.
         reference: the demanded motion, in counts.
-        control: the control loop used in this tick.
+        control: control loop used in this tick.
         settings: the present configuration.
-        zero: counts of the encoder at position 0 of the user.
+        zero: number of encoder counts at position 0 of the user.
         homed: whether a homing has set `zero`.
         standstill: velocity up to which the motor counts as standing, in counts per second.
     """
@@ -269,13 +270,13 @@ class Axis(Part):
 
     @property
     def ends(self) -> tuple[float, float]:
-        """Software limits in counts, the lower one first; infinite without limits."""
+        """Software limits in counts, lower limit first; a missing limit is infinite."""
         low, high = self.settings.software_limits
         return low + self.zero, high + self.zero
 
     @property
     def following_error(self) -> float:
-        """Counts from the motor to the reference."""
+        """Number of counts from the motor to the reference."""
         return self.reference.position - self.motor.counts
 
     @property
@@ -291,13 +292,13 @@ class Axis(Part):
         return abs(velocity) > self.standstill
 
     def position_of(self, counts: float) -> int:
-        """Return the position of the user at these counts."""
+        """Return the position of the user at encoder counts."""
         low, high = self.settings.position_range
         position = round((counts - self.zero) / self.settings.units.per_position)
         return (position - low) % (high - low + 1) + low
 
     def counts_of(self, position: int) -> float:
-        """Return the counts at a position of the user."""
+        """Return the encoder counts at a position of the user."""
         return self.zero + position * self.settings.units.per_position
 
     def counts_near(self, position: int) -> float:
@@ -366,7 +367,7 @@ class Ramp(IntEnum):
 
 
 _STAYING: Final = 4
-"""Added to a quick stop option: the drive stays in Quick stop active."""
+"""Number that is added to a quick stop option if the drive stays in Quick stop active."""
 
 
 class Stopping(Part):
@@ -416,7 +417,7 @@ class Stopping(Part):
 # Limit switches and home switch of an axis (CiA 402-2, 60FDh).
 
 FAR_DEG: Final = 1e9
-"""An angle that no shaft reaches."""
+"""Angle that no shaft reaches, in degrees."""
 
 _NEGATIVE_LIMIT: Final = 0x01
 _POSITIVE_LIMIT: Final = 0x02
@@ -447,7 +448,7 @@ class Switches(Part):
     Negative and positive are the directions of the user, that is with the polarity 607Eh applied.
 
     Attributes:
-        word: bits 0 to 2 of 60FDh.
+        word: value of bits 0 to 2 of 60FDh.
         by_angle: whether the shaft can press at least one of the switches.
     """
 
@@ -508,14 +509,14 @@ class Limits(Part):
 
     Args:
         axis: the axis with the settings.
-        switches: its limit switches.
+        switches: limit switches of the axis.
     """
 
     def __init__(self, axis: Axis, switches: Switches) -> None:
         self._axis, self._switches = axis, switches
 
     def velocity(self, wanted: float) -> Clamped:
-        """Clamp a velocity, in counts per second, to the largest one."""
+        """Clamp a velocity, in counts per second, to the largest velocity."""
         most = self._axis.settings.max_velocity
         return _clamp(wanted, -most, most)
 
@@ -532,7 +533,7 @@ class Limits(Part):
         return _clamp(wanted_a, -min(backward, most), min(forward, most))
 
     def reached(self) -> ErrorCode | None:
-        """Return the limit that ends the motion of the reference; None if no limit does.
+        """Return the limit that ends the motion of the reference, or None if no limit does.
 
         The limit is a pressed limit switch, or a software limit that the motion would exceed if
         it did not brake now.

@@ -122,7 +122,7 @@ _COOLING_US: Final = 1_000_000
 
 
 class _AbortConnection(IntEnum):
-    """Reactions to a lost connection (6007h); other values have no effect."""
+    """Reactions to a lost connection (6007h). Other values have no effect."""
 
     FAULT = 1
     DISABLE_VOLTAGE = 2
@@ -146,27 +146,27 @@ class Ds402(Application):
 
     Args:
         node: the slave.
-        slot: its place in the order of a tick.
-        servo: motor, power stage and load.
+        slot: place of the application in the order of a tick.
+        servo: motor, power stage and load, or None for an ideal motor.
         defaults: values of objects that the dictionary does not have, by (index, sub-index).
 
     Attributes:
-        modes: the modes that the drive has, by number.
+        modes: modes of operation that the drive has, by number.
         measures: functions for the actual values, by index.
         bounds: limits within which the drive reports no fault.
         encoder_error: error code of an encoder that is pulled out.
-        limits_are_faults: whether reaching a limit is a fault and not only a stop.
+        limits_are_faults: whether reaching a limit is a fault, not only a stop.
         more_targets: manufacturer-specific objects whose change is a new target.
-        outputs: its physical outputs; `read` returns their values.
-        parameters: its objects, by index.
-        offered: by number, the modes that both the drive and its dictionary have.
+        outputs: physical outputs. `read` returns their values.
+        parameters: objects of the drive, by index.
+        offered: modes by number that both the drive and its dictionary have.
         limits: limits of position and velocity.
-        automaton: the state machine of CiA 402.
-        supervision: detects faults of supply, temperature, encoder and following error.
-        actual_values: the objects that show measurements.
+        automaton: state machine of CiA 402.
+        supervision: object that detects faults of supply, temperature, encoder and following error.
+        actual_values: objects that show measurements.
         switches: limit switches and home switch.
-        mode: the active mode of operation.
-        mode_number: its number, as in 6061h.
+        mode: active mode of operation.
+        mode_number: number of the active mode, as in 6061h.
     """
 
     modes: ClassVar[Mapping[int, type[Mode]]] = MODES
@@ -235,35 +235,35 @@ class Ds402(Application):
 
     @property
     def limited(self) -> bool:
-        """Whether a limit cut something in the latest tick (bit 11 of the statusword)."""
+        """Whether a limit cut a demand in the latest tick (bit 11 of the statusword)."""
         self._stretch.catch_up()
         return self._limited
 
     @property
     def goes_on_plainly(self) -> bool:
-        """Whether the next ticks only run the mode, and no callback needs each of them."""
+        """Whether the next ticks only run the mode, and no callback needs every tick."""
         changes = self._stale or self.inputs.changed or self.actual_values.watched
         waits = self.supervision.waiting or not self.switches.free
         return self.automaton.operating and not (changes or waits)
 
     @property
     def enabled(self) -> bool:
-        """Whether it is in Operation enabled."""
+        """Whether the drive is in Operation enabled."""
         return self.automaton.state is DriveState.OPERATION_ENABLED
 
     @property
     def error_code(self) -> int:
-        """The latest error code that no reset has cleared, 0 for none."""
+        """The latest error code that no reset has cleared, or 0 if there is none."""
         return self._faults[-1] if self._faults else 0
 
     def read(self, name: str) -> int | float | str:
         """Return an output as the latest tick left it.
 
         Args:
-            name: one of `outputs`.
+            name: name of an output in `outputs`.
 
         Returns:
-            Its value.
+            The value of the output.
 
         Raises:
             KeyError: there is no output of that name.
@@ -309,12 +309,12 @@ class Ds402(Application):
         self._change_mode()
 
     def emergency(self, code: int, register: int, text: bytes) -> None:
-        """Note that the connection is lost."""
+        """Record that the connection is lost."""
         if code in settings.COMMUNICATION_ERRORS:
             self._lost.add(code)
 
     def emergency_clear(self, code: int, text: bytes | None) -> None:
-        """Note that the connection is restored."""
+        """Record that the connection is restored."""
         self._lost.discard(code)
 
     def state_changed(self, old: NmtState, new: NmtState) -> None:
@@ -358,18 +358,18 @@ class Ds402(Application):
         self._sleep(now_us, settled and not self.supervision.waiting, requested=requested)
 
     def request(self) -> None:
-        """Request `on_execute` in this tick; between two ticks, in the next one."""
+        """Request `on_execute` in this tick, or between two ticks in the next tick."""
         self._requested = True
         super().request()
 
     def skip(self, ticks: int, now_us: int, position: float, velocity: float) -> None:
-        """Set the state of the drive to the one after ticks that a stretch has computed.
+        """Set the state of the drive to the state after ticks that a stretch has computed.
 
         Args:
-            ticks: number of these ticks.
-            now_us: time of the last of them.
-            position: position of the reference.
-            velocity: velocity of the reference.
+            ticks: number of computed ticks.
+            now_us: time of the last computed tick.
+            position: position of the reference after these ticks.
+            velocity: velocity of the reference after these ticks.
         """
         axis = self._axis
         axis.reference.place(position, velocity)
@@ -453,7 +453,7 @@ class Ds402(Application):
             terminals.load(self._servo, inputs)
 
     def _sleep(self, now_us: int, settled: bool, *, requested: bool) -> None:
-        """Schedule the next tick: at an event, each second while the winding cools, or never."""
+        """Schedule the next tick: at an event, every second while the winding cools, or never."""
         motor = self._axis.motor
         if not (settled and motor.resting):
             self.schedule(now_us + TICK_US + self._stretch.plan(now_us, requested=requested))
@@ -464,12 +464,12 @@ class Ds402(Application):
             self.schedule(now_us + _COOLING_US)
 
     def _values_watched(self) -> None:
-        """Work tick by tick from now on: a TPDO follows each change of an actual value."""
+        """Work tick by tick from now on, because a TPDO follows each change of an actual value."""
         if self._stretch.ahead:
             self.request()
 
     def _controlled(self, entry: Entry) -> None:
-        """Act on a new controlword with the configuration before it."""
+        """Act on a new controlword with the configuration that was valid before the controlword."""
         self._interrupt()
         self._configure()
         before = self._view.controlword

@@ -119,4 +119,4 @@ DEFAULTS: Final[dict[tuple[int, int], int]] = {
     (POSITIVE_TORQUE_LIMIT, 0): 0xFFFF,
     (NEGATIVE_TORQUE_LIMIT, 0): 0xFFFF,
 }
-"""Defaults by (index, sub-index); 0 if not listed."""
+"""Defaults by (index, sub-index). An object that is not listed has the default 0."""

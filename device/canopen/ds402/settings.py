@@ -42,8 +42,8 @@ _CONTROLLABLE: Final = frozenset(
         *(ErrorCode.NEGATIVE_LIMIT, ErrorCode.POSITIVE_LIMIT, ErrorCode.SOFTWARE_LIMIT),
     )
 )
-"""Faults after which the motor can still be slowed down according to 605Eh; others switch it
-off."""
+"""Faults after which the motor can still be slowed down according to 605Eh. Other faults switch the
+motor off."""
 
 COMMUNICATION_ERRORS: Final = range(0x8100, 0x8200)
 
@@ -105,14 +105,14 @@ class Parameters(Part):
             entry.value = clamped(value, 8 * entry.size, signed=entry.description.signed)
 
     def watch(self, indices: Iterable[int], changed: OnEntry) -> None:
-        """Call `changed` whenever one of these objects changes."""
+        """Call `changed` whenever one of the given objects changes."""
         for index in indices:
             for entry in self._dictionary.object(index):
                 entry.watch(changed)
 
 
 def clamped(value: int, bits: int, *, signed: bool) -> int:
-    """Return the nearest number that an integer of this size can hold.
+    """Return the nearest number that an integer of a given size can hold.
 
     >>> clamped(40_000, 16, signed=True), clamped(-1, 16, signed=False)
     (32767, 0)
@@ -164,22 +164,24 @@ class Units(Part):
     - one count
     - a part of a revolution of the motor according to 6091h and 6092h; a revolution has the
       number of counts in 608Fh
-    - an angle after the gear of 6091h, if 60A8h selects it, with the power of ten in 60A8h
+    - an angle after the gear of 6091h, if 60A8h selects an angle, with the power of ten in 60A8h
 
-    A velocity unit is a position unit per second. If 60A9h or 608Ch selects it, the unit is
-    revolutions of the motor per minute, with the power of ten in that object. An acceleration
+    A velocity unit is a position unit per second. If 60A9h or 608Ch selects revolutions, the unit
+    is revolutions of the motor per minute, with the power of ten in that object. An acceleration
     unit is a velocity unit per second. 607Eh reverses the signs.
 
     Not emulated: 6090h, 6093h to 6097h; other dimensions.
 
     Args:
         parameters: the objects.
-        counts_per_turn: counts per revolution of the motor's encoder, if 608Fh does not exist.
+        counts_per_turn: number of counts per revolution of the motor's encoder, if 608Fh does not
+            exist.
 
     Attributes:
-        per_position: counts in a position unit, with the sign of the unit.
-        per_velocity: counts per second in a velocity unit, with the sign of the unit.
-        per_acceleration: counts per second per second in an acceleration unit, without sign.
+        per_position: number of counts in a position unit, with the sign of the unit.
+        per_velocity: number of counts per second in a velocity unit, with the sign of the unit.
+        per_acceleration: number of counts per second per second in an acceleration unit, without
+            sign.
     """
 
     def __init__(self, parameters: Parameters, counts_per_turn: int) -> None:
@@ -202,10 +204,11 @@ class Settings(Immutable):
 
     Attributes:
         units: units of the user.
-        max_velocity: the smaller one of 607Fh and 6080h (6080h is in revolutions per minute of
-            the motor).
-        software_limits: 607Dh with the home offset, as distances from the user's zero.
-        following_error_us: how long the error may be too large (6066h).
+        max_velocity: smaller one of 607Fh and 6080h (6080h is in revolutions per minute of the
+            motor).
+        software_limits: software limits 607Dh with the home offset, as distances from the user's
+            zero.
+        following_error_us: time for which the following error may be too large (6066h).
         interpolation_us: the interpolation period 60C2h.
         rated_current_a: the rated current 6075h.
         max_current_a: the largest current, from 6072h and 6073h.
@@ -305,7 +308,7 @@ def _per_mille(value: int) -> float:
 
 
 def _software_limits(parameters: Parameters, units: Units) -> tuple[float, float]:
-    """Return the limits in counts, lower one first; no limits unless lower is below upper."""
+    """Return the limits in counts, lower limit first; no limits unless lower is below upper."""
     lower = parameters.number(indices.SOFTWARE_LIMIT, 1)
     upper = parameters.number(indices.SOFTWARE_LIMIT, 2)
     if lower >= upper:
@@ -322,7 +325,7 @@ def _position_range(parameters: Parameters) -> tuple[int, int]:
 
 
 def _period_us(parameters: Parameters) -> int:
-    """Return 60C2h, at least one tick."""
+    """Return the period 60C2h, which is at least one tick."""
     value = parameters.number(indices.INTERPOLATION_PERIOD, 1)
     exponent = parameters.number(indices.INTERPOLATION_PERIOD, 2)
     if not -6 <= exponent <= 0:
@@ -331,7 +334,7 @@ def _period_us(parameters: Parameters) -> int:
 
 
 def _ratio(parameters: Parameters, index: int) -> float:
-    """Return sub-index 1 by sub-index 2, 0 if one of them is 0."""
+    """Return sub-index 1 divided by sub-index 2, or 0 if one of them is 0."""
     numerator, denominator = parameters.number(index, 1), parameters.number(index, 2)
     return numerator / denominator if denominator else 0.0
 
@@ -343,7 +346,7 @@ def _counts_per_unit(parameters: Parameters, per_turn: float) -> float:
 
 
 def _angle_unit(parameters: Parameters, per_turn: float) -> float:
-    """Return the counts of an angle unit, 0 if the unit is not an angle."""
+    """Return the counts of an angle unit, or 0 if the unit is not an angle."""
     unit = parameters.number(indices.SI_UNIT_POSITION)
     angle = _ANGLES.get(unit >> 16 & 0xFF, 0.0)
     if not angle:
@@ -353,7 +356,7 @@ def _angle_unit(parameters: Parameters, per_turn: float) -> float:
 
 
 def _velocity_unit(parameters: Parameters, per_turn: float) -> float:
-    """Return the counts per second of a unit in rpm, 0 if the unit is not rpm."""
+    """Return the counts per second of a unit in rpm, or 0 if the unit is not rpm."""
     unit = parameters.number(indices.SI_UNIT_VELOCITY)
     if unit >> 8 & 0xFFFF == _REVOLUTIONS << 8 | _PER_MINUTE:
         exponent = unit >> 24

@@ -29,7 +29,7 @@ class Stretch(Part):
     Args:
         drive: the drive.
         axis: the axis of the drive.
-        servo: its motor; without one there is no run-ahead.
+        servo: motor of the drive. Without a servo no ticks are computed ahead.
     """
 
     def __init__(self, drive: Ds402, axis: Axis, servo: Servo | None) -> None:
@@ -40,14 +40,14 @@ class Stretch(Part):
         self._bounds: Bounds
 
     def plan(self, now_us: int, *, requested: bool) -> int:
-        """Compute the ticks after the one at this time.
+        """Compute the ticks after the present tick.
 
         Args:
-            now_us: the time.
-            requested: whether the tick was requested, as opposed to being due by schedule.
+            now_us: time of the present tick.
+            requested: whether the present tick was requested, not due by schedule.
 
         Returns:
-            The duration of these ticks in microseconds.
+            The duration of the computed ticks in microseconds.
         """
         most, servo = self._most_us(now_us, requested=requested) // TICK_US, self._servo
         if most < _FEWEST or servo is None or not self._drive.goes_on_plainly:
@@ -95,7 +95,7 @@ class Stretch(Part):
         self._run = None
 
     def _most_us(self, now_us: int, *, requested: bool) -> int:
-        """Return the expected quiet time, estimated from the latest one."""
+        """Return the expected quiet time, estimated from the latest quiet time."""
         horizon = self._drive.node.horizon
         since_us = now_us - self._requested_us
         if requested:

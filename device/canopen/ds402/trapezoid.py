@@ -44,9 +44,9 @@ class PathLimits(Immutable):
 
     Attributes:
         velocity: the highest velocity.
-        acceleration: the steepest ramp away from standstill. For a sin^2 ramp it is the peak.
-        deceleration: the steepest ramp towards standstill, in the same way.
-        shape: of the ramps.
+        acceleration: steepest ramp away from standstill. For a sin^2 ramp it is the peak.
+        deceleration: steepest ramp towards standstill. For a sin^2 ramp it is the peak.
+        shape: shape of the ramps.
     """
 
     velocity: float
@@ -91,12 +91,12 @@ class _RampLeg(Immutable):
 
 
 class Path(Part):
-    """A planned path; after its end it continues at its last velocity.
+    """A planned path. After its end the motion continues at the last velocity.
 
     Attributes:
-        began_us: when it was planned.
-        end_s: its duration.
-        end: position and velocity at its end.
+        began_us: time at which the path begins.
+        end_s: duration of the path.
+        end: position and velocity at the end of the path.
     """
 
     __slots__ = ("_ramps", "began_us", "end", "end_s")
@@ -112,10 +112,10 @@ class Path(Part):
         """Join legs into a path.
 
         Args:
-            now_us: when it begins.
+            now_us: time at which the path begins.
             start: position and velocity at the beginning.
-            legs: its parts.
-            shape: of the ramps.
+            legs: parts of the path.
+            shape: shape of the ramps.
             target: exact end position, if known.
         """
         position, velocity, end_s = start.position, start.velocity, 0.0
@@ -130,7 +130,7 @@ class Path(Part):
         self.end = Motion(position if target is None else target, velocity)
 
     def at(self, now_us: int) -> Motion:
-        """Return the motion at a time not before it began."""
+        """Return the motion at a time, which must not be before the beginning."""
         now_s = (now_us - self.began_us) / _US_PER_S
         for ramp in self._ramps:
             if now_s < ramp.end_s:
@@ -144,7 +144,7 @@ class Path(Part):
 
 
 def to_velocity(now_us: int, start: Motion, velocity: float, limits: PathLimits) -> Path:
-    """Plan a change of velocity; it is not limited to the velocity limit.
+    """Plan a change of velocity, without applying the velocity limit.
 
     For a change of direction the path brakes to standstill first and then accelerates.
     """
@@ -161,12 +161,12 @@ def to_position(
     standstill and then returns. A motion above the velocity limit first brakes to that limit.
 
     Args:
-        now_us: when it begins.
-        start: position and velocity at that time.
+        now_us: time at which the path begins.
+        start: position and velocity at the beginning.
         target: end position.
         limits: limits of the path.
-        end_velocity: speed at the target in the direction of motion, at least 0. If the path is
-            too short for it, the speed at the target is as near to it as the limits allow.
+        end_velocity: speed at the target in the direction of motion, at least 0. If the path is too
+            short for this speed, the speed at the target is as near to it as the limits allow.
     """
     distance = target - start.position
     legs = _legs(start.velocity, distance, _effective(limits), min(end_velocity, limits.velocity))
@@ -241,7 +241,7 @@ class PathFollower(Part):
 
     @property
     def motion(self) -> Motion:
-        """The present reference, where a path may begin."""
+        """The present reference, at which a path may begin."""
         return Motion(self._reference.position, self._reference.velocity)
 
     def begin(self, path: Path) -> None:

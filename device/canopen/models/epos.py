@@ -43,7 +43,7 @@ from tickrig.wire.canopen.eds.object_table import (
 from tickrig.wire.canopen.pdo import PdoDescription
 
 NODE_ID: Final = 1
-"""Wheels of beego: 1 is left, 2 is right."""
+"""Default node-ID. In beego, 1 is the left wheel and 2 is the right wheel."""
 
 _I8: Final = DataType.INTEGER8
 _I16: Final = DataType.INTEGER16
@@ -106,14 +106,14 @@ def make_epos(node_id: int = NODE_ID, nonvolatile: Nonvolatile | None = None) ->
     """Make a positioning drive like Maxon's EPOS 24/5, at a wheel of beego.
 
     Args:
-        node_id: 1..127, or 255 for a slave that waits for LSS.
-        nonvolatile: stored parameters from an earlier run; empty memory if omitted.
+        node_id: node-ID 1..127, or 255 for a slave that waits for LSS.
+        nonvolatile: memory with parameters from an earlier run, or None for empty memory.
 
     Returns:
         A slave that boots in its first tick.
 
     Raises:
-        ValueError: invalid node-ID.
+        ValueError: the node-ID is invalid.
     """
     slave = make_slave(dictionary(), node_id, nonvolatile, make_application)
     slave.model = "epos"

@@ -1,6 +1,6 @@
 """f-palette-CANopen: 8 digital inputs, 8 digital outputs, 8 analogue inputs (NEDO report, table 7).
 
-Its documents are lost; channels, node-ID and converter are DECISION K22.
+The documents of the module are lost. Channels, node-ID and converter are DECISION K22.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ ANALOGUE_INPUTS: Final = 8
 _FULL_SCALE_MV: Final = 5_000
 
 ADC: Final = Converter("v", "V", low=0.0, high=_FULL_SCALE_MV / 1_000, high_raw=4095, shift=3)
-"""12 bit, left-justified in INTEGER16: 0..32760."""
+"""Converter of 12 bit, left-justified in INTEGER16: 0..32760."""
 
 BOOL: Final = DataType.BOOLEAN
 U8: Final = DataType.UNSIGNED8
@@ -59,14 +59,14 @@ def make_f_palette(node_id: int = NODE_ID, nonvolatile: Nonvolatile | None = Non
     """Make the I/O module f-palette-CANopen.
 
     Args:
-        node_id: 1..127, or 255 for a slave that waits for LSS.
-        nonvolatile: stored parameters from an earlier run; empty memory if omitted.
+        node_id: node-ID 1..127, or 255 for a slave that waits for LSS.
+        nonvolatile: memory with parameters from an earlier run, or None for empty memory.
 
     Returns:
         A slave that boots in its first tick.
 
     Raises:
-        ValueError: invalid node-ID.
+        ValueError: the node-ID is invalid.
     """
     slave = make_slave(dictionary(), node_id, nonvolatile, make_application)
     slave.model = "f-palette"
@@ -85,7 +85,7 @@ def _template() -> Dictionary:
 
 
 def object_table(profile: CommunicationProfile) -> ObjectTable:
-    """Return the objects of the module, with these communication objects."""
+    """Return the objects of the module, with the given communication objects."""
     objects = ObjectTable()
     add_communication(objects, profile)
     _add_digital(objects)

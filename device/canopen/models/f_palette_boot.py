@@ -18,11 +18,11 @@ from tickrig.device.canopen.stack import make_slave
 
 NODE_ID: Final = 17
 PROGRAM: Final = b"f-palette"
-"""The program that runs until another one is downloaded."""
+"""The program that runs until another program is downloaded."""
 
 
 class BootableModule(Ds401):
-    """The I/O module; its inputs and outputs belong to its program."""
+    """The I/O module, whose inputs and outputs belong to its program."""
 
     def __init__(self, node: CanopenSlave, slot: int) -> None:
         super().__init__(node, slot, inputs=(f_palette.ADC,) * f_palette.ANALOGUE_INPUTS)
@@ -37,7 +37,7 @@ class BootableModule(Ds401):
 def make_f_palette_boot(
     node_id: int = NODE_ID, nonvolatile: Nonvolatile | None = None
 ) -> CanopenSlave:
-    """Make the module; arguments and errors as in `make_f_palette`."""
+    """Make the module, with the arguments and errors of `make_f_palette`."""
     slave = make_slave(dictionary(), node_id, nonvolatile, make_application)
     slave.model = "f-palette-boot"
     return slave

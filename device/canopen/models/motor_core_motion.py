@@ -24,10 +24,10 @@ from tickrig.device.servo.servo import Servo
 from tickrig.device.twin import Part
 
 CONTROL_US: Final = 10_000
-"""The control tick (DECISION K19)."""
+"""Duration of a control tick (DECISION K19)."""
 
 DEGREE: Final = 1_000_000_000
-"""Nanodegrees."""
+"""Number of nanodegrees in a degree."""
 
 MAX_VELOCITY_UDEG_S: Final = 360_000_000
 _MAX_ACCELERATION_UDEG_S2: Final = 3_600_000_000
@@ -35,8 +35,7 @@ CHANGE_UDEG_S: Final = _MAX_ACCELERATION_UDEG_S2 * CONTROL_US // 1_000_000
 """Largest change of the velocity in a control tick."""
 
 _NDEG: Final = CONTROL_US // 2_000
-"""Nanodegrees that a tick adds per udeg/s of the velocity at its start, and the same for its end.
-"""
+"""Nanodegrees that a tick adds for each udeg/s of its start velocity, and of its end velocity. """
 
 _LANDING_NDEG: Final = 1_000
 """A microdegree: the remainder that whole velocities may leave at the end of an approach."""
@@ -69,8 +68,8 @@ class Trajectory:
         """Make a step that stops at the target as early as the limits allow.
 
         Args:
-            target_ndeg: where to stop.
-            limit_udeg_s: the velocity limit, positive.
+            target_ndeg: angle at which to stop.
+            limit_udeg_s: velocity limit, as a positive number.
         """
         distance = target_ndeg - self.position_ndeg
         last = _NDEG * self.velocity_udeg_s
@@ -137,7 +136,7 @@ class References(Part):
 
     Args:
         node: the slave.
-        on_reference: called when a reference arrives after a failure.
+        on_reference: function that is called when a reference arrives after a failure.
 
     Attributes:
         entries: the objects.
@@ -170,7 +169,7 @@ class References(Part):
 
     @property
     def number(self) -> int:
-        """The effective reference, -32767..32767."""
+        """The effective reference, from -32767 to 32767."""
         if self.failed and self._error_mode.number:
             return _limited(self._error_value.number, _I16_MAX)
         return _limited(self._reference.number, _I16_MAX)
@@ -357,10 +356,10 @@ class Motion(Part):
 
     Args:
         shaft: the shaft after the gear of the motor.
-        references: the demands.
+        references: demands on the motor.
 
     Attributes:
-        action: what the motor does at present.
+        action: present action of the motor.
         reached: whether the planned motion has ended at the reference and the motor has reached
             it.
     """
@@ -383,7 +382,7 @@ class Motion(Part):
 
     @property
     def steady(self) -> bool:
-        """Whether the next control tick would be the same as this one."""
+        """Whether the next control tick would be the same as the present one."""
         trajectory = self._trajectory
         stands = trajectory.begin_udeg_s == trajectory.velocity_udeg_s == 0
         return stands and self._begin_ma == self._end_ma
@@ -492,8 +491,8 @@ class Display(Part):
 
     Args:
         dictionary: the dictionary of the unit.
-        shaft: the measurements.
-        references: contain the full scales.
+        shaft: object with the measurements.
+        references: object with the full scales.
     """
 
     def __init__(self, dictionary: Dictionary, shaft: Shaft, references: References) -> None:

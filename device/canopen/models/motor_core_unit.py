@@ -64,15 +64,16 @@ class _Measurements(Immutable):
 
 @dataclass(frozen=True, slots=True)
 class _Fault(Immutable):
-    """One row of the table.
+    """A row of the table of faults.
 
     Attributes:
-        name: name for display.
-        code: emergency error code (CiA 402-1).
+        name: name of the fault, for display.
+        code: emergency error code of the fault (CiA 402-1).
         register: bits of the error register.
-        seen: whether the cause is present.
-        gone: whether the cause has ended; it is not always the opposite of `seen`.
-        after_us: how long the cause must be present before the fault is reported.
+        seen: function that returns whether the cause is present.
+        gone: function that returns whether the cause has ended. It is not always the opposite of
+            `seen`.
+        after_us: time for which the cause must be present before the fault is reported.
     """
 
     name: str
@@ -83,7 +84,7 @@ class _Fault(Immutable):
     after_us: int = 0
 
     def __reduce__(self) -> tuple[Callable[[str], _Fault], tuple[str]]:
-        """Return its name for a pickle."""
+        """Return the name of the fault for a pickle."""
         return _fault, (self.name,)
 
 
@@ -92,7 +93,7 @@ def _fault(name: str) -> _Fault:
 
 
 _SUPPLY_MV: Final = (10_000, 66_000)
-"""10 V (NEDO report, Table 6), and a tenth above its 60 V."""
+"""Limits of the supply: 10 V (NEDO report, Table 6), and a tenth above the 60 V of the report."""
 
 _SUPPLY_MARGIN_MV: Final = 1_000
 _WINDING_DC: Final = 1_180
@@ -106,7 +107,7 @@ _OVERLOADED_US: Final = 1_000_000
 _NO_CURRENT_MA: Final = 50
 _NO_CURRENT_US: Final = 100_000
 _SPARE_MV: Final = 500
-"""Below this voltage a missing current is no fault: the motor turns as fast as its supply
+"""Voltage below which a missing current is no fault, because the motor turns as fast as its supply
 allows."""
 _SLIP_DEG: Final = 1.0
 _DIP_US: Final = 5_000
@@ -367,7 +368,7 @@ class MotorCoreUnit(Application):
         self.schedule(self._rested_us(now_us) if controls and self._rests else now_us + TICK_US)
 
     def _supervise(self, now_us: int) -> bool:
-        """Detect new faults, clear ended ones; return whether there is a new one."""
+        """Detect new faults, and clear faults that have ended; return whether a fault is new."""
         if self._mode_was_written:
             self._mode_was_written = False
             if self._supervision.clear(self._measurements(now_us)):
@@ -421,7 +422,7 @@ class MotorCoreUnit(Application):
         return self._motion.steady and self.servo.resting and not self._supervision.waiting
 
     def _rested_us(self, now_us: int) -> int:
-        """Return when to update a motor at rest again, while its temperature changes."""
+        """Return the time of the next update of a motor at rest, while its temperature changes."""
         air_c, servo = self.servo.ambient_c, self.servo
         warmer_c = max(abs(servo.winding_c - air_c), abs(servo.housing_c - air_c))
         return now_us + _COOLING_US if warmer_c > _COOLED_C else NEVER
@@ -478,14 +479,14 @@ def make_motor_core_unit(
     """Make a motor core unit with its motor.
 
     Args:
-        node_id: 1..127, or 255 for a slave that waits for LSS.
-        nonvolatile: stored parameters from an earlier run; empty memory if omitted.
+        node_id: node-ID 1..127, or 255 for a slave that waits for LSS.
+        nonvolatile: memory with parameters from an earlier run, or None for empty memory.
 
     Returns:
         A slave that boots in its first tick.
 
     Raises:
-        ValueError: invalid node-ID.
+        ValueError: the node-ID is invalid.
     """
     slave = make_slave(dictionary(), node_id, nonvolatile, make_application)
     slave.model = "motor-core-unit"

@@ -28,8 +28,8 @@ class Slot(NamedTuple):
     """One mapped object.
 
     Attributes:
-        entry: the object; None for a dummy, which fills bits of an RPDO.
-        bits: length in the PDO.
+        entry: the object, or None for a dummy, which fills bits of an RPDO.
+        bits: number of bits in the PDO.
     """
 
     entry: Entry | None
@@ -37,7 +37,7 @@ class Slot(NamedTuple):
 
     @property
     def whole(self) -> bool:
-        """Whether all bytes of the entry are mapped, no bit more or less."""
+        """Whether exactly all bytes of the entry are mapped."""
         return self.entry is not None and 8 * self.entry.size == self.bits
 
 
@@ -50,7 +50,7 @@ def total_bits(slots: tuple[Slot, ...]) -> int:
 
 
 def alone_in(slots: tuple[Slot, ...]) -> Entry | None:
-    """Return the entry whose bytes are all the bytes of a TPDO; None if no single entry is."""
+    """Return the entry whose bytes are all the bytes of a TPDO, or None."""
     entry = slots[0].entry if len(slots) == 1 and slots[0].whole else None
     return None if entry is None or entry.source is not None else entry
 
@@ -58,7 +58,7 @@ def alone_in(slots: tuple[Slot, ...]) -> Entry | None:
 def make_pack(slots: tuple[Slot, ...]) -> Pack:
     """Return a function that packs the entries into the bytes of a TPDO.
 
-    Of an object that is mapped with fewer bits than it has, the TPDO contains the low bits.
+    If an object is mapped with fewer bits than it has, the TPDO contains its low bits.
     """
     entries = [slot.entry for slot in slots if slot.entry is not None]
     if not all(slot.whole for slot in slots):
@@ -187,7 +187,7 @@ def _list_values(dictionary: Dictionary, lists: range) -> Iterator[int]:
 
 
 class MpdoQueue(TpdoMode):
-    """MPDOs, in the order of events: one frame per object and per inhibit time.
+    """MPDOs in the order of events, with one frame per object and per inhibit time.
 
     An event of an object whose frame is already waiting adds no frame. The frame is sent with the
     newest data.
@@ -211,7 +211,7 @@ class MpdoQueue(TpdoMode):
         self.sender.wake(self.due_us)
 
     def run(self, now_us: int) -> None:
-        """Send the first waiting frame, or all without an inhibit time."""
+        """Send the first waiting frame, or all waiting frames if there is no inhibit time."""
         while self._waiting and self._free_us <= now_us:
             frame = self._waiting.pop(next(iter(self._waiting)))
             self.sender.send(frame if isinstance(frame, bytes) else self._frame_of(frame))
@@ -220,7 +220,7 @@ class MpdoQueue(TpdoMode):
         self.due_us = self._free_us if self._waiting else NEVER
 
     def answer(self) -> None:
-        """Send nothing: a remote frame cannot select an object."""
+        """Send nothing, because a remote frame cannot select an object."""
 
     def _frame_of(self, entry: Entry) -> bytes:
         return pdo.Mpdo(False, self._node_id, entry.index, entry.sub, _present(entry)).encode()
@@ -305,7 +305,7 @@ _DUMMIES: Final = {
 """Data types that fill up an RPDO, and their bits (CiA 301, dummy mapping)."""
 
 _SAM_LISTS: Final = {Access.RPDO: _DISPATCHING_LISTS, Access.TPDO: _SCANNER_LISTS}
-"""Without a dispatching or a scanner list there is no MPDO in source address mode."""
+"""Lists by direction, without which there is no MPDO in source address mode."""
 
 _NOTHING: Final = pdo.MappedObject(0, 0, 0)
 
@@ -320,10 +320,10 @@ class PdoMapping(Part):
     or too many bits disables the PDO.
 
     Args:
-        dictionary: contains the mapped objects.
+        dictionary: dictionary that contains the mapped objects.
         index: index of the mapping parameter.
-        direction: Access.RPDO or Access.TPDO.
-        parameters: the communication parameters, which determine whether the PDO is valid.
+        direction: direction of the PDO: `Access.RPDO` or `Access.TPDO`.
+        parameters: communication parameters, which determine whether the PDO is valid.
     """
 
     def __init__(
@@ -340,11 +340,11 @@ class PdoMapping(Part):
 
     @property
     def count(self) -> int:
-        """Sub-index 0: number of mapped objects, `SAM_MPDO` or `DAM_MPDO`."""
+        """Value of sub-index 0: number of mapped objects, `SAM_MPDO` or `DAM_MPDO`."""
         return len(self._objects) if self._count is None else self._count.number
 
     def slots(self) -> tuple[Slot, ...]:
-        """Return the mapped objects; none if the mapping is invalid, or for an MPDO."""
+        """Return the mapped objects; no objects if the mapping is invalid, or for an MPDO."""
         try:
             slots = self._slots(self.count)
         except SdoAbort:
@@ -358,7 +358,7 @@ class PdoMapping(Part):
         return tuple(self._slot(each) for each in mapped if each != _NOTHING)
 
     def _slot(self, mapped: pdo.MappedObject) -> Slot:
-        """Find an object; SdoAbort if it does not exist or has too few bits."""
+        """Find an object; raise SdoAbort if it does not exist or has too few bits."""
         # 0005 00 08h: eight bits that an RPDO carries without effect (CiA 301, dummy
         # mapping).
         if mapped.sub == 0 and mapped.index in _DUMMIES and self._direction is Access.RPDO:

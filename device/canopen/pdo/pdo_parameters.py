@@ -23,10 +23,10 @@ EVENT_DRIVEN: Final = range(254, 256)
 
 RPDO_TYPES: Final = frozenset((*SYNCHRONOUS, *EVENT_DRIVEN))
 TPDO_TYPES: Final = frozenset((*SYNCHRONOUS, RTR_SYNCHRONOUS, RTR_EVENT, *EVENT_DRIVEN))
-"""All others are reserved (CiA 301, transmission type)."""
+"""Transmission types of TPDOs; all other types are reserved (CiA 301, transmission type)."""
 
 COB_ID, TYPE, INHIBIT_TIME, RESERVED, EVENT_TIMER, SYNC_START = range(1, 7)
-"""Sub-indices; the reserved one (CiA 301, 7.5.2.37) exists only if an EDS describes it."""
+"""Sub-indices. The reserved sub-index (CiA 301, 7.5.2.37) exists only if an EDS describes it."""
 
 _MAX_SYNC_START: Final = 240
 _NOT_IN_A_CAN_ID: Final = EXTENDED | 0x1FFF_F800
@@ -42,10 +42,10 @@ class PdoParameters(Part):
     Not emulated: PDOs with a 29-bit CAN-ID; bit 29 is refused.
 
     Args:
-        dictionary: the objects of the slave; the objects of the PDO may be missing.
+        dictionary: dictionary of the slave, in which the objects of the PDO may be missing.
         index: index of the communication parameter.
         types: allowed transmission types.
-        changed: called with each entry whose value has changed.
+        changed: function that is called with each entry whose value has changed.
     """
 
     def __init__(
@@ -84,7 +84,7 @@ class PdoParameters(Part):
 
     @property
     def transmission_type(self) -> int:
-        """The transmission type; a PDO without one is event-driven."""
+        """The transmission type; a PDO without a transmission type is event-driven."""
         return self._number(TYPE, EVENT_DRIVEN[-1])
 
     @property
@@ -94,12 +94,12 @@ class PdoParameters(Part):
 
     @property
     def event_us(self) -> int:
-        """Event timer of a TPDO, deadline of an RPDO; 0 for none."""
+        """Event timer of a TPDO, or deadline of an RPDO; 0 means none."""
         return self._number(EVENT_TIMER) * 1_000
 
     @property
     def sync_start(self) -> int:
-        """SYNC start value, 0 for none."""
+        """SYNC start value; 0 means none."""
         return self._number(SYNC_START)
 
     def _number(self, sub: int, otherwise: int = 0) -> int:
@@ -148,18 +148,19 @@ class PdoSender(Protocol):
         """Send bytes, or the present values of the mapped objects."""
 
     def wake(self, due_us: int) -> None:
-        """Schedule a run of the mode at this time or earlier."""
+        """Schedule a run of the mode at a time or earlier."""
 
 
 class TpdoMode(Part):
     """Base of transmission types: a TPDO that is sent only on a remote frame.
 
     Attributes:
-        due_us: when it is due to run.
-        synchronous: whether it reacts to SYNC.
-        timed: whether it ever needs to run at a given time.
+        due_us: time at which the mode is due to run.
+        synchronous: whether the mode reacts to SYNC.
+        timed: whether the mode ever needs to run at a given time.
         on_change: whether a change of a mapped object is an event.
-        on_sync: called with the counter of each SYNC, or with 0 if the SYNC has no counter.
+        on_sync: function that is called with the counter of each SYNC, or with 0 if the SYNC has no
+            counter.
     """
 
     __slots__ = ("due_us", "on_sync", "sender")
@@ -173,7 +174,7 @@ class TpdoMode(Part):
         self.on_sync: Callable[[int], None] = _ignore
 
     def request(self, entry: Entry | None = None) -> None:
-        """Handle an event: the change of an object, or one raised by the application."""
+        """Handle an event: the change of an object, or an event raised by the application."""
 
     def run(self, now_us: int) -> None:
         """Do the work that is due."""
@@ -194,7 +195,7 @@ class Silent(TpdoMode):
 
 
 class SynchronousAcyclic(TpdoMode):
-    """Type 0: sent with the SYNC after an event, and with the first one."""
+    """Type 0: the TPDO is sent with the first SYNC, and with the SYNC after an event."""
 
     synchronous: ClassVar[bool] = True
     on_change: ClassVar[bool] = True
@@ -215,7 +216,7 @@ class SynchronousAcyclic(TpdoMode):
 
 
 class SynchronousCyclic(TpdoMode):
-    """Types 1 to 240: sent with each n-th SYNC; the n-th SYNC after the start is the first one.
+    """Types 1 to 240: the TPDO is sent with every n-th SYNC, counted from the start.
 
     If a SYNC start value is set and SYNC carries a counter, the TPDO is sent first with the SYNC
     whose counter has that value, as in CANopenNode.
@@ -254,7 +255,7 @@ class SynchronousCyclic(TpdoMode):
 
 
 class RtrSynchronous(TpdoMode):
-    """Type 252: sampled with SYNC and at the start; sent on a remote frame."""
+    """Type 252: the TPDO is sampled with SYNC and at the start, and sent on a remote frame."""
 
     synchronous: ClassVar[bool] = True
 
@@ -272,10 +273,10 @@ class RtrSynchronous(TpdoMode):
 
 
 class EventDriven(TpdoMode):
-    """Types 254 and 255: sent at the start, on an event and when the event timer has elapsed.
+    """Types 254 and 255: the TPDO is sent at the start, on an event and by the event timer.
 
-    The next transmission waits until the inhibit time has passed since the last one. It then has
-    the newest data.
+    The next transmission waits until the inhibit time has passed since the last transmission. The
+    TPDO then has the newest data.
     """
 
     timed: ClassVar[bool] = True
@@ -312,7 +313,7 @@ class EventDriven(TpdoMode):
             self.sender.wake(self.due_us)
 
     def _time_anew(self, now_us: int) -> None:
-        """Start the event timer; it runs from each transmission."""
+        """Start the event timer, which runs from each transmission."""
         event_us = self.sender.parameters.event_us
         self._retimed, self.due_us = False, now_us + event_us if event_us else NEVER
 

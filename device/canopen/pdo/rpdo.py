@@ -1,4 +1,4 @@
-"""One receive PDO (CiA 301, PDO; 1400h.. and 1600h..)."""
+"""Receive PDOs (CiA 301, PDO; 1400h.. and 1600h..)."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _RPDO_PARAMETERS: Final = range(0x1400, 0x1600)
 _RPDO_MAPPINGS: Final = 0x1600
 
 _Target = tuple[pdo_mapping.Unpack, int]
-"""The handler of the bytes, and the number of bytes it needs."""
+"""The handler of the bytes, and the number of bytes that it needs."""
 
 
 class Rpdo(Part):
@@ -40,8 +40,8 @@ class Rpdo(Part):
     synchronous RPDO that arrives after the synchronous window (1007h) is dropped.
 
     Args:
-        consumer: the service that it belongs to.
-        number: 1..512.
+        consumer: service that the RPDO belongs to.
+        number: number of the RPDO, 1..512.
 
     Attributes:
         deadline_us: time from which the next frame is late.
@@ -65,7 +65,7 @@ class Rpdo(Part):
 
     @property
     def reconfigures(self) -> bool:
-        """Whether it may write a communication object: it is an MPDO, or maps one."""
+        """Whether the RPDO may write a communication object, as an MPDO or by its mapping."""
         entries = (slot.entry for slot in self.mapping.slots())
         return self.mapping.count in (DAM_MPDO, SAM_MPDO) or any(
             entry is not None and entry.index in COMMUNICATION_AREA for entry in entries
@@ -73,7 +73,7 @@ class Rpdo(Part):
 
     @property
     def synchronous(self) -> bool:
-        """Whether it takes effect with SYNC."""
+        """Whether the RPDO takes effect with SYNC."""
         return self.parameters.transmission_type in SYNCHRONOUS
 
     def listen(self) -> Handler | None:
@@ -112,7 +112,7 @@ class Rpdo(Part):
             self._deliver(data)
 
     def expire(self) -> None:
-        """Report that its deadline has passed."""
+        """Report that the deadline of the RPDO has passed."""
         self.deadline_us = NEVER
         self._break(EmcyCode.RPDO_TIMEOUT)
 
@@ -199,8 +199,9 @@ class PdoConsumer(Service):
     frames on the wire decides which RPDOs come before the SYNC, also within a tick.
 
     Attributes:
-        rpdos: the RPDOs that the dictionary has.
-        on_rpdo: called with the number of an RPDO when its objects have been written.
+        rpdos: RPDOs that the dictionary has.
+        on_rpdo: function that is called with the number of an RPDO when its objects have been
+            written.
     """
 
     def __init__(self, node: CanopenSlave, slot: int) -> None:
@@ -244,7 +245,7 @@ class PdoConsumer(Service):
                 yield rpdo.parameters.can_id, handler
 
     def reconfigured_by(self, state: NmtState) -> Iterator[int]:
-        """Return the RPDOs that may write communication objects, and the SYNC that applies them."""
+        """Yield the CAN-IDs of RPDOs that may write communication objects, and of the SYNC."""
         if state is not NmtState.OPERATIONAL:
             return
         rpdos = [rpdo for rpdo in self.rpdos if rpdo.parameters.valid and rpdo.reconfigures]

@@ -1,4 +1,4 @@
-"""One transmit PDO (CiA 301, PDO; 1800h.. and 1A00h..)."""
+"""Transmit PDOs (CiA 301, PDO; 1800h.. and 1A00h..)."""
 
 from __future__ import annotations
 
@@ -64,15 +64,15 @@ _RTR_MODES: Final[dict[int, type[pdo_parameters.TpdoMode]]] = {
 class Tpdo(Part):
     """Sends the mapped objects according to its transmission type.
 
-    Its mode uses it as the sender, by `parameters`, `pack`, `send` and `wake`.
+    The mode of the TPDO uses the TPDO as sender, by `parameters`, `pack`, `send` and `wake`.
 
     Args:
-        producer: the service that it belongs to.
-        number: 1..512.
+        producer: service that the TPDO belongs to.
+        number: number of the TPDO, 1..512.
 
     Attributes:
-        mode: the active transmission type.
-        pack: packs the mapped objects into bytes.
+        mode: active transmission type.
+        pack: function that packs the mapped objects into bytes.
         entries: the mapped objects.
     """
 
@@ -187,10 +187,10 @@ class PdoProducer(Service):
     Each TPDO whose bit 30 is 0 answers remote frames, whatever its type.
 
     Attributes:
-        tpdos: the TPDOs that the dictionary has.
+        tpdos: TPDOs that the dictionary has.
         quiet: keys of entries whose change is not an event, because a profile decides on their
             events. Set it before the node is Operational.
-        on_sent: called with the mapped objects of each TPDO that has been sent.
+        on_sent: function that is called with the mapped objects of each TPDO that has been sent.
     """
 
     __slots__ = ("_counters", "_due_us", "_synchronous", "_timed", "on_sent", "quiet", "tpdos")
@@ -210,7 +210,7 @@ class PdoProducer(Service):
         node.sync_handlers.append(self._sync)
 
     def request(self, number: int) -> None:
-        """Raise an event for a TPDO (254, 255: sent; 0: sent with the next SYNC)."""
+        """Raise an event for a TPDO, which is sent now (types 254, 255) or with SYNC (type 0)."""
         for tpdo in self.tpdos:
             if tpdo.number == number:
                 tpdo.mode.request()
@@ -225,8 +225,8 @@ class PdoProducer(Service):
         """Write an object of other nodes by the first MPDO in destination address mode.
 
         Args:
-            node_id: the destination; 0 for all nodes.
-            data: up to four bytes.
+            node_id: node-ID of the destination, or 0 for all nodes.
+            data: up to four bytes to write.
         """
         for tpdo in self.tpdos:
             if isinstance(tpdo.mode, pdo_mapping.DamProducer):
@@ -262,7 +262,7 @@ class PdoProducer(Service):
             self._collect()
 
     def wake(self, due_us: int) -> None:
-        """Schedule a run of a TPDO at this time or earlier."""
+        """Schedule a run of a TPDO at a time or earlier."""
         if due_us < self._due_us:
             self._due_us = due_us
             self.node.await_tick(self, due_us)

@@ -15,15 +15,15 @@ _STEP_US: Final = 1_000
 
 
 class LatchedSetPoint(Mode):
-    """Follows a set-point that stays valid until another one is written.
+    """Follows a set-point that stays valid until another set-point is written.
 
     At the start the mode brakes, and the object of the set-point shows the reference. So nothing
     moves before the master writes a set-point.
 
     Attributes:
-        index: object of the target.
+        index: index of the object of the target.
         sub: sub-index of the target.
-        offset: object whose value is added to the target; 0 for none.
+        offset: index of the object whose value is added to the target, or 0 for none.
     """
 
     halts = False
@@ -40,7 +40,7 @@ class LatchedSetPoint(Mode):
         self._latch()
 
     def run(self, now_us: int) -> bool:
-        """Brake, or follow."""
+        """Brake, or follow the set-point."""
         if self._latched is not None:
             if self.number(self.index, self.sub) == self._latched:
                 return self._brake()
@@ -75,13 +75,13 @@ class LatchedSetPoint(Mode):
 class CyclicPosition(LatchedSetPoint):
     """Moves to the target position within an interpolation period, on a straight line.
 
-    A SYNC begins a new line. Another target begins one, too, without SYNC. At the end of the line
-    the motion stops.
+    A SYNC begins a new line. Without SYNC, another target begins a new line, too. At the end of the
+    line the motion stops.
 
     Not emulated: extrapolation when SYNC is late; the torque offset.
 
     Attributes:
-        rests: whether a line of length 0 counts as one that has ended.
+        rests: whether a line of length 0 counts as a line that has ended.
     """
 
     shows_following_error = True
@@ -137,9 +137,9 @@ class CyclicPosition(LatchedSetPoint):
 class InterpolatedPosition(CyclicPosition):
     """Moves to the data record 60C1h:01 within an interpolation period, on a straight line.
 
-    It moves while bit 4 of the controlword is set; bit 12 of the statusword is then set.
-    Otherwise it brakes with the profile deceleration. A SYNC begins a new line. Another record
-    begins one, too, without SYNC. Bit 10 is set when the line has ended.
+    The axis moves while bit 4 of the controlword is set. Bit 12 of the statusword is then set.
+    Otherwise the axis brakes with the profile deceleration. A SYNC begins a new line. Without SYNC,
+    another record begins a new line, too. Bit 10 is set when the line has ended.
 
     Not emulated: a buffer of records (60C4h); sub-modes other than 0 (60C0h).
     """
@@ -232,7 +232,7 @@ SETTINGS: Final = (_CURRENT_SETTING, _POSITION_SETTING, _VELOCITY_SETTING)
 
 
 class _PositionSetting(LatchedSetPoint):
-    """Position mode, -1: moves to 2062h, in position units.
+    """Position mode, -1, which moves to 2062h, in position units.
 
     Bit 8 of the controlword has no effect in these modes (DECISION K21).
     """
@@ -246,7 +246,7 @@ class _PositionSetting(LatchedSetPoint):
 
 
 class _VelocitySetting(Mode):
-    """Velocity mode, -2: turns at 206Bh, in velocity units.
+    """Velocity mode, -2, which turns at 206Bh, in velocity units.
 
     When the mode is chosen while the drive is enabled, 206Bh is set to the present velocity
     (DECISION K21).
@@ -270,7 +270,7 @@ class _VelocitySetting(Mode):
 
 
 class _CurrentSetting(Mode):
-    """Current mode, -3: applies 2030h, in milliamperes.
+    """Current mode, -3, which applies 2030h, in milliamperes.
 
     When the mode is chosen while the drive is enabled, 2030h is set to the present current
     (DECISION K21).

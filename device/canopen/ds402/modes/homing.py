@@ -26,7 +26,7 @@ class HomingMethod(NamedTuple):
     """A homing method: where home is and how to find it.
 
     Attributes:
-        switch: the switch whose edge counts; None if the method uses no switch.
+        switch: switch whose edge counts, or None if the method uses no switch.
         first: direction of the search when the switch is not active.
         approach: direction in which the axis crosses the edge, then the index pulse, at the end.
         active: whether the switch is active after the edge, in the direction of `approach`.
@@ -75,7 +75,7 @@ METHODS: Final[dict[int, HomingMethod]] = {
     35: HomingMethod(None, 0, 0, active=False, turns=False, by_index=False),
     37: HomingMethod(None, 0, 0, active=False, turns=False, by_index=False),
 }
-"""Methods by their number in 6098h; 35 and 37 use the present position."""
+"""Methods by number in 6098h. Methods 35 and 37 use the present position."""
 
 _LIMIT: Final = {-1: Switch.NEGATIVE_LIMIT, 0: Switch(0), +1: Switch.POSITIVE_LIMIT}
 """The limit switch ahead, by direction."""
@@ -104,7 +104,7 @@ class HomingSearch(Part):
     Attributes:
         method: the homing method.
         phase: phase of the search.
-        direction: direction of the motion, -1 or +1; 0 to stop.
+        direction: direction of the motion: -1 or +1, or 0 to stop.
     """
 
     def __init__(self, method: HomingMethod, switches: Switch) -> None:
@@ -116,7 +116,7 @@ class HomingSearch(Part):
 
     @property
     def slow(self) -> bool:
-        """Whether to move at the speed of 6099h:02 instead of 6099h:01."""
+        """Whether the axis moves at the speed of 6099h:02 instead of 6099h:01."""
         return self.phase in (Phase.APPROACH, Phase.INDEX)
 
     @property
@@ -131,7 +131,7 @@ class HomingSearch(Part):
             switches: the active switches.
             moving: sign of the demanded velocity.
             crawling: whether the demanded velocity is at most the slow speed.
-            index: whether the index pulse came since the last step.
+            index: whether the index pulse has come since the last step.
         """
         before, self._before = self._before, switches
         wrong_limit = _LIMIT[-moving] & switches & ~before
@@ -196,7 +196,7 @@ _FLAGS: Final = {
 
 
 class Homing(Mode):
-    """Searches for the home position, gives it the position 607Ch, and returns to it.
+    """Searches for the home position, assigns the position 607Ch to it, and returns to it.
 
     The axis brakes beyond the edge or index pulse that is home, and then returns to it: at the
     end 6064h equals 607Ch. An index pulse occurs each time the encoder has turned by its counts.
@@ -316,7 +316,7 @@ class Homing(Mode):
 
 
 def index_pulse(before: int, after: int, per_turn: int) -> int | None:
-    """Return the first index pulse between two positions in counts; None if there is none.
+    """Return the first index pulse between two positions in counts, or None if there is none.
 
     >>> index_pulse(1990, 2010, 2000), index_pulse(2000, 2010, 2000), index_pulse(1, 0, 2000)
     (2000, None, 0)

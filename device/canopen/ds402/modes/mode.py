@@ -24,9 +24,9 @@ class DriveView:
         axis: motor, reference, settings and zero.
         switches: limit switches and home switch.
         limits: limits of the axis.
-        stopping: brakes according to the option codes.
+        stopping: object that brakes according to the option codes.
         controlword: the latest controlword.
-        fresh: whether a SYNC came or a target changed since the last step.
+        fresh: whether a SYNC has come or a target has changed since the last step.
     """
 
     parameters: Parameters
@@ -45,15 +45,15 @@ class Mode(Part):
     previous mode. The drive then commands the motor.
 
     Args:
-        drive: the parts of the drive that it uses.
+        drive: parts of the drive that the mode uses.
 
     Attributes:
-        control: the control loop of the motor.
-        halts: whether bit 8 of the controlword stops it.
-        minds_limits: whether limit switches and software limits stop it; homing checks them
+        control: control loop of the motor.
+        halts: whether bit 8 of the controlword stops the mode.
+        minds_limits: whether limit switches and software limits stop the mode. Homing checks them
             itself.
         shows_following_error: whether bit 13 shows a following error.
-        flags: its bits in the statusword: 10, 12, 13 and additional bits of the mode.
+        flags: bits of the mode in the statusword: 10, 12, 13 and additional bits.
         limited: whether a limit cut a demand in the last step (bit 11 of the statusword).
     """
 
@@ -76,8 +76,8 @@ class Mode(Part):
         """Start the mode.
 
         Args:
-            enabled: True if the mode was chosen in Operation enabled, False if the drive is just
-                being enabled.
+            enabled: whether the mode was chosen in Operation enabled. False means that the drive is
+                just being enabled.
         """
 
     def start(self) -> None:
@@ -104,8 +104,8 @@ class Mode(Part):
         """Return the motion of the reference in the next steps if no input changes.
 
         Returns:
-            The line and the limits at which it ends, such as a limit that would cut it. None if
-            each step needs a separate call of `step`.
+            The line and the limits at which it ends, such as a limit that would cut the motion, or
+            None if each step needs a separate call of `step`.
         """
         return None
 

@@ -23,9 +23,9 @@ from tickrig.wire.canopen.drive import Statusword
 class _ProfileVelocity(Mode):
     """Ramps to the target velocity with 6083h and 6084h.
 
-    Bit 10: the velocity has been within the window 606Dh of the target for the time 606Eh;
-    without a window, the ramp has ended. Bit 12: the speed has not been above the threshold 606Fh
-    for the time 6070h; without a threshold, the motor stands.
+    Bit 10 is set when the velocity has been within the window 606Dh of the target for the time
+    606Eh, or without a window when the ramp has ended. Bit 12 is set when the speed has not been
+    above the threshold 606Fh for the time 6070h, or without a threshold when the motor stands.
 
     Not emulated: the maximum slippage (bit 13); ramps of other shapes (6086h).
     """
@@ -67,8 +67,8 @@ class _ProfileVelocity(Mode):
 class _ProfileTorque(Mode):
     """Ramps the current to the target torque, 6071h, with the slope 6087h.
 
-    The torque is proportional to the current: rated torque at rated current, without friction.
-    Halt ramps the torque to zero. Bit 10: the ramp has ended.
+    The torque is proportional to the current: rated torque at rated current, without friction. Halt
+    ramps the torque to zero. Bit 10 is set when the ramp has ended.
 
     Not emulated: torque profiles other than the linear ramp (6088h).
     """
@@ -129,11 +129,11 @@ MODES: Final[dict[int, type[Mode]]] = {
     9: CyclicVelocity,
     10: _CyclicTorque,
 }
-"""Modes of any drive; a model may add its own, with negative numbers."""
+"""Modes of any drive; a model may add modes with negative numbers."""
 
 
 def offered(modes: Mapping[int, type[Mode]], listed: int) -> Mapping[int, type[Mode]]:
-    """Return the modes that a dictionary lists in its 6502h; all modes if it lists none.
+    """Return the modes that a dictionary lists in its 6502h, or all modes if it lists none.
 
     >>> sorted(offered(MODES, 0b101))
     [0, 1, 3]

@@ -15,7 +15,7 @@ SLOWEST: Final = 1.0
 """Lowest velocity in counts per second, so that each profile ends."""
 
 STEEPEST: Final = 1e12
-"""Counts per second per second, for ramps without a limit."""
+"""Acceleration for ramps without a limit, in counts per second per second."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,10 +23,10 @@ class _SetPoint(Immutable):
     """A target and its limits, as they were when the set-point was given.
 
     Attributes:
-        target: counts.
+        target: target in counts.
         limits: limits of the path.
-        end_velocity: speed at the target, counts per second.
-        cut: whether a software limit moved the target.
+        end_velocity: speed at the target, in counts per second.
+        cut: whether a software limit has moved the target.
     """
 
     target: float
@@ -36,7 +36,7 @@ class _SetPoint(Immutable):
 
 
 class ProfilePosition(Mode):
-    """Moves to set-points; while it moves to one set-point, one more may wait.
+    """Moves to set-points. While the axis moves to a set-point, one more set-point may wait.
 
     The target, velocities and ramps of a set-point are latched when bit 4 rises; later changes
     apply to the next set-point. Bit 12 falls when bit 4 has fallen and no set-point waits. While
@@ -149,7 +149,7 @@ class ProfilePosition(Mode):
 def _profile_limits(
     settings: Settings, shape: trapezoid.RampShape = trapezoid.RampShape.LINEAR
 ) -> trapezoid.PathLimits:
-    """Return the limits of 6081h, 6083h and 6084h; 0 as profile velocity means the slowest."""
+    """Return the limits of 6081h, 6083h and 6084h; a profile velocity of 0 means the slowest."""
     return trapezoid.PathLimits(
         max(SLOWEST, settings.profile_velocity),
         min(STEEPEST, settings.acceleration),
