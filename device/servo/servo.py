@@ -99,7 +99,7 @@ class _Loops(Part):
 
     @property
     def gains(self) -> tuple[float, float, float, float, float, float]:
-        """Rad per count, and gains of position, integral, error, speed, friction, for `RunAhead`."""
+        """Rad per count, and gains of position, integral, error, speed and friction."""
         proportional, viscous, dry = self._proportional, self._viscous, self._dry
         return self._rad, self._position, self._integral, proportional, viscous, dry
 
