@@ -67,14 +67,14 @@ _NOTATION: Final = re.compile(
 
 
 class CanFrame(NamedTuple):
-    """A data or remote frame. For speed it is not validated; see `checked`.
+    """A data or remote frame. For speed the frame is not validated; see `checked`.
 
     Attributes:
-        can_id: 0x000..0x7FF, extended 0x0000_0000..0x1FFF_FFFF.
-        data: payload, 0 to 8 bytes; empty in a remote frame.
-        remote: a remote frame (RTR).
-        extended: a 29-bit identifier.
-        remote_length: the DLC of a remote frame.
+        can_id: identifier, 0x000..0x7FF, or 0x0000_0000..0x1FFF_FFFF if extended.
+        data: payload of 0 to 8 bytes, which is empty in a remote frame.
+        remote: whether the frame is a remote frame (RTR).
+        extended: whether the identifier has 29 bits.
+        remote_length: DLC of a remote frame.
     """
 
     can_id: int
@@ -93,14 +93,15 @@ class CanFrame(NamedTuple):
         """Read candump's compact notation.
 
         Args:
-            text: `ID#DATA`, or `ID#R` with an optional length; an ID with 8 digits is 29-bit.
+            text: frame as `ID#DATA`, or as `ID#R` with an optional length. An ID with 8 digits is
+                29-bit.
 
         Returns:
             The frame.
 
         Raises:
-            FramingError: not a frame in this notation.
-            FieldError: an identifier or length out of range.
+            FramingError: the text is not a frame in this notation.
+            FieldError: an identifier or length is out of range.
         """
         match = _NOTATION.fullmatch(text.strip())
         if match is None:
@@ -122,7 +123,7 @@ class CanFrame(NamedTuple):
             The frame itself.
 
         Raises:
-            FieldError: it is not a valid CAN frame.
+            FieldError: the frame is not a valid CAN frame.
         """
         most = EXTENDED_MAX if self.extended else STANDARD_MAX
         if not 0 <= self.can_id <= most:
@@ -142,7 +143,7 @@ class CanFrame(NamedTuple):
 
 
 def data_frame(can_id: int, data: bytes) -> CanFrame:
-    """Return `CanFrame(can_id, data)` in a third of the time: 11-bit, not validated."""
+    """Return `CanFrame(can_id, data)` with an 11-bit identifier in a third of the time."""
     return _new(CanFrame, (can_id, data, False, False, 0))
 
 
@@ -172,10 +173,10 @@ Frames = tuple[CanFrame, ...]
 # tests/wire/test_can_bits.py, which counts single bits, checks changes to this code. `fd_bits` uses
 # the same automaton for the data. In the CRC field of CAN FD the stuff bits are at fixed places.
 INTERFRAME_BITS: Final = 3
-"""Bits of the interframe space (intermission), included in `frame_bits`."""
+"""Number of bits of the interframe space (intermission), which `frame_bits` includes."""
 
 _CRC_POLYNOMIAL: Final = 0x4599
-"""x^15 + x^14 + x^10 + x^8 + x^7 + x^4 + x^3 + 1 (ISO 11898-1)."""
+"""Polynomial of the CRC: x^15 + x^14 + x^10 + x^8 + x^7 + x^4 + x^3 + 1 (ISO 11898-1)."""
 
 # The generator times x: the CRC of 15 bits is in the upper bits of 16, so whole bytes can be fed.
 # Zeros before a stream change nothing, because the seed is 0.
@@ -185,7 +186,7 @@ _crc16 = crcmod.mkCrcFun(1 << 16 | _CRC_POLYNOMIAL << 1, initCrc=0, rev=False, x
 # the seven bits of end of frame. For 29 bits: additionally 18 bits of the identifier, SRR and r1.
 STANDARD_BITS: Final = 1 + 11 + 3 + 4 + 15 + 10 + INTERFRAME_BITS
 EXTENDED_BITS: Final = STANDARD_BITS + 20
-"""Bits of an empty frame without stuff bits."""
+"""Number of bits of an empty frame without stuff bits."""
 EXTENDED_FLAGS: Final = 0b11  # SRR and IDE, both recessive
 
 # States of the stuffing automaton: value of the latest bit << 2 | length of its run - 1. A stuff
@@ -197,21 +198,22 @@ _FILL_BITS: Final = {START_STANDARD: 5, START_EXTENDED: 1}
 _STATES: Final = 10
 
 _MAX_STUFFED: Final = 29
-"""The most stuff bits for the 118 bits from start of frame to the CRC's end: (118 - 1) // 4."""
+"""Largest number of stuff bits for the 118 bits from start of frame to the CRC's end: (118 - 1) //
+4."""
 
 _STUFFED_BITS: Final = 256
-"""Position in a row that holds the number of stuff bits; before it are the following rows."""
+"""Position of the number of stuff bits in a row; the next rows are before this position."""
 
 KEPT_HEADS: Final = 4_096
 
 _Row = list[Any]
 
 _heads: Final[dict[int, tuple[int, _Row, int]]] = {}
-"""Cache of frame heads: a plain dict, because the order that `lru_cache` keeps costs 1 %."""
+"""Cache of frame heads. It is a plain dict, because the order that `lru_cache` keeps costs 1 %."""
 
 
 def frame_bits(frame: CanFrame) -> int:
-    """Return the bits of a frame with stuff bits and interframe space."""
+    """Return the number of bits of a frame, with stuff bits and interframe space."""
     data = frame[1]  # places, not names: all five at once would take longer than these
     key = frame[0] << 6 | len(data)
     if frame[2] or frame[3]:
@@ -232,7 +234,7 @@ The frame's data must be `bytes`: a slave may send a `bytearray`, which has no h
 
 
 def _head(key: int) -> tuple[int, _Row, int]:
-    """Return the bits of a frame without stuff bits, and row and CRC after the DLC."""
+    """Return the number of bits of a frame without stuff bits, and row and CRC after the DLC."""
     can_id, extended, remote, length = key >> 6, key >> 5 & 1, key >> 4 & 1, key & 0xF
     control = remote << 6 | length
     if extended:
@@ -251,7 +253,7 @@ def _head(key: int) -> tuple[int, _Row, int]:
 
 @lru_cache(1)
 def _rows() -> list[_Row]:
-    """Build the table of the automaton, so that a byte needs no Python step of its own.
+    """Build the table of the automaton, which handles a whole byte in one step.
 
     Returns:
         The rows by initial state. Each row holds the next row for each byte, and at `_STUFFED_BITS`
@@ -305,7 +307,7 @@ FD_LENGTHS: Final = (*range(9), 12, 16, 20, 24, 32, 48, 64)
 
 BRS: Final = 0x1
 ESI: Final = 0x2
-"""Flags of a frame (linux/can.h, CANFD_BRS and CANFD_ESI)."""
+"""Flags of a CAN FD frame (linux/can.h, CANFD_BRS and CANFD_ESI)."""
 
 _FD_NOTATION: Final = re.compile(
     r"([0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})##([0-9A-Fa-f])((?:[0-9A-Fa-f]{2}\.?)*)"
@@ -313,13 +315,13 @@ _FD_NOTATION: Final = re.compile(
 
 
 class FdFrame(NamedTuple):
-    """A CAN FD frame; it is always a data frame. It is not validated; see `checked`.
+    """A CAN FD frame, which is always a data frame. The frame is not validated; see `checked`.
 
     Attributes:
-        can_id: 0x000..0x7FF, extended 0x0000_0000..0x1FFF_FFFF.
-        data: payload, one of `FD_LENGTHS` bytes.
-        extended: a 29-bit identifier.
-        flags: `BRS` and `ESI`.
+        can_id: identifier, 0x000..0x7FF, or 0x0000_0000..0x1FFF_FFFF if extended.
+        data: payload, whose number of bytes is one of `FD_LENGTHS`.
+        extended: whether the identifier has 29 bits.
+        flags: flags `BRS` and `ESI`.
     """
 
     can_id: int
@@ -329,17 +331,17 @@ class FdFrame(NamedTuple):
 
     @property
     def brs(self) -> bool:
-        """Whether its data are sent at the data bit rate (bit rate switch)."""
+        """Whether the data are sent at the data bit rate (bit rate switch)."""
         return bool(self.flags & BRS)
 
     @property
     def esi(self) -> bool:
-        """Whether its sender was error passive (error state indicator)."""
+        """Whether the sender was error passive (error state indicator)."""
         return bool(self.flags & ESI)
 
     @property
     def remote(self) -> bool:
-        """Always False: CAN FD has no remote frames."""
+        """False, because CAN FD has no remote frames."""
         return False
 
     @property
@@ -352,15 +354,15 @@ class FdFrame(NamedTuple):
         """Read candump's compact notation.
 
         Args:
-            text: `ID##FDATA`. F is one hex digit: 1 means BRS, 2 means ESI; other flags are
-                ignored. An ID with 8 digits is 29-bit. Data are padded as in `checked`.
+            text: frame as `ID##FDATA`. F is one hex digit: 1 means BRS, 2 means ESI, and other
+                flags are ignored. An ID with 8 digits is 29-bit. Data are padded as in `checked`.
 
         Returns:
             The frame.
 
         Raises:
-            FramingError: not a frame in this notation.
-            FieldError: an identifier or length out of range.
+            FramingError: the text is not a frame in this notation.
+            FieldError: an identifier or length is out of range.
         """
         match = _FD_NOTATION.fullmatch(text.strip())
         if match is None:
@@ -382,7 +384,7 @@ class FdFrame(NamedTuple):
             a controller does.
 
         Raises:
-            FieldError: it is not a valid CAN FD frame.
+            FieldError: the frame is not a valid CAN FD frame.
         """
         most = EXTENDED_MAX if self.extended else STANDARD_MAX
         if not 0 <= self.can_id <= most:
@@ -403,12 +405,12 @@ class FdFrame(NamedTuple):
 class FdBits(NamedTuple):
     """The length of a frame on the bus.
 
-    The rate is assumed to switch after the bit BRS and before the CRC delimiter. In reality it
-    switches at the sample points of these two bits, which differ from bus to bus.
+    The rate is assumed to switch after the bit BRS and before the CRC delimiter. In reality the
+    rate switches at the sample points of these two bits, which differ from bus to bus.
 
     Attributes:
-        nominal: bits at the nominal bit rate, with the interframe space.
-        fast: bits at the data bit rate; 0 in a frame without BRS.
+        nominal: number of bits at the nominal bit rate, with the interframe space.
+        fast: number of bits at the data bit rate, which is 0 in a frame without BRS.
     """
 
     nominal: int
@@ -418,18 +420,19 @@ class FdBits(NamedTuple):
 # Stuff count with its parity (4), CRC of 17 or 21 bits, and a fixed stuff bit before each four bits
 # of these fields.
 _CRC_FIELD: Final = {False: 4 + 17 + 6, True: 4 + 21 + 7}
-"""Bits of stuff count, CRC and fixed stuff bits; the key is whether the data exceed 16 bytes."""
+"""Number of bits of stuff count, CRC and fixed stuff bits. The key is whether the data exceed 16
+bytes."""
 
 _TAIL: Final = 1 + 2 + 7 + INTERFRAME_BITS  # CRC delimiter, ACK, end of frame
 _KEPT: Final = 1_024
 
 
 def fd_bits(frame: FdFrame) -> FdBits:
-    """Return the bits of a frame with stuff bits and interframe space (ISO 11898-1).
+    """Return the numbers of bits of a frame, with stuff bits and interframe space (ISO 11898-1).
 
     The bits from start of frame to the end of the data are stuffed as in classic CAN. The CRC field
-    has stuff bits at fixed places. The first of them replaces a stuff bit that the last data bits
-    would need.
+    has stuff bits at fixed places. The first fixed stuff bit replaces a stuff bit that the last
+    data bits would need.
     """
     data, length = frame.data, frame.dlc
     nominal, fast, state = _fd_head(frame.can_id, frame.extended, frame.flags, length)
@@ -471,17 +474,17 @@ def _stuff(last: int, run: int, stream: str) -> tuple[int, int, int]:
 
 
 def parse_sent(text: str) -> CanFrame | FdFrame:
-    """Read a frame in candump's compact notation; `##` marks CAN FD.
+    """Read a frame in candump's compact notation, in which `##` marks CAN FD.
 
     Raises:
-        FramingError: not a frame in this notation.
-        FieldError: an identifier or length out of range.
+        FramingError: the text is not a frame in this notation.
+        FieldError: an identifier or length is out of range.
     """
     return FdFrame.parse(text) if "##" in text else CanFrame.parse(text)
 
 
 ERROR_FLAG: Final = 0x2000_0000
-"""Marks an identifier as that of an error frame (linux/can.h, CAN_ERR_FLAG)."""
+"""Flag that marks an identifier as that of an error frame (linux/can.h, CAN_ERR_FLAG)."""
 
 ERROR_CLASS_MASK: Final = 0x1FFF_FFFF
 
@@ -500,7 +503,7 @@ class ErrorFrame(NamedTuple):
     """An error frame of SocketCAN (linux/can/error.h).
 
     Attributes:
-        error_class: class of the error, a set of CAN_ERR_ bits.
+        error_class: class of the error, as a set of CAN_ERR_ bits.
         data: eight bytes with details.
     """
 
@@ -509,7 +512,7 @@ class ErrorFrame(NamedTuple):
 
     @classmethod
     def parse(cls, text: str) -> ErrorFrame:
-        """Read candump's notation; FramingError if it is not an error frame."""
+        """Read candump's notation; raise FramingError if the text is not an error frame."""
         match = _ERROR_NOTATION.fullmatch(text)
         if match is None:
             raise FramingError(f"{text!r} is not an error frame like {NO_ACK}")
@@ -521,10 +524,10 @@ class ErrorFrame(NamedTuple):
 
 
 NO_ACK: Final = ErrorFrame(0x20)
-"""No node acknowledged a frame: CAN_ERR_ACK."""
+"""Error frame after a frame that no node has acknowledged: CAN_ERR_ACK."""
 
 BIT_ERROR: Final = ErrorFrame(0x88, bytes((0, 0, 1, 0, 0, 0, 0, 0)))
-"""A bit on the bus differed from the sent one: CAN_ERR_PROT and BUSERROR, PROT_BIT."""
+"""Error frame after a bit that differed from the sent bit: CAN_ERR_PROT and BUSERROR, PROT_BIT."""
 
 
 class ErrorClass(IntFlag):
@@ -540,7 +543,7 @@ class ErrorClass(IntFlag):
     BUS_ERROR = 0x080
     RESTARTED = 0x100
     COUNTERS = 0x200
-    """Bytes 6 and 7 are TEC and REC."""
+    """Bytes 6 and 7 of the data are TEC and REC."""
 
 
 class ControllerFlag(IntFlag):
@@ -634,14 +637,14 @@ _ERROR: Final = re.compile(r"[23][0-9A-Fa-f]{7}#.*")  # bit 29: no identifier ha
 
 
 class CandumpError(ValueError):
-    """A line that is not a line of a CAN log."""
+    """A text is not a line of a CAN log."""
 
 
 class LogLine(NamedTuple):
-    """One frame or error frame of a log.
+    """A frame or error frame of a log.
 
     Attributes:
-        at_us: time of the end of the frame.
+        at_us: time of the end of the frame, in us.
         channel: name of the bus, without blanks.
         received: the frame.
     """
@@ -657,7 +660,7 @@ class LogLine(NamedTuple):
 
 
 def parse_line(line: str, number: int = 1) -> LogLine:
-    """Read one line; CandumpError if it is invalid."""
+    """Read one line; raise CandumpError if the line is invalid."""
     match = _LINE.fullmatch(line.rstrip())
     if match is None:
         raise CandumpError(
@@ -676,7 +679,7 @@ def parse_log(text: str) -> tuple[LogLine, ...]:
     """Read a log; empty lines are skipped.
 
     Raises:
-        CandumpError: an invalid line.
+        CandumpError: a line is invalid.
     """
     lines = enumerate(text.splitlines(), 1)
     return tuple(parse_line(line, number) for number, line in lines if line.strip())

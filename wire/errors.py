@@ -13,19 +13,19 @@ from tickrig._compiled import mypyc_attr
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class WireError(ValueError):
-    """Bytes that are not a message of this protocol."""
+    """The bytes are not a message of the protocol."""
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class FramingError(WireError):
-    """Not a message: bad name, length or terminator."""
+    """The bytes are not a message, because of a bad name, length or terminator."""
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class ChecksumError(WireError):
-    """A complete message with a wrong checksum."""
+    """A complete message has a wrong checksum."""
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class FieldError(WireError):
-    """A valid message with a field out of range."""
+    """A valid message has a field out of range."""

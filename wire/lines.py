@@ -10,8 +10,8 @@ class LineSplitter:
     r"""Collects bytes into whole lines, however they are split into chunks.
 
     Args:
-        max_bytes: a longer line is returned in pieces, so that noise without LF cannot fill the
-            memory.
+        max_bytes: largest number of bytes of a line. A longer line is returned in pieces, so that
+            noise without LF cannot fill the memory.
 
     >>> splitter = LineSplitter()
     >>> splitter.push(b"OK:be"), splitter.push(b"ep\r\nEV:")
@@ -29,7 +29,7 @@ class LineSplitter:
             data: the received bytes.
 
         Returns:
-            The completed lines, without LF and one CR before it.
+            The completed lines, without LF and without one CR before the LF.
         """
         *lines, tail = (self._tail + data).split(b"\n")
         out = []

@@ -31,13 +31,13 @@ import crcmod
 from tickrig.wire.errors import ChecksumError, FramingError, WireError
 
 _crc16: Final[Callable[[bytes], int]] = crcmod.mkCrcFun(0x1_8005, 0xFFFF, rev=True, xorOut=0)
-"""The CRC over address, function code and data: polynomial 8005h, reflected, initial value FFFFh
-(Modbus over Serial Line 1.02, CRC Checking)."""
+"""Function for the CRC over address, function code and data, with polynomial 8005h, reflected, and
+initial value FFFFh (Modbus over Serial Line 1.02, CRC Checking)."""
 
 MAX_FRAME_BYTES: Final = 256
 _MIN_FRAME_BYTES: Final = 4
 BROADCAST: Final = 0
-"""Broadcast address; no slave answers."""
+"""Broadcast address, to which no slave answers."""
 ADDRESSES: Final = range(1, 248)
 """Addresses of individual slaves."""
 
@@ -64,11 +64,11 @@ def encode_frame(address: int, message: bytes) -> bytes:
 
 
 def parse_frame(frame: bytes) -> tuple[int, bytes]:
-    """Read a frame; return its address and its message.
+    """Read a frame; return the address and the message.
 
     Raises:
-        FramingError: an invalid length.
-        ChecksumError: a wrong CRC.
+        FramingError: the length is invalid.
+        ChecksumError: the CRC is wrong.
     """
     if not _MIN_FRAME_BYTES <= len(frame) <= MAX_FRAME_BYTES:
         raise FramingError(f"{len(frame)} bytes, a frame has {_MIN_FRAME_BYTES}..{MAX_FRAME_BYTES}")
@@ -93,7 +93,7 @@ _WRITE_HEAD: Final = struct.Struct(">HHB")
 
 
 class ExceptionCode(IntEnum):
-    """Exception codes: why a slave refused a request."""
+    """Exception codes, which say why a slave has refused a request."""
 
     ILLEGAL_FUNCTION = 1
     ILLEGAL_DATA_ADDRESS = 2
@@ -112,12 +112,12 @@ class Refusal(WireError):  # noqa: N818 - what the slave does
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """A request; writes happen before reads.
+    """A request, in which writes happen before reads.
 
     Attributes:
-        function: its code.
-        read: first register and number of registers to read.
-        write: first register and values to write.
+        function: function code.
+        read: first register, and number of registers to read.
+        write: first register, and values to write.
     """
 
     function: int
@@ -144,7 +144,7 @@ def parse_request(message: bytes) -> Request:
     """Read a request.
 
     Raises:
-        Refusal: an unknown function, or numbers out of range.
+        Refusal: the function is unknown, or a number is out of range.
     """
     function, data = message[0], message[1:]
     if function == READ:
@@ -178,7 +178,7 @@ def encode_exception(function: int, code: ExceptionCode) -> bytes:
 
 
 def _pack_registers(values: Sequence[int]) -> bytes:
-    """Write registers, high byte first."""
+    """Write registers, with the high byte first."""
     return struct.pack(f">{len(values)}H", *values)
 
 
@@ -280,7 +280,7 @@ class Command(IntEnum):
 
 
 class Status(IntFlag):
-    """Status of the driver (0200h); bits 5 and 6 are our addition."""
+    """Status of the driver (0200h). Bits 5 and 6 are our addition."""
 
     ENABLED = 0x01
     MOVING = 0x02
@@ -292,7 +292,7 @@ class Status(IntFlag):
 
 
 class Fault(IntFlag):
-    """Reason for switching a wheel off (0201h, 0202h); ours, as the proposal defines no reasons."""
+    """Reason for switching a wheel off (0201h, 0202h), our choice because the proposal has none."""
 
     OVER_CURRENT = 0x01
     ENCODER = 0x04
@@ -301,15 +301,15 @@ class Fault(IntFlag):
 
 
 class Report(NamedTuple):
-    """Registers that a master reads each period: 12 from `Address.STATUS` on.
+    """Registers that a master reads in each period: 12 registers from `Address.STATUS` on.
 
     Attributes:
         status: status of the driver.
         fault_left: fault of the left wheel.
         fault_right: fault of the right wheel.
-        sample: milliseconds since power-up, modulo 65536.
-        left: position of the left wheel, counts.
-        right: position of the right wheel, counts.
+        sample: number of milliseconds since power-up, modulo 65536.
+        left: position of the left wheel, in counts.
+        right: position of the right wheel, in counts.
     """
 
     status: Status
@@ -328,7 +328,7 @@ class Report(NamedTuple):
 
 
 REPORT: Final = (Address.STATUS.value, 12)
-"""First register and number of registers."""
+"""First register and number of registers of a report."""
 
 
 def wide(value: int) -> tuple[int, int]:

@@ -7,7 +7,7 @@ Data types of ports and of the objects that carry them (NEDO report, 3.4.43.3, T
 >>> SHORT.sequence(2).decode([b"\x01\x00", b"\xff\xff"])
 (1, -1)
 
-The objects of a DeviceRTC, made of its profile (DECISION K2, K3, K17).
+The objects of a DeviceRTC, made from its profile (DECISION K2, K3, K17).
 
 >>> table = object_table(RtcProfile(type_name="Empty"))
 >>> {f"{row.index:04X}h": row.default.decode() for row in table if row.index == 0x1008}
@@ -46,7 +46,7 @@ from tickrig.wire.errors import FieldError
 T = TypeVar("T")
 
 MAX_TEXT: Final = 255
-"""Largest number of characters of a text port; ours."""
+"""Largest number of characters of a text port, which is our choice."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,15 +54,16 @@ class CanopenPortType(Generic[T]):
     """A data type of a port; each element of a value is an object in the dictionary.
 
     Attributes:
-        name: the RTC name of Table 4.
-        data_type: the CANopen data type of an element.
-        kind: the Python type of an element.
+        name: name of the RTC type in Table 4.
+        data_type: CANopen data type of an element.
+        kind: Python type of an element.
         length: number of elements.
-        many: True if a value is a tuple of `length` elements, False if it is a single element.
-        width: bits of an element if its data type does not define them.
+        many: whether a value is a tuple of `length` elements. Otherwise a value is a single
+            element.
+        width: number of bits of an element if its data type does not define it.
 
     Raises:
-        ValueError: a sequence without elements.
+        ValueError: a sequence has no elements.
     """
 
     name: str
@@ -78,19 +79,19 @@ class CanopenPortType(Generic[T]):
             raise ValueError(f"a sequence of {self.length} elements, at least 1 is needed")
 
     def sequence(self, length: int) -> CanopenPortType[tuple[T, ...]]:
-        """Return the sequence type with this number of elements (DECISION K3)."""
+        """Return the sequence type with a given number of elements (DECISION K3)."""
         return CanopenPortType(
             self.name, self.data_type, self.kind, length, many=True, width=self.width
         )
 
     @property
     def element_bits(self) -> int:
-        """Bits of an element in Table 4; 0 for a text."""
+        """Number of bits of an element in Table 4, or 0 for a text."""
         return self.width or self.data_type.bits
 
     @property
     def bits(self) -> int:
-        """Bits of a value in a PDO; 0 for a text, which does not fit into a PDO."""
+        """Number of bits of a value in a PDO, or 0 for a text, which does not fit into a PDO."""
         return self.element_bits * self.length
 
     @property
@@ -102,11 +103,11 @@ class CanopenPortType(Generic[T]):
 
     @property
     def default(self) -> bytes:
-        """Bytes of an element at power-on: 0, or an empty text."""
+        """Bytes of an element at power-on, which are 0 or an empty text."""
         return bytes(self.max_bytes if self.element_bits else 0)
 
     def encode(self, value: T) -> tuple[bytes, ...]:
-        """Return the bytes of each element; FieldError if the value is not of this type."""
+        """Return the bytes of each element; raise FieldError if the value has another type."""
         items: Any = value if self.many else (value,)
         if len(items) != self.length:
             raise FieldError(f"{len(items)} elements of {self.name}, {self.length} are needed")
@@ -118,7 +119,7 @@ class CanopenPortType(Generic[T]):
         return elements
 
     def decode(self, elements: Sequence[bytes]) -> T:
-        """Return the value of the bytes of all elements."""
+        """Return the value from the bytes of all elements."""
         items = [self.data_type.decode(data) for data in elements]
         values = tuple(bool(item) if self.kind is bool else item for item in items)
         return cast(T, values if self.many else values[0])
@@ -152,14 +153,14 @@ PORT_TYPES: Final[Mapping[str, CanopenPortType[Any]]] = MappingProxyType(
         )
     }
 )
-"""Table 4 by RTC name, without Integer; LongLong is ours (DECISION K5)."""
+"""Types of Table 4 by RTC name, without Integer. LongLong is our addition (DECISION K5)."""
 
 INTEGER: Final = "Integer"
 _INTEGERS: Final = {8: DataType.INTEGER8, 16: DataType.INTEGER16, 32: DataType.INTEGER32}
 
 
 def integer(word_bits: int) -> CanopenPortType[int]:
-    """Return Integer for a device with this word size (Table 4, note 1).
+    """Return the type Integer for a device with a given word size (Table 4, note 1).
 
     Raises:
         ValueError: the word size is not 8, 16 or 32.
@@ -172,7 +173,7 @@ def integer(word_bits: int) -> CanopenPortType[int]:
 # The profile of a DeviceRTC, and the place of its ports in the dictionary (DECISION K2, K3, K17).
 
 FIRST_PORT: Final = 0x2100
-"""Index of the first port; the others follow in order of declaration."""
+"""Index of the first port; the other ports follow in order of declaration."""
 
 _PORT_OBJECTS: Final = range(FIRST_PORT, 0x6000)
 """Indices of ports, up to the end of the manufacturer-specific objects (CiA 301)."""
@@ -184,7 +185,7 @@ MOST_ELEMENTS: Final = 254
 """Largest number of elements of an array (CiA 301)."""
 
 _PREDEFINED_PDOS: Final = 4
-"""PDOs in each direction with a COB-ID of the pre-defined connection set."""
+"""Number of PDOs in each direction with a COB-ID of the pre-defined connection set."""
 
 _CAN_IDS: Final = range(0x181, 0x6E0)
 
@@ -195,7 +196,7 @@ _VERSION: Final = re.compile(r"[0-9]{1,4}\.[0-9]{1,4}(\.[0-9]{1,4})?")
 
 
 class PortDirection(Enum):
-    """Direction of the data, seen from the device."""
+    """Direction of the data, from the point of view of the device."""
 
     IN = "in"
     OUT = "out"
@@ -213,11 +214,12 @@ class CanopenPortProfile:
     """Declaration of a port.
 
     Attributes:
-        name: a letter, then up to 31 letters, digits and underscores.
-        direction: in-port or out-port.
-        port_type: type of its values.
-        cob_id: CAN-ID of its PDO; None for that of the pre-defined connection set.
-        transport: None for a PDO if the type fits into one, else SDO.
+        name: name of the port: a letter, then up to 31 letters, digits and underscores.
+        direction: direction of the port: in-port or out-port.
+        port_type: type of the values.
+        cob_id: CAN-ID of the PDO, or None to use the CAN-ID of the pre-defined connection set.
+        transport: transport of the values. None selects a PDO if the type fits into one PDO, or
+            else SDO.
     """
 
     name: str
@@ -233,7 +235,7 @@ class CanopenPortProfile:
 
     @property
     def by_sdo(self) -> bool:
-        """Whether its object is read and written by SDO only."""
+        """Whether the object of the port is read and written by SDO only."""
         return self.transport is PortTransport.SDO or not self.fits_pdo
 
 
@@ -242,9 +244,9 @@ class PlacedPort:
     """A port with its objects and its PDO.
 
     Attributes:
-        profile: the port.
-        index: of its object.
-        number: of its RPDO or TPDO, 1..512; 0 without one.
+        profile: declaration of the port.
+        index: index of the object.
+        number: number of the RPDO or TPDO, 1..512, or 0 without a PDO.
     """
 
     profile: CanopenPortProfile
@@ -258,9 +260,9 @@ class PlacedPort:
 
     @property
     def cob_id(self) -> int | None:
-        """CAN-ID of RPDO n for an in-port, of TPDO n for an out-port.
+        """CAN-ID of RPDO n for an in-port, or of TPDO n for an out-port.
 
-        It is without the node-ID if `relative`; None without a CAN-ID: the PDO is off.
+        If `relative` is true, the CAN-ID is without the node-ID. None means that the PDO is off.
         """
         if not self.relative:
             return self.profile.cob_id
@@ -269,16 +271,16 @@ class PlacedPort:
 
     @property
     def subs(self) -> tuple[int, ...]:
-        """Sub-indices of its elements: 0 for a variable, 1 and up for an array."""
+        """Sub-indices of the elements: 0 for a variable, or 1 and up for an array."""
         length = self.profile.port_type.length
         return (0,) if length == 1 else tuple(range(1, length + 1))
 
     @property
     def mapping(self) -> tuple[int, ...]:
-        """The mapping parameter of its PDO.
+        """The mapping parameter of the PDO.
 
-        Each Boolean has one bit (Table 4). Dummy bits pad the last byte of an RPDO; a TPDO cannot
-        have them (CiA 301), so its last byte ends with unmapped zeros.
+        Each Boolean has one bit (Table 4). Dummy bits pad the last byte of an RPDO. A TPDO cannot
+        have dummy bits (CiA 301), so its last byte ends with unmapped zeros.
         """
         kind = self.profile.port_type
         mapped = [MappedObject(self.index, sub, kind.element_bits).encode() for sub in self.subs]
@@ -291,16 +293,18 @@ class RtcProfile:
     """The profile of a component.
 
     Attributes:
-        type_name: spelled like a name of a port; 1008h.
-        version: such as 1.0 or 1.0.2; 100Ah, and the revision number 1018h:03.
-        vendor: who made it, for the EDS.
-        category: description for people.
-        rate_hz: how often `on_execute` runs, 1..1000 Hz.
-        product_code: 1018h:02; by default the CRC-32 of the type name.
-        ports: in order of declaration.
+        type_name: type of the component, spelled like the name of a port. It is the value of 1008h.
+        version: version such as 1.0 or 1.0.2. It is the value of 100Ah, and of the revision number
+            1018h:03.
+        vendor: maker of the component, for the EDS.
+        category: description as readable text.
+        rate_hz: rate at which `on_execute` runs, 1..1000 Hz.
+        product_code: value of 1018h:02. The default is the CRC-32 of the type name.
+        ports: ports in order of declaration.
 
     Raises:
-        ValueError: an invalid value; one line with the value and the allowed ones.
+        ValueError: a value is invalid. The message has one line with the value and the allowed
+            values.
     """
 
     type_name: str
@@ -337,7 +341,7 @@ class RtcProfile:
         return int(major) << 16 | int(minor)
 
     def placed(self, direction: PortDirection | None = None) -> tuple[PlacedPort, ...]:
-        """Return the ports with their objects: all, or those with a PDO in one direction."""
+        """Return the ports with their objects: all ports, or ports with a PDO in one direction."""
         return tuple(
             port
             for port in self._place()
@@ -412,7 +416,7 @@ _HEARTBEAT_MS: Final = 100
 
 
 def object_table(profile: RtcProfile) -> ObjectTable:
-    """Return the objects: those of CiA 301, then one for each port from 2100h on."""
+    """Return the objects: the objects of CiA 301, then an object for each port from 2100h on."""
     table = ObjectTable()
     communication = CommunicationProfile(
         device_type=_NO_PROFILE,
@@ -432,7 +436,7 @@ def object_table(profile: RtcProfile) -> ObjectTable:
 
 
 def device_info(profile: RtcProfile) -> DeviceInfo:
-    """Return the head of the EDS."""
+    """Return vendor, product and bit rates for the EDS."""
     return DeviceInfo(profile.vendor, profile.type_name, bit_rates=BIT_RATES)
 
 

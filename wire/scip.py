@@ -21,8 +21,8 @@ The data of a scan: time stamp, and distances in blocks of 64 characters, each w
 >>> parse_scan((b'm2@0?', b'1DhM'), 3)
 (16000000, (5432,))
 
-SCIP 1.1, the protocol of a URG-04LX after power-up. It has no sums; a status has one character, and
-a distance two.
+SCIP 1.1, the protocol of a URG-04LX after power-up. SCIP 1.1 has no sums. A status has one
+character, and a distance has two.
 
 Sources: HokuyoAIST, urg_nz (gearbox) and urg_library as hosts; two recordings of real sensors
 (`tests/golden/scip_urg_04lx.json`). The document itself is no longer public.
@@ -75,7 +75,7 @@ STRING_LETTERS: Final = "0H"
 LASER_OFF: Final = "10"
 LASER_TROUBLE: Final = "50"
 MOTOR_TROUBLE: Final = "51"
-"""50..97 are hardware faults; their assignment is our choice."""
+"""Statuses of hardware faults, which are 50..97. The assignment is our choice."""
 
 
 _BITS: Final = 6
@@ -84,16 +84,16 @@ _ZERO: Final = 0x30
 _CHARACTERS: Final = bytes(range(_ZERO, _ZERO + _MASK + 1))
 
 _BASE64: Final = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/"
-"""Base64 characters of 6 bits, four for three bytes: five times as fast as shifts and masks."""
+"""Base64 characters of 6 bits; with them encoding is five times as fast as by shifts and masks."""
 
 _FROM_BASE64: Final = bytes.maketrans(_BASE64, _CHARACTERS)
 _TO_BASE64: Final = bytes.maketrans(_CHARACTERS, _BASE64)
 _MOST: Final = 4
-"""Number of characters of a number."""
+"""Largest number of characters of a number."""
 
 
 def encode_numbers(values: Sequence[int], width: int) -> bytes:
-    """Return numbers in `width` characters each, 1 to 4, one after the other.
+    """Return numbers one after the other, each in `width` (1 to 4) characters.
 
     Raises:
         FieldError: a number needs more characters.
@@ -113,11 +113,11 @@ def encode_numbers(values: Sequence[int], width: int) -> bytes:
 
 
 def parse_numbers(data: bytes, width: int) -> tuple[int, ...]:
-    """Return the numbers encoded in characters; each number has `width` of them, 1 to 4.
+    """Return the numbers encoded in characters; each number has `width` (1 to 4) characters.
 
     Raises:
-        FieldError: an invalid character.
-        FramingError: an incomplete number at the end.
+        FieldError: a character is invalid.
+        FramingError: the number at the end is incomplete.
     """
     # Check before base64: `a2b_base64` skips characters that it does not know.
     if strange := data.translate(None, _CHARACTERS):
@@ -135,12 +135,12 @@ def parse_numbers(data: bytes, width: int) -> tuple[int, ...]:
 
 
 def encode_number(value: int, width: int) -> bytes:
-    """Return a number in `width` characters; FieldError if it needs more."""
+    """Return a number in `width` characters; raise FieldError if it needs more characters."""
     return encode_numbers((value,), width)
 
 
 def parse_number(data: bytes) -> int:
-    """Return the number in all characters; FieldError if one is invalid."""
+    """Return the number in all characters; raise FieldError if a character is invalid."""
     return parse_numbers(data, len(data))[0]
 
 
@@ -168,7 +168,7 @@ def without_sum(line: bytes) -> bytes:
 
 _SYMBOL_BYTES: Final = 2
 MOST_STRING: Final = 16
-"""Letters that a string may have (SCIP 2.0, communication format)."""
+"""Largest number of letters of a string (SCIP 2.0, communication format)."""
 
 LETTERS: Final = frozenset(ascii_letters + digits + " ._+@")
 
@@ -188,17 +188,17 @@ SIZES: Final[Mapping[str, tuple[int, ...]]] = {
     "PP": (),
     "II": (),
 }
-"""Characters of each parameter."""
+"""Numbers of characters of the parameters, by command."""
 
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """One command, received or to send; it is not validated.
+    """A command that was received or is to be sent. The command is not validated.
 
     Attributes:
-        symbol: two letters.
+        symbol: symbol of two letters.
         parameters: all parameters, one after the other.
-        string: the string with its semicolon, empty without a string.
+        string: string with its semicolon, or empty without a string.
     """
 
     symbol: str
@@ -234,11 +234,11 @@ class Command:
 _TIME_WIDTH: Final = 4
 _BLOCK_BYTES: Final = 64
 WIDTHS: Final = {"D": 3, "S": 2}
-"""Characters of a distance, by the second letter of the command."""
+"""Number of characters of a distance, by the second letter of the command."""
 
 
 def encode_scan(time_ms: int, distances: Sequence[int], width: int) -> tuple[bytes, ...]:
-    """Return the lines after the status; FieldError for a number that does not fit."""
+    """Return the lines after the status; raise FieldError for a number that does not fit."""
     data = encode_numbers(distances, width)
     blocks = [data[at : at + _BLOCK_BYTES] for at in range(0, len(data), _BLOCK_BYTES)]
     return tuple(with_sum(line) for line in (encode_number(time_ms, _TIME_WIDTH), *blocks))
@@ -248,9 +248,9 @@ def parse_scan(lines: Sequence[bytes], width: int) -> tuple[int, tuple[int, ...]
     """Return time stamp in ms and distances in mm.
 
     Raises:
-        ChecksumError: a line with a wrong sum.
-        FramingError: no time stamp, or an incomplete distance.
-        FieldError: an invalid character.
+        ChecksumError: the sum of a line is wrong.
+        FramingError: there is no time stamp, or a distance is incomplete.
+        FieldError: a character is invalid.
     """
     # Each line has a sum of its own, and a distance may be split between two blocks of 64
     # characters. So remove the sums first, join the blocks, then cut the distances.
@@ -266,11 +266,11 @@ SWITCH: Final = b"SCIP2.0"
 
 SCIP1_OK: Final = b"0"
 ERROR: Final = b"E"
-"""Answer to QT, by which hosts detect SCIP 1.1; anything but 0 is an error."""
+"""Status in the answer to QT, by which hosts detect SCIP 1.1. Any status except 0 is an error."""
 
 _WIDTH: Final = 2
 FARTHEST_MM: Final = 4_095
-"""Largest number in two characters."""
+"""Largest distance in mm, which is the largest number in two characters."""
 
 
 def encode_reply(echo: bytes, status: bytes, lines: Iterable[bytes] = ()) -> bytes:
@@ -279,7 +279,7 @@ def encode_reply(echo: bytes, status: bytes, lines: Iterable[bytes] = ()) -> byt
 
 
 def encode_distances(distances: Sequence[int]) -> tuple[bytes, ...]:
-    """Return the lines of G; FieldError for a number that does not fit."""
+    """Return the lines of the answer to G; raise FieldError for a number that does not fit."""
     data = encode_numbers(distances, _WIDTH)
     return tuple(data[at : at + _BLOCK_BYTES] for at in range(0, len(data), _BLOCK_BYTES))
 
@@ -287,18 +287,17 @@ def encode_distances(distances: Sequence[int]) -> tuple[bytes, ...]:
 _END: Final = b"\n\n"
 _STATUS_BYTES: Final = 2
 MOST_BYTES: Final = 16_384
-"""Largest size of a reply: a whole scan has less than 3000 bytes."""
+"""Largest size of a reply in bytes; a whole scan has less than 3000 bytes."""
 
 
 @dataclass(frozen=True, slots=True)
 class Reply:
-    """One reply.
+    """A reply of a sensor.
 
     Attributes:
-        echo: the command, in which the number of scans is replaced by the number of remaining
-            scans.
-        status: two characters.
-        lines: the lines after the status, as received, each with its sum.
+        echo: command, in which the number of scans is replaced by the number of remaining scans.
+        status: status of two characters.
+        lines: lines after the status, as received, each with its sum.
     """
 
     echo: bytes
@@ -315,7 +314,7 @@ class Reply:
         """Read a reply without its last two line ends.
 
         Raises:
-            FramingError: no echo or status.
+            FramingError: there is no echo or no status.
             ChecksumError: the sum of the status does not match.
         """
         echo, *rest = data.split(b"\n")
@@ -358,17 +357,17 @@ class ReplySplitter:
 
 
 def encode_lines(values: Mapping[str, str]) -> tuple[bytes, ...]:
-    """Return the lines; the sum does not include the semicolon."""
+    """Return the lines of values; the sum does not include the semicolon."""
     texts = [f"{key}:{value}".encode("latin-1") for key, value in values.items()]
     return tuple(with_sum(text + b";", text) for text in texts)
 
 
 def parse_lines(lines: Iterable[bytes]) -> dict[str, str]:
-    """Return the values by their keys.
+    """Return the values by key.
 
     Raises:
-        FramingError: an invalid line.
-        ChecksumError: a line with a wrong sum.
+        FramingError: a line is invalid.
+        ChecksumError: the sum of a line is wrong.
     """
     values = {}
     for line in lines:
@@ -384,17 +383,17 @@ def parse_lines(lines: Iterable[bytes]) -> dict[str, str]:
 
 @dataclass(frozen=True, slots=True)
 class Specification:
-    """The reply to PP: limits in mm, steps, turns per minute.
+    """The reply to PP, with limits in mm, steps, and turns per minute.
 
     Attributes:
         model: name of the model.
-        nearest_mm: DMIN, the smallest distance.
-        farthest_mm: DMAX, the largest distance.
-        resolution: ARES, number of steps in a whole turn.
-        first: AMIN, the first step that measures.
-        last: AMAX, the last step that measures.
-        front: AFRT, the step straight ahead.
-        speed_rpm: SCAN.
+        nearest_mm: smallest distance (DMIN).
+        farthest_mm: largest distance (DMAX).
+        resolution: number of steps in a whole turn (ARES).
+        first: first step that measures (AMIN).
+        last: last step that measures (AMAX).
+        front: step that is straight ahead (AFRT).
+        speed_rpm: speed in turns per minute (SCAN).
     """
 
     model: str
@@ -420,7 +419,7 @@ class Specification:
         """Read a reply to PP.
 
         Raises:
-            WireError: an invalid line, or a number that is missing, invalid or below 0.
+            WireError: a line is invalid, or a number is missing, invalid or below 0.
         """
         values = parse_lines(lines)
         numbers = []

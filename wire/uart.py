@@ -10,14 +10,15 @@ from tickrig.wire.errors import FieldError
 from tickrig.wire.instant import NEVER
 
 Parity = Literal["N", "E", "O", "M", "S"]
-"""Parity: none, even, odd, mark (always 1), space (always 0)."""
+"""Parity of a setting: none, even, odd, mark (always 1), space (always 0)."""
 
 PS_PER_US: Final = 1_000_000
 PS_PER_S: Final = 1_000_000 * PS_PER_US
-"""Times here are in picoseconds, because bits of a fast line are shorter than a microsecond."""
+"""Number of picoseconds in a second. Times are in picoseconds, because a bit may be shorter than a
+microsecond."""
 
 _OVERSAMPLING: Final = 16
-"""Samples of a receiver per bit."""
+"""Number of samples per bit in a receiver."""
 
 _MID_BIT: Final = _OVERSAMPLING // 2
 
@@ -28,12 +29,12 @@ class UartSetting:
 
     Attributes:
         baud: bit rate in bit/s, at least 1.
-        data_bits: number of data bits of a character, 5 to 8; the lowest is sent first.
+        data_bits: number of data bits of a character, 5 to 8. The lowest bit is sent first.
         parity: parity of the bit after the data bits.
-        stop_bits: 1, 1.5 or 2; a receiver checks only the first.
+        stop_bits: number of stop bits: 1, 1.5 or 2. A receiver checks only the first stop bit.
 
     Raises:
-        FieldError: a value out of range.
+        FieldError: a value is out of range.
 
     >>> str(UartSetting(9_600, 7, "E", 2)), UartSetting(9_600, 7, "E", 2).frame_bits
     ('9600 7E2', 11)
@@ -61,7 +62,7 @@ class UartSetting:
 
     @property
     def frame_bits(self) -> float:
-        """Bits of a character on the line, from the start bit to the last stop bit."""
+        """Number of bits of a character on the line, from the start bit to the last stop bit."""
         return 1 + self.data_bits + (self.parity != "N") + self.stop_bits
 
     def duration_ps(self, characters: int = 1) -> int:
@@ -75,7 +76,7 @@ class UartSetting:
         return int(characters * 2 * self.frame_bits) * PS_PER_S // (2 * self.baud)
 
     def parity_bit(self, value: int) -> int:
-        """Compute the parity bit of a character; without parity it is 1, as the stop bit.
+        """Compute the parity bit of a character; without parity the bit is 1, like the stop bit.
 
         Args:
             value: the character.
@@ -87,7 +88,7 @@ class UartSetting:
         """Return start bit, data bits and parity bit of a character.
 
         Args:
-            value: the character; bits above its data bits are not sent.
+            value: the character. Bits above its data bits are not sent.
         """
         value &= (1 << self.data_bits) - 1
         data = tuple(value >> bit & 1 for bit in range(self.data_bits))
@@ -99,10 +100,10 @@ class UartSetting:
 
         Args:
             value: the character.
-            start_ps: when its start bit begins.
+            start_ps: time at which the start bit begins.
 
         Yields:
-            level 1 or 0 and its end in ps; the stop bits as one level.
+            The levels 1 or 0, each with its end in ps. The stop bits are one level.
         """
         for number, bit in enumerate(self.bits(value), start=1):
             yield bit, start_ps + number * PS_PER_S // self.baud
@@ -114,11 +115,12 @@ class Character:
     """A character received by a UART.
 
     Attributes:
-        value: the sampled data bits.
+        value: sampled data bits.
         end_ps: end of the first stop bit.
-        framing_error: the line was 0 where a stop bit should have been.
-        parity_error: the parity bit does not match the value.
-        line_break: the line was 0 from the start bit to the stop bit; `framing_error` is set too.
+        framing_error: whether the line was 0 in place of a stop bit.
+        parity_error: whether the parity bit does not match the value.
+        line_break: whether the line was 0 from the start bit to the stop bit. `framing_error` is
+            then set, too.
     """
 
     value: int
@@ -135,14 +137,14 @@ class UartReceiver:
     A sample of 0 after a sample of 1 is the edge of a start bit. Half a bit later the line must
     still be 0. Then each bit is sampled once, in its middle (National Semiconductor PC16550D uses
     this clock of 16 times the baud rate). After a framing error or a break the line has to be 1
-    again before a new start bit is possible. The PC16550D differs: it treats the missing stop bit
-    as a start bit.
+    again before a new start bit is possible. The PC16550D is different, because it treats the
+    missing stop bit as a start bit.
 
     Not emulated: majority votes of several samples, FIFOs and their overrun.
 
     Args:
         setting: the UART setting of the receiver.
-        now_ps: start of sampling; the line is idle.
+        now_ps: start of sampling, when the line is idle.
     """
 
     setting: UartSetting
@@ -157,7 +159,7 @@ class UartReceiver:
 
     @property
     def due_ps(self) -> int:
-        """The time at which the stop bit is sampled; `NEVER` without a present character."""
+        """The time at which the stop bit is sampled, or `NEVER` without a present character."""
         if self._sampled is None:
             return NEVER
         left = self._frame_samples - len(self._sampled) - 1
@@ -167,8 +169,8 @@ class UartReceiver:
         """Set the level of the line, starting at the end of the previous push.
 
         Args:
-            level: 1 or 0.
-            until_ps: end of the level; a time in the past is allowed.
+            level: level of the line, 1 or 0.
+            until_ps: end of the level. A time in the past is allowed.
 
         Yields:
             The characters that are complete.
@@ -201,7 +203,7 @@ class UartReceiver:
 
     @property
     def _frame_samples(self) -> int:
-        """Start bit, data bits, parity bit, stop bit."""
+        """Number of samples of a frame: start bit, data bits, parity bit, stop bit."""
         return 2 + self.setting.data_bits + (self.setting.parity != "N")
 
     def _character(self, sampled: list[int], end_ps: int) -> Character:

@@ -21,7 +21,7 @@ from tickrig.wire.errors import ChecksumError, FieldError, FramingError
 
 BAUD: Final = 38_400
 ROUNDS: Final = 1 << 16
-"""Largest round number; then counting restarts at 0."""
+"""Number of rounds after which counting restarts at 0."""
 
 MAX_LEVEL: Final = 100
 _UCODE: Final = re.compile(r"[0-9A-Fa-f]{32}", re.ASCII)
@@ -33,12 +33,15 @@ class LineType(Enum):
     """Kind of a line.
 
     Attributes:
-        READER: sent after power-up and in answer to ID: version of the protocol, range in mm, cone
-            in degrees, and 1 while the reader listens.
-        UCODE: a received marker: number of the round, ucode, level of the signal in per cent.
-        ROUND: the end of a round: its number, and the number of markers received in it.
-        LIGHT: the end of a round in which too much light made all markers unreadable: its number.
-        REFUSED: the answer to an invalid command.
+        READER: line after power-up and in answer to ID, with the version of the protocol, the range
+            in mm, the cone in degrees, and 1 while the reader listens.
+        UCODE: line for a received marker, with the number of the round, the ucode, and the level of
+            the signal in per cent.
+        ROUND: line for the end of a round, with the number of the round, and the number of markers
+            received in it.
+        LIGHT: line for the end of a round in which too much light made all markers unreadable, with
+            the number of the round.
+        REFUSED: line in answer to an invalid command.
     """
 
     READER = "UI"
@@ -55,17 +58,17 @@ HIGHEST: Final = {
     LineType.LIGHT: (ROUNDS - 1,),
     LineType.REFUSED: (),
 }
-"""The fields of each kind: numbers from 0 to this value, None for a ucode."""
+"""Largest values of the fields of each kind of line, which start at 0, or None for a ucode."""
 
 _COMMANDS: Final = (b"ID", b"ON", b"OFF")
-"""Commands of a host, each with LF: identify, start listening, stop listening."""
+"""Commands of a host, which are followed by LF: identify, start listening, stop listening."""
 
 
 def parse_ucode(text: str) -> str:
-    """Return a ucode in normal form: 128 bits, 32 hex digits in capitals.
+    """Return a ucode of 128 bits in normal form, which has 32 hex digits in capitals.
 
     Raises:
-        FieldError: it is not a ucode.
+        FieldError: the text is not a ucode.
 
     >>> parse_ucode("00001c00000000000001000000000abc")
     '00001C00000000000001000000000ABC'
@@ -81,8 +84,8 @@ class UcodeLine:
     """A line of a reader.
 
     Attributes:
-        type: its kind.
-        fields: as in `HIGHEST`; ucodes as 32 hex digits in capitals.
+        type: kind of the line.
+        fields: values, as in `HIGHEST`. Ucodes are texts of 32 hex digits in capitals.
 
     Raises:
         FieldError: the fields do not fit the kind.
@@ -112,9 +115,9 @@ def parse_line(line: bytes) -> UcodeLine:
     """Read a line without its end.
 
     Raises:
-        FramingError: not a line of a reader.
-        ChecksumError: wrong sum.
-        FieldError: fields that do not fit the kind.
+        FramingError: the line is not a line of a reader.
+        ChecksumError: the sum is wrong.
+        FieldError: the fields do not fit the kind.
     """
     if (match := _LINE.fullmatch(line)) is None:
         raise FramingError(f"no line of a ucode reader: {line[:60]!r}")

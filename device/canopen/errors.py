@@ -306,7 +306,7 @@ class EmcyConsumer(Service):
 
     Attributes:
         latest: the latest EMCY of each node since the reset.
-        on_emcy: function that is called with the node-ID and the message.
+        on_emcy: functions that are called with the node-ID and the message.
     """
 
     def __init__(self, node: CanopenSlave, slot: int) -> None:

@@ -325,7 +325,7 @@ class CanopenSlave(Copyable):
         accepts: CAN-IDs that the slave receives, for the acceptance filter of a wire. None stands
             for all CAN-IDs, from power-on or a reset until the first tick.
         reconfigured_by: CAN-IDs of the frames that may change `accepts` when handled.
-        on_accepts: function that is called when `accepts` or `reconfigured_by` has changed.
+        on_accepts: functions that are called when `accepts` or `reconfigured_by` has changed.
         time_of_day: TIME stamp that was received last, or None before the first one.
         silent_until_us: time before which the slave sends nothing, while LSS switches the bit rate.
         on_state: functions that are called with the old and the new state on each change of the NMT
@@ -344,7 +344,7 @@ class CanopenSlave(Copyable):
             or stays in Initialising.
         admits: function that is called before each NMT command. It returns whether the command is
             carried out.
-        entered: functions that are called like `on_state`, but earlier, for parts of the slave.
+        entered: function that is called like `on_state`, but earlier, for a part of the slave.
     """
 
     __slots__ = (  # each slave's attributes lie in one place then, for 1,016 of them 5 %

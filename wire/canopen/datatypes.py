@@ -18,7 +18,7 @@ from typing import Final, NamedTuple
 from tickrig.wire.errors import FieldError, FramingError
 
 Value = bool | int | float | str | bytes
-"""The value of an object: strings are str, octet strings and domains are bytes."""
+"""The value of an object. Strings are str, and octet strings and domains are bytes."""
 
 
 class DataType(IntEnum):
@@ -50,26 +50,27 @@ class DataType(IntEnum):
     UNSIGNED56 = 0x1A
     UNSIGNED64 = 0x1B
     VISIBLE_CHAR = 0xA0
-    """One character; not of CiA 301, but of Table 4 of RTC-CANopen (NEDO report, 3.4.43.3)."""
+    """Type of one character, which is not in CiA 301, but in Table 4 of RTC-CANopen (NEDO report,
+    3.4.43.3)."""
 
     @property
     def bits(self) -> int:
-        """Size in bits, 0 if it varies."""
+        """Size in bits, or 0 if the size varies."""
         return _BITS.get(self, 0)
 
     @property
     def size(self) -> int:
-        """Size in bytes, 0 if it varies."""
+        """Size in bytes, or 0 if the size varies."""
         return (self.bits + 7) // 8
 
     @property
     def signed(self) -> bool:
-        """Whether it is a signed integer."""
+        """Whether the type is a signed integer."""
         return self in _SIGNED
 
     @property
     def is_integer(self) -> bool:
-        """Whether its value is a whole number; BOOLEAN counts as one bit."""
+        """Whether a value is a whole number; BOOLEAN counts as a number of one bit."""
         return self in _SIGNED or self in _UNSIGNED
 
     @property
@@ -82,7 +83,7 @@ class DataType(IntEnum):
         """Return the bytes of a value, little endian (CiA 301, 7.1.4).
 
         Args:
-            value: a number in the range of this type, a text, or bytes.
+            value: number in the range of this type, or a text, or bytes.
 
         Raises:
             FieldError: the value does not fit.
@@ -96,7 +97,7 @@ class DataType(IntEnum):
         """Return the value of bytes.
 
         Args:
-            data: as in an SDO or a PDO.
+            data: bytes, as in an SDO or a PDO.
 
         Raises:
             FieldError: the number of bytes does not fit this type.
@@ -190,15 +191,15 @@ _MAX_DAYS: Final = 0xFFFF
 # B0 A4 29 04 31 43: 28 bits of milliseconds, 4 reserved, 16 bits of days.
 _LAYOUT: Final = struct.Struct("<IH")
 _MS_MASK: Final = 0x0FFF_FFFF
-"""The upper four bits are reserved."""
+"""Mask of the milliseconds, whose upper four bits are reserved."""
 
 
 class TimeOfDay(NamedTuple):
     """Absolute time.
 
     Attributes:
-        ms: milliseconds after midnight, 0 to 86 399 999.
-        days: days since 1 January 1984, 0 to 65 535.
+        ms: number of milliseconds after midnight, 0 to 86 399 999.
+        days: number of days since 1 January 1984, 0 to 65 535.
     """
 
     ms: int
@@ -213,7 +214,7 @@ class TimeOfDay(NamedTuple):
         return cls(ms & _MS_MASK, days).checked()
 
     def checked(self) -> TimeOfDay:
-        """Return the time itself; FieldError if it is invalid."""
+        """Return the time itself; raise FieldError if it is invalid."""
         if not 0 <= self.ms < DAY_MS:
             raise FieldError(f"{self.ms} ms after midnight, a day has {DAY_MS}")
         if not 0 <= self.days <= _MAX_DAYS:
@@ -221,7 +222,7 @@ class TimeOfDay(NamedTuple):
         return self
 
     def encode(self) -> bytes:
-        """Return the six bytes; FieldError if the time is invalid."""
+        """Return the six bytes; raise FieldError if the time is invalid."""
         return _LAYOUT.pack(*self.checked())
 
     def after(self, elapsed_us: int) -> TimeOfDay:

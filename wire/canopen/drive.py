@@ -1,4 +1,4 @@
-"""Controlword and statusword of a drive, and the states that a statusword tells (CiA 402-2).
+"""Controlword and statusword of a drive, and the states in a statusword (CiA 402-2).
 
 >>> state_of(0x0637)
 <DriveState.OPERATION_ENABLED: 39>
@@ -13,7 +13,7 @@ from typing import Final
 
 
 class Controlword(IntFlag):
-    """Bits of 6040h; 4, 5, 6 and 9 belong to the mode of operation."""
+    """Bits of 6040h. Bits 4, 5, 6 and 9 belong to the mode of operation."""
 
     SWITCH_ON = 0x0001
     ENABLE_VOLTAGE = 0x0002
@@ -28,7 +28,7 @@ class Controlword(IntFlag):
 
 
 class Statusword(IntFlag):
-    """Bits of 6041h beside those of the state; 12 and 13 belong to the mode of operation."""
+    """Bits of 6041h except those of the state. Bits 12 and 13 belong to the mode of operation."""
 
     VOLTAGE_ENABLED = 0x0010
     WARNING = 0x0080
@@ -54,7 +54,7 @@ class DriveState(IntEnum):
 
     @property
     def words(self) -> str:
-        """The name as the standard writes it: `Ready to switch on`."""
+        """The name in the spelling of the standard, such as `Ready to switch on`."""
         return self.name.capitalize().replace("_", " ")
 
 
@@ -66,7 +66,7 @@ _ANY_QUICK_STOP: Final = (
 
 
 def state_of(statusword: int) -> DriveState | None:
-    """Return the state that a statusword tells, None if its bits are those of no state."""
+    """Return the state in a statusword, or None if its bits are not those of a state."""
     for state in DriveState:
         if statusword & (0x4F if state in _ANY_QUICK_STOP else 0x6F) == state:
             return state

@@ -35,7 +35,7 @@ class ErrorRegister(IntFlag):
 
 
 class EmcyCode(DescribedCode):
-    """Emergency error codes; those that end in 00h denote a class."""
+    """Emergency error codes; codes that end in 00h denote a class."""
 
     NO_ERROR = 0x0000, "error reset or no error"
     GENERIC = 0x1000, "generic error"
@@ -96,9 +96,9 @@ class Emcy(NamedTuple):
     """An EMCY message.
 
     Attributes:
-        code: emergency error code, 0x0000 for the end of an error.
-        register: the error register after it.
-        text: five manufacturer-specific bytes.
+        code: emergency error code, or 0x0000 for the end of an error.
+        register: error register after the error.
+        text: five bytes that are manufacturer-specific.
     """
 
     code: int
@@ -107,7 +107,7 @@ class Emcy(NamedTuple):
 
     @classmethod
     def parse(cls, data: bytes) -> Emcy:
-        """Read the eight bytes; FramingError if there are more or fewer."""
+        """Read the eight bytes; raise FramingError if there are more or fewer bytes."""
         if len(data) != _LAYOUT.size:
             raise FramingError(f"an EMCY of {len(data)} bytes, it has {_LAYOUT.size}")
         return cls(*_LAYOUT.unpack(data))

@@ -13,15 +13,15 @@ from enum import IntEnum
 from typing import Final, NamedTuple
 
 LSS_MASTER_COB_ID: Final = 0x7E5
-"""From the LSS master to the slaves."""
+"""CAN-ID of messages from the LSS master to the slaves."""
 
 LSS_SLAVE_COB_ID: Final = 0x7E4
-"""From a slave to the LSS master."""
+"""CAN-ID of messages from a slave to the LSS master."""
 
 MESSAGE_BYTES: Final = 8
 
 STANDARD_TABLE: Final = 0
-"""Selects the bit timing table of CiA 305."""
+"""Number that selects the bit timing table of CiA 305."""
 
 BIT_RATES: Final = {
     0: 1_000_000,
@@ -33,10 +33,11 @@ BIT_RATES: Final = {
     7: 20_000,
     8: 10_000,
 }
-"""Bit rate in bit/s by index of the standard table; 5 is reserved, 9 is automatic detection."""
+"""Bit rates in bit/s by index of the standard table. Index 5 is reserved, and 9 is automatic
+detection."""
 
 FASTSCAN_RESET: Final = 0x80
-"""Bit Check that starts a fastscan."""
+"""Value of Bit Check that starts a fastscan."""
 
 # cs, four bytes with the low one first, three reserved: 40 9A 02 00 00 00 00 00.
 _NUMBER: Final = struct.Struct("<xI3x")
@@ -90,7 +91,7 @@ class LssError(IntEnum):
 
 
 class LssAddress(NamedTuple):
-    """LSS address: the identity object 1018h, unique for each device."""
+    """LSS address, which is the identity object 1018h and unique for each device."""
 
     vendor: int
     product: int
@@ -102,10 +103,10 @@ class FastScan(NamedTuple):
     """A fastscan request.
 
     Attributes:
-        id_number: the requested part of the LSS address.
-        bit_check: the lowest compared bit, 0x80 to restart.
-        sub: number of the part, 0 vendor-ID to 3 serial number.
-        next_sub: the next part.
+        id_number: requested part of the LSS address.
+        bit_check: lowest compared bit, or 0x80 to restart.
+        sub: number of the part, from 0 (vendor-ID) to 3 (serial number).
+        next_sub: number of the next part.
     """
 
     id_number: int

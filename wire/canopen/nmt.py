@@ -9,13 +9,14 @@ from typing import Final
 # COB-ID entries of the dictionary: a CAN-ID with flag bits, and the restricted CAN-IDs.
 
 INVALID: Final = 1 << 31
-"""Bit 31: the object does not exist or is not valid (PDO, EMCY, SDO); SYNC and TIME differ."""
+"""Bit 31 of a COB-ID: the object does not exist or is not valid (PDO, EMCY, SDO, but not SYNC,
+TIME)."""
 
 FLAG_30: Final = 1 << 30
-"""Bit 30: no RTR (TPDO), produces (SYNC, TIME)."""
+"""Bit 30 of a COB-ID: no RTR (TPDO), or the device produces the message (SYNC, TIME)."""
 
 EXTENDED: Final = 1 << 29
-"""Bit 29: 29-bit CAN-ID."""
+"""Bit 29 of a COB-ID: 29-bit CAN-ID."""
 
 CAN_ID_MASK: Final = 0x7FF
 
@@ -45,7 +46,7 @@ def is_restricted(can_id: int) -> bool:
 
 NMT_COB_ID: Final = 0x000
 ERROR_CONTROL_COB_ID: Final = 0x700
-"""CAN-ID of boot-up, heartbeat and guarding, plus the node-ID."""
+"""CAN-ID of boot-up, heartbeat and guarding, without the node-ID that is added."""
 
 ALL_NODES: Final = 0
 
@@ -74,4 +75,4 @@ COMMANDED: Final[Mapping[int, NmtState]] = {
     NmtCommand.STOP: NmtState.STOPPED,
     NmtCommand.ENTER_PRE_OPERATIONAL: NmtState.PRE_OPERATIONAL,
 }
-"""Next state by command, from each state but Initialising."""
+"""Next state by command, for each state except Initialising."""

@@ -27,10 +27,10 @@ MAX_PDO_BITS: Final = 64
 MAX_MAPPED_OBJECTS: Final = 64
 
 SAM_MPDO: Final = 0xFE
-"""Sub-index 0 of a mapping: multiplexed PDO, source address mode."""
+"""Value of sub-index 0 of a mapping for a multiplexed PDO in source address mode."""
 
 DAM_MPDO: Final = 0xFF
-"""Sub-index 0 of a mapping: multiplexed PDO, destination address mode."""
+"""Value of sub-index 0 of a mapping for a multiplexed PDO in destination address mode."""
 
 MPDO_DATA_BYTES: Final = 4
 
@@ -40,12 +40,13 @@ _NODE_ID_MASK: Final = 0x7F
 
 @dataclass(frozen=True, slots=True)
 class MappedObject:
-    """One entry of a PDO mapping (CiA 301, PDO mapping parameter).
+    """An entry of a PDO mapping (CiA 301, PDO mapping parameter).
 
     Attributes:
-        index: 0x0000..0xFFFF; below 0x0020 a data type, as a dummy.
-        sub: 0..255.
-        bits: length in the PDO.
+        index: index of the object, 0x0000..0xFFFF. An index below 0x0020 is a data type, which is a
+            dummy.
+        sub: sub-index of the object, 0..255.
+        bits: number of bits in the PDO.
     """
 
     index: int
@@ -64,7 +65,7 @@ class MappedObject:
 
 
 def fields(mapping: Iterable[int]) -> Iterator[tuple[MappedObject, int]]:
-    """Yield the objects of a mapping (entries such as 6040 0010h), and the bits before each."""
+    """Yield the objects of a mapping (entries such as 6040 0010h), with the bits before them."""
     shift = 0
     for value in mapping:
         mapped = MappedObject.parse(value)
@@ -75,15 +76,15 @@ def fields(mapping: Iterable[int]) -> Iterator[tuple[MappedObject, int]]:
 @mypyc_attr(allow_interpreted_subclasses=True)
 @dataclass(frozen=True, slots=True)
 class PdoDescription:
-    """A PDO: its communication parameter and its mapping.
+    """A PDO with its communication parameter and its mapping.
 
     Attributes:
-        cob_id: with its flags: bit 31 if it is off.
-        mapping: objects as 6040 0010h: index, sub-index, bits.
-        transmission_type: 0..255.
-        inhibit_100us: inhibit time of a TPDO.
-        event_ms: event timer.
-        relative: the node-ID is added to the COB-ID.
+        cob_id: COB-ID with its flags. Bit 31 is set if the PDO is off.
+        mapping: mapped objects in the form 6040 0010h: index, sub-index, number of bits.
+        transmission_type: transmission type, 0..255.
+        inhibit_100us: inhibit time of a TPDO, in units of 100 us.
+        event_ms: event timer, in ms.
+        relative: whether the node-ID is added to the COB-ID.
     """
 
     cob_id: int
@@ -95,27 +96,27 @@ class PdoDescription:
 
     @property
     def can_id(self) -> int:
-        """Its CAN-ID, 0 if it has none."""
+        """The CAN-ID of the PDO, or 0 if it has none."""
         return self.cob_id & CAN_ID_MASK
 
     @property
     def enabled(self) -> bool:
-        """Whether it exists: bit 31 is 0."""
+        """Whether the PDO exists: bit 31 is 0."""
         return not self.cob_id & INVALID
 
     @property
     def size(self) -> int:
-        """Its length in bytes."""
+        """The length of the PDO in bytes."""
         return (sum(value & 0xFF for value in self.mapping) + 7) // 8
 
 
 @dataclass(frozen=True, slots=True)
 class Scanned:
-    """One entry of an object scanner list, 1FA0h.. (CiA 301, object scanner list).
+    """An entry of an object scanner list, 1FA0h.. (CiA 301, object scanner list).
 
     Attributes:
-        index: of the objects that a SAM-MPDO producer may send.
-        sub: the first of them.
+        index: index of the object that a SAM-MPDO producer may send.
+        sub: first sub-index that the producer may send.
         block: number of consecutive sub-indices.
     """
 
@@ -136,14 +137,14 @@ class Scanned:
 
 @dataclass(frozen=True, slots=True)
 class Dispatched:
-    """One entry of an object dispatching list, 1FD0h.. (CiA 301, object dispatching list).
+    """An entry of an object dispatching list, 1FD0h.. (CiA 301, object dispatching list).
 
     Attributes:
-        node_id: of the SAM-MPDO producer.
-        producer_index: of the object there.
-        producer_sub: the first sub-index there.
-        index: of the object here.
-        sub: the first sub-index here.
+        node_id: node-ID of the SAM-MPDO producer.
+        producer_index: index of the object in the producer.
+        producer_sub: first sub-index of the object in the producer.
+        index: index of the object in the consumer.
+        sub: first sub-index of the object in the consumer.
         block: number of consecutive sub-indices.
     """
 
@@ -177,12 +178,13 @@ class Mpdo:
     """A multiplexed PDO (CiA 301, MPDO protocol).
 
     Attributes:
-        destination: True in destination address mode, where the other fields name the consumer;
-            else they name the producer.
-        node_id: 0 in destination address mode: all nodes.
-        index: of the object, there.
-        sub: of the object, there.
-        data: four bytes, padded with zeros.
+        destination: whether the MPDO is in destination address mode. The other fields then name the
+            consumer, or else they name the producer.
+        node_id: node-ID of the consumer or the producer. In destination address mode 0 means all
+            nodes.
+        index: index of the object in that node.
+        sub: sub-index of the object in that node.
+        data: data of four bytes, padded with zeros.
     """
 
     destination: bool
@@ -200,7 +202,7 @@ class Mpdo:
 
     @classmethod
     def parse(cls, data: bytes) -> Mpdo:
-        """Read the data of a frame; FramingError unless it has eight bytes."""
+        """Read the data of a frame; raise FramingError unless there are eight bytes."""
         if len(data) != MAX_PDO_BYTES:
             raise FramingError(f"{len(data)} bytes, an MPDO has {MAX_PDO_BYTES}")
         return cls(
@@ -220,7 +222,7 @@ class Mpdo:
 
 
 def pack_bits(fields: Iterable[tuple[int, int]]) -> bytes:
-    """Pack values, lowest bit first, padded to whole bytes.
+    """Pack values into bytes, with the lowest bit first and zeros at the end.
 
     Args:
         fields: pairs of value and number of bits; excess bits are dropped.

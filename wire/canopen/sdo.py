@@ -1,8 +1,8 @@
 r"""SDO frames as values: expedited and segmented transfer, abort (CiA 301, SDO protocols).
 
-The first byte means one thing from a client and another from a server, so each side has its parser.
-A segment of a block transfer looks like any other frame: use `BlockSegment.parse` while a block is
-running.
+The first byte from a client and the first byte from a server have different meanings, so each side
+has a parser. A segment of a block transfer looks like any other frame: use `BlockSegment.parse`
+while a block is running.
 
 >>> parse_request(bytes.fromhex("2F002000A5000000"))
 DownloadInitiateRequest(index=8192, sub=0, data=b'\xa5', size=1)
@@ -54,7 +54,7 @@ class Abort:
     """Abort SDO transfer, from either side.
 
     Attributes:
-        code: an AbortCode, or the received number if it is unknown.
+        code: abort code as an `AbortCode`, or the received number if it is unknown.
     """
 
     index: int
@@ -77,8 +77,9 @@ class _Initiate:
     """Initiate frame of a transfer, with the data or its size.
 
     Attributes:
-        data: 1 to 4 bytes of an expedited transfer, None if segments follow.
-        size: number of bytes, None if it is not indicated; expedited data then has 4 bytes.
+        data: data of an expedited transfer, 1 to 4 bytes, or None if segments follow.
+        size: number of bytes, or None if the size is not indicated. Expedited data then have 4
+            bytes.
     """
 
     COMMAND: ClassVar[int]
@@ -167,7 +168,7 @@ class Segment:
     """Up to 7 bytes of a segmented transfer, in either direction.
 
     Attributes:
-        last: no more segments follow.
+        last: whether no more segments follow.
     """
 
     toggle: bool
@@ -288,11 +289,11 @@ _BLOCK_RESPONSES: Final[dict[int, tuple[Callable[[bytes], Response] | None, ...]
     ),
     ServerCommand.BLOCK_UPLOAD: (BlockUploadInitiateResponse.parse, BlockEnd.parse) * 2,
 }
-"""Frames by subcommand: in a block upload it has two bits, including the size bit."""
+"""Frames by subcommand, which has two bits in a block upload, including the size bit."""
 
 
 def parse_request(frame: bytes) -> Request:
-    """Read a frame of a client; FramingError if it is not a command."""
+    """Read a frame of a client; raise FramingError if it is not a command."""
     check_frame(frame)
     specifier = frame[0] & SPECIFIER
     choice = _BLOCK_REQUESTS.get(specifier)
@@ -303,7 +304,7 @@ def parse_request(frame: bytes) -> Request:
 
 
 def parse_response(frame: bytes) -> Response:
-    """Read a frame of a server; FramingError if it is not a command."""
+    """Read a frame of a server; raise FramingError if it is not a command."""
     if len(frame) != FRAME_BYTES:
         check_frame(frame)
     specifier = frame[0] & SPECIFIER

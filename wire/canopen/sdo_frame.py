@@ -106,7 +106,7 @@ def describe_abort(code: int) -> str:
 
 REQUEST_COB_ID: Final = 0x600
 RESPONSE_COB_ID: Final = 0x580
-"""CAN-IDs of requests and responses of the default SDO server, plus the node-ID."""
+"""CAN-IDs of requests and responses of the default SDO server, to which the node-ID is added."""
 
 FRAME_BYTES: Final = 8
 EXPEDITED_BYTES: Final = 4
@@ -129,7 +129,7 @@ MAX_BLOCK_SIZE: Final = 127
 # sent it, and whether a block is running.
 TOGGLE: Final = 0x10
 LAST: Final = 0x01
-"""Bit c of a segment: no more segments."""
+"""Bit c of a segment: no more segments follow."""
 SIZE_INDICATED: Final = 0x01
 EXPEDITED: Final = 0x02
 
@@ -169,7 +169,8 @@ BLOCK_ENDED: Final = 0xA1
 BLOCK_ACKNOWLEDGE: Final = 0xA2
 BLOCK_START: Final = 0xA3
 BLOCK_END: Final = 0xC1
-"""Block transfer: these four are the same from client and server; an end has n in bits 4 to 2."""
+"""Commands of a block transfer. These four are equal for client and server. An end has n in bits 4
+to 2."""
 BLOCK_SUBCOMMAND: Final = 0x03
 """Bits of the subcommand in a block upload and in an acknowledgement."""
 
@@ -205,11 +206,11 @@ def check_frame(frame: bytes) -> None:
 
 @dataclass(frozen=True, slots=True)
 class BlockSegment:
-    """7 bytes of a block, in either direction; the end frame has the fill of the last one.
+    """A segment of a block with 7 bytes; the end frame has the fill of the last segment.
 
     Attributes:
-        seqno: 1..127, its position in the block.
-        last: no more segments follow.
+        seqno: position in the block, 1..127.
+        last: whether no more segments follow.
     """
 
     seqno: int
@@ -236,8 +237,8 @@ class _BlockInitiate:
     """Initiate frame of a block transfer from the sender of the data.
 
     Attributes:
-        crc: the sender supports the CRC.
-        size: number of bytes, None if it is not indicated.
+        crc: whether the sender supports the CRC.
+        size: number of bytes, or None if it is not indicated.
     """
 
     index: int
@@ -278,8 +279,8 @@ class BlockDownloadInitiateResponse:
     """Response to `BlockDownloadInitiateRequest`.
 
     Attributes:
-        crc: the server supports the CRC.
-        block_size: segments in the first block, 1..127.
+        crc: whether the server supports the CRC.
+        block_size: number of segments in the first block, 1..127.
     """
 
     index: int
@@ -303,9 +304,9 @@ class BlockUploadInitiateRequest:
     """Initiate SDO block upload.
 
     Attributes:
-        crc: the client supports the CRC.
-        block_size: segments in the first block, 1..127.
-        threshold: protocol switch threshold, 0 to forbid the switch to another upload.
+        crc: whether the client supports the CRC.
+        block_size: number of segments in the first block, 1..127.
+        threshold: protocol switch threshold, or 0 to forbid the switch to another upload.
     """
 
     index: int
@@ -344,8 +345,8 @@ class BlockAcknowledge:
     """Acknowledgement of a block, in either direction.
 
     Attributes:
-        ackseq: the last segment received in sequence, 0 for none.
-        block_size: segments in the next block, 1..127.
+        ackseq: number of the last segment received in sequence, or 0 for none.
+        block_size: number of segments in the next block, 1..127.
     """
 
     ackseq: int
@@ -366,8 +367,8 @@ class BlockEnd:
     """End of a block transfer from the sender of the data, in either direction.
 
     Attributes:
-        fill: unused bytes of the last segment, 0..7.
-        crc: 0 if one side does not support it.
+        fill: number of unused bytes of the last segment, 0..7.
+        crc: CRC of the data, or 0 if one side does not support it.
     """
 
     fill: int

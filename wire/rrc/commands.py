@@ -19,11 +19,11 @@ from tickrig.wire.rrc.message import all_digits, check_digit, read_hex, read_sig
 
 
 class Parameter:
-    """One parameter of a command: number of digits, and allowed values.
+    """A parameter of a command, with its number of digits and allowed values.
 
     Attributes:
         width: number of hex digits, 1 or 2.
-        low: smallest value; below 0 for two's complement.
+        low: smallest value. A value below 0 is written in two's complement.
         high: largest value.
         values: all allowed values by their digits, in either case.
     """
@@ -37,7 +37,7 @@ class Parameter:
         self.values = {d: value for d, value in numbers.items() if low <= value <= high}
 
     def read(self, digits: bytes) -> int:
-        """Read the parameter from its digits; FieldError for a bad digit or value."""
+        """Read the parameter from its digits; raise FieldError for a bad digit or value."""
         value = self.values.get(digits)
         if value is None:
             return self.checked(read_signed(digits) if self.low < 0 else read_hex(digits))
@@ -48,7 +48,7 @@ class Parameter:
         return b"%0*x" % (self.width, value & 0xFF)
 
     def checked(self, value: int) -> int:
-        """Return the value; FieldError if it is out of range."""
+        """Return the value; raise FieldError if it is out of range."""
         if not self.low <= value <= self.high:
             raise FieldError(f"{value} is not in {self.low}..{self.high}")
         return value
@@ -69,10 +69,10 @@ class UnknownCommand(FramingError):  # noqa: N818 - the manual's word: CommandUn
 
 
 class BadParameters(FieldError):  # noqa: N818 - what came
-    """A known command with a wrong number of digits, a bad digit or a bad value.
+    """A known command has a wrong number of digits, a bad digit or a bad value.
 
     Attributes:
-        name: the command's name.
+        name: name of the command.
     """
 
     def __init__(self, name: bytes, reason: str) -> None:
@@ -122,11 +122,11 @@ class Limit(Command):
     """Drive by the stick, within limits.
 
     Attributes:
-        v_pct: #1, translation input limit, 0..100 %.
-        w_pct: #2, rotation input limit, 0..100 %.
-        sum_pct: #3, limit of |v| + |w|, 0..255 %.
-        product_pct: #4, limit of |v| * |w| / 100, 0..255 %.
-        radius_pct: #5, limit of the root of v² + w², 0..255 %.
+        v_pct: parameter #1, translation input limit, 0..100 %.
+        w_pct: parameter #2, rotation input limit, 0..100 %.
+        sum_pct: parameter #3, limit of |v| + |w|, 0..255 %.
+        product_pct: parameter #4, limit of |v| * |w| / 100, 0..255 %.
+        radius_pct: parameter #5, limit of the root of v² + w², 0..255 %.
     """
 
     name = b"limit"
@@ -187,19 +187,20 @@ class Joystick(Command):
     """Shape the stick. The defaults are those of the emulator (DECISION R15).
 
     Attributes:
-        v_low_pct: #1, translation that counts as 0; below `v_high_pct`.
-        w_low_pct: #2, rotation that counts as 0; below `w_high_pct`.
-        v_high_pct: #3, translation that counts as 100.
-        w_high_pct: #4, rotation that counts as 100.
-        v_exponent: #5, 0..15: output = input ^ (1 + 0.1 * #5).
-        w_exponent: #6, 0..15.
-        reverse_mode: #7, 0 plain, 1 no backing, 2 gear change, 3 gear change reversed.
-        neutral_pct: #8, neutral radius, 0..100 %; if #7 is 0 or 1, any byte is allowed (DECISION
-            R14).
-        switch_deg: #9, threshold between backward and forward gear, 0..90 from straight back; if #7
-            is 0 or 1, any byte is allowed.
-        fade_deg: #10, angle at which the backward gear starts to fade, 0..90 from straight back; if
-            #7 is 0 or 1, any byte is allowed.
+        v_low_pct: parameter #1, translation that counts as 0, which is below `v_high_pct`.
+        w_low_pct: parameter #2, rotation that counts as 0, which is below `w_high_pct`.
+        v_high_pct: parameter #3, translation that counts as 100.
+        w_high_pct: parameter #4, rotation that counts as 100.
+        v_exponent: parameter #5, exponent of translation, 0..15: output = input ^ (1 + 0.1 * #5).
+        w_exponent: parameter #6, exponent of rotation, 0..15.
+        reverse_mode: parameter #7, reverse mode: 0 plain, 1 no backing, 2 gear change, 3 gear
+            change reversed.
+        neutral_pct: parameter #8, neutral radius, 0..100 %. If #7 is 0 or 1, any byte is allowed
+            (DECISION R14).
+        switch_deg: parameter #9, threshold between backward and forward gear, 0..90 from straight
+            back. If #7 is 0 or 1, any byte is allowed.
+        fade_deg: parameter #10, angle at which the backward gear starts to fade, 0..90 from
+            straight back. If #7 is 0 or 1, any byte is allowed.
     """
 
     name = b"joystick"
@@ -234,10 +235,10 @@ class Joystick(Command):
             raise BadParameters(self.name, "lower dead zone is not below the upper one")
 
     def after(self, former: Joystick) -> Joystick:
-        """Return the settings after this command; #8 to #10 out of range keep the former values.
+        """Return the settings after this command; #8 to #10 out of range keep their former values.
 
         Args:
-            former: the settings before (DECISION R14).
+            former: settings before the command (DECISION R14).
 
         >>> Joystick(neutral_pct=255, switch_deg=20).after(Joystick(neutral_pct=7)).values()[7:]
         (7, 20, 45)
@@ -253,7 +254,7 @@ class Joystick(Command):
 
 @dataclass(frozen=True, slots=True)
 class Watchdog(Command):
-    """Stop VR2 after this time without a correct command: 0..255 x 10 ms, 0 is off."""
+    """Stop VR2 after a time without a correct command: 0..255 x 10 ms, where 0 is off."""
 
     name = b"watchdog"
     parameters = (_BYTE,)
@@ -318,8 +319,8 @@ def parse_command(message: bytes) -> Command:
     """Read a command without line end and CHECK.
 
     Raises:
-        UnknownCommand: unknown name; names are lower case.
-        BadParameters: wrong number of digits, a bad digit, a value out of range.
+        UnknownCommand: the name is unknown. Names are lower case.
+        BadParameters: the number of digits is wrong, a digit is bad, or a value is out of range.
     """
     # First the name is checked, then the count of characters, then digits, then ranges (R11). So
     # `limit 6464ffffff` is ER:limit and `Limit6464ffffff` is ER:CommandUnknown.
@@ -332,7 +333,7 @@ def parse_command(message: bytes) -> Command:
 
 
 def _read_parameters(kind: type[Command], text: bytes) -> tuple[int, ...]:
-    """Split the text after the name into parameters; BadParameters if it does not fit."""
+    """Split the text after the name into parameters; raise BadParameters if it does not fit."""
     at = len(kind.literal)
     size = kind.size
     if len(text) != size or not text.startswith(kind.literal):

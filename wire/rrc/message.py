@@ -14,7 +14,7 @@ _HEX_DIGITS: Final = frozenset(bytes([code]) for code in b"0123456789ABCDEFabcde
 
 
 def all_digits(width: int) -> list[bytes]:
-    """Return all numbers with this many hex digits, in every mixture of cases."""
+    """Return all numbers with a given number of hex digits, in every mixture of cases."""
     return [b"".join(digits) for digits in product(sorted(_HEX_DIGITS), repeat=width)]
 
 
@@ -22,7 +22,7 @@ def read_hex(digits: bytes) -> int:
     """Read one or two hex digits of either case.
 
     Raises:
-        FieldError: a character that is not a hex digit.
+        FieldError: a character is not a hex digit.
     """
     if not all(digits[n : n + 1] in _HEX_DIGITS for n in range(len(digits))):
         raise FieldError(f"{digits!r} is not hexadecimal")
@@ -88,10 +88,11 @@ PERIOD_US: Final = 10_000
 PERIODS_A_SECOND: Final = 100
 
 LINES_A_PERIOD: Final = 2
-"""Lines processed in a period while VR2 runs; otherwise one in two periods."""
+"""Number of lines processed in a period while VR2 runs. Otherwise one line is processed in two
+periods."""
 
 PACE_WITHOUT_VR2: Final = PERIODS_A_SECOND // 2 * SAFE_PCT // PERIOD_PCT
-"""Lines per second that a host may send while VR2 does not run."""
+"""Number of lines per second that a host may send while VR2 does not run."""
 
 
 def pace_lines_s(*, stable: bool, status: bool, extra_pct: int = 0) -> int:

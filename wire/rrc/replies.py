@@ -48,7 +48,7 @@ POWER_ON_TRIGGER: Final = "PowerOnTrigger"
 
 @dataclass(frozen=True, slots=True)
 class Ok:
-    """`OK:name`: the command was executed."""
+    """Reply `OK:name`: the command was executed."""
 
     name: str
 
@@ -59,7 +59,7 @@ class Ok:
 
 @dataclass(frozen=True, slots=True)
 class Refusal:
-    """`ER:reason`: the name of a command, or the fault of the line."""
+    """Reply `ER:reason` with the name of a command, or with the fault of the line."""
 
     reason: str
 
@@ -70,13 +70,13 @@ class Refusal:
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """`EV:name`: the state of RRC or VR2 changed. Newer firmware may send other names."""
+    """Event `EV:name`: the state of RRC or VR2 has changed. Newer firmware may send other names."""
 
     name: str
 
     @property
     def kind(self) -> RrcEvent | None:
-        """The event of the manual; None if the manual does not list it."""
+        """The event of the manual, or None if the manual does not list it."""
         if self.name == POWER_ON_TRIGGER:
             return RrcEvent.POWER_ON
         try:
@@ -91,18 +91,21 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class StatusA:
-    """`SA:`: the state of RRC and VR2, once a period of 10 ms.
+    """Status line `SA:` with the state of RRC and VR2, once a period of 10 ms.
 
     Attributes:
-        in_v_pct: #1, translation of the stick, -100..100 %.
-        in_w_pct: #2, rotation of the stick.
-        out_v_pct: #3, translation sent to the power module.
-        out_w_pct: #4, rotation sent to the power module.
-        gauge: #5, voltage gauge, 1..10.
-        speed_mode: #6, 1..5.
-        speed_up_count: #7, 0..15; odd while the button is pressed.
-        speed_down_count: #8.
-        alarm_count: #9.
+        in_v_pct: field #1, translation of the stick, -100..100 %.
+        in_w_pct: field #2, rotation of the stick, -100..100 %.
+        out_v_pct: field #3, translation sent to the power module.
+        out_w_pct: field #4, rotation sent to the power module.
+        gauge: field #5, voltage gauge, 1..10.
+        speed_mode: field #6, speed mode, 1..5.
+        speed_up_count: field #7, counter of the speed-up button, 0..15, which is odd while the
+            button is pressed.
+        speed_down_count: field #8, counter of the speed-down button, 0..15, which is odd while the
+            button is pressed.
+        alarm_count: field #9, counter of the alarm button, 0..15, which is odd while the button is
+            pressed.
     """
 
     in_v_pct: int
@@ -130,7 +133,7 @@ class StatusA:
 
 @dataclass(frozen=True, slots=True)
 class Text:
-    """Any other line: the answer to `device`, `version`, `date`, or one of newer firmware."""
+    """Any other line: the answer to `device`, `version`, `date`, or a line of newer firmware."""
 
     text: str
 
@@ -152,9 +155,9 @@ def parse_reply(line: bytes) -> Reply:
     """Read a line without its LF.
 
     Raises:
-        FramingError: an SA line with a wrong length.
-        ChecksumError: an SA line whose CHECK does not match.
-        FieldError: an SA line with a bad digit or a value out of range.
+        FramingError: an SA line has a wrong length.
+        ChecksumError: the CHECK of an SA line does not match.
+        FieldError: an SA line has a bad digit or a value out of range.
     """
     prefix = line[:3]
     if prefix == b"SA:":

@@ -11,7 +11,7 @@ from typing import Final
 
 
 class LiteCommand(Enum):
-    """Commands: Cmnd0 selects the RTC object, Cmnd1 its operation; the reply repeats both."""
+    """Commands: Cmnd0 selects the RTC object, and Cmnd1 its operation. A reply repeats both."""
 
     INITIALIZE = b"CI"
     PROFILE = b"CZ"
@@ -51,7 +51,7 @@ FAULT_COMMANDS: Final = {
     LiteLinkFault.CHECKSUM: LiteCommand.CHECKSUM_FAULT,
     LiteLinkFault.UNKNOWN: LiteCommand.UNKNOWN_FAULT,
 }
-"""The frame that reports each fault."""
+"""Commands of the frames that report faults, by fault."""
 
 
 class LiteStatus(IntEnum):

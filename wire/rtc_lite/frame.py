@@ -42,10 +42,10 @@ MAX_DATA_BYTES: Final = 60
 """Largest size of the data: with header, commands and checksum it fills a buffer of 64 bytes."""
 
 Layout = Callable[[bytes | bytearray], int]
-"""Returns the minimum length of the data from the bytes read up to now."""
+"""Function that returns the minimum length of the data from the bytes read up to now."""
 
 WITH_FIELDS: Final = (LiteStatus.OK, LiteStatus.ERROR, LiteStatus.WRONG_STATE)
-"""Statuses with fields; the reply ends after any other status."""
+"""Statuses that are followed by fields; the reply ends after any other status."""
 
 
 def _fixed(size: int, data: bytes | bytearray) -> int:
@@ -62,7 +62,7 @@ def _port_data(data: bytes | bytearray) -> int:
 
 
 def _reply(size: int, data: bytes | bytearray) -> int:
-    """A status, followed by fields of a fixed size for some statuses."""
+    """Return the length of a status and its fields, which have a fixed size."""
     return 1 + size if data and data[0] in WITH_FIELDS else 1
 
 
@@ -84,7 +84,7 @@ WITH_STATE: Final = (
     *(LiteCommand.ACTIVATE, LiteCommand.DEACTIVATE, LiteCommand.EXECUTE, LiteCommand.ABORT),
     *(LiteCommand.ERROR, LiteCommand.RESET, LiteCommand.STARTUP, LiteCommand.SHUTDOWN),
 )
-"""Commands of the life cycle: without arguments, with the state in the reply."""
+"""Commands of the life cycle, which have no arguments, and the state in the reply."""
 
 _FAULTS: Final = (LiteCommand.CHECKSUM_FAULT, LiteCommand.TIMEOUT_FAULT, LiteCommand.UNKNOWN_FAULT)
 """Fault reports of a device for bytes that are not a valid frame."""
@@ -96,7 +96,7 @@ REQUESTS: Final[Mapping[LiteCommand, Layout]] = {
     LiteCommand.WRITE: _port_data,
     LiteCommand.POLL: _counted,
 }
-"""Frames of a proxy."""
+"""Layouts of the frames of a proxy, by command."""
 
 REPLIES: Final[Mapping[LiteCommand, Layout]] = {
     **dict.fromkeys((*WITH_STATE, LiteCommand.PING, LiteCommand.CONTEXT), partial(_reply, 1)),
@@ -110,18 +110,19 @@ REPLIES: Final[Mapping[LiteCommand, Layout]] = {
     LiteCommand.DATA: _port_data,
     LiteCommand.POLL: _polled,
 }
-"""Frames of a device."""
+"""Layouts of the frames of a device, by command."""
 
 
 class Framing(StrEnum):
-    """Framing: frames of RTC-Lite, or packets of RTno."""
+    """Framing of the line: frames of RTC-Lite, or packets of RTno."""
 
     LITE = "lite"  # the frames of RTC-Lite
     RTNO = "rtno"  # bridge mode: packets of RTno
 
 
 HEADER: Final = b"\n"
-"""0x0A (DECISION L4). It may occur in data; only the position distinguishes it."""
+"""Header byte 0x0A (DECISION L4). The byte may occur in data; only the position distinguishes
+it."""
 
 
 class Checksum(StrEnum):
@@ -140,8 +141,8 @@ class LiteFrame:
     """A frame in either direction.
 
     Attributes:
-        command: Cmnd0 and Cmnd1.
-        data: the marshalled arguments, at most 60 bytes.
+        command: command bytes Cmnd0 and Cmnd1.
+        data: marshalled arguments, at most 60 bytes.
     """
 
     command: LiteCommand
@@ -174,11 +175,12 @@ _COMMANDS: Final = {command.value: command for command in LiteCommand}
 class LiteDecoder:
     """Reads the frames of one direction (DECISION L6, L7).
 
-    It has no clock. Its owner watches the line and calls `clear` after 100 ms without a byte if a
-    frame has `begun`, or after 20 ms without a byte if the decoder is `lost`.
+    The decoder has no clock. The owner of the decoder watches the line. It calls `clear` after 100
+    ms without a byte if a frame has `begun`, or after 20 ms without a byte if the decoder is
+    `lost`.
 
     Args:
-        layouts: `REQUESTS` at the device, `REPLIES` at the proxy.
+        layouts: layouts of the frames: `REQUESTS` at the device, `REPLIES` at the proxy.
         checksum: algorithm of the checksum.
 
     Attributes:
@@ -202,7 +204,7 @@ class LiteDecoder:
         self._frame.clear()
 
     def push(self, data: bytes) -> list[LiteFrame | LiteLinkFault]:
-        """Add received bytes; return completed frames, and the faults of others."""
+        """Add received bytes; return completed frames, and the faults of invalid frames."""
         out = []
         for code in data:
             if not self.lost and (self._frame or code == HEADER[0]):

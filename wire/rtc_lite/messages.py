@@ -17,7 +17,7 @@ from tickrig.wire.rtc_lite.codes import LiteStatus
 from tickrig.wire.rtc_lite.frame import MAX_DATA_BYTES, REPLIES, LiteFrame
 
 PORT_COUNTS_BYTES: Final = 2
-"""The lengths of name and data precede them."""
+"""Number of bytes for the lengths of name and data, which precede name and data."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,8 +25,8 @@ class LitePortData:
     """Data on its way to an in-port (PS) or from an out-port (QV).
 
     Attributes:
-        name: of the port, as on the wire.
-        data: the marshalled value.
+        name: name of the port, as on the wire.
+        data: marshalled value.
     """
 
     name: bytes
@@ -45,11 +45,11 @@ class LitePortData:
 
 @dataclass(frozen=True, slots=True)
 class LitePortProfile:
-    """A port as the device describes it (PP, QQ).
+    """Description of a port by the device (PP, QQ).
 
     Attributes:
-        code: letter of its type; it may be unknown.
-        name: of the port.
+        code: letter of the type of the port, which may be unknown.
+        name: name of the port.
     """
 
     code: str
@@ -62,12 +62,12 @@ class LitePortProfile:
 
 @dataclass(frozen=True, slots=True)
 class LiteComponentProfile:
-    """The message after the ports: their numbers, and the type of the component (CZ).
+    """The message after the ports, with their numbers and the type of the component (CZ).
 
     Attributes:
         in_ports: number of PP frames sent.
         out_ports: number of QQ frames sent.
-        type_name: the type of the component.
+        type_name: type of the component.
     """
 
     in_ports: int
@@ -84,8 +84,8 @@ class LiteReply:
     """The reply of a device.
 
     Attributes:
-        status: a `LiteStatus`, or an unknown number.
-        fields: the bytes after the status: state, sequence number, context type.
+        status: status as a `LiteStatus`, or an unknown number.
+        fields: bytes after the status: state, sequence number, context type.
     """
 
     status: int
@@ -102,7 +102,7 @@ class LiteReply:
 
 
 def parse_port_data(data: bytes) -> LitePortData:
-    """Read the data of PS or QV; FramingError if its lengths do not fit."""
+    """Read the data of PS or QV; raise FramingError if the lengths do not fit."""
     size = 2 + data[0] + data[1] if len(data) >= PORT_COUNTS_BYTES else PORT_COUNTS_BYTES
     if len(data) != size:
         raise FramingError(f"{data.hex(' ')} has {len(data)} bytes, {size} were expected")
@@ -111,14 +111,14 @@ def parse_port_data(data: bytes) -> LitePortData:
 
 
 def parse_port_profile(data: bytes) -> LitePortProfile:
-    """Read the data of PP or QQ; FramingError if its length does not fit."""
+    """Read the data of PP or QQ; raise FramingError if the length does not fit."""
     if not data or not 1 <= data[0] == len(data) - 1:
         raise FramingError(f"{data.hex(' ')} is not a length, a letter and a name")
     return LitePortProfile(chr(data[1]), data[2:])
 
 
 def parse_component_profile(fields: bytes) -> LiteComponentProfile:
-    """Read the fields of the reply to CZ; FramingError if their length does not fit."""
+    """Read the fields of the reply to CZ; raise FramingError if their length does not fit."""
     if len(fields) < 3 or len(fields) != 3 + fields[2]:
         raise FramingError(f"{fields.hex(' ')} is not two numbers, a length and a name")
     return LiteComponentProfile(fields[0], fields[1], fields[3:])
@@ -128,7 +128,7 @@ def parse_reply(frame: LiteFrame) -> LiteReply:
     """Read the data of a reply.
 
     Raises:
-        FramingError: a frame that is not a reply, or has a wrong length.
+        FramingError: the frame is not a reply, or has a wrong length.
     """
     data, layout = frame.data, REPLIES[frame.command]
     if not data or layout(data) != len(data):

@@ -41,7 +41,7 @@ LETTERS: Final[Mapping[LiteCommand, bytes]] = MappingProxyType(
         **dict.fromkeys(FAULT_COMMANDS.values(), b"F"),
     }
 )
-"""RTno's letter of each command."""
+"""RTno's letters by command."""
 
 _REQUESTS: Final = {LETTERS[command]: command for command in REQUESTS if command in LETTERS}
 _WITHOUT_STATUS: Final = (LiteCommand.STATE, LiteCommand.CONTEXT)
@@ -62,16 +62,16 @@ _STATES: Final = {
     LiteCommand.ERROR: b"E",
     LiteCommand.RESET: b"I",
 }
-"""The state after an executed command."""
+"""States after an executed command, by command."""
 
 
 def encode_request(frame: LiteFrame) -> bytes:
-    """Write a request as a packet; KeyError if RTno has no letter for it."""
+    """Write a request as a packet; raise KeyError if RTno has no letter for the request."""
     return pack(LETTERS[frame.command], frame.data)
 
 
 def encode_packet(frame: LiteFrame) -> bytes:
-    """Write a frame of the device as a packet; KeyError if RTno has no letter for it."""
+    """Write a frame of the device as a packet; raise KeyError if RTno has no letter for it."""
     return pack(LETTERS[frame.command], _packet_data(frame))
 
 
@@ -103,7 +103,7 @@ class RtnoPacketDecoder:
     """Reads packets in either direction from a byte stream.
 
     Attributes:
-        lost: whether too much data was announced; all bytes are then discarded until `clear`.
+        lost: whether too much data was announced. All bytes are then discarded until `clear`.
     """
 
     lost: bool = field(default=False, init=False)
@@ -120,7 +120,7 @@ class RtnoPacketDecoder:
         self._packet.clear()
 
     def packets(self, data: bytes) -> list[RtnoPacket | LiteLinkFault]:
-        """Add received bytes; return completed packets, and the faults of others."""
+        """Add received bytes; return completed packets, and the faults of invalid packets."""
         out = []
         for code in data:
             if self.lost:
@@ -154,13 +154,13 @@ class RtnoPacketDecoder:
 
 @dataclass(slots=True)
 class RtnoDecoder(RtnoPacketDecoder):
-    """Reads the packets of a proxy as frames; it is used in the same way as `LiteDecoder`.
+    """Reads the packets of a proxy as frames, and is used in the same way as `LiteDecoder`.
 
     An unknown letter has the same effect as too much data.
     """
 
     def push(self, data: bytes) -> list[LiteFrame | LiteLinkFault]:
-        """Add received bytes; return completed packets as frames, and the faults of others."""
+        """Add received bytes; return completed packets as frames, and faults of invalid packets."""
         out = []
         for found in self.packets(data):
             out.append(found if isinstance(found, LiteLinkFault) else _frame_of(found))
@@ -180,11 +180,11 @@ def _frame_of(packet: RtnoPacket) -> LiteFrame | LiteLinkFault:
 
 @dataclass(slots=True)
 class RtnoReplies(RtnoPacketDecoder):
-    r"""Reads the packets of a device as frames; it is used in the same way as `Decoder(REPLIES)`.
+    r"""Reads the packets of a device as frames, and is used in the same way as `Decoder(REPLIES)`.
 
     RTno omits parts of a frame: the status of a state, the state after a command, the numbers and
-    the type of a profile. This decoder adds the parts that follow from the rest. The state after a
-    refusal is `?`, which is not a state.
+    the type of a profile. This decoder adds the omitted parts that follow from the other parts. The
+    state after a refusal is `?`, which is not a state.
 
     >>> RtnoReplies().push(bytes.fromhex("0a 0a 58 01 49 a2"))
     [LiteFrame(command=<LiteCommand.STATE: b'CX'>, data=b'@I')]
@@ -195,7 +195,7 @@ class RtnoReplies(RtnoPacketDecoder):
     )  # since the last profile
 
     def push(self, data: bytes) -> list[LiteFrame | LiteLinkFault]:
-        """Add received bytes; return completed packets as frames, and the faults of others."""
+        """Add received bytes; return completed packets as frames, and faults of invalid packets."""
         return [
             found if isinstance(found, LiteLinkFault) else self._frame_of(found)
             for found in self.packets(data)

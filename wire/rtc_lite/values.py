@@ -27,7 +27,7 @@ def encode_name(name: str) -> bytes:
     """Write a name of 1 to 15 printable ASCII characters without blanks (DECISION L6).
 
     Raises:
-        FieldError: it is empty, too long, or has other characters.
+        FieldError: the name is empty, is too long, or has other characters.
     """
     if not 1 <= len(name) <= _MAX_NAME_BYTES:
         raise FieldError(f"name {name!r} has {len(name)} characters, 1..{_MAX_NAME_BYTES} fit")
@@ -39,7 +39,7 @@ def encode_name(name: str) -> bytes:
 T = TypeVar("T")
 
 _TEXT: Final = "latin-1"
-"""Format of characters, in place of a `struct` format."""
+"""Format of characters, which is used in place of a `struct` format."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,11 +47,11 @@ class LitePortType(Generic[T]):
     """A data type of a port.
 
     Attributes:
-        code: letter of the type; upper case for a sequence.
+        code: letter of the type, in upper case for a sequence.
         name: type of the port at the proxy, such as `TimedLong`.
-        size: bytes of a value, or of an element in a sequence.
-        format: `struct` format of an element; `_TEXT` for characters.
-        initial: the value before the first write.
+        size: number of bytes of a value, or of an element in a sequence.
+        format: `struct` format of an element, or `_TEXT` for characters.
+        initial: value before the first write.
     """
 
     code: str
@@ -66,7 +66,7 @@ class LitePortType(Generic[T]):
         return self.code.isupper()
 
     def encode(self, value: T) -> bytes:
-        """Write a value; FieldError if it is not of this type."""
+        """Write a value; raise FieldError if the value does not have this type."""
         if self.format == _TEXT:
             return self._encode_text(cast(str, value))
         values: Any = value if self.sequence else (value,)
@@ -76,7 +76,7 @@ class LitePortType(Generic[T]):
             raise FieldError(f"{self.name} cannot be {values}: {error}") from None
 
     def decode(self, data: bytes) -> T:
-        """Read a value; FieldError if the bytes are not of this type."""
+        """Read a value; raise FieldError if the bytes do not have this type."""
         self.check_size(data)
         if self.format == _TEXT:
             return cast(T, data.decode("latin-1"))
@@ -84,7 +84,7 @@ class LitePortType(Generic[T]):
         return cast(T, values if self.sequence else values[0])
 
     def check_size(self, data: bytes) -> None:
-        """Raise FieldError unless a value can have this number of bytes."""
+        """Raise FieldError unless a value can have the number of bytes."""
         whole = len(data) % self.size == 0 if self.sequence else len(data) == self.size
         if not whole:
             unit = "bytes each" if self.sequence else "bytes"
@@ -128,4 +128,4 @@ PORT_TYPES: Final[Mapping[str, LitePortType[Any]]] = MappingProxyType(
         )
     }
 )
-"""All types by their letter."""
+"""All types by letter."""

@@ -62,7 +62,7 @@ _Decode = Callable[[bytes], tuple[Any, int]]
 
 
 def encode(value: Struct, endian: Endian = Endian.LITTLE) -> bytes:
-    """Return the bytes of a struct; FieldError if a field does not fit its IDL type."""
+    """Return the bytes of a struct; raise FieldError if a field does not fit its IDL type."""
     coder = _codec(type(value), endian)[0]
     try:
         return coder(value)
@@ -71,7 +71,7 @@ def encode(value: Struct, endian: Endian = Endian.LITTLE) -> bytes:
 
 
 def decode(kind: type[S], data: bytes, endian: Endian = Endian.LITTLE) -> S:
-    """Return the struct in the bytes; FieldError if they are not one struct."""
+    """Return the struct in the bytes; raise FieldError if the bytes are not one struct."""
     try:
         value, end = _codec(kind, endian)[1](data)
     except UnicodeError as error:
@@ -100,14 +100,14 @@ _NUMBERS: Final[Mapping[Primitive, str]] = {
     Primitive.FLOAT: "f",
     Primitive.DOUBLE: "d",
 }
-"""Formats of the struct module."""
+"""Formats of the struct module, by IDL type."""
 
 _COUNT: Final = "I"
 """Format of counts and enumerators."""
 
 
 class _Codec:
-    """Generates the source of encoder and decoder in one walk through a struct."""
+    """Generates the source of the encoder and the decoder of a struct."""
 
     def __init__(self, kind: type[Struct], mark: str) -> None:
         self._kind, self._mark = kind, mark
@@ -137,11 +137,11 @@ class _Codec:
         """Generate the code of one field.
 
         Args:
-            hint: its annotation.
-            path: the encoder's expression for its value.
+            hint: annotation of the field.
+            path: expression of the encoder for the value of the field.
 
         Returns:
-            The decoder's expression for the value; the names in it are set by then.
+            The decoder's expression for the value. The names in the expression are set before it.
         """
         if get_origin(hint) is Annotated:
             return self._primitive(get_args(hint)[1], path)
@@ -159,7 +159,7 @@ class _Codec:
         raise TypeError(f"{hint} is no IDL type")
 
     def _made(self, kind: type[Struct], parts: list[str]) -> str:
-        """Build a struct from its parts: a third faster than by a call of its class."""
+        """Build a struct from its parts, a third faster than by a call of its class."""
         made = self._name()
         self._making.append(f"{made} = new({self._constant(kind)})")
         for name, part in zip(kind.__match_args__, parts, strict=True):
@@ -310,7 +310,7 @@ class _Codec:
         self._decoder.append(self._indent + line)
 
     def _read(self, expression: str) -> str:
-        """Make the decoder check a value at once, so that it reports the first fault."""
+        """Make the decoder check a value at once, so that the decoder reports the first fault."""
         name = self._name()
         self._take(f"{name} = {expression}")
         return name
@@ -326,7 +326,7 @@ class _Codec:
 
 
 def _letters(hint: Any) -> str:
-    """Return the formats of all numbers in an element, nothing if it has other parts."""
+    """Return the formats of all numbers in an element, or nothing if it has other parts."""
     if get_origin(hint) is Annotated:
         return _NUMBERS.get(get_args(hint)[1], "")
     if not (isinstance(hint, type) and issubclass(hint, Struct)):
@@ -346,7 +346,7 @@ def _is_tight(letters: str) -> bool:
 
 
 def _ends(layout: str) -> tuple[int, ...]:
-    """Return where each number of a run ends."""
+    """Return the position of the end of each number of a run."""
     return tuple(
         struct.calcsize(f"={layout[: n + 1]}") for n, letter in enumerate(layout) if letter != "x"
     )
@@ -403,7 +403,7 @@ def _wchar(data: bytes) -> str:
 
 
 def _utf16(data: bytes) -> str:
-    """Decode UTF-16; big-endian without a byte order mark (GIOP 1.2)."""
+    """Decode UTF-16, which is big-endian without a byte order mark (GIOP 1.2)."""
     return data.decode("utf-16" if data[:2] in (b"\xfe\xff", b"\xff\xfe") else _UTF16)
 
 

@@ -1,7 +1,7 @@
 """IDL types as Python annotations (OMG IDL to CDR, CORBA 3.0, chapter 15).
 
 A struct is a class whose fields carry these annotations, in the order of the IDL file. Sequences
-are tuples; sequences of octets are bytes.
+are tuples, but sequences of octets are bytes.
 
 >>> class Speeds(Struct):
 ...     left: Double = 0.0
@@ -58,8 +58,8 @@ OctetSeq = Annotated[bytes, Primitive.OCTET_SEQ]
 class _StructType(type):
     """Turns each struct into a value type with slots.
 
-    `dataclass(frozen=True, slots=True)` takes five times as long for a class. This matters for a
-    command that loads 140 of these classes. This metaclass only enters the fields, for
+    `dataclass(frozen=True, slots=True)` takes five times as long for a class. The time matters for
+    a command that loads 140 of these classes. This metaclass only enters the fields, for
     `dataclasses.replace`.
     """
 
@@ -78,7 +78,7 @@ class _StructType(type):
 
 
 def _define_methods(kind: Any) -> None:
-    """Define the methods that depend on the fields: `__init__`, and `_values` for the others."""
+    """Define the methods that depend on the fields: `__init__`, and `_values`, which others use."""
     scope: dict[str, Any] = {}
     for name, zero in kind._zeros.items():
         scope[f"put_{name}"], scope[f"_{name}"] = getattr(kind, name).__set__, zero
@@ -94,8 +94,8 @@ def define(source: str, scope: dict[str, Any]) -> None:
     """Define functions from source generated for the fields of a struct.
 
     Args:
-        source: the source; it uses only names of fields and of `scope`.
-        scope: globals of the functions; the defined functions are added to it by name.
+        source: source, which uses only names of fields and of `scope`.
+        scope: globals of the functions. The defined functions are added to it by name.
     """
     exec(source, scope)
 
@@ -106,7 +106,7 @@ class Struct(metaclass=_StructType):
     Values are not checked until they are encoded.
 
     Attributes:
-        idl_module: the IDL module that contains the struct.
+        idl_module: IDL module that contains the struct.
         __match_args__: names of the fields, in the order of the IDL file.
     """
 
@@ -120,7 +120,7 @@ class Struct(metaclass=_StructType):
         return f"IDL:{cls.idl_module}/{cls.__name__}:1.0"
 
     def _values(self) -> tuple[object, ...]:
-        """Return the fields in their order; each struct has its own."""
+        """Return the values of the fields in their order; each struct has its own method."""
         return ()
 
     def __setattr__(self, name: str, value: object) -> None:

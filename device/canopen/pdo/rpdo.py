@@ -200,7 +200,7 @@ class PdoConsumer(Service):
 
     Attributes:
         rpdos: RPDOs that the dictionary has.
-        on_rpdo: function that is called with the number of an RPDO when its objects have been
+        on_rpdo: functions that are called with the number of an RPDO when its objects have been
             written.
     """
 

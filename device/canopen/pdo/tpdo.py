@@ -190,7 +190,7 @@ class PdoProducer(Service):
         tpdos: TPDOs that the dictionary has.
         quiet: keys of entries whose change is not an event, because a profile decides on their
             events. Set it before the node is Operational.
-        on_sent: function that is called with the mapped objects of each TPDO that has been sent.
+        on_sent: functions that are called with the mapped objects of each TPDO that has been sent.
     """
 
     __slots__ = ("_counters", "_due_us", "_synchronous", "_timed", "on_sent", "quiet", "tpdos")

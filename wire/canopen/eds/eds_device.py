@@ -31,7 +31,7 @@ _MOST_PDOS: Final = 0x200
 _MAPPING: Final = 0x200
 _MOST_MAPPED: Final = 0x40
 _PREDEFINED: Final = 4
-"""PDOs in each direction with a CAN-ID of the predefined connection set (CiA 301)."""
+"""Number of PDOs in each direction with a CAN-ID of the predefined connection set (CiA 301)."""
 _OFF: Final = 0x8000_0000
 
 _U8: Final = DataType.UNSIGNED8
@@ -50,10 +50,10 @@ class _Way(NamedTuple):
     """Differences between RPDOs and TPDOs.
 
     Attributes:
-        name: RPDO or TPDO.
-        key: keyword of their number in [DeviceInfo].
+        name: name of the direction: RPDO or TPDO.
+        key: keyword of the number of PDOs in [DeviceInfo].
         first: index of the first communication parameter.
-        can_id: CAN-ID of the first, without the node-ID.
+        can_id: CAN-ID of the first PDO, without the node-ID.
     """
 
     name: str
@@ -71,11 +71,11 @@ WAYS: Final = (
 def _implied_pdos(file: EdsFile) -> Iterator[_Implied]:
     """Yield the communication and mapping parameters implied by CompactPDO.
 
-    NrOfRXPDO and NrOfTXPDO count all PDOs: the described ones, then the implied ones on the lowest
-    free numbers. Described objects are unchanged; only a missing half is implied. A mapping
-    parameter has 64 entries, as in Lely's reader. The file has no defaults for them, so the COB-IDs
-    are those of CiA 301: the first four of the predefined connection set, the others off; a DCF may
-    give values, as in [1600Value].
+    NrOfRXPDO and NrOfTXPDO count all PDOs: the described PDOs, and the implied PDOs on the lowest
+    free numbers. Described objects are unchanged, and only a missing half is implied. A mapping
+    parameter has 64 entries, as in Lely's reader. The file has no defaults for implied objects, so
+    the COB-IDs are those of CiA 301: the first four PDOs have COB-IDs of the predefined connection
+    set, and all other PDOs are off. A DCF may give values, as in [1600Value].
     """
     mask = file.number("DeviceInfo", "CompactPDO")
     subs = [sub for sub in range(1, len(ELEMENTS) + 1) if mask >> sub - 1 & 1]
@@ -156,12 +156,12 @@ def _module_objects(
     Objects that the file describes itself, as a DCF may, are unchanged.
 
     Args:
-        file: collects errors: modules that are not described, or no connected modules.
-        entries: the described entries.
-        objects: their names and kinds.
+        file: file that collects errors: modules that are not described, or no connected modules.
+        entries: described entries.
+        objects: names and kinds of the described objects.
 
     Returns:
-        Name and kind of each object, and all of its entries.
+        The name and kind of each object, and all entries of the object.
     """
     if _CONNECTED not in file.sections:
         if file.number(_SUPPORTED, "NrOfEntries"):
@@ -191,7 +191,7 @@ def _missing(file: EdsFile, section: str, wanted: str) -> None:
 
 
 def _list_numbers(file: EdsFile, section: str) -> list[int]:
-    """Return the numbers of a list, in its order; 0 is none."""
+    """Return the numbers of a list, in its order, without zeros."""
     keys = (key for key in file.sections.get(section, {}) if key.isascii() and key.isdigit())
     found = (file.number(section, key) for key in sorted(keys, key=int))
     return [number for number in found if number]
@@ -200,7 +200,7 @@ def _list_numbers(file: EdsFile, section: str) -> list[int]:
 def _listed(
     modules: list[int], rows: Iterable[EntryDescription], objects: _Objects
 ) -> Iterator[_Added]:
-    """Yield 1027h with the numbers of the modules, where the file leaves them open."""
+    """Yield 1027h with the numbers of the modules, if the file does not give them."""
     own = [row for row in rows if row.index == _MODULE_LIST]
     if own:
         count = min(len(modules), max(row.sub for row in own))
@@ -290,7 +290,7 @@ def _object(
 
 
 def _count(file: EdsFile, section: str) -> tuple[int, int]:
-    """Return the number of sub-indices that a module adds, or of bits of one (`0;2`)."""
+    """Return the number of added sub-indices, or of bits of one sub-index (`0;2`)."""
     text = file.value(section, "Count")
     whole, _, bits = text.partition(";")
     try:
@@ -323,11 +323,11 @@ class EdsDevice:
     """The device described by a file.
 
     Attributes:
-        info: vendor, product, bit rates.
-        entries: of all objects.
+        info: vendor, product and bit rates.
+        entries: entries of all objects.
         objects: names and kinds by index.
-        node_id: of a DCF, None if missing.
-        bit_rate: of a DCF in bit/s, None if missing.
+        node_id: node-ID of a DCF, or None if missing.
+        bit_rate: bit rate of a DCF in bit/s, or None if missing.
     """
 
     info: DeviceInfo
@@ -338,12 +338,12 @@ class EdsDevice:
 
 
 def read_device(file: EdsFile) -> EdsDevice:
-    """Read a file; invalid parts are skipped and added to its errors.
+    """Read a file; invalid parts are skipped and added to the errors of the file.
 
     A deviation from the standard with a clear meaning becomes a warning that names the value used:
     C suffixes, empty and missing keywords, CompactSubObj in a RECORD, texts beyond ASCII. A
     ParameterValue (DCF) is used as power-on value. ObjFlags concern configuration tools, not the
-    device, and are dropped. Objects implied by CompactPDO and those of connected modules are
+    device, and are dropped. Objects implied by CompactPDO and objects of connected modules are
     included.
     """
     kinds = _kinds(file)
@@ -398,7 +398,7 @@ def _node_id(file: EdsFile) -> int | None:
 
 
 def _bit_rate(file: EdsFile) -> int | None:
-    """Return the bit rate of a DCF in bit/s (CiA 306 uses kbit/s); None if it is invalid."""
+    """Return the bit rate of a DCF in bit/s (CiA 306 uses kbit/s), or None if invalid."""
     said = file.number(COMMISSIONING, "Baudrate")
     if said <= max(BIT_RATES_KBIT):
         return 1_000 * said or None
@@ -410,7 +410,7 @@ def _bit_rate(file: EdsFile) -> int | None:
 
 
 def _kinds(file: EdsFile) -> _Kinds:
-    """Return the kind of each object, without those that only define a data type."""
+    """Return the kind of each object, without objects that only define a data type."""
     kinds = {}
     with_subs = {index for _, index, sub in file.objects() if sub is not None}
     for section, index, sub in file.objects():

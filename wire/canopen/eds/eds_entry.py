@@ -25,10 +25,10 @@ class StandardObject(NamedTuple):
     """Properties of one object, or of each object in a range.
 
     Attributes:
-        composed: whether it has sub-indices.
-        types: data type by sub-index.
-        others: data type of the other sub-indices, None for any.
-        fixed: whether it is read-only.
+        composed: whether the object has sub-indices.
+        types: data types by sub-index.
+        others: data type of the other sub-indices, or None for any type.
+        fixed: whether the object is read-only.
     """
 
     composed: bool
@@ -80,7 +80,7 @@ _RANGES: Final = (
 
 
 def standard_object(index: int) -> StandardObject | None:
-    """Return the properties of an object in CiA 301; None if nothing is checked."""
+    """Return the properties of an object in CiA 301, or None if nothing is checked."""
     for area, found in _RANGES:
         if index in area:
             return found
@@ -88,12 +88,12 @@ def standard_object(index: int) -> StandardObject | None:
 
 
 def _standard_type(index: int, sub: int, *, composed: bool) -> DataType | None:
-    """Return the data type of an entry, None if the standards do not define it.
+    """Return the data type of an entry, or None if the standards do not define it.
 
     Args:
-        index: of the object.
-        sub: sub-index.
-        composed: whether it is described as an element, not as a variable.
+        index: index of the object.
+        sub: sub-index of the entry.
+        composed: whether the entry is described as an element, not as a variable.
 
     >>> _standard_type(0x1017, 0, composed=False).name
     'UNSIGNED16'
@@ -129,20 +129,21 @@ _MISSING: Final = {
     "DataType": "data-type-missing",
     "AccessType": "access-missing",
 }
-"""The rule that a missing keyword violates."""
+"""Rules that missing keywords violate, by keyword."""
 
 
 def read_entry(
     file: EdsFile, section: str, index: int, sub: int, name: str | None = None
 ) -> object_table.EntryDescription:
-    """Read an entry; note missing keywords and the values used instead.
+    """Read an entry; record missing keywords and the values used instead.
 
     Args:
-        file: collects errors.
-        section: section of the entry, or of its array for a compact one.
-        index: of its object.
-        sub: sub-index.
-        name: None for the file's `ParameterName`.
+        file: file that collects errors.
+        section: section of the entry. For an entry of a compact array, it is the section of the
+            array.
+        index: index of the object.
+        sub: sub-index of the entry.
+        name: name of the entry, or None to use the file's `ParameterName`.
     """
     if name is None:
         name = _required(file, section, "ParameterName", "")
@@ -172,7 +173,7 @@ def _required(file: EdsFile, section: str, key: str, instead: str) -> str:
 
 
 class _Type(NamedTuple):
-    """A data type, whether the file defines it, and the limits of a derived one."""
+    """A data type, whether the file defines the type, and the limits of a derived type."""
 
     kind: DataType
     is_said: bool = True
@@ -197,7 +198,7 @@ def _data_type(file: EdsFile, section: str, index: int, sub: int) -> _Type:
 
 
 def _usual_type(section: str, index: int, sub: int) -> DataType:
-    """Return the data type of an object in CiA 301, DOMAIN if it has none."""
+    """Return the data type of an object in CiA 301, or DOMAIN if it has none."""
     if section.endswith("sub0"):
         return DataType.UNSIGNED8
     composed = bool(sub) or not section.endswith(f"{index:04X}")
@@ -205,10 +206,10 @@ def _usual_type(section: str, index: int, sub: int) -> DataType:
 
 
 def _derived(file: EdsFile, section: str, number: int, own: tuple[str, str, str]) -> _Type:
-    """Return the base type of a data type defined in the file, as CanFestival writes them.
+    """Return the base type of a data type that the file defines, as CanFestival does.
 
-    Sub-index 1 is the type, 2 and 3 are the smallest and the largest number; of a string, 2 is its
-    length.
+    Sub-index 1 is the type. Sub-indices 2 and 3 are the smallest and the largest number. For a
+    string, sub-index 2 is the length.
     """
     said = file.number(own[0], "DefaultValue", DataType.DOMAIN)
     kind = _known_type(file, section if said == number else own[0], said)
@@ -227,7 +228,7 @@ def _derived(file: EdsFile, section: str, number: int, own: tuple[str, str, str]
 
 
 def _own_type(file: EdsFile, number: int) -> tuple[str, str, str] | None:
-    """Return the sections that derive a data type, None if the file does not derive it."""
+    """Return the sections that derive a data type, or None if the file does not derive it."""
     for form in (f"{number:X}", f"{number:04X}"):
         if file.value(f"{form}sub1", "DefaultValue"):
             return f"{form}sub1", f"{form}sub2", f"{form}sub3"
@@ -263,7 +264,7 @@ def _access(file: EdsFile, section: str) -> object_table.Access:
 def _default(
     file: EdsFile, section: str, index: int, sub: int, said: _Type
 ) -> tuple[bytes | None, bool]:
-    """Return the power-on value of the file, and whether it is relative to the node-ID."""
+    """Return the power-on value in the file, and whether it is relative to the node-ID."""
     kind = said.kind
     if file.value(section, "DefaultBytes"):
         return _exact(file, section, kind), False
@@ -281,7 +282,7 @@ def _default(
 
 
 def _text(file: EdsFile, section: str, key: str, kind: DataType) -> str:
-    """Return the text of a value; of a number in CiA 306 notation without a comment."""
+    """Return the text of a value. A number is in CiA 306 notation, without a comment."""
     if kind.is_integer:
         return file.numeric(section, key)
     return file.word(section, key) if kind in _NUMBERS else file.value(section, key)
@@ -290,13 +291,13 @@ def _text(file: EdsFile, section: str, key: str, kind: DataType) -> str:
 def read_value_beside(
     file: EdsFile, index: int, sub: int, kind: DataType
 ) -> tuple[bytes | None, bool]:
-    """Return the value in a DCF of an entry without a section, None if missing.
+    """Return the value in a DCF for an entry without a section, or None if missing.
 
     Args:
-        file: collects errors.
-        index: of the object; the value is in `[INDEXValue]`.
-        sub: sub-index.
-        kind: its data type.
+        file: file that collects errors.
+        index: index of the object. The value is in `[INDEXValue]`.
+        sub: sub-index of the entry.
+        kind: data type of the value.
 
     Returns:
         The bytes, and whether to add the node-ID.
@@ -356,7 +357,7 @@ def _check_form(  # noqa: PLR0913, PLR0917 - a place, its text and what it is
 
 
 def _foreign_text(file: EdsFile, section: str, key: str, kind: DataType) -> bytes:
-    """Return the bytes of a text beyond ASCII: in ISO 8859-1 if possible, else in UTF-8."""
+    """Return the bytes of a text beyond ASCII, in ISO 8859-1 if possible, or else in UTF-8."""
     text = file.value(section, key)
     try:
         data, coding = kind.encode(text), "ISO 8859-1"
@@ -370,7 +371,7 @@ def _foreign_text(file: EdsFile, section: str, key: str, kind: DataType) -> byte
 def _limits(
     file: EdsFile, section: str, kind: DataType
 ) -> tuple[int | float | None, int | float | None]:
-    """Return the limits of a number; other types have none."""
+    """Return the limits of a number; other types have no limits."""
     low, high = _limit(file, section, "LowLimit", kind), _limit(file, section, "HighLimit", kind)
     if low is not None and high is not None and low > high:
         reason = f"LowLimit {low} is above HighLimit {high}: neither is taken"
@@ -396,7 +397,7 @@ def _limit(file: EdsFile, section: str, key: str, kind: DataType) -> int | float
 
 
 def _factor(file: EdsFile, section: str) -> float:
-    """Return the factor, a non-standard keyword that the canopen library also reads."""
+    """Return the factor, from a non-standard keyword that the canopen library also reads."""
     text = file.word(section, "Factor")
     try:
         factor = float(text or 1)
@@ -428,14 +429,14 @@ def object_kind(file: EdsFile, section: str, with_subs: bool) -> object_table.Ob
 def read_object(
     file: EdsFile, head: str, index: int, kind: object_table.ObjectCode, subs: list[tuple[str, int]]
 ) -> Iterator[object_table.EntryDescription]:
-    """Read the entries of one object; individual sections override those of a compact one.
+    """Read the entries of one object; sections of sub-indices override a compact description.
 
     Args:
-        file: collects errors.
-        head: its section.
-        index: of the object.
-        kind: of the object.
-        subs: the sections of its sub-indices.
+        file: file that collects errors.
+        head: section of the object.
+        index: index of the object.
+        kind: kind of the object.
+        subs: sections of the sub-indices.
     """
     if kind in VARIABLES:
         yield read_entry(file, head, index, 0)

@@ -42,7 +42,7 @@ from tickrig.wire.canopen.eds.xdd import XddError, is_xml, xdd_lines
 
 _LONGEST: Final = 40
 _LONGEST_TITLE: Final = len("1018sub01")
-"""Keyword of a sub-index (CiA 311)."""
+"""Length of the longest title of a section of an object, such as `1018sub01`."""
 _DCF_ENDINGS: Final = (".dcf", ".xdc")
 
 
@@ -51,10 +51,10 @@ class Finding(NamedTuple):
 
     Attributes:
         file: name of the file.
-        section: without brackets, empty for the file as a whole.
-        reason: the key or line, its text, and the allowed or used value.
-        line: line number, 0 for the file as a whole.
-        rule: name of the violated rule of `canmon eds check`, empty if there is none.
+        section: name of the section without brackets, or empty for the file as a whole.
+        reason: text with the key or line, its text, and the allowed or used value.
+        line: line number, or 0 for the file as a whole.
+        rule: name of the violated rule of `canmon eds check`, or empty if there is none.
     """
 
     file: str
@@ -71,7 +71,7 @@ class Finding(NamedTuple):
 
 
 def finding_lines(findings: Iterable[Finding]) -> Iterator[str]:
-    """Yield the findings in EDS files, one line each; a finding in many sections only once."""
+    """Yield the findings in EDS files, one per line; a finding in many sections occurs once."""
     alike: dict[tuple[str, str], list[Finding]] = {}
     for finding in dict.fromkeys(findings):
         alike.setdefault((finding.file, finding.reason), []).append(finding)
@@ -81,7 +81,7 @@ def finding_lines(findings: Iterable[Finding]) -> Iterator[str]:
 
 
 class EdsError(ValueError):
-    """An EDS that cannot be used; the message has all findings, one line each."""
+    """The EDS cannot be used; the message has all findings, one per line."""
 
     def __init__(self, findings: Iterable[Finding]) -> None:
         self.findings = tuple(findings)
@@ -109,18 +109,20 @@ _OWN_WORD: Final = re.compile(r"(MaxBytes|DefaultBytes) of (\w+) is (\w+)")
 class EdsFile:
     """The sections of an EDS, DCF, XDD or XDC, as CiA 306 spells them.
 
-    It collects findings: first those of its lines, then those of its readers. An unreadable line
-    matters only in a section that describes the device. Of a duplicate section or keyword the first
-    is used, as in most readers.
+    The object collects findings: first findings of the lines, then findings of the readers. An
+    unreadable line matters only in a section that describes the device. If a section or keyword is
+    duplicate, the first one is used, as in most readers.
 
     Args:
-        name: name in findings.
-        text: the whole file.
+        name: name of the file in findings.
+        text: content of the file.
 
     Attributes:
-        sections: texts by section and lower-case keyword: `1017`, `1018sub1`, `DeviceInfo`.
-        lines: all lines; of XML the equivalent EDS lines, with the line numbers of their elements.
-        is_xml: whether it is XML.
+        sections: texts by section and lower-case keyword. Sections have names such as `1017`,
+            `1018sub1`, `DeviceInfo`.
+        lines: all lines. For XML these are the equivalent EDS lines, with the line numbers of their
+            elements.
+        is_xml: whether the file is XML.
         errors: findings that change the described device.
         warnings: deviations from the standard with a clear meaning.
     """
@@ -143,17 +145,17 @@ class EdsFile:
 
     @property
     def errors(self) -> tuple[Finding, ...]:
-        """All errors, without duplicates, in the order in which they were found."""
+        """All errors, without duplicates, in the order of their detection."""
         return tuple(self._errors)
 
     @property
     def warnings(self) -> tuple[Finding, ...]:
-        """All warnings, likewise."""
+        """All warnings, without duplicates, in the order of their detection."""
         return tuple(self._warnings)
 
     @property
     def is_dcf(self) -> bool:
-        """Whether it is a DCF: by its name, or because it has a node-ID."""
+        """Whether the file is a DCF, by its name or because it has a node-ID."""
         return self.name.lower().endswith(_DCF_ENDINGS) or "DeviceComissioning" in self.sections
 
     def refuse(self, section: str, reason: str, rule: str, key: str = "") -> None:
@@ -162,17 +164,17 @@ class EdsFile:
         self._errors[Finding(self.name, section, reason, line, rule)] = None
 
     def warn(self, section: str, reason: str, rule: str, key: str = "") -> None:
-        """Add a warning, likewise."""
+        """Add a warning at the line of a keyword or a section."""
         line = self.line(section, key)
         self._warnings[Finding(self.name, section, reason, line, rule)] = None
 
     def line(self, section: str, key: str = "") -> int:
-        """Return the number of the line of a keyword, else of its section, else 0."""
+        """Return the line number of a keyword, or else of its section, or else 0."""
         place = self._places.get((section, key.lower()))
         return place or self._places.get((section, ""), 0)
 
     def value(self, section: str, key: str) -> str:
-        """Return the text of a keyword, empty if it is missing; see `word`."""
+        """Return the text of a keyword, or "" if it is missing; see `word`."""
         found = self.sections.get(section)
         return "" if found is None else found.get(key.lower(), "")
 
@@ -183,9 +185,9 @@ class EdsFile:
     def word(self, section: str, key: str) -> str:
         """Return the value of a keyword without free text, without a trailing comment.
 
-        In CiA 306 comments are separate lines; readers also accept ` ;` after any value. After a
-        number or an access type, `;`, `#` and `//` start a comment too, with a warning: unlike in a
-        text, they have no other meaning there.
+        In CiA 306 comments are separate lines. Readers also accept ` ;` after any value. After a
+        number or an access type, `;`, `#` and `//` start a comment, too, with a warning. Unlike in
+        a text, these characters have no other meaning there.
         """
         text = self.value(section, key)
         said = eds_value.without_comment(text)
@@ -217,9 +219,9 @@ class EdsFile:
     ) -> int:
         """Return the number of a keyword.
 
-        The default is used if it is missing, and with a warning if the keyword is empty, not a
-        number, or not in `low` to `high`. One of `words` (lower case) stands for its number, with a
-        warning.
+        The default is used if the keyword is missing. The default is used with a warning if the
+        keyword is empty, not a number, or not in `low` to `high`. A word of `words` (lower case)
+        stands for its number, with a warning.
         """
         text = self.numeric(section, key)
         if not text:
@@ -243,7 +245,7 @@ class EdsFile:
         return default
 
     def objects(self) -> Iterator[tuple[str, int, int | None]]:
-        """Return the sections of objects, with index and sub-index; None for the object itself."""
+        """Return the sections of objects, with index and sub-index (None for the object itself)."""
         return iter(self._objects)
 
     def _parse(self) -> None:
@@ -304,7 +306,7 @@ class EdsFile:
             self._warn_at(line, reason, "doubled-key")
 
     def _skip(self, line: eds_value.EdsLine) -> None:
-        """Report the first such line before the sections, and each one in them."""
+        """Report the first unreadable line before the sections, and each one in a section."""
         if line.section or not self._warnings:
             reason = f"{shorten(line.content)!r} is no keyword with a value: it is skipped"
             self._warn_at(line, reason, "no-keyword")
@@ -324,17 +326,17 @@ _WITHIN_WORD: Final = re.compile(
     rb"(?<=[A-Za-z\x80-\xff])[\x80-\x91\x93-\xff](?=[A-Za-z\x80-\xff])"
 )
 _LETTERS_1252: Final = frozenset(range(0xC0, 0x100)) - {0xE1}
-"""Bytes that are letters in Windows-1252; E1h is a letter of either (á, ß)."""
+"""Bytes that are letters in Windows-1252, except E1h, a letter in both encodings (á, ß)."""
 _LETTERS_850: Final = frozenset((*range(0x80, 0x9B), *range(0xA0, 0xA6)))
 """Bytes that are letters in CP850, and no letters in Windows-1252."""
 
 
 def encoding_of(data: bytes) -> str:
-    r"""Return the encoding of a file, by its name in Python.
+    r"""Return the encoding of a file, as a name in Python.
 
-    UTF-16 if it has the byte order mark or every other byte at the start is zero; UTF-8 if it is
-    valid UTF-8. Otherwise a single-byte encoding: CP850 if it gives letters within words where
-    Windows-1252 does not, else Windows-1252.
+    The encoding is UTF-16 if the file has the byte order mark or if every other byte at the start
+    is zero. It is UTF-8 if the file is valid UTF-8. Otherwise it is a single-byte encoding: CP850
+    if CP850 gives letters within words where Windows-1252 does not, or else Windows-1252.
 
     >>> encoding_of(b"[\0F\0"), encoding_of("µ".encode()), encoding_of(b"\xb5")
     ('utf-16-le', 'utf-8', 'cp1252')
@@ -360,8 +362,8 @@ def decode_text(data: bytes, encoding: str = "") -> str:
     r"""Return the text of a file in any encoding, without a byte order mark.
 
     Args:
-        data: the whole file.
-        encoding: name of its encoding in Python, empty to detect it.
+        data: content of the file.
+        encoding: name of the encoding in Python, or empty to detect the encoding.
 
     >>> decode_text("\ufeffµ".encode()), decode_text("µ".encode("cp1252"))
     ('µ', 'µ')

@@ -13,7 +13,7 @@ from tickrig.wire.canopen.datatypes import DataType, Value
 # The lines of an EDS or DCF: section titles, keywords with values, comments (CiA 306).
 
 _SECTIONS: Final = ("DeviceInfo", "DeviceComissioning")
-"""Sections that describe the device, besides its objects."""
+"""Sections that describe the device, in addition to its objects."""
 
 _NAMED: Final = (
     *_SECTIONS,
@@ -48,15 +48,15 @@ _LINE_COMMENT: Final = re.compile(r"(^|\s);.*|^\s*#.*")
 
 
 class EdsLine(NamedTuple):
-    """One line, with its parsed content.
+    """A line with its parsed content.
 
     Attributes:
-        number: 1 for the first line of a file.
+        number: line number, counted from 1.
         text: the line as written, without its end.
-        section: its section in CiA 306 spelling; empty before the first.
-        title: title of the section that it starts, as written; empty elsewhere.
-        key: keyword, empty elsewhere.
-        value: of a keyword; `#` and `//` are kept, because a text may contain them.
+        section: section of the line in CiA 306 spelling, or empty before the first section.
+        title: title, as written, of the section that the line starts, or empty in other lines.
+        key: keyword of the line, or empty in other lines.
+        value: value of a keyword. `#` and `//` are kept, because a text may contain them.
         content: the line without a comment.
     """
 
@@ -70,7 +70,7 @@ class EdsLine(NamedTuple):
 
     @property
     def is_keyword(self) -> bool:
-        """Whether it assigns a value; the name may be missing."""
+        """Whether the line assigns a value; the name may be missing."""
         return "=" in self.content and not self.title
 
 
@@ -135,7 +135,7 @@ def canonical_section(title: str) -> str:
 
 @lru_cache(maxsize=4096)
 def object_section(section: str) -> tuple[int, int | None] | None:
-    """Return index and sub-index of a section that describes an object; None for another one.
+    """Return index and sub-index of a section that describes an object, or None.
 
     >>> object_section("1A00subA"), object_section("1017"), object_section("1600Value")
     ((6656, 10), (4119, None), None)
@@ -148,7 +148,7 @@ def object_section(section: str) -> tuple[int, int | None] | None:
 
 @lru_cache(maxsize=4096)
 def describes_device(section: str) -> bool:
-    """Return whether a section, or the part before the first one, describes the device."""
+    """Return whether a section, or the part before the first section, describes the device."""
     if not section or section in _SECTIONS or _OBJECT.fullmatch(section.upper()):
         return True
     return is_module_object(section)
@@ -176,9 +176,9 @@ FLOATS: Final = {DataType.REAL32: "f", DataType.REAL64: "d"}
 TIMES: Final = (DataType.TIME_OF_DAY, DataType.TIME_DIFFERENCE)
 
 _WIDEST: Final = 64
-"""Bits of the widest number."""
+"""Number of bits of the widest number."""
 _C_WIDTHS: Final = (8, 16, 32, 64)
-"""Bits of the integers of C."""
+"""Numbers of bits of the integers of C."""
 
 _PLAIN: Final = re.compile(r"0x[0-9A-Fa-f]+|0|[1-9][0-9]*|", re.ASCII)
 _C_SUFFIX: Final = re.compile(r"\b(0x[0-9a-f]+|[0-9]+)[ul]{1,3}\b", re.IGNORECASE | re.ASCII)
@@ -199,7 +199,7 @@ _TRUTH: Final = {"true": True, "false": False}
 def without_comment(text: str) -> str:
     """Return a number or a word without a trailing comment.
 
-    `#`, `//` and `;` start one, with or without a blank before them.
+    `#`, `//` and `;` start a comment, with or without a blank before them.
 
     >>> without_comment("0x07 # VAR"), without_comment("7//VAR"), without_comment("$NODEID+8;x")
     ('0x07', '7', '$NODEID+8')
@@ -213,14 +213,14 @@ def parse_value(kind: DataType, text: str) -> tuple[Value, bool]:
     """Read a value.
 
     Args:
-        kind: its data type.
-        text: not empty.
+        kind: data type of the value.
+        text: text, which is not empty.
 
     Returns:
         The value, and whether to add the node-ID.
 
     Raises:
-        ValueError: not a value of this type.
+        ValueError: the text is not a value of this type.
 
     >>> parse_value(DataType.UNSIGNED32, "$NODEID+0x180")
     (384, True)
@@ -249,8 +249,8 @@ def _twos_complement(kind: DataType, number: int) -> int:
     """Return the number of an integer type with the same bits as a number.
 
     A negative number of an unsigned type becomes its two's complement. For a signed type, an
-    unsigned bit pattern in its own width or that of a wider C type becomes the negative number.
-    Others are unchanged.
+    unsigned bit pattern with the width of the type or of a wider C type becomes the negative
+    number. Other numbers are unchanged.
 
     >>> _twos_complement(DataType.UNSIGNED8, -128), _twos_complement(DataType.UNSIGNED8, -129)
     (128, -129)
@@ -290,9 +290,9 @@ def is_plain_number(text: str) -> bool:
 def plain_numbers(text: str) -> str:
     """Return numbers in CiA 306 notation.
 
-    It removes C suffixes, blanks and underscores within numbers, trailing comments, leading zeros
-    that do not form an octal number, a plus sign, and decimals that are 0; assembler notation of
-    hexadecimal numbers becomes 0x. Node-IDs are unchanged.
+    The function removes C suffixes, blanks and underscores within numbers, trailing comments,
+    leading zeros that do not form an octal number, a plus sign, and decimals that are 0. Assembler
+    notation of hexadecimal numbers becomes 0x. Node-IDs are unchanged.
 
     >>> plain_numbers("0x1234567890ABCDEFLL"), plain_numbers("$NODEID+0x80u"), plain_numbers("0009")
     ('0x1234567890ABCDEF', '$NODEID+0x80', '9')
@@ -315,15 +315,16 @@ def plain_numbers(text: str) -> str:
 
 
 def parse_limit(kind: DataType, text: str, *, upper: bool = True) -> int | float | None:
-    """Read a limit; None if the type has no limits or the limit does not restrict it.
+    """Read a limit; return None if the type has no limits or the limit does not restrict it.
 
     Args:
-        kind: its data type.
-        text: not empty.
-        upper: whether it is HighLimit. A limit beyond the type, which has no effect, is kept.
+        kind: data type of the limited value.
+        text: text, which is not empty.
+        upper: whether the limit is HighLimit. A limit beyond the type, which has no effect, is
+            kept.
 
     Raises:
-        ValueError: it is not a number of at most 64 bits.
+        ValueError: the text is not a number of at most 64 bits.
 
     >>> parse_limit(DataType.UNSIGNED8, "-1"), parse_limit(DataType.INTEGER8, "0xFFFF")
     (255, 65535)
@@ -345,7 +346,7 @@ def parse_limit(kind: DataType, text: str, *, upper: bool = True) -> int | float
 
 
 def format_limit(kind: DataType, limit: int | float) -> str:
-    """Write a limit; of a float as its bytes if they represent it exactly."""
+    """Return a limit as text. A float is written as its bytes if they represent it exactly."""
     with suppress(ValueError):
         if kind in FLOATS and kind.decode(data := kind.encode(limit)) == limit:
             return format_value(kind, data)
@@ -353,9 +354,9 @@ def format_limit(kind: DataType, limit: int | float) -> str:
 
 
 def format_value(kind: DataType, data: bytes, *, relative: bool = False) -> str:
-    """Write a value; the caller detects losses by reading it again.
+    """Return a value as text; the caller detects losses by reading the text again.
 
-    A float is written as its bytes, as Lely's tools require; 0 is always written as 0.
+    A float is written as its bytes, as Lely's tools require, but 0 is always written as 0.
 
     >>> format_value(DataType.UNSIGNED32, (0x180).to_bytes(4, "little"), relative=True)
     '$NODEID+0x180'
@@ -387,7 +388,7 @@ def parse_sum(text: str) -> tuple[int, bool]:
 
 
 def _parse_float(layout: str, text: str) -> float:
-    """Read a decimal number, or the bytes of a float as a hexadecimal one."""
+    """Read a decimal number, or the bytes of a float as a hexadecimal number."""
     if not text.lower().startswith("0x"):
         return float(text)
     data = int(text, 16).to_bytes(struct.calcsize(layout), "big")
@@ -407,7 +408,7 @@ def is_hex_bytes(text: str) -> bool:
 
 
 def _parse_bytes(text: str) -> bytes:
-    r"""Read hexadecimal bytes; some editors write 0x before them or before each, or a text instead.
+    r"""Read hexadecimal bytes; some editors write 0x before all or each of them, or write a text.
 
     >>> _parse_bytes("0102"), _parse_bytes("0x0102"), _parse_bytes("0x0"), _parse_bytes("no")
     (b'\x01\x02', b'\x01\x02', b'\x00', b'no')

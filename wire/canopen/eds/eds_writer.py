@@ -34,7 +34,7 @@ _NO_WORD: Final = re.compile(r"[^a-z0-9]+")
 
 
 class Table(Protocol):
-    """EntryDescription objects: an `ObjectTable`, or the shared description of dictionaries."""
+    """A table of `EntryDescription`: an `ObjectTable`, or the description of dictionaries."""
 
     @property
     def objects(self) -> Mapping[int, object_table.ObjectDescription]:
@@ -54,7 +54,7 @@ def write_eds(table: Table, info: object_table.DeviceInfo = _NO_INFO) -> str:
     after the product and dated 1970, so the same dictionary gives the same text.
 
     Raises:
-        ValueError: a name or an access that an EDS cannot hold.
+        ValueError: an EDS cannot hold a name or an access.
 
     >>> from tickrig.wire.canopen.eds.object_table import ObjectTable
     >>> text = write_eds(ObjectTable())
@@ -75,11 +75,12 @@ def write_dcf(
 
     Args:
         table: the objects.
-        node_id: 1..127.
-        bit_rate: in bit/s.
-        values: bytes of the present values by index << 8 | sub-index; others have their default,
-            with the node-ID added if relative.
-        info: the head of the file.
+        node_id: node-ID of the node, 1..127.
+        bit_rate: bit rate in bit/s.
+        values: present values as bytes. The key is index << 8 | sub-index. An object that is not
+            listed keeps its default value; a default that is relative to the node-ID gets the
+            node-ID added.
+        info: vendor, product and bit rates for the sections `[FileInfo]` and `[DeviceInfo]`.
     """
     commissioning = [
         "[DeviceComissioning]",
@@ -196,7 +197,7 @@ def entry_lines(entry: object_table.EntryDescription) -> list[str]:
     """Return the section of one sub-index.
 
     Raises:
-        ValueError: a name or an access that an EDS cannot hold.
+        ValueError: an EDS cannot hold a name or an access.
 
     >>> from tickrig.wire.canopen.eds.object_table import RO, DataType
     >>> entry_lines(object_table.EntryDescription(0x2000, 1, "x", DataType.UNSIGNED8, RO))[:2]
@@ -231,7 +232,7 @@ def access_type(entry: object_table.EntryDescription) -> str:
     """Return the AccessType of an entry.
 
     Raises:
-        ValueError: CiA 306 has no word for it.
+        ValueError: CiA 306 has no word for the access.
 
     >>> from tickrig.wire.canopen.eds.object_table import RWW, DataType, EntryDescription
     >>> access_type(EntryDescription(0x6040, 0, "Controlword", DataType.UNSIGNED16, RWW))
@@ -248,7 +249,7 @@ def access_type(entry: object_table.EntryDescription) -> str:
 
 
 def _default(entry: object_table.EntryDescription) -> str | None:
-    """Return the text of a default, None if no text represents it exactly."""
+    """Return the text of a default, or None if no text represents it exactly."""
     text = format_value(entry.data_type, entry.default, relative=entry.relative)
     return text if _reads_as(entry, text) else None
 
@@ -271,5 +272,5 @@ def _name(text: str) -> str:
 
 
 def _fits_a_line(text: str) -> bool:
-    """Return whether a value survives blanks, comments and line ends of an EDS."""
+    """Return whether reading restores a value in spite of blanks, comments and line ends."""
     return text.isprintable() and text == text.strip() and " ;" not in text

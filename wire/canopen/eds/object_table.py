@@ -1,4 +1,4 @@
-"""Object tables of devices, written as in their manuals, and the head of an EDS."""
+"""Object tables of devices, written as in their manuals, and the device data of an EDS."""
 
 from __future__ import annotations
 
@@ -33,11 +33,12 @@ class Access(Flag):
         """Return the access of an entry of an EDS (CiA 306).
 
         Args:
-            access_type: ro, wo, rw, rwr, rww or const, in any case.
-            mappable: whether PDOs may carry it (PDOMapping).
+            access_type: access in CiA 306 notation: ro, wo, rw, rwr, rww or const, in upper or
+                lower case.
+            mappable: whether PDOs may carry the entry (PDOMapping).
 
         Raises:
-            ValueError: unknown access.
+            ValueError: the access is unknown.
         """
         access = _ACCESS_TYPES.get(access_type.lower())
         if access is None:
@@ -54,11 +55,11 @@ RW: Final = Access.READ | Access.WRITE
 WO: Final = Access.WRITE
 CONST: Final = Access.READ | Access.CONST
 ROT: Final = RO | Access.TPDO
-"""Read only, may be mapped into a TPDO."""
+"""Access of an entry that is read only and may be mapped into a TPDO."""
 RWW: Final = RW | Access.RPDO
-"""Read and written, may be mapped into an RPDO."""
+"""Access of an entry that is read and written and may be mapped into an RPDO."""
 RWRW: Final = RWW | Access.TPDO
-"""Read and written, may be mapped in both directions."""
+"""Access of an entry that is read and written and may be mapped in both directions."""
 
 _ACCESS_TYPES: Final = {"ro": RO, "wo": WO, "rw": RW, "rwr": RW, "rww": RW, "const": CONST}
 _MAPPABLE: Final = {
@@ -93,30 +94,32 @@ class EntryDescription:
     """Constant description of a variable, or of one element of an array or record (CiA 306).
 
     Args:
-        index: 0x0000..0xFFFF.
-        sub: 0..255.
-        name: as in the EDS.
-        data_type: determines size and notation; DOMAIN if a file has an unknown one.
+        index: index, 0x0000..0xFFFF.
+        sub: sub-index, 0..255.
+        name: name, as in the EDS.
+        data_type: data type, which determines size and notation. It is DOMAIN if the type in a file
+            is unknown.
         access: access of the bus.
-        default: power-on value or its bytes; if omitted, zero or the nearest limit, or empty.
-        low: smallest value, None for that of the data type.
-        high: largest value.
-        relative: the node-ID is added to the default ($NODEID).
+        default: power-on value or its bytes. If omitted, it is zero, or the nearest limit, or empty.
+        low: smallest value, or None to use the limit of the data type.
+        high: largest value, or None to use the limit of the data type.
+        relative: whether the node-ID is added to the default ($NODEID).
         max_bytes: largest size of a string or domain.
-        unit: of the value, empty if none is given.
-        factor: by which its number is multiplied to be in that unit.
+        unit: unit of the value, or empty if unknown.
+        factor: factor by which the number is multiplied to be in the unit.
 
     Raises:
         FieldError: the default is not a value of the data type.
 
     Attributes:
         default: bytes of the power-on value.
-        has_default: whether one was given.
-        size: size in bytes, 0 if it varies.
-        signed: whether it is a signed integer.
-        readable: the bus may read it.
-        writable: the bus may write it.
-        shared_by_twins: copies of a slave within the process share it (`device/twin`).
+        has_default: whether a default was given.
+        size: size in bytes, or 0 if the size varies.
+        signed: whether the data type is a signed integer.
+        readable: whether the bus may read the entry.
+        writable: whether the bus may write the entry.
+        shared_by_twins: flag that is always true: copies of a slave within the process share the
+            description (`device/twin`).
         key: index and sub-index in one number.
     """
 
@@ -158,11 +161,11 @@ class EntryDescription:
         """Return the same entry with another power-on value.
 
         Args:
-            default: the value, or its bytes.
-            relative: the node-ID is added to it.
+            default: power-on value, or its bytes.
+            relative: whether the node-ID is added to the default.
 
         Returns:
-            A new description.
+            A new description of the entry.
 
         Raises:
             FieldError: the default is not a value of the data type.
@@ -179,14 +182,14 @@ class EntryDescription:
         )
 
     def __repr__(self) -> str:
-        """Return its name for a log line."""
+        """Return the name of the entry for a log line."""
         return f"<{self.index:04X}h:{self.sub:02X} {self.name}>"
 
     def power_on_data(self, node_id: int) -> bytes:
         """Return the bytes of the default, with the node-ID added if it is relative.
 
         Args:
-            node_id: 1 to 127.
+            node_id: node-ID, 1 to 127.
         """
         if not self.relative:
             return self.default
@@ -211,12 +214,12 @@ class Element(NamedTuple):
     """One sub-index of a record.
 
     Attributes:
-        sub: 1..254.
-        name: as in the EDS.
-        kind: data type.
+        sub: sub-index, 1..254.
+        name: name, as in the EDS.
+        kind: data type of the element.
         access: access of the bus.
         default: power-on value.
-        relative: the node-ID is added to it.
+        relative: whether the node-ID is added to the default.
     """
 
     sub: int
@@ -232,7 +235,7 @@ class ObjectTable:
     """Collects objects, and returns them sorted by index and sub-index.
 
     Attributes:
-        objects: names and kinds.
+        objects: names and kinds by index.
 
     >>> table = ObjectTable()
     >>> table.variable(0x1000, "Device type", DataType.UNSIGNED32, RO, 0x191)
@@ -290,7 +293,7 @@ class ObjectTable:
         *,
         max_bytes: int = MAX_VARIABLE_BYTES,
     ) -> None:
-        """Add an array of equal elements; sub-index 0 counts them."""
+        """Add an array of equal elements, whose number is in sub-index 0."""
         self._head(index, name, ObjectCode.ARRAY, RO, count)
         self._rows += (
             EntryDescription(
@@ -311,7 +314,7 @@ class ObjectTable:
     ) -> None:
         """Add a record; sub-index 0 holds `count`, by default the highest sub-index.
 
-        With `code` it is an array whose elements have individual names and defaults.
+        With `code`, the object is an array whose elements have individual names and defaults.
         """
         rows = list(elements)
         highest = max(row.sub for row in rows) if count is None else count
@@ -338,10 +341,10 @@ class DeviceInfo:
     """Vendor, product and bit rates.
 
     Attributes:
-        vendor_name: empty if unknown.
-        product_name: empty if unknown.
-        order_code: empty if unknown.
-        bit_rates: bit/s that it supports.
+        vendor_name: name of the vendor, or empty if unknown.
+        product_name: name of the product, or empty if unknown.
+        order_code: order code of the product, or empty if unknown.
+        bit_rates: bit rates that the device supports, in bit/s.
     """
 
     vendor_name: str = ""
@@ -366,18 +369,18 @@ _MAPPED: Final = 8
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CommunicationProfile:
-    """Differences between devices.
+    """Values of communication objects that differ between devices.
 
     Attributes:
-        device_type: 1000h.
-        name: 1008h.
-        hardware: 1009h.
-        software: 100Ah.
-        product_code: 1018h:02; the vendor-ID is 0, which belongs to no vendor.
-        rpdos: from 1400h on.
-        tpdos: from 1800h on.
-        revision: 1018h:03.
-        heartbeat_ms: 1017h.
+        device_type: value of 1000h.
+        name: value of 1008h.
+        hardware: value of 1009h.
+        software: value of 100Ah.
+        product_code: value of 1018h:02. The vendor-ID is 0, which belongs to no vendor.
+        rpdos: descriptions of the RPDOs, from 1400h on.
+        tpdos: descriptions of the TPDOs, from 1800h on.
+        revision: value of 1018h:03.
+        heartbeat_ms: value of 1017h, in ms.
     """
 
     device_type: int

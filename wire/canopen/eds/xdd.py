@@ -1,6 +1,6 @@
 """XDD and XDC files (XML, CiA 311), converted to the lines of an EDS.
 
-Document types and their entities are refused; no external file is fetched.
+Document types and their entities are refused. No external file is fetched.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _DATA_TYPES: Final = {
     **{"REAL": 0x08, "LREAL": 0x11, "CHAR": 0x09, "STRING": 0x09},
     **{"WSTRING": 0x0B, "BITSTRING": 0x0A},
 }
-"""Data types of parameters (CiA 311, after IEC 61131-3) and those of CiA 301."""
+"""Data types of parameters (CiA 311, after IEC 61131-3), and data types of CiA 301."""
 
 _ACCESS: Final = {
     **{"const": "const", "read": "ro", "write": "wo", "readWrite": "rw"},
@@ -50,7 +50,7 @@ _COMMISSIONING: Final = {
     **{"networkName": "NetworkName", "networkNumber": "NetNumber"},
     "CANopenManager": "CANopenManager",
 }
-"""`nodeID` as in CiA 311, `NodeID` as CANopenEditor writes it."""
+"""Attributes with an EDS keyword: `nodeID` is in CiA 311, and CANopenEditor writes `NodeID`."""
 _OBJECT: Final = {
     **{"name": "ParameterName", "subNumber": "SubNumber", "defaultValue": "DefaultValue"},
     **{"actualValue": "ParameterValue", "denotation": "Denotation", "objFlags": "ObjFlags"},
@@ -63,10 +63,10 @@ _FILE: Final = {
 
 
 class XddError(ValueError):
-    """XML that cannot be read.
+    """The XML cannot be read.
 
     Attributes:
-        line: line number, 0 for the file as a whole.
+        line: line number, or 0 for the file as a whole.
     """
 
     def __init__(self, reason: str, line: int) -> None:
@@ -76,7 +76,7 @@ class XddError(ValueError):
 
 @mypyc_attr(serializable=True)
 class Element:
-    """An XML element; names have no prefixes."""
+    """An XML element, whose names have no prefixes."""
 
     def __init__(self, name: str, attributes: dict[str, str], line: int) -> None:
         self.name = name
@@ -87,7 +87,7 @@ class Element:
 
 
 def is_xml(text: str) -> bool:
-    """Return whether a text is XML: it starts as no EDS can."""
+    """Return whether a text is XML, by a start that no EDS can have."""
     return text.lstrip().startswith("<")
 
 
@@ -95,7 +95,7 @@ def xdd_lines(text: str) -> list[EdsLine]:
     """Return the lines of an EDS equivalent to an XDD or XDC.
 
     Raises:
-        XddError: it is not well-formed, has a document type, or no CANopen object list.
+        XddError: the text is not well-formed, has a document type, or has no CANopen object list.
     """
     elements = read_xml(text)
     if not any(element.name == "CANopenObjectList" for element in elements):
@@ -108,7 +108,7 @@ def read_xml(text: str) -> list[Element]:
     """Return all elements of XML in the order of the file.
 
     Raises:
-        XddError: it is not well-formed, has a document type, or is nested deeper than 64.
+        XddError: the text is not well-formed, has a document type, or is nested deeper than 64.
     """
     body = text.lstrip()
     reader = _Reader(text.count("\n", 0, len(text) - len(body)))
@@ -218,7 +218,7 @@ def _head_items(element: Element) -> Iterator[tuple[str, _Item]]:
 
 
 def _kbit(text: str) -> str:
-    """Return a bit rate in kbit/s; other texts unchanged.
+    """Return a bit rate in kbit/s; return other texts unchanged.
 
     >>> _kbit("250 Kbps"), _kbit("1 Mbps"), _kbit("500000"), _kbit("auto-baudRate")
     ('250', '1000', '500000', 'auto-baudRate')
@@ -242,7 +242,7 @@ def _objects(elements: list[Element], parameters: _Parameters) -> Iterator[EdsLi
 
 
 def _entry(element: Element, parameters: _Parameters) -> Iterator[_Item]:
-    """Yield the keywords of an object or one of its entries, its own attributes first."""
+    """Yield the keywords of an object or entry, those of its own attributes first."""
     parameter = parameters.of(element)
     said = {key: (text, line) for key, text, line in _renamed(element, _OBJECT)}
     kind = element.attributes.get("objectType", "7")
@@ -287,7 +287,7 @@ class _Parameters:
         }
 
     def of(self, element: Element) -> Element | None:
-        """Return the element that an element refers to, None if it is missing."""
+        """Return the element that an element refers to, or None if it is missing."""
         return self._known.get(element.attributes.get("uniqueIDRef", ""))
 
     def items(self, parameter: Element | None) -> Iterator[_Item]:
