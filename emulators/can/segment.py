@@ -96,7 +96,8 @@ class CanSegment(TransmissionOutcomes):
         start_us: start time.
         faults: the armed faults.
         observers: functions that are called with each frame that ends.
-        on_traffic: functions that are called when a frame may end earlier than the previous `due_us`.
+        on_traffic: functions that are called when a frame may end earlier than the previous
+            `due_us`.
 
     Attributes:
         now_us: present time of the bus.

@@ -45,7 +45,8 @@ class CanWire(Copyable):
         faults: armed faults. `arm` and `clear` act at the present time of the bus.
         observers: functions that are called with each frame and each error frame on the bus, and
             with its time.
-        on_traffic: functions that are called when a frame may end earlier than the previous `due_us`.
+        on_traffic: functions that are called when a frame may end earlier than the previous
+            `due_us`.
 
     >>> wire = CanWire(bit_rate=500_000)
     >>> node, host = wire.end(), wire.end()

@@ -100,7 +100,7 @@ class EntryDescription:
         data_type: data type, which determines size and notation. It is DOMAIN if the type in a file
             is unknown.
         access: access of the bus.
-        default: power-on value or its bytes. If omitted, it is zero, or the nearest limit, or empty.
+        default: power-on value or its bytes. If omitted, it is zero, the nearest limit, or empty.
         low: smallest value, or None to use the limit of the data type.
         high: largest value, or None to use the limit of the data type.
         relative: whether the node-ID is added to the default ($NODEID).
