@@ -20,9 +20,9 @@ class SignalType(Enum):
 
     Attributes:
         LEVEL: a quantity, such as a stick, a voltage or a load.
-        BUTTON: 1 while pressed.
+        BUTTON: button, whose value is 1 while the button is pressed.
         TEXT: text, or bytes in hex.
-        FAULT: 1 while the physical fault is present.
+        FAULT: physical fault, whose value is 1 while the fault is present.
     """
 
     LEVEL = "level"  # a quantity: a stick, a voltage, a load

@@ -646,7 +646,7 @@ class LogLine(NamedTuple):
     Attributes:
         at_us: time of the end of the frame, in us.
         channel: name of the bus, without blanks.
-        received: the frame.
+        received: frame or error frame on the bus.
     """
 
     at_us: int

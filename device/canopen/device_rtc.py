@@ -431,7 +431,7 @@ class DeviceRtc(Application):
     Args:
         node: the slave, whose dictionary is the dictionary of the component.
         slot: place of the application in the order of a tick.
-        kind: the component.
+        kind: class of the component.
 
     Attributes:
         life: the life cycle, with the component.
@@ -518,7 +518,7 @@ def make_device_rtc(
     """Make a slave that is a DeviceRTC.
 
     Args:
-        kind: the component.
+        kind: class of the component.
         node_id: node-ID 1..127, or 255 for a slave that waits for LSS.
         nonvolatile: memory kept from an earlier run.
 

@@ -86,7 +86,8 @@ class Entry(Part):
     callbacks to the entry; each is called with the entry.
 
     Args:
-        description: name, type, access and limits; shared with other slaves.
+        description: description with name, type, access and limits, which is shared with other
+            slaves.
 
     Attributes:
         description: description of the entry, as given.
@@ -260,7 +261,7 @@ class DictionaryDescription(Immutable):
 
     Args:
         entries: entries in any order, which are kept sorted.
-        objects: names and kinds of arrays and records; a variable has the name of its entry.
+        objects: names and kinds of arrays and records. A variable has the name of its entry.
 
     Raises:
         ValueError: two entries have the same index and sub-index.

@@ -255,7 +255,7 @@ class _ErrorHistory(Part):
     it. The end of an error is not recorded.
 
     Args:
-        dictionary: the objects of the slave; 1003h may be missing.
+        dictionary: objects of the slave, of which 1003h may be missing.
     """
 
     def __init__(self, dictionary: Dictionary) -> None:

@@ -125,7 +125,7 @@ class _DownloadSize(Part):
     Args:
         server: the server, with the memory limit of the slave.
         entry: the object to write.
-        announced: number of bytes that the client announces; None if it announces none.
+        announced: number of bytes that the client announces, or None if it announces no number.
 
     Raises:
         SdoAbort: the entry is not writable, or the announced size does not fit.

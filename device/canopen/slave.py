@@ -305,7 +305,7 @@ class CanopenSlave(Copyable):
     Not emulated: the time that a real slave's processor needs.
 
     Args:
-        dictionary: the objects; they determine the services.
+        dictionary: the objects, which determine the services.
         node_id: node-ID 1..127, or `UNCONFIGURED`. A node-ID that LSS has stored takes precedence.
         services: factories of the services, in the order of a tick.
         nonvolatile: memory that survives a power cycle.

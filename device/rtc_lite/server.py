@@ -60,7 +60,7 @@ class LiteServer:
     """Answers the requests of the proxy, without a clock.
 
     Attributes:
-        life: the component and its state.
+        life: life cycle of the component, with its state.
         context: the execution context.
         timer: the timer whose rate can be set.
     """

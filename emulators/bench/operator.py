@@ -551,7 +551,7 @@ class Operator(Copyable):
             raise ValueError(f"a press lasts at least 1 us, not {duration_us} us")
 
     def release(self, name: str) -> None:
-        """Release a button; ValueError if it is not a button."""
+        """Release a button; raise ValueError if it is not a button."""
         self.check_press(name)
         self.set(name, 0)
 

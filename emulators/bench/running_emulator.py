@@ -49,7 +49,7 @@ class RunningEmulator(ABC):
 
     Args:
         name: name of the device.
-        device: the physical side.
+        device: physical side of the device.
         wire: object on which wire faults are armed.
         link: address for the host, as text.
         trace: the recording, closed at the end.

@@ -100,7 +100,7 @@ class CanWire(Copyable):
         """Advance the bus to a time.
 
         Args:
-            now_us: the time.
+            now_us: time to which the bus advances, in microseconds.
         """
         self.bus.advance(now_us)
         if self._apart:

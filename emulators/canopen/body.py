@@ -111,7 +111,7 @@ class DrivenWheel(NamedTuple):
 
     Attributes:
         name: name of the wheel.
-        node: the drive.
+        node: node of the drive.
         forward: sign of the shaft: -1 if the wheel is mounted the other way round, or else 1.
     """
 

@@ -105,7 +105,7 @@ def make_nodes(
 
 
 def describe(cache: EdsCache, device: Path | str, profile: str = AUTO) -> DeviceDescription:
-    """Describe the node of a file, a model or a user's class; ValueError for anything else.
+    """Describe the node of a file, a model or a user's class; raise ValueError for anything else.
 
     Args:
         cache: cache of EDS files.

@@ -73,7 +73,7 @@ class _SerialRun(EmulatorRun[_Options]):
     """A run of a device on a serial line.
 
     Args:
-        configured: the device.
+        configured: device with its configuration.
         options: options of the command line.
     """
 

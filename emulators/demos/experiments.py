@@ -236,7 +236,7 @@ class ConvoyRun:
         clock: clock of a run in real time. Without a clock the run is in virtual time.
 
     Attributes:
-        convoy: the robots.
+        convoy: convoy of the robots.
         tracks: tracks of the robots, in the order of their numbers.
         marks: changes of connectors.
     """

@@ -131,7 +131,7 @@ class CorridorStage:
     Attributes:
         service: the service that resolves ucodes.
         board: the board of the node.
-        loop: the cart.
+        loop: closed loop with the cart.
         estimate: the estimated position of the cart.
     """
 

@@ -124,7 +124,7 @@ class FrameFormat(Immutable):
         """Return a splitter for one direction of a log.
 
         Args:
-            mark: the direction.
+            mark: direction of the traffic.
 
         Returns:
             A splitter that returns the frames as text.
@@ -160,7 +160,7 @@ class FrameSplitter(Copyable):
         """Add received bytes and return completed frames.
 
         Args:
-            now_us: the present time.
+            now_us: present time in microseconds.
             data: bytes received since the last call. Call the function without bytes when `due_us`
                 has passed.
 
@@ -193,7 +193,7 @@ class FrameLog:
 
     Args:
         rule: the rule with its descriptions.
-        mark: the direction.
+        mark: direction of the traffic.
     """
 
     def __init__(self, rule: FrameFormat, mark: Mark) -> None:

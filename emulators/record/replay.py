@@ -119,7 +119,7 @@ class RecordedRun:
     """A trace that has been read.
 
     Attributes:
-        header: the device and its configuration.
+        header: header with the device and its configuration.
         records: lines of the trace in order.
         ended: whether the trace contains the duration of the run. If not, the writer was killed or
             its disk was full. The last tick may then be incomplete and is left out.

@@ -120,8 +120,8 @@ class ClosedLoop:
         clock: clock for waiting, if a pace is given.
 
     Attributes:
-        rig: the bases on their lines.
-        manager: the components.
+        rig: rig with the bases on their lines.
+        manager: manager of the components.
         carts: carts in the order of the parameters.
         cart: the first cart.
         chain: the components of the first cart.

@@ -577,7 +577,7 @@ class FaultyPort(Copyable, Generic[W]):
         """Change the setting of the device, after the faults have released their held traffic.
 
         Args:
-            now_us: the present time.
+            now_us: present time in microseconds.
             setting: the new setting.
         """
         held = any(map(_holds, self._from_device.values()))

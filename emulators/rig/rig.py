@@ -165,7 +165,7 @@ class _Wires(Part):
         """Advance to a time, but stop before a tick for which a station was woken.
 
         Args:
-            until_us: the time.
+            until_us: time to which the wires advance at most.
             hosts: hosts at which arriving traffic also stops the advance.
 
         Returns:
@@ -455,7 +455,7 @@ class Rig(Copyable):
         """Run for a duration.
 
         Args:
-            duration_us: the duration.
+            duration_us: duration in microseconds.
         """
         self.run_to(self.now_us + duration_us)
 

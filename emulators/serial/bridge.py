@@ -49,7 +49,7 @@ class HostSetting:
         """Check whether the host's setting differs: twice a second, or at once.
 
         Args:
-            now_us: the present time.
+            now_us: present time in microseconds.
             at_once: whether the host has acted.
         """
         if now_us < self._next_us and not at_once:

@@ -129,7 +129,7 @@ class DismissedHost:
 
     Args:
         connection: connection to the host.
-        now_us: the present time.
+        now_us: present time in microseconds.
         reason: reason for the refusal, as a line of text.
     """
 

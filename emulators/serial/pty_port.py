@@ -31,7 +31,7 @@ class _PtyLink:
 
     Args:
         path: path of the link.
-        target: the terminal.
+        target: path of the terminal.
 
     Raises:
         FileExistsError: a running emulator uses this link, or it does not belong to an emulator.
@@ -194,7 +194,7 @@ class PtyPort(NonCopyable):
         buffer_bytes: largest number of bytes kept for a host that does not read.
 
     Attributes:
-        path: the terminal, such as `/dev/pts/7`.
+        path: path of the terminal, such as `/dev/pts/7`.
         lost: number of bytes dropped because no host read them.
         spoken: whether a host ever sent data.
 

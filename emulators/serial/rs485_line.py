@@ -16,7 +16,7 @@ class _Burst:
     """Bytes that one end sends back to back.
 
     Attributes:
-        sender: the sender.
+        sender: end that sends the bytes.
         start_us: start of the burst.
         end_us: end of the burst.
         data: the bytes as they arrive.
@@ -94,8 +94,8 @@ class Rs485Line(Copyable):
         """Send bytes on the wires back to back; an end calls this.
 
         Args:
-            sender: the end.
-            now_us: the present time.
+            sender: end that sends the bytes.
+            now_us: present time in microseconds.
             start_us: start of the first byte.
             data: the bytes.
 
@@ -122,7 +122,7 @@ class Rs485Line(Copyable):
 
         Args:
             sender: sender of the bytes.
-            now_us: the present time.
+            now_us: present time in microseconds.
 
         Returns:
             The time at which the byte in transit has passed, in us.
@@ -155,7 +155,7 @@ class Rs485Line(Copyable):
 
         Args:
             burst: burst of bytes sent back to back.
-            now_us: the present time.
+            now_us: present time in microseconds.
 
         Returns:
             The number of bytes, including the bytes already taken.

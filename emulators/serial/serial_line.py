@@ -93,7 +93,7 @@ class LineEnd(Part):
         """Change the setting of the device at this end, after the last stop bit that it has sent.
 
         Args:
-            now_us: the present time.
+            now_us: present time in microseconds.
             setting: the new setting.
         """
         uart = self.uart
@@ -111,7 +111,7 @@ class LineEnd(Part):
         """Remove the bytes sent from here that have not arrived.
 
         Args:
-            now_us: the present time.
+            now_us: present time in microseconds.
 
         Returns:
             The start of the start bit in ps and the value of each byte.

@@ -1,1 +1,1 @@
-"""What people test with: the bench, its rig files and reports, the plug-in, tests of devices."""
+"""Tools for tests: the bench, its rig files and reports, the plug-in, tests of devices."""

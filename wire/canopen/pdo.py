@@ -225,7 +225,7 @@ def pack_bits(fields: Iterable[tuple[int, int]]) -> bytes:
     """Pack values into bytes, with the lowest bit first and zeros at the end.
 
     Args:
-        fields: pairs of value and number of bits; excess bits are dropped.
+        fields: pairs of value and number of bits. Excess bits of a value are dropped.
     """
     number = position = 0
     for value, bits in fields:

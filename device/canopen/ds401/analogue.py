@@ -115,7 +115,7 @@ class _AnalogueChannel(Part):
     Args:
         prefix: prefix of the name: `ai` or `ao`.
         number: number of the channel, 1..254.
-        converter: None for plain counts.
+        converter: converter of the channel, or None for plain counts.
 
     Attributes:
         name: name of the physical input or output.

@@ -145,7 +145,7 @@ class Automaton(Part):
 
         Args:
             operate: function that runs one control period of the mode of operation.
-            now_us: the time.
+            now_us: present time in microseconds.
 
         Returns:
             True if the drive has no work until an input changes.

@@ -173,7 +173,7 @@ class Units(Part):
     Not emulated: 6090h, 6093h to 6097h; other dimensions.
 
     Args:
-        parameters: the objects.
+        parameters: objects of the drive, with defaults.
         counts_per_turn: number of counts per revolution of the motor's encoder, if 608Fh does not
             exist.
 

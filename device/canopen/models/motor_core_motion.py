@@ -139,7 +139,7 @@ class References(Part):
         on_reference: function that is called when a reference arrives after a failure.
 
     Attributes:
-        entries: the objects.
+        entries: entries of the objects.
         failed: whether no reference has arrived since the failure.
     """
 

@@ -65,7 +65,7 @@ class PortBefore:
     """A port that forwards all traffic to and from another port.
 
     Args:
-        port: the other port.
+        port: port to which all traffic is forwarded.
     """
 
     def __init__(self, port: CountingPort) -> None:

@@ -71,7 +71,7 @@ class _NodeMaker:
     """Makes the slaves of a bus.yml.
 
     Args:
-        bus: the file.
+        bus: content of the bus.yml.
         robot: joints of the robot, or None if there is no description of them.
         cache: cache of EDS files.
         mistakes: list that collects errors.

@@ -104,7 +104,7 @@ class HostReceiver(Copyable):
 
     Args:
         end: the host's end of the line.
-        device: the device's setting.
+        device: setting of the device.
         garbled: function that is called with the time when bytes of another setting are sampled.
 
     Attributes:
@@ -124,8 +124,8 @@ class HostReceiver(Copyable):
         """Change the setting with which the device sends; the host's setting is unchanged.
 
         Args:
-            device: the new setting.
-            now_us: the present time.
+            device: new setting of the device.
+            now_us: present time in microseconds.
         """
         if self._uart is None:
             now_ps = now_us * PS_PER_US
@@ -139,7 +139,7 @@ class HostReceiver(Copyable):
         """Receive with a setting from now on; a partly received character is lost.
 
         Args:
-            setting: the host's setting.
+            setting: setting of the host.
             now_us: present time, by which all earlier characters have been read.
         """
         same, self._setting = setting == self._device, setting
@@ -175,7 +175,7 @@ class HostReceiver(Copyable):
         """Return the received characters.
 
         Args:
-            now_us: the present time.
+            now_us: present time in microseconds.
         """
         if self._uart is None:
             return self._end.poll(now_us)
@@ -226,7 +226,7 @@ class HostTransmitter(Copyable):
     Args:
         event_queue: event queue of the rig. Characters arrive between the rig's ticks.
         end: the host's end of the line.
-        device: the device's setting.
+        device: setting of the device.
         lines: modem lines with the CTS that the transmitter may have to wait for.
         garbled: function that is called with the time when bytes are sent that the device samples
             differently.
@@ -288,7 +288,7 @@ class HostTransmitter(Copyable):
         """Send bytes after the bytes that are being sent.
 
         Args:
-            now_us: the present time.
+            now_us: present time in microseconds.
             data: the bytes.
 
         Returns:
@@ -309,8 +309,8 @@ class HostTransmitter(Copyable):
         The device loses a partly received character. Bytes in transit are sampled.
 
         Args:
-            device: the new setting.
-            now_us: the present time.
+            device: new setting of the device.
+            now_us: present time in microseconds.
         """
         self._advance(now_us)
         sent = [(start_ps, value, self.setting) for start_ps, value in self._end.withdraw(now_us)]
@@ -326,7 +326,7 @@ class HostTransmitter(Copyable):
         """Send the held bytes, unless the output is suspended or still waits for CTS.
 
         Args:
-            now_us: the present time.
+            now_us: present time in microseconds.
         """
         if self.held and not self._stopped:
             held = bytes(self.held)
@@ -357,7 +357,7 @@ class HostTransmitter(Copyable):
         """Start or end a break, with the line at 0.
 
         Args:
-            now_us: the present time.
+            now_us: present time in microseconds.
             on: whether there is a break.
         """
         self._advance(now_us)

@@ -380,7 +380,7 @@ class Bench(BenchDevice, Closing):
         raise TypeError(f"an input is set by a call: bench.set({name!r}, {value!r})")
 
     def __getitem__(self, name: str) -> BenchDevice:
-        """Return a device; KeyError if the name is unknown."""
+        """Return a device; raise KeyError if the name is unknown."""
         if name not in self._devices:
             raise KeyError(f"no device {name!r}; {near(name, self._devices)}")
         return self._devices[name]

@@ -370,7 +370,7 @@ class RigState(Copyable):
         return faults
 
     def wire_of(self, device: str) -> str:
-        """Return the name of the wire that a device is on; ValueError if there is none."""
+        """Return the name of the wire that a device is on; raise ValueError if there is none."""
         for mount in self.mounts.values():
             if device in mount.parts:
                 return mount.name
@@ -568,7 +568,7 @@ class BenchRig(RunningEmulator):
         return max([now_us, *sent_us]) - now_us + 2 * tick_us
 
     def save_trace(self, path: Path) -> None:
-        """Write the recording in memory to a file; OSError if that fails."""
+        """Write the recording in memory to a file; raise OSError if that fails."""
         if self.state.recorder is None:
             raise NotOnThisBench("nothing was recorded on this bench")
         self.state.recorder.save(path, self.rig.now_us)

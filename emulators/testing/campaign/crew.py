@@ -173,7 +173,7 @@ class Crew:
         self._closed = False
 
     def collect(self) -> Collected:
-        """Return the collected tests; Refusal if pytest refuses them."""
+        """Return the collected tests; raise Refusal if pytest refuses them."""
         if not self._idle:
             self._idle.append(self._start())
         return self._idle[-1].collected

@@ -71,7 +71,7 @@ class DaskWorkers:
 
     Args:
         url: address of the scheduler.
-        plan: the campaign.
+        plan: plan of the campaign.
 
     Raises:
         Refusal: there is no scheduler, or no worker.

@@ -97,7 +97,7 @@ class Run(NamedTuple):
 
 
 class RunVerdict(NamedTuple):
-    """How a run ended.
+    """Verdict of a run.
 
     Attributes:
         number: number of the run in the campaign.

@@ -98,7 +98,7 @@ class Shard(NamedTuple):
 
     @classmethod
     def parse(cls, text: str) -> Shard:
-        """Read a shard; ValueError if it is invalid."""
+        """Read a shard; raise ValueError if it is invalid."""
         part, slash, parts = text.partition("/")
         digits = slash and part.isdecimal() and parts.isdecimal() and len(text) <= 15
         if not digits or not 1 <= int(part) <= int(parts):
@@ -118,7 +118,7 @@ class CampaignPlan:
 
     Attributes:
         order: options of the runs.
-        collected: the tests.
+        collected: collected tests.
         seeds: seeds of the runs.
         shard: part of all runs that this campaign does.
     """

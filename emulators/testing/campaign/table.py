@@ -62,7 +62,7 @@ class CampaignTable(NamedTuple):
 
     Attributes:
         parameters: names of the parameters, which are the names of columns.
-        rows: the runs.
+        rows: rows of the table, one row for each run.
     """
 
     parameters: tuple[str, ...]
@@ -196,8 +196,8 @@ def summary(table: CampaignTable, file: str) -> Iterator[str]:
     """Yield the lines of the summary: counts by outcome, and details of the failures.
 
     Args:
-        table: the runs.
-        file: the name of the table.
+        table: table of the runs.
+        file: name of the file with the table.
     """
     counts = Counter(row.outcome for row in table.rows)
     ended = ", ".join(f"{counts[name]} {name}" for name in _ORDER if counts[name])

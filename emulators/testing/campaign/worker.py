@@ -56,7 +56,7 @@ class _Worker:
 
     Args:
         conn: the pipe to the parent.
-        order: the request.
+        order: order of the campaign, with the tests to collect.
     """
 
     def __init__(self, conn: Connection, order: CampaignOrder) -> None:

@@ -54,7 +54,7 @@ class _Signals:
     """All signals of a bench that can be drawn: inputs, outputs, and signals of its rig file.
 
     Args:
-        rig: the bench.
+        rig: rig of the bench.
     """
 
     def __init__(self, rig: BenchRig) -> None:

@@ -86,7 +86,8 @@ class CalledSlave:
     """A slave from a callable, which is called each millisecond.
 
     Args:
-        make: makes the callable, in its state after power-on; called again at each power-on.
+        make: function that makes the callable, in its state after power-on. It is called again at
+            each power-on.
 
     Raises:
         ValueError: it does not make a callable.

@@ -202,7 +202,7 @@ def check_written(rule: str, name: str, value: object, listed: object = None) ->
     Args:
         rule: the rule with this argument.
         name: name of the argument.
-        value: the argument.
+        value: value of the argument.
         listed: values that the rule lists, or None if the rule lists no values.
     """
     try:
@@ -246,7 +246,7 @@ class HostFailure:
     """A failure of a run.
 
     Attributes:
-        error: the exception.
+        error: exception of the run.
         violated: place that raised the exception, such as `invariant it_is_slow`, `rule drive`,
             `connect`, `end`.
         at_us: time of the failure on the bench.
@@ -291,7 +291,7 @@ class HostRuns:
     """Runs of one machine; a context manager that keeps the bench open.
 
     Args:
-        kind: the machine.
+        kind: class of the machine.
 
     Attributes:
         machine: the machine.

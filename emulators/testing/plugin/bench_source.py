@@ -74,7 +74,7 @@ class WantedBench(NamedTuple):
     """The bench that a test requests.
 
     Attributes:
-        source: the devices on the bench.
+        source: description of the devices on the bench.
         mode: `virtual`, `real` or `hardware`.
         seed: seed of all random numbers, or None to use the seed of the source.
         folder: folder that relative paths start from.

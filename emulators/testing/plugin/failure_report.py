@@ -46,7 +46,7 @@ def keep(bench: Bench, folder: Path, nodeid: str) -> tuple[list[Path], list[str]
 
     Args:
         bench: bench of the test, which is still open.
-        folder: folder of the files; it is created.
+        folder: folder of the files, which is created.
         nodeid: node ID of the test.
 
     Returns:

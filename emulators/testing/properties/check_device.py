@@ -39,7 +39,7 @@ def _check_start(start: Session, device: Any, nothing: Any) -> None:
     """Check that each act of `start` can be executed.
 
     Args:
-        start: the acts.
+        start: acts that start the device.
         device: a device of the same type, which is not changed.
         nothing: empty traffic.
 

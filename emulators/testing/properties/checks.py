@@ -146,7 +146,7 @@ def _check_due_us(bench: Callable[..., device_bench.DeviceBench], session: Sessi
 
     Args:
         bench: function that makes a bench.
-        session: the acts.
+        session: acts of the session.
 
     Raises:
         AssertionError: a tick before the device is due changes something.

@@ -37,7 +37,7 @@ class ReportedTest:
     """A test and its place on the page.
 
     Attributes:
-        record: the test.
+        record: record of the test.
         anchor: link target on the page, which is equal in each report with these tests.
         file: part of the node ID before the name of the test.
         name: rest of the node ID.

@@ -110,7 +110,7 @@ class _TestOnPage:
     """A test with the parts that fit on the page.
 
     Attributes:
-        place: the test, its anchor and name.
+        place: test with its anchor and name on the page.
         timeline: time line of the test, or None if there is none or it does not fit.
         longrepr: pytest's text of the failure.
         journal: last lines of the journal.

@@ -338,7 +338,7 @@ def summary(plan: RigPlan) -> Iterator[str]:
     """Yield the counts of all parts, then lines for each wire with its devices and places.
 
     Args:
-        plan: the bench.
+        plan: content of the rig file.
     """
     counts = [
         _count(len(plan.devices), "device"),

@@ -83,7 +83,7 @@ def probe(plan: DevicePlan, seed: int = 0) -> Probe | list[WrongDevice]:
     """Make a device.
 
     Args:
-        plan: the device.
+        plan: plan of the device in the rig file.
         seed: seed of all random numbers, for a device on a serial line.
 
     Returns:

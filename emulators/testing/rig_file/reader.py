@@ -98,7 +98,7 @@ def _refuse_old_tables(top: Section) -> Section:
     """Return a rig file unchanged; record an error for each table of an earlier version.
 
     Args:
-        top: the whole file.
+        top: content of the whole file.
     """
     given, before = top.values, len(top.notes.all)
     nodes = given.get("node")
@@ -164,7 +164,7 @@ def _with_nodes(top: Section, folder: Path, *, alone: bool = False) -> Section:
     Keys of the file for a device with the same name are kept.
 
     Args:
-        top: the whole file.
+        top: content of the whole file.
         folder: folder in which the bus.yml is searched.
         alone: whether there is only the bus.yml. An unreadable file then raises OSError.
     """

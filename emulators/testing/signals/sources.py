@@ -307,7 +307,7 @@ class SignalSpec(Immutable):
         every_us: time for which a value is held. With 0 there is a new value at each tick of the
             rig.
         low: the least value.
-        high: the greatest value.
+        high: greatest value.
         step: quantisation: values are rounded to multiples of this number. 0 means no rounding.
     """
 

@@ -20,7 +20,7 @@ class DriveView:
     """The parts of a drive that its modes of operation use.
 
     Attributes:
-        parameters: the objects.
+        parameters: objects of the drive, with defaults.
         axis: motor, reference, settings and zero.
         switches: limit switches and home switch.
         limits: limits of the axis.

@@ -33,7 +33,7 @@ class PortRecord:
     trace has no actions on nodes, because a bus is compared by its frames.
 
     Args:
-        plan: the rig file.
+        plan: content of the rig file.
         mounts: wires of an equivalent emulated bench, for the types of the wires.
         now_us: function that returns the time in microseconds.
     """
@@ -71,7 +71,7 @@ class PortRecord:
         self._done(device, RESET)
 
     def save(self, path: Path) -> None:
-        """Write the trace; OSError if that fails."""
+        """Write the trace; raise OSError if that fails."""
         now_us = self._now_us()
         records = sorted((x for x in self._records if x.at_us <= now_us), key=lambda x: x.at_us)
         end = BenchRecord(now_us, "", Mark.END)

@@ -33,7 +33,7 @@ def _places_of(
     """Return the addresses of the wires by name; unknown addresses are omitted.
 
     Args:
-        plan: the rig file.
+        plan: content of the rig file.
         hardware: section of the rig file for real devices.
         mounts: wires of an equivalent emulated bench, with the rates of the devices.
     """
@@ -114,7 +114,7 @@ class HardwareMode(BenchMode):
         return (time.monotonic_ns() - self._begun_ns) // 1_000
 
     def request(self, do: str, **fields: Any) -> Object:
-        """Execute a request by the operator; ValueError if the request is refused."""
+        """Execute a request by the operator; raise ValueError if the request is refused."""
         return self._operators.request(do, fields)
 
     def fault(
@@ -185,7 +185,7 @@ class HardwareMode(BenchMode):
         raise NotOnThisBench("this works on emulated devices alone: here are real ones")
 
     def save_trace(self, path: Path) -> None:
-        """Write traffic and operator actions; OSError if that fails."""
+        """Write traffic and operator actions; raise OSError if that fails."""
         self._record.save(path)
 
     def fork(self) -> NoReturn:

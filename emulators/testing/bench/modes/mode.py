@@ -109,7 +109,7 @@ class BenchMode(ABC):
 
     @abstractmethod
     def request(self, do: str, **fields: Any) -> Object:
-        """Execute a request of the control socket; ValueError if the request is refused."""
+        """Execute a request of the control socket; raise ValueError if the request is refused."""
 
     @abstractmethod
     def act(self, action: Callable[[BenchRig], _T]) -> _T:
@@ -167,7 +167,7 @@ class BenchMode(ABC):
 
     @abstractmethod
     def save_trace(self, path: Path) -> None:
-        """Write a trace of the run; OSError if that fails."""
+        """Write a trace of the run; raise OSError if that fails."""
 
     def journal(self) -> tuple[WireLine, ...]:
         """Return the latest lines, frames and actions."""
@@ -212,7 +212,7 @@ class EmulatedMode(BenchMode):
         return self.act(question)
 
     def request(self, do: str, **fields: object) -> Object:
-        """Execute a request of the control socket; ValueError if the request is refused."""
+        """Execute a request of the control socket; raise ValueError if the request is refused."""
         request = {"v": VERSION, "do": do, **fields}
         return _answer_of(self.act(lambda rig: self._control.answer(request)))
 
@@ -249,7 +249,7 @@ class EmulatedMode(BenchMode):
             self.request("set", name=full, value=POWER[found] if on else 1 - POWER[found])
 
     def save_trace(self, path: Path) -> None:
-        """Write a trace of the run; OSError if that fails."""
+        """Write a trace of the run; raise OSError if that fails."""
         self.act(lambda rig: rig.save_trace(path))
 
 

@@ -535,7 +535,7 @@ class Operators:
             operator.close()
 
     def request(self, do: str, fields: dict[str, Any]) -> Object:
-        """Execute a request of a control socket; ValueError if the request is refused."""
+        """Execute a request of a control socket; raise ValueError if the request is refused."""
         match do:
             case "set":
                 self._set(fields["name"], fields["value"])
