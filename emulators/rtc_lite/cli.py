@@ -19,7 +19,7 @@ def main() -> None:
     possible, with the same transcript each time, and with exit status 1 if an expectation was
     missed. Together with --link, --serve or --control it is played in real time.
 
-    \b Faults of the device: power_cut, slow_answer. Faults of the line: noise=0.01 (random bytes),
+    Faults of the device: power_cut, slow_answer. Faults of the line: noise=0.01 (random bytes),
     flip=0.001 (inverted bits), ping=0.5 (every second PING is unanswered), radio=0.05 (a lossy
     radio link).
 

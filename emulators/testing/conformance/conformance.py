@@ -193,9 +193,9 @@ def conformance(  # noqa: PLR0913 - by keyword
         node_id: node-ID, 1..127. The default is the node-ID of the slave, if the slave has one.
         eds: EDS, DCF or XDD of the slave. Without a file, slaves of tickrig describe themselves,
             and the tester queries other slaves.
-        level: level of the test: `read-only`, `communication` or `intrusive`. The default is
-            `intrusive`, because nothing real can move in virtual time. (`canmon conform` only
-            reads.)
+        level: level of the test, which is `read-only`, `communication` or `intrusive`.
+            The default is `intrusive`, because nothing real can move in virtual time.
+            (`canmon conform` only reads.)
         only: groups or ids of checks, with * and ?, as `"NMT,HB"` or as a sequence. By default all
             checks run.
         allow: indices of profile objects, 6000h..9FFFh, that may be written.
