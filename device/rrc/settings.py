@@ -37,7 +37,7 @@ class RrcState(Enum):
 
 
 class Move(Enum):
-    """Transitions between the states of the RRC."""
+    """Events that change the state of the RRC."""
 
     INITIALIZED = auto()
     POWER_ON_FAILED = auto()

@@ -121,7 +121,7 @@ class Node(Copyable):
 
     @property
     def horizon(self) -> Horizon | None:
-        """Time up to which the slave may compute ahead."""
+        """Time limits up to which the slave may compute ahead."""
         return self.slave.horizon
 
     @horizon.setter

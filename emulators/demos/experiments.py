@@ -39,7 +39,7 @@ _SECOND_US: Final = 1_000_000
 _ROW_US: Final = 2 * _SECOND_US
 _RATE_HZ: Final = 50.0
 _PATIENT: Final = "3600"
-"""Seconds for which a follower waits at the last position of a silent leader."""
+"""Time-out in seconds; until then a follower goes to the last pose of a silent leader and waits."""
 
 _Echo = Callable[[str], None]
 

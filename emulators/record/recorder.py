@@ -121,7 +121,7 @@ class DeviceBefore(Generic[W]):
 
     @property
     def horizon(self) -> Horizon | None:
-        """Time up to which the device may compute ahead."""
+        """Time limits up to which the device may compute ahead."""
         return getattr(self._device, "horizon", None)
 
     @horizon.setter

@@ -130,7 +130,7 @@ class _Wires(Part):
         self._begin(place)
 
     def _begin(self, place: int) -> None:
-        """Advance a wire from now on, because it has traffic."""
+        """Count a wire as busy from now on, because it has traffic."""
         if place not in self._busy:
             self._busy = tuple(sorted((*self._busy, place)))
 

@@ -58,7 +58,7 @@ NEXT_STATE: Final = {
     (_QUICK_STOP, Command.DISABLE_VOLTAGE): _SOD,  # 12
     (_QUICK_STOP, Command.ENABLE_OPERATION): _ENABLED,  # 16, if 605Ah lets it stay
 }
-"""Next state by state and command; the drive or a fault makes transitions 0, 1 and 13 to 15."""
+"""Next state by (state, command), without transitions 0, 1, 13, 14 (drive) and 15 (fault reset)."""
 
 _POWERED: Final = (_ENABLED, _QUICK_STOP, DriveState.FAULT_REACTION_ACTIVE)
 """States in which the motor may have torque."""

@@ -89,8 +89,8 @@ def _compare_port(
         recording: the recording, made at the port of the host.
         name: name of the device.
         make: function that makes the device.
-        tolerance: tolerances. They include a time after the end in which the emulator may still
-            answer.
+        tolerance: tolerances. Their time is also the time after the end of the recording in which
+            the emulator may still answer.
         settle_us: time for which the emulator is on before the recording starts. If the first
             recorded output is the greeting after power-on, a start at power-on is tried too. If an
             input was set for less than a tick, other tick phases are tried. The closest run counts.
@@ -229,8 +229,8 @@ def _compare_bus(
     Args:
         recording: the recording, made at a port of the bus.
         make: function that makes the nodes on a bus.
-        tolerance: tolerances. They include a time after the end in which the nodes may still
-            answer.
+        tolerance: tolerances. Their time is also the time after the end of the recording in which
+            the nodes may still answer.
         settle_us: time for which the nodes are on before the recording starts. If the first frame
             is a frame after power-on, a start at power-on is tried too, and the closer run counts.
         bit_rate: bit rate of the bus in bit/s.
