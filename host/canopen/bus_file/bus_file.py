@@ -53,11 +53,11 @@ _FLAGS: Final = {
     "reset_all_nodes": False,
     "stop_all_nodes": False,
 }
-"""Keys that dcfgen takes for numbers, with their defaults."""
+"""Keys whose values dcfgen reads as numbers, with their defaults."""
 
 
 def _read_options(section: BusFileSection | None) -> BusDefaults:
-    """Read the section `options`, which holds for all nodes."""
+    """Read the section `options`, whose settings apply to all nodes."""
     if section is None:
         return BusDefaults()
     check_keys(section, OPTIONS, open_to_others=True)
@@ -131,7 +131,10 @@ def _error_behavior(section: BusFileSection) -> dict[int, int]:
 
 
 def _watch_master(node: BusFileSection, sheet: Sheet, writes: Writes, master: BusMaster) -> None:
-    """Write the master's heartbeat time that a slave watches, before all other writes."""
+    """Write the heartbeat time of the master that a slave watches.
+
+    This write is before all others.
+    """
     time_ms = int(master.heartbeat_producer_ms * master.heartbeat_multiplier)
     entries = {sub: sheet.value(_CONSUMER, sub) for sub in sheet.subs(_CONSUMER) if sub}
     watched = node.flag("heartbeat_consumer", default=False) and time_ms > 0
@@ -180,10 +183,10 @@ class BusFile:
     """The content of a bus.yml.
 
     Attributes:
-        path: the file.
+        path: path of the file.
         options: settings of all nodes.
-        master: the master; None if the file has no section for it.
-        slaves: the slaves that have an EDS, by name, in the order of dcfgen.
+        master: the master, or None if the file has no section for a master.
+        slaves: slaves that have an EDS, by name, in the order of dcfgen.
         findings: all errors and warnings, in the order of the lines. If one of them is an error,
             the other attributes contain only the valid parts of the file.
     """
@@ -196,12 +199,12 @@ class BusFile:
 
     @property
     def errors(self) -> tuple[RuleFinding, ...]:
-        """What dcfgen, cogen or the ros2_canopen container refuses."""
+        """The findings that make dcfgen, cogen or the ros2_canopen container refuse the file."""
         return self._of(Severity.ERROR)
 
     @property
     def warnings(self) -> tuple[RuleFinding, ...]:
-        """What dcfgen only warns of, and what a node would refuse at boot-up."""
+        """The findings that dcfgen only warns about, and those that a node refuses at boot-up."""
         return self._of(Severity.WARNING)
 
     def _of(self, severity: Severity) -> tuple[RuleFinding, ...]:
@@ -209,10 +212,10 @@ class BusFile:
 
 
 def is_bus_file(data: bytes) -> bool:
-    r"""Return whether a file is a bus.yml, valid or not; does not need PyYAML.
+    r"""Return whether a file is a bus.yml, valid or not. The function does not need PyYAML.
 
     Args:
-        data: the file, or its beginning.
+        data: content of the file, or its beginning.
 
     >>> is_bus_file(b"master:\n  node_id: 1\n"), is_bus_file(b"[device.rrc]\n")
     (True, False)
@@ -222,11 +225,11 @@ def is_bus_file(data: bytes) -> bool:
 
 
 def check_of(data: bytes, path: Path) -> str:
-    r"""Return the kind of a YAML file and the command that checks it; empty for other kinds.
+    r"""Return the kind of a YAML file and the command that checks it; empty if the kind is unknown.
 
     Args:
-        data: the file, or its beginning.
-        path: path of the file, for the message.
+        data: content of the file, or its beginning.
+        path: path of the file, used in the message.
 
     >>> check_of(b"master:\n  node_id: 1\n", Path("bus.yml"))
     'a bus.yml; use: tickrig check bus.yml'
@@ -244,10 +247,10 @@ def read_bus_file(path: Path) -> BusFile:
     """Read a bus.yml and the EDS and DCF files that it names.
 
     Args:
-        path: the file; its EDS and DCF files are also searched beside it.
+        path: path of the file. EDS and DCF files are also searched in the folder of this file.
 
     Returns:
-        The content of the file, and its findings.
+        The content of the file with its findings.
 
     Raises:
         OSError: the file cannot be read.
@@ -283,7 +286,7 @@ def decode_bus_file(data: bytes, path: Path) -> BusFile:
 
 
 class _Reader:
-    """Reads the sections of one file."""
+    """Reader for the sections of one file."""
 
     def __init__(self, path: Path, layout: Layout, notes: BusFileNotes, top: FilePlace) -> None:
         self._path, self._layout, self._notes, self._top = path, layout, notes, top

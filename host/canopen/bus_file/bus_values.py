@@ -17,14 +17,14 @@ _Extra = Mapping[str, Item]
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """The values that a master checks at boot-up (1F84h to 1F88h); a value of 0 is not checked.
+    """The values that a master checks at boot-up (1F84h to 1F88h). A value of 0 is not checked.
 
     Attributes:
-        device_type: 1000h.
-        vendor_id: 1018h:01.
-        product_code: 1018h:02.
-        revision_number: 1018h:03.
-        serial_number: 1018h:04.
+        device_type: device type (object 1000h).
+        vendor_id: vendor-ID (object 1018h:01).
+        product_code: product code (object 1018h:02).
+        revision_number: revision number (object 1018h:03).
+        serial_number: serial number (object 1018h:04).
     """
 
     device_type: int = 0
@@ -39,9 +39,9 @@ class BusWrite:
     """One entry of a concise DCF, which the master writes at boot-up.
 
     Attributes:
-        index: 0x0000..0xFFFF.
-        sub_index: 0..255.
-        data: the bytes, little endian.
+        index: index of the object, 0x0000..0xFFFF.
+        sub_index: sub-index of the object, 0..255.
+        data: bytes to write, little endian.
         place: the line of the file that requires the write.
     """
 
@@ -56,14 +56,14 @@ class BusPdo:
     """A PDO of a slave.
 
     Attributes:
-        number: 1..512.
-        transmit: whether the slave sends it.
-        cob_id: the COB-ID with its upper bits; if bit 31 is set, the PDO is disabled.
+        number: number of the PDO, 1..512.
+        transmit: whether the slave sends the PDO.
+        cob_id: COB-ID with its upper bits. If bit 31 is set, the PDO is disabled.
         transmission: transmission type, 0..255.
         inhibit_time_100us: inhibit time of a TPDO, in units of 100 µs.
-        event_timer_ms: event timer of a TPDO, deadline of an RPDO.
+        event_timer_ms: event timer of a TPDO, or deadline of an RPDO.
         sync_start: SYNC start value of a TPDO.
-        mapping: the mapped objects; an index below 0020h is a dummy.
+        mapping: mapped objects. An index below 0020h is a dummy object.
     """
 
     number: int
@@ -83,7 +83,7 @@ class BusPdo:
 
 @dataclass(frozen=True, slots=True)
 class DriveChannel:
-    """An axis of a drive in ros2_canopen's 402 driver; lengths are in the user's units.
+    """An axis of a drive in ros2_canopen's 402 driver. Lengths are in units of the user.
 
     Attributes:
         name: name of the joint.
@@ -110,39 +110,41 @@ class DriveChannel:
 
 @dataclass(frozen=True, slots=True)
 class BusSlave:
-    """A slave of the bus, with what the master expects of it and writes to it.
+    """A slave of the bus: the values that the master expects of the slave and writes to it.
 
     Attributes:
-        name: name of its section.
-        node_id: 1..127.
-        place: place of its section.
-        sheet: its EDS or DCF.
+        name: name of the slave, which is the name of its section.
+        node_id: node-ID of the slave, 1..127.
+        place: place of the slave's section in the file.
+        sheet: EDS or DCF of the slave.
         device: the device that the EDS or DCF describes.
-        identity: what the master checks at boot-up.
+        identity: identity that the master checks at boot-up.
         writes: concise DCF, in the order in which the master writes it.
-        pdos: all PDOs of the dictionary after these writes, RPDOs first.
-        master_pdos: the PDOs that enter the master's own dictionary, TPDOs of the slave first.
-        heartbeat_producer_ms: producer heartbeat time of the slave after the writes, 0 for no
+        pdos: all PDOs of the dictionary after `writes`, RPDOs first.
+        master_pdos: PDOs that enter the master's own dictionary, TPDOs of the slave first.
+        heartbeat_producer_ms: producer heartbeat time of the slave after the writes, or 0 for no
             heartbeat.
         heartbeat_consumer: whether the slave watches the master's heartbeat.
-        heartbeat_multiplier: how many producer times the master waits for a heartbeat.
-        guard_time_ms: guard time, 0 for no node guarding.
+        heartbeat_multiplier: number of producer heartbeat times that the master waits for a
+            heartbeat.
+        guard_time_ms: guard time, or 0 for no node guarding.
         life_time_factor: life time factor of node guarding.
-        emcy_cob_id: COB-ID of EMCY with its upper bits.
+        emcy_cob_id: COB-ID of the EMCY message with its upper bits.
         boot: whether the master configures and boots the slave (1F81h, bit 2).
-        mandatory: whether the master needs the slave to start the network (bit 3).
-        reset_communication: whether the master may reset the slave at boot-up (bit 4).
+        mandatory: whether the master needs the slave to start the network (1F81h, bit 3).
+        reset_communication: whether the master may reset the slave at boot-up (1F81h, bit 4).
         retry_factor: number of attempts of node guarding.
-        software_file: firmware file, empty if there is none.
-        software_version: software version that the master expects (1F55h), 0 for any.
-        restore_configuration: sub-index of 1011h that the master restores before the writes, 0 for
-            no restoring.
-        boot_timeout_ms: how long ros2_canopen waits for the slave, None for its default.
-        driver: class of ros2_canopen, empty without a driver.
+        software_file: path of the firmware file, empty if there is none.
+        software_version: software version that the master expects (1F55h), or 0 for any.
+        restore_configuration: sub-index of 1011h that the master restores before the writes, or 0
+            to restore nothing.
+        boot_timeout_ms: time that ros2_canopen waits for the slave, or None for the default of
+            ros2_canopen.
+        driver: driver class of ros2_canopen, empty without a driver.
         package: package of the driver.
-        channels: axes, one for a node without `num_channels`.
-        settings: all other keys that the file gives the driver, unchanged.
-        extra: the mapping `tickrig:`.
+        channels: axes of the drive. A node without `num_channels` has one axis.
+        settings: all other keys of the driver in the file, unchanged.
+        extra: mapping `tickrig:` of the slave.
     """
 
     name: str
@@ -190,30 +192,33 @@ class BusMaster:
     """The master of the bus.
 
     Attributes:
-        node_id: 1..127; 255 if the file gives none.
-        place: place of its section.
-        baudrate: kbit/s.
-        identity: the identity of the master.
-        sync_period_us: period of SYNC, 0 for no SYNC.
-        sync_window_us: 1007h.
-        sync_overflow: 1019h.
-        heartbeat_producer_ms: producer heartbeat time, 0 for no heartbeat.
+        node_id: node-ID of the master, 1..127, or 255 if the file does not set a node-ID.
+        place: place of the master's section in the file.
+        baudrate: bit rate of the bus in kbit/s.
+        identity: identity of the master.
+        sync_period_us: period of SYNC, or 0 for no SYNC.
+        sync_window_us: synchronous window length (object 1007h).
+        sync_overflow: synchronous counter overflow value (object 1019h).
+        heartbeat_producer_ms: producer heartbeat time of the master, or 0 for no heartbeat.
         heartbeat_consumer: whether the master watches the heartbeats of the slaves.
-        heartbeat_multiplier: how many producer times the slaves wait for a heartbeat.
-        emcy_inhibit_time_100us: 1015h.
-        nmt_inhibit_time_100us: 102Ah.
-        error_behavior: 1029h by sub-index.
-        time_cob_id: 1012h.
+        heartbeat_multiplier: number of producer heartbeat times that the slaves wait for a
+            heartbeat.
+        emcy_inhibit_time_100us: inhibit time of EMCY messages (object 1015h).
+        nmt_inhibit_time_100us: inhibit time of NMT commands (object 102Ah).
+        error_behavior: error behavior (object 1029h) by sub-index.
+        time_cob_id: COB-ID of the TIME message (object 1012h).
         start: whether the master enters Operational by itself.
         start_nodes: whether the master starts the slaves.
         start_all_nodes: whether the master starts the slaves with one command.
         reset_all_nodes: whether the master resets all slaves if it loses a mandatory slave.
         stop_all_nodes: whether the master stops all slaves if it loses a mandatory slave.
-        boot_time_ms: how long the master waits for the mandatory slaves (1F89h), 0 for no limit.
-        boot_timeout_ms: how long ros2_canopen waits for all slaves, None for its default.
-        driver: class of ros2_canopen, empty without a driver.
+        boot_time_ms: time that the master waits for the mandatory slaves (1F89h), or 0 for no
+            limit.
+        boot_timeout_ms: time that ros2_canopen waits for all slaves, or None for the default of
+            ros2_canopen.
+        driver: driver class of ros2_canopen, empty without a driver.
         package: package of the driver.
-        extra: the mapping `tickrig:`.
+        extra: mapping `tickrig:` of the master.
     """
 
     node_id: int
@@ -244,13 +249,14 @@ class BusMaster:
 
 @dataclass(frozen=True, slots=True)
 class BusDefaults:
-    """Settings of all nodes that do not have their own.
+    """Default settings for nodes that do not have settings of their own.
 
     Attributes:
         dcf_path: folder of the DCF files at run time, as written in the file.
-        heartbeat_multiplier: factor of producer times.
+        heartbeat_multiplier: number of producer heartbeat times that a consumer waits for a
+            heartbeat.
         retry_factor: number of attempts of node guarding.
-        extra: the mapping `tickrig:`.
+        extra: mapping `tickrig:` of the section.
     """
 
     dcf_path: str = ""

@@ -53,13 +53,13 @@ _FLAGS: Final = {
 
 
 class _Allowed(NamedTuple):
-    """Allowed values of a driver setting: whole numbers, or a boolean if there are none."""
+    """Allowed values of a driver setting: whole numbers, or a boolean if no numbers are listed."""
 
     numbers: Sequence[int]
     said: str
 
     def value_of(self, item: Item) -> int | None:
-        """Return the value that yaml-cpp reads; None if the driver does not accept this value.
+        """Return the value that yaml-cpp reads, or None if the driver does not accept the value.
 
         yaml-cpp ignores quotes. A boolean becomes 1 or 0.
         """
@@ -93,7 +93,7 @@ def check_keys(
     """Report unknown keys.
 
     Args:
-        section: the section that is checked.
+        section: the section to check.
         known: all keys that the section may have.
         open_to_others: whether a driver of the user may read other keys. They are reported as keys
             for that driver, except keys that look like a misspelling.

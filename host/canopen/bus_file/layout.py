@@ -20,11 +20,12 @@ class Layout(NamedTuple):
     """The sections of a file as dcfgen reads them.
 
     Attributes:
-        options: the section of options; None if the file has none.
-        master: the section of the master; None if the file has none.
-        slaves: the sections of the slaves by name, in the order of dcfgen.
-        hidden: places of keys that begin with a dot, by name, if dcfgen reads the file directly.
-        defaults: the section that cogen merges into all nodes; None if the file has none.
+        options: section of options, or None if the file has none.
+        master: section of the master, or None if the file has none.
+        slaves: sections of the slaves by name, in the order of dcfgen.
+        hidden: places of keys that begin with a dot, by name. The mapping is empty unless dcfgen
+            reads the file directly.
+        defaults: section that cogen merges into all nodes, or None if the file has none.
     """
 
     options: BusFileSection | None
@@ -37,8 +38,8 @@ class Layout(NamedTuple):
 def read_layout(tree: Item, notes: BusFileNotes) -> Layout:
     """Find the sections of a file.
 
-    A key that begins with a dot is not a node; its value only defines anchors. As in cogen,
-    `defaults` override the keys of a node, and all keys are sorted.
+    A key that begins with a dot is not a node. The value of such a key only defines anchors. As in
+    cogen, `defaults` override the keys of a node, and all keys are sorted.
     """
     top = BusFileSection(notes, "", tree, tree.place)
     ends = _optional(top, OPTIONS), _optional(top, MASTER)
@@ -77,7 +78,7 @@ def _cogen_nodes(top: BusFileSection) -> dict[str, BusFileSection]:
 
 
 def _named(section: BusFileSection) -> Iterator[str]:
-    """Yield the names of nodes; report names that are not text."""
+    """Yield the names of nodes. Report names that are not text."""
     for key in section.fields:
         if isinstance(key, str):
             yield key
@@ -107,8 +108,9 @@ def _sorted(item: Item, done: dict[int, Item]) -> Item:
     """Return a mapping with its keys sorted at all levels, as PyYAML writes it.
 
     Args:
-        item: the mapping; any other value is returned unchanged.
-        done: sorted mappings by the identity of the original, so that an anchor is sorted once.
+        item: mapping to sort. Any other value is returned unchanged.
+        done: sorted mappings by the identity of the original mapping, so that each anchor is sorted
+            once.
     """
     if not item.is_mapping:
         return item

@@ -13,14 +13,14 @@ from tickrig.host.text.document import FilePlace, Item, Key
 from tickrig.wire.canopen.eds.eds_file import shorten
 
 RULES: Final = read_rules(Path(__file__).with_name("rules.txt"))
-"""The rules for a bus.yml by name, errors first."""
+"""Rules for a bus.yml by name. Rules for errors come first."""
 
 _HEX: Final = re.compile(r"[0-9A-Fa-f]{1,8}[hH]")
 _QUOTED: Final = re.compile(r"0[xX][0-9A-Fa-f]+")
 _FOLLOWING: Final = frozenset(
     {"direction", "no-value", "not-mappable", "read-only", "value-limits"}
 )
-"""Rules that a wrong key in the same line also breaks: another key was meant."""
+"""Rules that a wrong key in the same line also breaks, because the user meant another key."""
 UNSIGNED8, UNSIGNED16, UNSIGNED32 = 0xFF, 0xFFFF, 0xFFFF_FFFF
 
 
@@ -31,13 +31,14 @@ class BusFileNotes:
         self._found: dict[tuple[str, FilePlace, str], RuleFinding] = {}
 
     def note(self, rule: str, place: FilePlace, where: str, text: str) -> None:
-        """Record a finding; a finding that several nodes have in the same line is recorded once.
+        """Record a finding. A finding that several nodes have in the same line is recorded once.
 
         Args:
             rule: name of the rule.
-            place: the line.
-            where: section and keys, as `joint_1.tpdo.1`; empty for the file as a whole.
-            text: the value in the file, and the allowed values.
+            place: line of the finding.
+            where: section and keys, such as `joint_1.tpdo.1`, or an empty text for the file as a
+                whole.
+            text: value in the file, and the allowed values.
         """
         found = RuleFinding(RULES[rule], place.file, place.line, shorten(where), text)
         self._found.setdefault((rule, place, text), found)
@@ -47,12 +48,12 @@ class BusFileNotes:
         return len(self._found)
 
     def since(self, count: int) -> list[RuleFinding]:
-        """Return the findings after the first `count`."""
+        """Return the findings after the first `count` findings."""
         return [*self._found.values()][count:]
 
     @property
     def all(self) -> tuple[RuleFinding, ...]:
-        """All findings in line order, without those that follow from another in the same line."""
+        """All findings in line order, without those that follow from another one in the line."""
         found = self._found.values()
         slips = {(one.file, one.line) for one in found if one.rule.name == "unknown-key"}
         told = (
@@ -67,10 +68,10 @@ class BusFileSection:
     """A mapping of the file, read as dcfgen reads it.
 
     Args:
-        notes: collects the findings.
-        name: section and keys, for people.
-        item: the mapping; any other value is reported and counts as empty.
-        place: place of its key.
+        notes: collector of the findings.
+        name: section and keys, as shown to the user.
+        item: mapping to read. Any other value is reported and counts as an empty mapping.
+        place: place of the mapping's key.
     """
 
     def __init__(self, notes: BusFileNotes, name: str, item: Item, place: FilePlace) -> None:
@@ -90,7 +91,7 @@ class BusFileSection:
         return key in self.fields
 
     def place_of(self, key: Key) -> FilePlace:
-        """Return the place of a key, or that of the section if the key is missing."""
+        """Return the place of a key, or the place of the section if the key is missing."""
         return self._item.keys.get(key, self.place)
 
     def note(self, rule: str, key: Key, text: str) -> None:
@@ -98,13 +99,13 @@ class BusFileSection:
         self.notes.note(rule, self.place_of(key), self.name, text)
 
     def section(self, key: Key) -> BusFileSection:
-        """Return a mapping in it; empty if there is none."""
+        """Return a mapping of the section, or an empty one if the key is missing."""
         place = self.place_of(key)
         item = self.fields.get(key, Item({}, place))
         return BusFileSection(self.notes, f"{self.name}.{key}", item, place)
 
     def sections(self, key: Key) -> list[BusFileSection]:
-        """Return the mappings of a list in it."""
+        """Return the mappings of a list of the section."""
         item = self.fields.get(key)
         if item is None:
             return []
@@ -114,7 +115,7 @@ class BusFileSection:
         return [BusFileSection(self.notes, name, each, each.place) for each in item.items]
 
     def whole(self, key: Key, default: int = 0, low: int = 0, high: int = UNSIGNED32) -> int:
-        """Return a whole number; the default if the key is missing or wrong."""
+        """Return a whole number, or the default if the key is missing or the value is wrong."""
         item = self.fields.get(key)
         if item is None:
             return default
@@ -133,13 +134,13 @@ class BusFileSection:
         return number
 
     def real(self, key: Key, default: float) -> float:
-        """Return a number, whole or fractional."""
+        """Return a whole or fractional number, or the default."""
         item = self.fields.get(key)
         number = None if item is None else self._number(key, item, fraction=True)
         return default if number is None else float(number)
 
     def flag(self, key: Key, default: bool) -> bool:
-        """Return a boolean; any text counts as true, as for dcfgen."""
+        """Return a boolean. As in dcfgen, any text counts as true."""
         item = self.fields.get(key)
         if item is None:
             return default
@@ -150,7 +151,7 @@ class BusFileSection:
         return bool(item.value)
 
     def text(self, key: Key, default: str = "") -> str:
-        """Return a text."""
+        """Return a text, or the default."""
         item = self.fields.get(key)
         if item is None:
             return default
@@ -160,7 +161,7 @@ class BusFileSection:
         return item.value if isinstance(item.value, str) else item.text
 
     def _number(self, key: Key, item: Item, *, fraction: bool = False) -> int | float | None:
-        """Return what Python's int() or float() makes of a value; None if it raises."""
+        """Return the result of Python's int() or float() for a value, or None after an error."""
         value = item.value
         try:
             if isinstance(value, str):
@@ -176,7 +177,7 @@ class BusFileSection:
 
 
 def _as_number(text: str) -> str:
-    """Return how to write a text as a number: without quotes, or with 0x in front."""
+    """Return the notation that makes a text a number: without quotes, or with 0x in front."""
     if _HEX.fullmatch(text):
         return f"; did you mean 0x{text[:-1]}?"
     return ": it is a text; without quotes it is one" if _QUOTED.fullmatch(text) else ""

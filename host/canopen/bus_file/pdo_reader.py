@@ -24,7 +24,10 @@ _OTHER_WAY: Final = {
     True: ("event_deadline",),
     False: ("event_timer", "inhibit_time", "sync_start"),
 }
-"""Keys that dcfgen reads only for PDOs of the other direction, by whether it is a TPDO."""
+"""Keys that dcfgen reads only for PDOs of the other direction.
+
+The key is whether the PDO is a TPDO.
+"""
 _FIRST_FREE: Final = 0x680
 _END_OF_FREE: Final = 0x6E0
 
@@ -36,7 +39,7 @@ class CobIds:
         self._next = _FIRST_FREE
 
     def take(self) -> int | None:
-        """Return the next free COB-ID, None if all are taken."""
+        """Return the next free COB-ID, or None if all COB-IDs are taken."""
         if self._next >= _END_OF_FREE:
             return None
         self._next += 1
@@ -47,13 +50,13 @@ _MAPPED: Final = ("index", "sub_index", "bits")
 
 
 class PdoReader:
-    """Reads the sections `rpdo` and `tpdo` of one node.
+    """Reader for the sections `rpdo` and `tpdo` of one node.
 
     Args:
-        node: its section.
-        sheet: its EDS.
-        writes: collects the writes.
-        cob_ids: the free COB-IDs of the whole bus.
+        node: section of the node.
+        sheet: EDS of the node.
+        writes: collector of the writes.
+        cob_ids: free COB-IDs of the whole bus.
     """
 
     def __init__(self, node: BusFileSection, sheet: Sheet, writes: Writes, cob_ids: CobIds) -> None:
@@ -63,8 +66,8 @@ class PdoReader:
         """Read one of the two sections.
 
         Args:
-            key: `rpdo` or `tpdo`.
-            first: index of the first communication parameter.
+            key: name of the section, `rpdo` or `tpdo`.
+            first: index of the communication parameter of the first PDO.
 
         Returns:
             The PDOs that enter the master's dictionary.
@@ -86,7 +89,7 @@ class PdoReader:
         return tuple(pdo for pdo in pdos.values() if pdo.enabled and pdo.mapping)
 
     def _configured(self, pdo: BusPdo, index: int, section: BusFileSection) -> BusPdo:
-        """Write what differs from the EDS as dcfgen does: disable, parameters, mapping, enable."""
+        """Write differences from the EDS as dcfgen does: disable, parameters, mapping, enable."""
         check_keys(section, PDO)
         for key in _OTHER_WAY[pdo.transmit]:
             if key in section:
@@ -129,7 +132,7 @@ class PdoReader:
         return taken
 
     def _with_parameters(self, pdo: BusPdo, index: int, section: BusFileSection) -> BusPdo:
-        """Read the parameters that the file gives; do not write those of the other direction."""
+        """Read the parameters in the file. Do not write the parameters of the other direction."""
         kind = section.whole("transmission", pdo.transmission, 0, UNSIGNED8)
         inhibit = section.whole("inhibit_time", pdo.inhibit_time_100us, 0, UNSIGNED16)
         timer = section.whole("event_timer", pdo.event_timer_ms, 0, UNSIGNED16)
@@ -176,7 +179,7 @@ class PdoReader:
         return replace(pdo, mapping=tuple(mapping))
 
     def _mapped(self, entry: BusFileSection, pdo: BusPdo) -> MappedObject | None:
-        """Return what an entry maps, None if it does not exist."""
+        """Return the object that a mapping entry maps, or None if the object does not exist."""
         if "index" not in entry:
             entry.note("kind", "index", "an entry of mapping needs an index")
             return None
@@ -215,7 +218,7 @@ class PdoReader:
 
 
 def _said(pdos: dict[int, BusPdo]) -> str:
-    """Return the PDO numbers that exist, for messages."""
+    """Return the existing PDO numbers, as text for messages."""
     return ", ".join(map(str, list(pdos)[:12])) + (", ..." if len(pdos) > 12 else "") or "none"
 
 

@@ -19,12 +19,12 @@ from tickrig.wire.canopen.eds.eds_value import parse_number, plain_numbers
 from tickrig.wire.canopen.eds.object_table import EntryDescription
 
 _FOLDER_WORD: Final = "@BUS_CONFIG_PATH@"
-"""Placeholder that the build of ros2_canopen replaces by the folder of the installed bus.yml."""
+"""Placeholder that ros2_canopen's build replaces by the folder of the installed bus.yml."""
 IDENTITY: Final = 0x1018
 UNSET: Final = 255
 """The node-ID of an unconfigured node."""
 _WRONG: Final = -(1 << 31) - 1
-"""Node-ID of an entry that is not a number; the entry itself is reported."""
+"""Node-ID of an entry that is not a number. The entry itself is reported."""
 _MOST_PDOS: Final = 0x200
 _SUFFIXES: Final = (".eds", ".dcf", ".xdd", ".xdc")
 
@@ -33,10 +33,10 @@ class Sheet:
     """A data sheet with the power-on values of one node.
 
     Args:
-        path: the file.
-        file: its sections.
-        device: the device that the sections describe.
-        node_id: node-ID of the node, 0 to use the node-ID in the file.
+        path: path of the file.
+        file: sections of the file.
+        device: device that the sections describe.
+        node_id: node-ID of the node, or 0 to use the node-ID in the file.
     """
 
     def __init__(self, path: Path, file: EdsFile, device: EdsDevice, node_id: int) -> None:
@@ -51,7 +51,10 @@ class Sheet:
         return index in self._rows
 
     def pdos(self, first: int) -> list[int]:
-        """Return the existing communication parameters; `first` is the index for PDO 1."""
+        """Return the existing communication parameters.
+
+        `first` is the index of the parameter of PDO 1.
+        """
         return sorted([index for index in self._rows if first <= index < first + _MOST_PDOS])
 
     def subs(self, index: int) -> dict[int, EntryDescription]:
@@ -59,11 +62,11 @@ class Sheet:
         return self._rows.get(index, {})
 
     def row(self, index: int, sub: int) -> EntryDescription | None:
-        """Return an entry, None if it does not exist."""
+        """Return an entry, or None if the entry does not exist."""
         return self._rows.get(index, {}).get(sub)
 
     def value(self, index: int, sub: int, default: int = 0) -> int:
-        """Return the power-on value of a number; the default if it does not exist."""
+        """Return the power-on value of a number, or the default if the entry does not exist."""
         row = self.row(index, sub)
         if row is None or not row.data_type.is_integer:
             return default
@@ -71,7 +74,7 @@ class Sheet:
         return int.from_bytes(data, "little", signed=row.signed)
 
     def beside(self, index: int) -> str:
-        """Return where an object that lacks an entry is described, or that it does not exist."""
+        """Return where the object of a missing entry is described, or that there is none."""
         return str(self.place(index)) if index in self else f"{self.path} has no {index:04X}h"
 
     def place(self, index: int, sub: int | None = None) -> FilePlace:
@@ -83,14 +86,14 @@ class Sheet:
         return FilePlace(str(self.path), 0)
 
     def head_number(self, section: str, key: str) -> int:
-        """Return a number of the section DeviceInfo, 0 if it is missing."""
+        """Return a number of the section DeviceInfo, or 0 if the keyword is missing."""
         try:
             return parse_number(plain_numbers(self.file.value(section, key)) or "0")
         except ValueError:
             return 0
 
     def identity(self, key: str, sub: int) -> int:
-        """Return a number of the identity; as in dcfgen, DeviceInfo takes precedence."""
+        """Return a number of the identity. As in dcfgen, DeviceInfo takes precedence over 1018h."""
         section = COMMISSIONING if key.startswith("LSS") else "DeviceInfo"
         if self.file.value(section, key):  # a 0 also takes precedence: then nothing is checked
             return self.head_number(section, key)
@@ -98,18 +101,18 @@ class Sheet:
 
 
 class Sheets:
-    """Finds and reads the EDS and DCF files of a bus.
+    """Reader that finds the EDS and DCF files of a bus.
 
     Args:
         folder: folder of the bus.yml.
-        dcf_path: the `dcf_path` of the options, for nodes without their own.
+        dcf_path: `dcf_path` of the options, used for nodes without a `dcf_path` of their own.
     """
 
     def __init__(self, folder: Path, dcf_path: str) -> None:
         self._folder, self._dcf_path = folder, dcf_path
 
     def find(self, node: BusFileSection) -> Sheet | None:
-        """Return the sheet of a node; record a finding and return None if it has none.
+        """Return the sheet of a node. Record a finding and return None if the node has no sheet.
 
         The file is searched in this order:
 
@@ -148,7 +151,7 @@ class Sheets:
         return os.path.expandvars(text.replace(_FOLDER_WORD, str(self._folder)))
 
     def _not_found(self, name: str, looked: list[Path]) -> str:
-        """Return the folders where a file is missing, and the file that may be meant."""
+        """Return the folders that lack a file, and the existing file that the user may mean."""
         where = ", ".join(dict.fromkeys(str(path.parent) for path in looked))
         beside = [path.name for path in self._folder.iterdir() if path.suffix.lower() in _SUFFIXES]
         meant = closest(Path(name).name, sorted(beside))
@@ -168,7 +171,7 @@ class Sheets:
 
 
 def _node_id(node: BusFileSection) -> int:
-    """Return the node-ID that the section gives, 0 if it is missing or wrong."""
+    """Return the node-ID in the section, or 0 if the node-ID is missing or wrong."""
     number = node.whole("node_id", _WRONG if "node_id" in node else UNSET, _WRONG + 1)
     if number == _WRONG:
         return 0
@@ -199,12 +202,12 @@ _ODD_SIZES: Final = (3, 5, 6, 7)
 
 
 class Writes:
-    """Collects the writes for one slave.
+    """Collector of the writes to one slave.
 
     Args:
         sheet: EDS or DCF of the slave.
-        name: of its section.
-        notes: collects the contradictions to the EDS.
+        name: name of the slave's section.
+        notes: collector of the contradictions to the EDS.
     """
 
     def __init__(self, sheet: Sheet, name: str, notes: BusFileNotes) -> None:
@@ -217,14 +220,14 @@ class Writes:
         return tuple(self._all)
 
     def add(self, index: int, sub: int, value: int, place: FilePlace, said: str = "") -> None:
-        """Add a write; report and omit a write that dcfgen refuses.
+        """Add a write. Report and omit a write that dcfgen refuses.
 
         Args:
             index: index of the object.
-            sub: sub-index.
-            value: the value as given by the file.
+            sub: sub-index of the object.
+            value: value in the file.
             place: the line of the file that requires the write.
-            said: the value as written on that line.
+            said: text of the value on that line.
         """
         if (write := self._made(index, sub, value, place, said)) is not None:
             self._all.append(write)
@@ -235,7 +238,7 @@ class Writes:
             self._all.insert(0, write)
 
     def values(self) -> dict[int, bytes]:
-        """Return the last written values, by index << 8 | sub-index."""
+        """Return the last written values. The key is index << 8 | sub-index."""
         return {write.index << 8 | write.sub_index: write.data for write in self._all}
 
     def _made(

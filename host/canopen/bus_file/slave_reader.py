@@ -1,4 +1,4 @@
-"""Make slaves from the nodes of the file and their EDS."""
+"""Readers that make slaves from the nodes of the file and their EDS files."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ _WRITE: Final = ("index", "sub_index", "value")
 
 
 class SlaveReader:
-    """Reads one node.
+    """Reader for one node.
 
     Args:
-        name: of its section.
-        node: the section.
-        sheet: its EDS or DCF.
-        options: those of the file.
-        cob_ids: the free COB-IDs of the whole bus.
+        name: name of the node's section.
+        node: section of the node.
+        sheet: EDS or DCF of the node.
+        options: options of the file.
+        cob_ids: free COB-IDs of the whole bus.
     """
 
     def __init__(
@@ -41,7 +41,7 @@ class SlaveReader:
         self.writes = Writes(sheet, node.name, node.notes)
 
     def read(self) -> BusSlave:
-        """Read all but its writes, which are in `writes` in the order of dcfgen, and its PDOs."""
+        """Read the node and its PDOs. `writes` receives the writes in the order of dcfgen."""
         node, sheet = self._node, self._sheet
         check_keys(node, SLAVE, open_to_others=True)
         self._check_identity_keys()
@@ -63,7 +63,10 @@ class SlaveReader:
         )
 
     def _with_error_control(self, slave: BusSlave) -> BusSlave:
-        """Read how master and slave supervise each other; write what differs from the EDS."""
+        """Read how master and slave supervise each other.
+
+        Write the values that differ from the EDS.
+        """
         node = self._node
         self._changed("time_cob_id", TIME, 0x100)
         heartbeat = self._changed("heartbeat_producer", HEARTBEAT, 0, UNSIGNED16)
@@ -87,7 +90,7 @@ class SlaveReader:
         )
 
     def _with_boot(self, slave: BusSlave) -> BusSlave:
-        """Read what the master does at boot-up."""
+        """Read the actions of the master at boot-up."""
         node = self._node
         return replace(
             slave,
@@ -101,7 +104,7 @@ class SlaveReader:
         )
 
     def _identity(self) -> Identity:
-        """Return the identity to check; the file can only set revision and serial number."""
+        """Return the identity to check. The file can only set revision and serial number."""
         node, sheet = self._node, self._sheet
         for index, sub in ((0x1000, 0), (IDENTITY, 1)):
             if sheet.row(index, sub) is None:
@@ -118,7 +121,7 @@ class SlaveReader:
         )
 
     def _check_head(self) -> None:
-        """Report numbers of DeviceInfo that differ from those in 1018h."""
+        """Report numbers of DeviceInfo that differ from the numbers in 1018h."""
         sheet = self._sheet
         for sub, key in ((1, "VendorNumber"), (2, "ProductNumber"), (3, "RevisionNumber")):
             head, number = sheet.head_number("DeviceInfo", key), sheet.value(IDENTITY, sub)
@@ -129,7 +132,10 @@ class SlaveReader:
                 self._node.notes.note("identity", place, self._node.name, text)
 
     def _identity_number(self, key: str, head: str, sub: int) -> int:
-        """Return a number that the file may set; it is not checked if the EDS lacks the entry."""
+        """Return a number that the file may set.
+
+        The number is not checked if the EDS lacks the entry.
+        """
         node, sheet = self._node, self._sheet
         in_eds = sheet.identity(head, sub)
         number = node.whole(key, in_eds)
@@ -145,7 +151,7 @@ class SlaveReader:
         return number
 
     def _check_identity_keys(self) -> None:
-        """Report keys that the master does not read, because it takes the value from the EDS."""
+        """Report keys that the master does not read, because the EDS provides their values."""
         for key, head, sub in (
             ("vendor_id", "VendorNumber", 1),
             ("product_code", "ProductNumber", 2),
@@ -157,7 +163,7 @@ class SlaveReader:
                 self._node.note("identity-key", key, text)
 
     def _changed(self, key: str, index: int, usual: int, high: int = 0xFFFF_FFFF) -> int:
-        """Read a number that an object holds; write it if it differs from the EDS."""
+        """Read a number that an object holds. Write the number if it differs from the EDS."""
         node, sheet = self._node, self._sheet
         before = sheet.value(index, 0, usual)
         if key not in node:
@@ -229,7 +235,7 @@ def read_extra(section: BusFileSection) -> dict[str, Item]:
 
 
 def _read_channels(node: BusFileSection, name: str) -> tuple[DriveChannel, ...]:
-    """Read the names and scales of the axes of a node; without a number of axes, read one axis."""
+    """Read names and scales of the axes of a node. Read one axis if the number is missing."""
     count = node.whole("num_channels", 1, 1, _MOST_CHANNELS)
     names = node.fields.get("channel_names")
     own = node.sections("channels")

@@ -1,4 +1,4 @@
-"""The configuration in a DCF: its values, differences in a node, and writing them."""
+"""The configuration in a DCF: its values, its differences from a node, and writing it to a node."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ _Address = tuple[int, int]
 Values = dict[_Address, bytes]
 
 _COMMANDS: Final = (0x1003, 0x1010, 0x1011, *range(0x1F50, 0x1F58))
-"""Objects whose writing triggers an action: error history, store, restore, programs."""
+"""Objects that trigger an action when written: error history, store, restore, programs."""
 _CONFIGURED: Final = 0x1020
-"""Object "verify configuration": its date and time are written last."""
+"""Object "verify configuration". Its date and time are written last."""
 _COB_ID: Final = 1
 """Sub-index of the communication parameter of a PDO."""
 _TEXTS: Final = (DataType.VISIBLE_STRING, DataType.UNICODE_STRING)
@@ -28,9 +28,9 @@ def dcf_values(file: EdsFile, device: EdsDevice, node_id: int) -> Values:
     """Return the values that a DCF configures: the ParameterValues of its writable objects.
 
     Args:
-        file: the DCF.
-        device: the device that it describes.
-        node_id: added to values that are relative to it.
+        file: sections of the DCF.
+        device: device that the DCF describes.
+        node_id: node-ID, which is added to values that are relative to the node-ID.
     """
     sections = {(index, sub or 0): section for section, index, sub in file.objects()}
     return {
@@ -54,14 +54,14 @@ def is_parameter(row: EntryDescription) -> bool:
 
 
 def same(row: EntryDescription | None, wanted: bytes, found: bytes) -> bool:
-    """Return whether two values mean the same: texts are compared without trailing zeros."""
+    """Return whether two values are equal. Texts are compared without trailing zeros."""
     if row is not None and row.data_type in _TEXTS:
         return wanted.rstrip(b"\0") == found.rstrip(b"\0")
     return wanted == found
 
 
 def disabled(done: Sequence[Write], left: Sequence[Write]) -> str:
-    """Return which PDO the writes so far disable and a remaining write would enable."""
+    """Return the PDO that is disabled by the writes so far and enabled by a remaining write."""
     was = {at: data for at, data in done if at[1] == _COB_ID and _is_pdo(at[0])}
     will = {at: data for at, data in left if at[1] == _COB_ID and _is_pdo(at[0])}
     open_pdos = [at for at in was.keys() & will if _is_off(was[at]) and not _is_off(will[at])]
@@ -81,15 +81,15 @@ def writes(
     number: Callable[[_Address], int],
     writable: Collection[_Address],
 ) -> list[Write]:
-    """Return the writes in order; the date of the configuration is written last.
+    """Return the writes in order. The date of the configuration is written last.
 
     Args:
-        values: the wanted values of the node.
-        number: reads an object of the node, as an unsigned number.
-        writable: objects that can be written; intermediate writes to other objects are left out.
+        values: wanted values of the node.
+        number: function that reads an object of the node as an unsigned number.
+        writable: objects that can be written. Intermediate writes to other objects are left out.
 
     Raises:
-        ValueError: an invalid COB-ID or number of mapped objects.
+        ValueError: a COB-ID or a number of mapped objects is invalid.
     """
     last = {at: data for at, data in values.items() if at[0] == _CONFIGURED}
     first = {at: values[at] for at in sorted(values) if at not in last}

@@ -25,13 +25,13 @@ from tickrig.wire.canopen.lss import (
 )
 
 _ANSWER_US: Final = 500_000
-"""How long the master waits for the answer to a command."""
+"""Time that the master waits for the answer to a command."""
 SCAN_US: Final = 20_000
-"""How long to wait for answers to a question of a fastscan, which several slaves may answer."""
+"""Time to wait for answers to a question of a fastscan, which several slaves may answer."""
 _SILENCE_US: Final = 200_000
-"""Within this time, late answers to a failed fastscan have arrived."""
+"""Time within which late answers to a failed fastscan arrive."""
 _PATIENCE: Final = (1, 2, 4)
-"""A fastscan is tried with these multiples of its wait."""
+"""Factors of the wait time in successive attempts of a fastscan."""
 _SETTLE_US: Final = 5_000
 """Pause after a command without an answer, so that slow slaves can execute it."""
 _BITS: Final = range(31, -1, -1)
@@ -50,11 +50,11 @@ _ERRORS: Final = {
 
 
 class LssFailed(Exception):  # noqa: N818 - what the slave did
-    """A slave refused or did not answer, or several slaves answered a question for one slave.
+    """A slave refused or did not answer, or several slaves answered a question to one slave.
 
     Attributes:
-        command: the command that failed, None if several commands failed.
-        code: error code of the slave, 0 if it did not refuse.
+        command: command that failed, or None if several commands failed.
+        code: error code of the slave, or 0 if no slave refused.
     """
 
     def __init__(self, message: str, command: LssCommand | None = None, code: int = 0) -> None:
@@ -63,12 +63,12 @@ class LssFailed(Exception):  # noqa: N818 - what the slave did
 
 
 class LssMaster:
-    """The LSS master of a bus; a bus may have only one.
+    """The LSS master of a bus. A bus may have only one LSS master.
 
     Args:
-        bus: the bus.
-        answer_us: how long to wait for the answer to a command.
-        scan_us: how long to wait for answers to each of the 133 questions of a fastscan.
+        bus: bus with the slaves.
+        answer_us: time to wait for the answer to a command.
+        scan_us: time to wait for answers to each of the 133 questions of a fastscan.
 
     Attributes:
         waiting: whether all slaves have returned to the state waiting at the end of `at_work`.
@@ -95,7 +95,7 @@ class LssMaster:
         self._bus.gather(_SETTLE_US)
 
     def select(self, address: LssAddress) -> bool:
-        """Switch the slave with this address to configuration; return False if none answers."""
+        """Switch the slave with this address to configuration. Return False if no slave answers."""
         for number, part in enumerate(address[:3]):
             command = LssCommand(LssCommand.SWITCH_VENDOR + number)
             self._bus.send(LSS_MASTER_COB_ID, message(command, part))
@@ -104,12 +104,15 @@ class LssMaster:
         return LssCommand.SWITCHED in (answer[0] for answer in answers)
 
     def fastscan(self) -> LssAddress | None:
-        """Find a slave without a node-ID and switch it to configuration; None if there is none.
+        """Switch a slave without a node-ID to configuration.
 
-        If answers arrive too late for their questions, the scan starts again with twice the time.
+        Return its address, or None if there is none.
+
+        If answers arrive too late for their questions, the scan starts again with twice the wait
+        time.
 
         Raises:
-            LssFailed: in each scan, the answers of the slaves fit no address.
+            LssFailed: the answers of the slaves match no address in any scan.
         """
         failed: LssFailed | None = None
         for factor in _PATIENCE:
@@ -143,7 +146,10 @@ class LssMaster:
         return LssAddress(*found)
 
     def address(self) -> LssAddress:
-        """Return the address of the only slave in configuration; raises as `configure_node_id`."""
+        """Return the address of the only slave in configuration.
+
+        Raises as `configure_node_id` does.
+        """
         return LssAddress(
             *(
                 number_of(self._command(message(LssCommand(LssCommand.INQUIRE_VENDOR + sub))))
@@ -152,11 +158,11 @@ class LssMaster:
         )
 
     def node_id(self) -> int:
-        """Return the active node-ID of the slave in configuration, 255 for none."""
+        """Return the active node-ID of the slave in configuration, or 255 for none."""
         return self._command(message(LssCommand.INQUIRE_NODE_ID))[1]
 
     def count(self) -> int:
-        """Return how many slaves in configuration answer; 0 if none supports the question.
+        """Return how many slaves in configuration answer, or 0 if no slave supports the question.
 
         A fastscan finds slaves with the same address as one slave. If these slaves answer at the
         same moment, their answers are one frame on the bus and count as one answer.
@@ -167,16 +173,16 @@ class LssMaster:
         """Set the node-ID of the slave in configuration.
 
         Args:
-            node_id: 1..127, or 255 for none.
+            node_id: new node-ID, 1..127, or 255 for none.
 
         Raises:
-            LssFailed: it refuses or does not answer, or several answer.
+            LssFailed: the slave refuses or does not answer, or several slaves answer.
             LinkClosed: the bus is gone.
         """
         self._configure(message(LssCommand.CONFIGURE_NODE_ID, node_id))
 
     def configure_bit_rate(self, bit_rate: int) -> None:
-        """Set the bit rate in bit/s, one of `INDICES`; raises as `configure_node_id`."""
+        """Set the bit rate in bit/s, one of `INDICES`. Raises as `configure_node_id` does."""
         number = STANDARD_TABLE | INDICES[bit_rate] << 8
         self._configure(message(LssCommand.CONFIGURE_BIT_TIMING, number))
 
@@ -185,11 +191,11 @@ class LssMaster:
         self._bus.send(LSS_MASTER_COB_ID, message(LssCommand.ACTIVATE_BIT_TIMING, delay_ms))
 
     def store(self) -> None:
-        """Make the slave store node-ID and bit rate; raises as `configure_node_id`."""
+        """Make the slave store node-ID and bit rate. Raises as `configure_node_id` does."""
         self._configure(message(LssCommand.STORE))
 
     def _scan(self, request: FastScan, wait_us: int) -> bool:
-        """Return whether a slave answers; late answers of other slaves count too."""
+        """Return whether a slave answers. Late answers of other slaves count too."""
         self._bus.send(LSS_MASTER_COB_ID, request.encode())
         return any(answer[0] == LssCommand.IDENTIFIED for answer in self._gather(wait_us))
 
@@ -218,7 +224,7 @@ class LssMaster:
         return [answer for answer in answers if answer[0] == request[0]]
 
     def _request(self, request: bytes) -> list[bytes]:
-        """Send a command; return the first answers that arrive together."""
+        """Send a command. Return the first answers that arrive together."""
         bus = self._bus
         bus.gather(0)
         bus.send(LSS_MASTER_COB_ID, request)

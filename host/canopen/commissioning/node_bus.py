@@ -26,16 +26,16 @@ _ERROR_CONTROL: Final = range(ERROR_CONTROL_COB_ID + 1, ERROR_CONTROL_COB_ID + 1
 
 
 class NodeBus:
-    """SDO, NMT and single frames on a bus, from one thread.
+    """SDO, NMT and single frames on a bus, used from one thread.
 
     If you interrupt an SDO transfer, for example by Ctrl-C, the transfer is aborted.
 
     Args:
-        link: the bus.
-        timeout_us: how long to wait for an SDO response.
+        link: connection to the bus.
+        timeout_us: time to wait for an SDO response.
 
     Attributes:
-        states: last reported state of each node, by node-ID; a boot-up counts as a report.
+        states: last reported NMT state by node-ID. A boot-up counts as a report.
     """
 
     def __init__(self, link: StampedLink, timeout_us: int = SDO_TIMEOUT_US) -> None:
@@ -45,15 +45,15 @@ class NodeBus:
 
     @property
     def now_us(self) -> int:
-        """Time of the bus."""
+        """Time of the bus in microseconds."""
         return self._link.now_us
 
     def send(self, can_id: int, data: bytes) -> None:
-        """Send a data frame; raises LinkClosed if the bus is gone."""
+        """Send a data frame. Raises LinkClosed if the bus is gone."""
         self._link.send((data_frame(can_id, data),))
 
     def listen(self, until_us: int) -> tuple[int, StampedFrames]:
-        """Wait for a first frame; return a time, and all frames that had arrived by then.
+        """Wait for a first frame. Return a time, and all frames that had arrived by that time.
 
         Raises:
             LinkClosed: the bus is gone.
@@ -65,7 +65,7 @@ class NodeBus:
         return now_us, frames
 
     def gather(self, span_us: int) -> list[CanFrame]:
-        """Let this much time pass; return the frames that arrive."""
+        """Let this much time pass. Return the frames that arrive."""
         until_us, found = self.now_us + span_us, list[CanFrame]()
         now_us = self.now_us
         while now_us < until_us:
@@ -74,13 +74,13 @@ class NodeBus:
         return found
 
     def command(self, command: NmtCommand, node_id: int) -> None:
-        """Send an NMT command; node-ID 0 addresses all nodes."""
+        """Send an NMT command. Node-ID 0 addresses all nodes."""
         self.send(NMT_COB_ID, bytes((command, node_id)))
 
     def await_state(
         self, node_id: int, wanted: tuple[NmtState, ...], within_us: int
     ) -> NmtState | None:
-        """Wait until a node reports one of the given states; return the last reported state."""
+        """Wait until a node reports one of the given states. Return the last reported state."""
         until_us, now_us = self.now_us + within_us, self.now_us
         self.states.pop(node_id, None)
         while self.states.get(node_id) not in wanted and now_us < until_us:
@@ -91,9 +91,9 @@ class NodeBus:
         """Run a script, and return its result or raise its error.
 
         Args:
-            node_id: the node that it talks to.
-            script: the script.
-            timeout_us: how long to wait for a response; 0 for the default.
+            node_id: node-ID of the node that the script communicates with.
+            script: script to run.
+            timeout_us: time to wait for a response, or 0 for the default.
 
         Raises:
             LinkClosed: the bus is gone.
@@ -110,22 +110,22 @@ class NodeBus:
             raise
 
     def read(self, node_id: int, index: int, sub: int, size: int = 0) -> bytes:
-        """Read an object.
+        """Read an object with an SDO upload.
 
         Args:
-            node_id: the node.
-            index: of the object.
-            sub: its sub-index.
-            size: of the object in bytes, 0 if unknown.
+            node_id: node-ID of the node.
+            index: index of the object.
+            sub: sub-index of the object.
+            size: size of the object in bytes, or 0 if the size is unknown.
 
         Raises:
-            SdoFailed: the node refuses, or does not answer.
+            SdoFailed: the node refuses or does not answer.
             LinkClosed: the bus is gone.
         """
         return self.run(node_id, upload(index, sub, size))
 
     def write(self, node_id: int, index: int, sub: int, data: bytes, timeout_us: int = 0) -> None:
-        """Write an object; raises as `read`."""
+        """Write an object. Raises as `read` does."""
         self.run(node_id, download(index, sub, data), timeout_us)
 
     def _guard(self, can_id: int) -> None:
@@ -147,7 +147,7 @@ _IDENTITY: Final = 0x1018
 
 _AT_ONCE: Final = 8
 _GAP_US: Final = 10_000
-"""Nodes queried at the same time, before a pause for other traffic on a slow bus."""
+"""Number of nodes queried at once, and the pause after them for other traffic on a slow bus."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,13 +155,14 @@ class NodeFound:
     """A node that answered or sent a frame.
 
     Attributes:
-        node_id: 1..127.
-        device_type: 1000h, None if the node did not answer.
-        identity: 1018h:01 to 04, without the sub-indices that the node does not have.
-        name: 1008h, empty if the node has none.
-        state: last reported state, None if the node reported none.
+        node_id: node-ID of the node, 1..127.
+        device_type: device type (object 1000h), or None if the node did not answer.
+        identity: identity (objects 1018h:01 to 04) by sub-index, without the sub-indices that the
+            node does not have.
+        name: device name (object 1008h), empty if the node has none.
+        state: last reported NMT state, or None if the node reported none.
         answers: number of answers to one question; 2 means that two nodes share this node-ID.
-        heartbeat_ms: 1017h, None if the node has none.
+        heartbeat_ms: producer heartbeat time (object 1017h), or None if the node has none.
     """
 
     node_id: int
@@ -175,11 +176,11 @@ class NodeFound:
 
 @dataclass(slots=True)
 class NetworkScan:
-    """Queries all node-IDs and returns the nodes; changes nothing on the bus.
+    """A scan that queries all node-IDs and returns the nodes. The scan changes nothing on the bus.
 
     Args:
-        bus: the bus.
-        wait_us: how long to wait for the last answers and for heartbeats.
+        bus: bus to scan.
+        wait_us: time to wait for the last answers and for heartbeats.
 
     Attributes:
         unconfigured: whether LSS slaves without a node-ID answered.
@@ -192,7 +193,10 @@ class NetworkScan:
     _types: dict[int, int] = field(default_factory=dict)
 
     def run(self) -> list[NodeFound]:
-        """Return the nodes that answered or sent a frame, by node-ID; LinkClosed without a bus."""
+        """Return the nodes that answered or sent a frame, by node-ID.
+
+        Raises LinkClosed without a bus.
+        """
         for first in range(1, 128, _AT_ONCE):
             for node_id in _NODE_IDS[first - 1 : first - 1 + _AT_ONCE]:
                 request = UploadInitiateRequest(_DEVICE_TYPE, 0).encode()
@@ -225,7 +229,7 @@ class NetworkScan:
                     pass
 
     def _identify(self, node_id: int) -> NodeFound:
-        """Read the identity of a node that answered; skip one that only sent a frame."""
+        """Read the identity of a node that answered. Skip a node that only sent a frame."""
         state = self.bus.states.get(node_id)
         if not self._answers[node_id]:
             return NodeFound(node_id, state=state, answers=0)

@@ -22,7 +22,7 @@ _MOST_IDLE: Final = 20
 Answer = TypeVar("Answer")
 
 _OnProgress = Callable[[int], object]
-"""Called with the number of bytes that the server has acknowledged."""
+"""Function that is called with the number of bytes that the server has acknowledged."""
 
 
 def download_blocks(index: int, sub: int, data: bytes, on_progress: _OnProgress) -> Script[None]:
@@ -33,13 +33,13 @@ def download_blocks(index: int, sub: int, data: bytes, on_progress: _OnProgress)
     301 defines no way to continue.
 
     Args:
-        index: of the object.
-        sub: its sub-index.
-        data: the bytes to write.
-        on_progress: called with the progress.
+        index: index of the object.
+        sub: sub-index of the object.
+        data: bytes to write.
+        on_progress: function that is called with the number of acknowledged bytes.
 
     Raises:
-        SdoAborted: the server refuses, or sends an unexpected answer; the code is
+        SdoAborted: the server refuses, or sends an unexpected answer. The code is
             `COMMAND_SPECIFIER` if the server does not support block transfer.
         SdoTimeout: the server does not answer.
     """
@@ -71,7 +71,7 @@ def download_blocks(index: int, sub: int, data: bytes, on_progress: _OnProgress)
 def _send_block(
     index: int, sub: int, data: bytes, first: int, count: int
 ) -> Script[sdo_frame.BlockAcknowledge]:
-    """Send segments; return the acknowledgement of the last one."""
+    """Send segments. Return the acknowledgement of the last segment."""
     at = first * sdo_frame.SEGMENT_BYTES
     for seqno in range(1, count):
         yield SdoFrame(bytes((seqno,)) + data[at : at + sdo_frame.SEGMENT_BYTES])
@@ -84,7 +84,7 @@ def _send_block(
 
 
 def _request(request: SdoRequest, kind: type[Answer]) -> Script[Answer]:
-    """Send a request and return its response; any other frame ends the transfer."""
+    """Send a request and return its response. Any other frame ends the transfer."""
     answer = yield request
     if isinstance(answer, kind):
         return answer
@@ -94,23 +94,23 @@ def _request(request: SdoRequest, kind: type[Answer]) -> Script[Answer]:
 
 
 def _abort(index: int, sub: int, code: sdo_frame.AbortCode) -> Script[NoReturn]:
-    """Abort the transfer after a response of the server that is not allowed at this point."""
+    """Abort the transfer after a response of the server that is not allowed in this state."""
     yield SdoFrame(Abort(index, sub, code).encode())
     raise SdoAborted(index, sub, code)
 
 
 COMMANDS: Final = {"stop": 0, "start": 1, "reset": 2, "clear": 3}
-"""Program control, 1F51h."""
+"""Commands of program control (object 1F51h) by name."""
 _STATES: Final = {0: "stopped", 1: "running"}
 
 _PATIENCE_US: Final = 60_000_000
-"""How long flash may be busy, and how long a program may take to stop or start."""
+"""Longest time that flash may be busy, and that a program may take to stop or start."""
 _ANSWER_US: Final = 10_000_000
-"""How long a node that clears its flash may take to answer."""
+"""Longest time until a node that clears its flash answers."""
 
 _LOOKS: Final = 3
 _SILENCE_US: Final = 500_000
-"""Within this time, the answers of a node to segments after an abort have arrived."""
+"""Time within which a node's answers to segments after an abort arrive."""
 
 _ERRORS: Final = {
     0: "no error",
@@ -136,7 +136,7 @@ _Say = Callable[[str], object]
 
 
 class ProgramFailed(Exception):  # noqa: N818 - what the node did
-    """The node did not do what was requested; the message gives the request."""
+    """The node did not do what was requested. The message contains the request."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,9 +144,9 @@ class ProgramStatus:
     """What a node reports about a program.
 
     Attributes:
-        control: 1F51h.
-        identification: 1F56h, None if it has none.
-        flash: 1F57h, None if it has none.
+        control: value of program control (object 1F51h).
+        identification: program identification (object 1F56h), or None if the node has none.
+        flash: flash status (object 1F57h), or None if the node has none.
     """
 
     control: int
@@ -165,17 +165,17 @@ class Program:
     """A program of a node.
 
     Args:
-        bus: the bus.
-        node_id: the node.
-        number: number of the program, 1..254, which is the sub-index.
-        say: called with a description of each step.
+        bus: bus of the node.
+        node_id: node-ID of the node.
+        number: number of the program, 1..254, which is the sub-index of its objects.
+        say: function that is called with a description of each step.
     """
 
     def __init__(self, bus: NodeBus, node_id: int, number: int, say: _Say) -> None:
         self._bus, self._node_id, self._number, self._say = bus, node_id, number, say
 
     def status(self) -> ProgramStatus:
-        """Read the status of the program; SdoFailed if the node has no 1F51h."""
+        """Read the status of the program. Raises SdoFailed if the node has no object 1F51h."""
         control = self._read(boot_slave.CONTROL)
         return ProgramStatus(
             control,
@@ -184,7 +184,7 @@ class Program:
         )
 
     def command(self, command: int) -> None:
-        """Write program control.
+        """Write a command to program control.
 
         A node that stops or starts its program may reset before it answers.
 
@@ -198,7 +198,7 @@ class Program:
                 raise
 
     def stop(self) -> None:
-        """Stop the program unless it is already stopped; wait until it has stopped."""
+        """Stop the program unless it is already stopped. Wait until it has stopped."""
         if self._read(boot_slave.CONTROL) == boot_slave.STOP:
             self._say("it is already stopped")
             return
@@ -222,16 +222,16 @@ class Program:
         """Write the program, and wait until the flash is written.
 
         Args:
-            data: the program.
-            on_progress: called with the progress.
+            data: bytes of the program.
+            on_progress: function that is called with the number of acknowledged bytes.
             tries: number of attempts. A disturbed transfer starts from the beginning, because a
                 client cannot resume a transfer (CiA 301).
 
         Returns:
-            The number of attempts made.
+            The number of attempts.
 
         Raises:
-            SdoFailed: the node refuses, or the last try failed.
+            SdoFailed: the node refuses, or the last attempt failed.
             ProgramFailed: the flash could not be written.
         """
         for number in range(1, tries + 1):
@@ -251,7 +251,7 @@ class Program:
         return number
 
     def _is_there(self) -> bool:
-        """Return whether the node answers any request; up to two frames may be lost."""
+        """Return whether the node answers any request. Up to two frames may be lost."""
         for _ in range(_LOOKS):
             try:
                 self._read(boot_slave.CONTROL)
@@ -274,7 +274,7 @@ class Program:
             on_progress(len(data))
 
     def await_control(self, wanted: int) -> None:
-        """Wait until program control has this value; a node does not answer during a reset."""
+        """Wait until program control has this value. A node does not answer during a reset."""
         until_us = self._bus.now_us + _PATIENCE_US
         while (control := self._optional(boot_slave.CONTROL)) != wanted:
             if self._bus.now_us >= until_us:
@@ -286,7 +286,7 @@ class Program:
             self._bus.gather(boot_slave.LOOK_US)
 
     def _await_flash(self, allowed: tuple[int, ...]) -> None:
-        """Wait until the flash is ready; raise an error that is not allowed."""
+        """Wait until the flash is ready. Raise an error that the caller does not allow."""
         until_us = self._bus.now_us + _PATIENCE_US
         while (
             status := self._optional(boot_slave.FLASH_STATUS)

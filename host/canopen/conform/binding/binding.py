@@ -31,9 +31,9 @@ from tickrig.wire.canopen.eds.object_table import EntryDescription
 
 _ABSENT_OBJECTS: Final = range(0x5FFF, 0x5EFF, -1)
 _COUNTED: Final = (0x1018, 0x1016, 0x1010, 0x1200)
-"""Types of which sub-index 0 holds the highest sub-index."""
+"""Types whose sub-index 0 holds the highest sub-index."""
 _GROWING: Final = (0x1003, *range(0x1200, 0x1C00))
-"""Objects that may have more sub-indices than in the EDS: errors, COB-IDs, mappings."""
+"""Objects that may have more sub-indices than the EDS lists: errors, COB-IDs, mappings."""
 _LAST_SUB: Final = 0xFE
 
 _Place = tuple[int, int]
@@ -44,8 +44,8 @@ class _AbsentPlaces(NamedTuple):
     """Kinds of unused places, in the order in which they are tried.
 
     Attributes:
-        name: in checks, after `$`.
-        what: what the node must have, for messages.
+        name: name of the place in checks, without its `$`.
+        what: description of what the node must have, used in messages.
         certain: whether CiA 301 allows no object at this place.
         likely: whether no description mentions this place.
     """
@@ -57,11 +57,11 @@ class _AbsentPlaces(NamedTuple):
 
 
 def _absent_places(device: EdsDevice, reader: ObjectReader) -> Iterator[_AbsentPlaces]:
-    """Yield an unused index, an unused sub-index of a record, and one of a variable.
+    """Yield unused places: an index, a sub-index of a record, and a sub-index of a variable.
 
     Args:
         device: the existing objects.
-        reader: reads the number of their sub-indices.
+        reader: reader for the number of sub-indices.
 
     Raises:
         SdoTimeout: the node does not answer.
@@ -87,11 +87,11 @@ _DEVICE_TYPE: Final = 0x1000
 
 @dataclass(frozen=True, slots=True)
 class BoundObject:
-    """The object of the node that a name stands for.
+    """The object of the node that a name in a check stands for.
 
     Attributes:
-        entry: its description.
-        value: the bytes that were read, None if it cannot be read.
+        entry: description of the object.
+        value: bytes that were read, or None if the object cannot be read.
     """
 
     entry: EntryDescription
@@ -116,7 +116,7 @@ class BoundObject:
 
 @dataclass(frozen=True, slots=True)
 class BoundPlace:
-    """A place in the dictionary at which the node has nothing."""
+    """A place in the dictionary at which the node has no object."""
 
     index: int
     sub: int
@@ -127,16 +127,16 @@ Bound = BoundObject | BoundPdo | BoundPlace
 
 @dataclass(frozen=True, slots=True)
 class Binding:
-    """The objects that the names of `NAMES` stand for, and the reasons for names without an object.
+    """The objects that the names in `NAMES` stand for, and the reasons for names without an object.
 
     Attributes:
-        device: the objects of the EDS, or those that answered.
+        device: objects in the EDS, or the objects that answered.
         bound: the objects by name.
-        reasons: the reasons in words why names are not bound, by name.
+        reasons: reasons in words for each name that is not bound, by name.
         findings: contradictions between EDS and node, one per line.
         known: whether the objects come from an EDS.
-        entries: the objects, by index and sub-index.
-        reader: the reader that has read the objects.
+        entries: entries of the dictionary by index and sub-index.
+        reader: reader that has read the objects.
     """
 
     device: EdsDevice
@@ -171,21 +171,22 @@ def bind(
     allow: Collection[int] = (),
     never: Collection[int] = (),
 ) -> Binding:
-    """Find an object or PDO for each name; the node is only read.
+    """Find an object or PDO for each name. The node is only read.
 
     Objects that checks write later are in the communication area or the manufacturer area. Without
     an EDS these objects are only in the communication area, because it is unknown which other
     objects may be written.
 
     Args:
-        device: the device of its EDS. If it is None, the node is read to find out which objects of
-            CiA 301 it has.
-        upload: reads an object of the node.
-        allow: indices of the profile area, 6000h to 9FFFh, that may be written nevertheless.
+        device: device that the EDS describes, or None to read from the node which objects of CiA
+            301 it has.
+        upload: function that reads an object of the node.
+        allow: indices of the profile area, 6000h to 9FFFh, that may be written despite the general
+            rule.
         never: indices that are never written.
 
     Returns:
-        The bound names.
+        The objects by name, and the reasons for names without an object.
 
     Raises:
         SdoTimeout: the node does not answer.
@@ -208,7 +209,7 @@ def bind(
 
 
 def _bind_object(search: _Search, wanted: WantedObject) -> None:
-    """Take the best object that matches, may be used in this way and can be read."""
+    """Take the best object that matches, may be used as the check needs, and can be read."""
     if wanted.at is None:
         fitting = wanted.fitting(search.facts)
     else:
@@ -246,7 +247,7 @@ def _not_free(wanted: WantedObject, fitting: list[EntryDescription]) -> str:
 
 
 def _is_free(search: _Search, entry: EntryDescription) -> bool:
-    """Return whether an object accepts every value of its type; few profile objects do."""
+    """Return whether an object accepts every value of its type. Few profile objects do."""
     if entry.index not in PROFILE_AREA:
         return True
     profile = (search.reader.number(_DEVICE_TYPE, 0) or 0) & 0xFFFF
@@ -261,7 +262,7 @@ def _may_write(search: _Search, index: int) -> bool:
 
 
 def _order(wanted: WantedObject, entry: EntryDescription) -> tuple[bool | int, ...]:
-    """Sort key: the least harmful object first, then the simplest."""
+    """Return a sort key: the least harmful object comes first, then the simplest."""
     narrow = entry.low is not None or entry.high is not None
     if wanted.use is Use.WRITE and entry.index in HARMLESS:
         return (0, HARMLESS.index(entry.index))
@@ -271,9 +272,9 @@ def _order(wanted: WantedObject, entry: EntryDescription) -> tuple[bool | int, .
 
 
 def _bind_absent(search: _Search, places: _AbsentPlaces) -> None:
-    """Take a place that must be unused but is used; the checks then report it.
+    """Take a place that must be unused but is used, so that the checks report this error.
 
-    If there is no such place, take the first unused place. If the node has an object at every
+    If the node uses no such place, take the first unused place. If the node has an object at every
     place, take any place.
     """
     certain = [place for place in places.certain if _may_write(search, place[0])]
@@ -293,7 +294,7 @@ def _bind_absent(search: _Search, places: _AbsentPlaces) -> None:
 
 
 def _has_something(search: _Search, place: _Place) -> bool:
-    """Read a place that should be unused; an answer is a finding."""
+    """Read a place that should be unused. An answer is a finding."""
     if not isinstance(search.reader.try_read(*place), bytes):
         return False
     why = "is not described" if search.known else "cannot be there"

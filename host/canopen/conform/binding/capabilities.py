@@ -1,4 +1,4 @@
-"""Capabilities of a node, as needed by checks: from its EDS, confirmed by the node."""
+"""Capabilities of a node that checks need, taken from its EDS and confirmed by the node."""
 
 from __future__ import annotations
 
@@ -41,19 +41,19 @@ _OF_OBJECTS: Final[Mapping[str, tuple[str, ...]]] = {
     "rtr": ("tpdo_remappable",),
     "bits": ("tpdo_bool",),
 }
-"""Features that exist if the objects exist to which these names are bound."""
+"""Features, and the names whose objects must exist for each feature."""
 
 _PROFILES: Final[Mapping[str, tuple[int, tuple[int, ...]]]] = {
     "401": (401, (0x6000, 0x6200, 0x6400, 0x6401, 0x6411)),
     "402": (402, (0x6040, 0x6041)),
 }
-"""The low word of 1000h, and objects of which at least one must exist."""
+"""Profile number (the low word of 1000h), and objects of which at least one must exist."""
 
 _LSS: Final = ("lss", "lssident", "unconfigured")
 _IDENTITY: Final = ((1, "VendorNumber"), (2, "ProductNumber"), (3, "RevisionNumber"))
 _DEVICE_TYPE: Final = 0x1000
 _ON_COMMAND: Final = {"store": 0x1010, "restore": 0x1011}
-"""Optional functions of objects; bit 0 of the first sub-index is set if they are supported."""
+"""Optional functions of objects. Bit 0 of the first sub-index is set if they are supported."""
 _STORE: Final = 0x1010
 _AUTONOMOUSLY: Final = 2
 _LSS_ADDRESS: Final = 0x1018
@@ -62,16 +62,16 @@ _LSS_NUMBERS: Final = frozenset(range(1, 5))
 
 
 _DUMMIES: Final = {"dummy5": "dummy0005", "dummy6": "dummy0006"}
-"""Dummy objects that checks map in place of an object, and their names in an EDS."""
+"""Dummy objects that checks map in place of an object, with their names in an EDS."""
 
 
 class EdsClaims(NamedTuple):
-    """What an EDS says about a node besides its objects.
+    """The statements of an EDS about a node, besides the objects.
 
     Attributes:
         lss: whether the node has LSS.
-        dummies: features for the dummy objects that may be mapped, of `_DUMMIES`.
-        identity: the first numbers of 1018h, by sub-index, from the section DeviceInfo.
+        dummies: features for dummy objects that may be mapped, from `_DUMMIES`.
+        identity: first numbers of 1018h by sub-index, from the section DeviceInfo.
     """
 
     lss: bool
@@ -96,9 +96,9 @@ class NodeDescription(NamedTuple):
     """The description of a node before the node is queried.
 
     Attributes:
-        device: its objects.
-        claims: the properties in its EDS besides the objects.
-        wrong: errors and warnings of the EDS.
+        device: device with the objects of the node.
+        claims: properties that the EDS states besides the objects.
+        wrong: errors and warnings in the EDS.
     """
 
     device: EdsDevice
@@ -129,7 +129,7 @@ class NodeDescription(NamedTuple):
 
 
 def _as_said(row: EntryDescription) -> EntryDescription:
-    """Return an entry with the default from its EDS."""
+    """Return an entry with the default that its EDS gives."""
     if row.default:
         return row.with_default(row.default, relative=row.relative)
     return EntryDescription(
@@ -145,8 +145,8 @@ class NodeFeatures:
     """The capabilities of a node.
 
     Attributes:
-        words: the features, as checks name them.
-        reasons: why other features are missing, in words.
+        words: names of the features, as checks write them.
+        reasons: reasons in words for missing features.
         findings: contradictions between EDS and node, one per line.
     """
 
@@ -158,15 +158,15 @@ class NodeFeatures:
 def find_features(
     binding: Binding, client: SdoClient, claims: EdsClaims | None = None
 ) -> NodeFeatures:
-    """Find out the capabilities of a node; only read the node.
+    """Find out the capabilities of a node. The node is only read.
 
     Only the EDS shows whether the node has LSS, because a trial would change the state of all nodes
     on the bus. Without an EDS the tester assumes that the node has no LSS.
 
     Args:
-        binding: its objects.
-        client: tries a block upload.
-        claims: the properties in its EDS, None without an EDS.
+        binding: objects of the node by name.
+        client: client that tries a block upload.
+        claims: properties that the EDS states, or None without an EDS.
     """
     reasons = dict(_missing(binding))
     for word, key in _DUMMIES.items():
@@ -194,7 +194,7 @@ def find_features(
 
 
 def _has_block_upload(client: SdoClient) -> bool:
-    """Return whether a node starts a block upload of 1000h; abort the upload then."""
+    """Return whether a node starts a block upload of 1000h. Abort the upload then."""
     try:
         return client.run(_try_block_upload())
     except SdoMisnamed:
@@ -231,7 +231,7 @@ def _unsaid(claims: EdsClaims | None, key: str, what: str) -> str:
 
 
 def _number(text: str) -> int | None:
-    """Read a number of an EDS, None if it is not a number."""
+    """Read a number of an EDS. Return None if the text is not a number."""
     with suppress(ValueError):
         return parse_number(plain_numbers(text))
     return None

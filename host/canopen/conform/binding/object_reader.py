@@ -1,4 +1,4 @@
-"""Reads objects of a node, each once, and reports contradictions to their descriptions."""
+"""Reader that reads each object of a node once and reports contradictions to the descriptions."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from tickrig.wire.canopen.eds.eds_device import EdsDevice
 from tickrig.wire.canopen.sdo_frame import AbortCode, describe_abort
 
 Upload = Callable[[int, int], bytes]
-"""Reads an object by index and sub-index; raises SdoAborted or SdoTimeout."""
+"""Function that reads an object by index and sub-index. It raises SdoAborted or SdoTimeout."""
 
 PATIENCE: Final = 3
-"""After this many requests in a row without an answer, the node is gone."""
+"""Number of successive requests without an answer after which the node counts as gone."""
 
 _ABSENT: Final = (AbortCode.NO_OBJECT, AbortCode.NO_SUBINDEX)
 _BROKEN: Final = (AbortCode.TOGGLE_BIT, AbortCode.COMMAND_SPECIFIER)
-"""Abort codes of an upload that went wrong, from either side."""
+"""Abort codes of an upload that went wrong, sent by client or server."""
 
 
 class ObjectReader:
-    """Reads objects and caches their values.
+    """Reader that caches the values of objects.
 
     Args:
-        upload: reads an object.
+        upload: function that reads an object.
 
     Attributes:
         findings: descriptions that the node contradicts, one per line.
@@ -45,7 +45,7 @@ class ObjectReader:
         return {at: value for at, value in self._known.items() if isinstance(value, bytes)}
 
     def read(self, entry: object_table.EntryDescription) -> bytes | None:
-        """Return the value of a described object, None if it cannot be read or has another size.
+        """Return the value of a described object, or None if it cannot be read or has another size.
 
         Raises:
             SdoTimeout: the node has stopped answering.
@@ -58,7 +58,7 @@ class ObjectReader:
         return answer if isinstance(answer, bytes) and not wrong else None
 
     def number(self, index: int, sub: int) -> int | None:
-        """Return an unsigned number of at most 32 bits, None if there is none.
+        """Return an unsigned number of at most 32 bits, or None if the object has no such value.
 
         Raises:
             SdoTimeout: the node has stopped answering.
@@ -96,7 +96,7 @@ class ObjectReader:
 
 
 def _contradiction(entry: object_table.EntryDescription, answer: bytes | SdoFailed) -> str:
-    """Return how an answer differs from the description, empty if it does not."""
+    """Return the difference between an answer and the description, empty if there is none."""
     match answer:
         case SdoAborted() if answer.code in _ABSENT and entry.sub in {0, 1}:
             return f"is described, but the node does not have it: {describe_abort(answer.code)}"
@@ -155,7 +155,7 @@ _MAPPED: Final = 8
 
 
 def probe_device(reader: ObjectReader) -> EdsDevice:
-    """Find out which objects of CiA 301 a node has; other objects stay unknown.
+    """Find out which objects of CiA 301 a node has. Other objects stay unknown.
 
     Raises:
         SdoTimeout: the node does not answer.

@@ -1,4 +1,4 @@
-"""The PDOs of a node by their kinds: enabled or not, event-driven or synchronous, remappable."""
+"""The PDOs of a node by kind: enabled or not, event-driven or synchronous, remappable."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ _MAPPING: Final = 0x200
 """Distance of a mapping parameter from its communication parameter."""
 
 _LOOKED_AT: Final = 16
-"""PDOs of each direction that are read; a node may have 512."""
+"""Number of PDOs of each direction that are read. A node may have 512 PDOs."""
 
 _MOST_MAPPED: Final = 64
-"""The highest number of mapped objects; larger numbers mark multiplexed PDOs."""
+"""The highest number of mapped objects. Larger numbers mark multiplexed PDOs."""
 
 _COB_ID: Final = 1
 _TYPE: Final = 2
@@ -35,14 +35,14 @@ _CYCLIC: Final = range(1, 241)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BoundPdo(PdoDescription):
-    """A PDO as it was found in the node.
+    """A PDO that was found in the node.
 
     Attributes:
-        index: of its communication parameter, 1400h.. or 1800h...
-        subs: sub-indices of its communication parameter.
-        remappable: whether its mapping and COB-ID may be written.
+        index: index of the communication parameter, from 1400h or from 1800h.
+        subs: sub-indices of the communication parameter.
+        remappable: whether mapping and COB-ID of the PDO may be written.
         places: number of objects that can be mapped.
-        restless: whether it has an inhibit time or an event timer that cannot be switched off.
+        restless: whether the PDO has an inhibit time or an event timer that cannot be switched off.
     """
 
     index: int
@@ -53,7 +53,7 @@ class BoundPdo(PdoDescription):
 
     @property
     def mapping_index(self) -> int:
-        """Index of its mapping parameter."""
+        """Index of the mapping parameter of the PDO."""
         return self.index + _MAPPING
 
     def place(self, address: tuple[int, int]) -> tuple[int, int] | None:
@@ -66,7 +66,7 @@ class BoundPdo(PdoDescription):
 
 
 class _PdoKind(NamedTuple):
-    """A name in checks, its meaning in words, and the PDOs of that kind."""
+    """A kind of PDO: its name in checks, its meaning in words, and the PDOs of that kind."""
 
     name: str
     what: str
@@ -74,7 +74,7 @@ class _PdoKind(NamedTuple):
 
 
 def _kinds(way: str) -> Iterator[_PdoKind]:
-    """Yield the kinds that exist in both directions."""
+    """Yield the kinds of PDOs that exist in both directions."""
     pdo = way.upper()
     yield _PdoKind(way, pdo, lambda pdo: True)
     yield _PdoKind(f"{way}_enabled", f"{pdo} that is enabled", lambda pdo: pdo.enabled)
@@ -152,9 +152,9 @@ def bind_pdos(
     RPDOs while these have their original mapping.
 
     Args:
-        device: the device of its EDS.
-        reader: reads the node.
-        may_write: whether an object may be written.
+        device: device that the EDS describes.
+        reader: reader for objects of the node.
+        may_write: function that returns whether an object may be written.
 
     Returns:
         The PDOs that were found, and the reasons for the missing ones, by name.
@@ -184,7 +184,7 @@ def _harmless(may_write: Callable[[int], bool]) -> _PdoKind:
 
 
 def _read(device: EdsDevice, reader: ObjectReader, area: range) -> Iterator[BoundPdo]:
-    """Read the first PDOs of a direction; skip those that are incomplete or 29-bit."""
+    """Read the first PDOs of a direction. Skip PDOs that are incomplete or have a 29-bit CAN-ID."""
     subs: dict[int, dict[int, bool]] = {}
     for entry in device.entries:
         subs.setdefault(entry.index, {})[entry.sub] = entry.writable

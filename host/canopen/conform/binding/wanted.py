@@ -12,15 +12,15 @@ from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
 
 COMMUNICATION_AREA: Final = range(0x1000, 0x2000)
 PROFILE_AREA: Final = range(0x6000, 0xA000)
-"""Areas in which a write may move something."""
+"""Area of profile objects, in which a write may move something."""
 
 GENERIC_IO: Final = 401
-"""The low word of 1000h of a CiA 401 module."""
+"""The profile number of a CiA 401 module, which is the low word of 1000h."""
 PLAIN_OUTPUTS: Final = (0x6200, 0x6300, 0x6320, 0x6410, 0x6411, 0x6412)
-"""Outputs of CiA 401, which accept every value; other profile objects are modes or positions."""
+"""Outputs of CiA 401 that accept every value. Other profile objects are modes or positions."""
 
 HARMLESS: Final = (0x1015, 0x1007, 0x100D, 0x100C, 0x1017, 0x1006)
-"""Communication objects that accept every value, and that stand for others of their size."""
+"""Communication objects that accept every value. They stand for other objects of their size."""
 
 TEXTS: Final = (DataType.VISIBLE_STRING, DataType.OCTET_STRING, DataType.UNICODE_STRING)
 _SIZES: Final = (8, 16, 32, 64)
@@ -28,12 +28,12 @@ _ACCESS: Final = {
     **{"r": Access.READ.value, "w": Access.WRITE.value, "c": Access.CONST.value},
     **{"t": Access.TPDO.value, "p": Access.RPDO.value},
 }
-"""The letters of `objects.txt`."""
+"""Letters that `objects.txt` uses."""
 _MOST_BYTES: Final = 1 << 32
 
 
 class Use(Enum):
-    """How a check uses an object."""
+    """The use of an object in a check."""
 
     READ = "read, or mapped if it is read-only"
     REFUSED = "written, and the node must refuse it"
@@ -41,13 +41,16 @@ class Use(Enum):
 
 
 class EntryFacts(NamedTuple):
-    """The facts that decide which names an entry can stand for, computed once for all names.
+    """The facts that decide which names an entry can stand for.
+
+    They are computed once for all names.
 
     Attributes:
-        entry: the entry.
-        access: the bits of its access.
-        kind: the number of its data type.
-        free: whether it accepts what its description allows, without further rules of CiA 301.
+        entry: entry of the dictionary.
+        access: bits of the entry's access.
+        kind: number of the entry's data type.
+        free: whether the entry accepts what its description allows, without further rules of CiA
+            301.
     """
 
     entry: EntryDescription
@@ -71,14 +74,14 @@ class WantedObject(NamedTuple):
     """A name and the objects that it can stand for.
 
     Attributes:
-        name: in checks, after `$`.
-        what: description for messages.
-        use: how checks use it.
-        access: the required access: a mask of bits, and their values.
-        kinds: numbers of the data types; None for any.
-        limited: its type must have values beyond both limits.
-        at: its only possible place; the other criteria then do not apply.
-        lengths: allowed lengths of its value, in bytes.
+        name: name of the object in checks, without its `$`.
+        what: description of the object, used in messages.
+        use: use of the object in checks.
+        access: required access as a mask of bits, and the values of these bits.
+        kinds: numbers of the allowed data types, or None for any.
+        limited: whether the data type must have values beyond both limits.
+        at: only possible place of the object. If it is set, the other criteria do not apply.
+        lengths: allowed lengths of the value in bytes.
     """
 
     name: str
@@ -109,7 +112,7 @@ class WantedObject(NamedTuple):
 
 
 def _is_limited(entry: EntryDescription) -> bool:
-    """Return whether its type has values beyond both limits."""
+    """Return whether the data type of an entry has values beyond both limits."""
     if entry.low is None or entry.high is None:
         return False
     lowest, highest = entry.data_type.limits
@@ -127,7 +130,7 @@ _KINDS: Final[Mapping[str, Collection[int] | None]] = {
 
 
 def _read_wanted(text: str) -> Iterator[WantedObject]:
-    """Read `objects.txt`; its head describes the format of a line."""
+    """Read `objects.txt`. The head of that file describes the format of a line."""
     for line in text.splitlines():
         if line.startswith("#"):
             continue
