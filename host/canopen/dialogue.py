@@ -56,32 +56,34 @@ from tickrig.wire.instant import NEVER
 SDO_TIMEOUT_US: Final = 500_000
 
 LEAST_COPY_US: Final = 2_000
-"""How long a copy of an answer may take: an error frame and the repeated frame at 125 kbit/s."""
+"""Longest delay of a copied answer: an error frame and the repeated frame at 125 kbit/s."""
 _MOST_COPY_US: Final = 20_000
 _MISNAMED_US: Final = 100_000
-"""How long the right answer may follow one that names another object, as a late copy does."""
+"""Longest time until the right answer follows an answer that names another object."""
 
 Object = tuple[int, int]
 """Index and sub-index."""
 
 _NONE_NAMED: Final = (0, 0)
-"""What the abort of a server names that could not parse a request."""
+"""The object that a server's abort names if the server could not parse the request."""
 
 FENCES: Final[tuple[Object, ...]] = (
     *((index, 0) for index in (0x1000, 0x1001, 0x1018)),
     *((0x1018, sub) for sub in range(1, 5)),
     *((0x1000, sub) for sub in range(1, 0xFF)),
 )
-"""Objects that may be read at any time; every server answers, if only with an abort."""
+"""Objects that may be read at any time. Every server answers, at least with an abort."""
 
 
 @dataclass(slots=True)  # not frozen: frozen requests take three times as long to create
 class SdoRequest:
-    """Send an SDO request; the result is the response; raises SdoTimeout without a response.
+    """Step that sends an SDO request. The result is the response.
+
+    Raises SdoTimeout if no response arrives.
 
     Attributes:
-        goes_on: whether the request continues a transfer of the server; otherwise it starts a
-            transfer.
+        goes_on: whether the request continues a transfer of the server. Otherwise the request
+            starts a transfer.
     """
 
     request: bytes
@@ -92,21 +94,21 @@ class SdoRequest:
 
 @dataclass(frozen=True, slots=True)
 class SdoFrame:
-    """Send an SDO frame that has no answer."""
+    """Step that sends an SDO frame without an answer."""
 
     request: bytes
 
 
 @dataclass(frozen=True, slots=True)
 class NmtRequest:
-    """Send an NMT command."""
+    """Step that sends an NMT command."""
 
     command: NmtCommand
 
 
 @dataclass(frozen=True, slots=True)
 class AwaitState:
-    """Wait until a heartbeat or boot-up reports a state; raises StateTimeout."""
+    """Step that waits for a heartbeat or boot-up with a given state. It raises StateTimeout."""
 
     state: NmtState
     timeout_us: int
@@ -114,10 +116,12 @@ class AwaitState:
 
 @dataclass(frozen=True, slots=True)
 class AwaitReport:
-    """Wait for any heartbeat or node guarding response; the result is its state, None without one.
+    """Step that waits for any heartbeat or node guarding response.
+
+    The result is the state in the response, or None without a response.
 
     Attributes:
-        timeout_us: how long to wait.
+        timeout_us: time to wait.
         boot_up: whether a boot-up also counts.
     """
 
@@ -127,12 +131,12 @@ class AwaitReport:
 
 @dataclass(frozen=True, slots=True)
 class Guard:
-    """Request the state by node guarding."""
+    """Step that requests the state by node guarding."""
 
 
 @dataclass(frozen=True, slots=True)
 class Pause:
-    """Let time pass."""
+    """Step that lets time pass."""
 
     duration_us: int
 
@@ -142,7 +146,7 @@ Step = SdoRequest | SdoFrame | NmtRequest | AwaitState | AwaitReport | Guard | P
 T = TypeVar("T")
 
 Script = Generator[Step, Any, T]
-"""A script that returns a T; it receives the result of each step, None if there is none."""
+"""A script that returns a T. The script receives the result of each step, or None without one."""
 
 Answer = sdo.Response | None
 
@@ -151,22 +155,25 @@ Send = Callable[[int, bytes], None]
 
 
 def nothing(*_: object) -> None:
-    """Do nothing; used if the host guards no node, or if no caller needs the result of a script."""
+    """Do nothing.
+
+    This is used if the host guards no node, or if no caller needs a script's result.
+    """
 
 
 Misnamed = Callable[[Object, bytes], object]
-"""Receives the object that was asked for, and the answer that names another one."""
+"""Function that receives the requested object, and the answer that names another object."""
 
 
 class QueuedScript(NamedTuple):
     """A script, and the callbacks for its end.
 
     Attributes:
-        what: description for messages.
-        done: called with its result.
-        failed: called with the error that it raised.
-        dropped: called if it is dropped before its end.
-        moves: whether it may change the NMT state of the node.
+        what: description of the script for messages.
+        done: function that is called with the result of the script.
+        failed: function that is called with the error that the script raised.
+        dropped: function that is called if the script is dropped before its end.
+        moves: whether the script may change the NMT state of the node.
     """
 
     what: str
@@ -184,20 +191,20 @@ class Unanswered(list[Object]):
     """
 
     def add(self, at: Object) -> None:
-        """Add a question."""
+        """Add the object of a request."""
         if self[-1:] != [at]:
             self.append(at)
 
     def hear(self, at: Object) -> None:
-        """Drop the requests before those about the object; the server no longer answers them."""
+        """Drop the requests before those about the object. The server no longer answers them."""
         if at in self:
             del self[: self.index(at)]
 
     def fence(self, at: Object) -> Object:
-        """Return an object whose answer shows that no answer about `at` can follow.
+        """Return an object whose answer proves that no answer about `at` can follow.
 
         The latest request is preferred, so that a node that is gone gets requests for the same
-        fence. If all fences are open, the oldest request is dropped: a server that answers at this
+        fence. If all fences are open, the oldest request is dropped. A server that answers at this
         point has left more than 250 requests unanswered.
         """
         last = self[-1]
@@ -211,23 +218,24 @@ class Unanswered(list[Object]):
 
 
 class Dialogue:
-    """The dialogue with one node; it sends, and never blocks.
+    """The dialogue with one node. The dialogue sends frames, and never blocks.
 
     Keep the dialogue as long as you communicate with the node, because only the dialogue knows
     which requests the server may still answer.
 
     Args:
-        node_id: the node.
-        send: sends a data frame; takes CAN-ID and data.
-        guard: sends a remote frame; takes the CAN-ID.
-        sdo_timeout_us: how long to wait for an SDO response.
-        on_misnamed: called with each answer that ends a request and names another object; None
-            ignores such answers.
+        node_id: node-ID of the node.
+        send: function that sends a data frame. Its arguments are CAN-ID and data.
+        guard: function that sends a remote frame. Its argument is the CAN-ID.
+        sdo_timeout_us: time to wait for an SDO response.
+        on_misnamed: function that is called with each answer that ends a request and names another
+            object. None ignores such answers.
 
     Attributes:
-        sdo_timeout_us: as given; a new value takes effect with the next request.
-        due_us: when a time-out or a pause ends, `NEVER` if there is none.
-        job: the running job.
+        sdo_timeout_us: time to wait for an SDO response. A new value takes effect with the next
+            request.
+        due_us: end of the running time-out or pause, or `NEVER` if there is none.
+        job: job that is running.
     """
 
     def __init__(
@@ -257,7 +265,7 @@ class Dialogue:
         return self.job is not None and any(job.moves for job in (self.job, *self._jobs))
 
     def start(self, now_us: int, job: QueuedScript) -> None:
-        """Run a job after those before it have ended."""
+        """Run a job after all earlier jobs have ended."""
         self._now_us = now_us
         if self.job is None and not self._jobs:
             self.job = job
@@ -284,17 +292,17 @@ class Dialogue:
             job.dropped()
 
     def abort(self, code: sdo_frame.AbortCode) -> None:
-        """Drop all jobs; abort the running SDO transfer, if there is one."""
+        """Drop all jobs. Abort the running SDO transfer, if there is one."""
         if self.job is not None and self._transfer is not None:
             self._say(sdo.Abort(*self._transfer, code).encode())
         self.clear()
 
     def remember(self, at: Object) -> None:
-        """Record that another client asked the server about an object and got no answer."""
+        """Record that another client's request about an object got no answer from the server."""
         self._unanswered.add(at)
 
     def receive_sdo(self, now_us: int, data: bytes) -> None:
-        """Process a response; ignore answers to other requests, and copies."""
+        """Process a response. Ignore copies, and answers to other requests."""
         self._now_us = now_us
         try:
             answer = sdo.parse_response(data)
@@ -322,7 +330,7 @@ class Dialogue:
             self._keep_misnamed(now_us, named, data)
 
     def _keep_misnamed(self, now_us: int, named: Object | None, data: bytes) -> None:
-        """Keep an answer that names another object; it is used unless the right one follows."""
+        """Keep an answer that names another object. It is used unless the right answer follows."""
         if self._on_misnamed is None or named is None or named in self._unanswered:
             return
         self._misnamed = data
@@ -332,8 +340,8 @@ class Dialogue:
     def _end_misnamed(self, step: SdoRequest) -> sdo.Abort | errors.SdoMisnamed:
         """Return the error for an answer that names another object than the request.
 
-        An abort ends the only open transfer, no matter which object it names. A value may belong to
-        another object.
+        An abort ends the only open transfer, no matter which object the abort names. A value may
+        belong to another object.
         """
         at, data, alone = (step.index, step.sub), self._misnamed, len(self._unanswered) == 1
         self._unanswered.clear()
@@ -350,8 +358,8 @@ class Dialogue:
     ) -> bool:
         """Return whether a response can only be the answer to a step.
 
-        A segment and an abort of 0000h:00 name no object. While other requests are open, they may
-        be answers to those requests.
+        A segment and an abort of 0000h:00 name no object. While other requests are open, such a
+        response may be an answer to one of those requests.
         """
         if named is not None and named != _NONE_NAMED:
             mine = named == (step.index, step.sub)
@@ -378,7 +386,7 @@ class Dialogue:
                 pass
 
     def tick(self, now_us: int) -> None:
-        """End what has timed out."""
+        """End the steps that have timed out."""
         self._now_us = now_us
         if now_us < self.due_us:
             return
@@ -402,7 +410,7 @@ class Dialogue:
         self._go_on(None)
 
     def _go_on(self, value: object) -> None:
-        """Resume a script with the result of its step, and take its steps up to one that waits."""
+        """Resume a script with the result of its step. Run its steps up to a step that waits."""
         job = self.job
         assert job is not None
         self._step, self._expected, self.due_us = None, None, NEVER
@@ -420,14 +428,14 @@ class Dialogue:
             self._end(job.failed, error)
 
     def _end(self, callback: Callable[[Any], None], what: object) -> None:
-        """End a job, call back, and start the next one unless the callback did."""
+        """End a job and call back. Start the next job unless the callback did."""
         self.job = None
         callback(what)
         if self._jobs and self.job is None:
             self._next()
 
     def _take(self, step: Step) -> bool:
-        """Process a step that is not an SDO request; return True if the step waits."""
+        """Process a step that is not an SDO request. Return True if the step waits."""
         match step:
             case AwaitState() | AwaitReport():
                 self._step, self.due_us = step, self._now_us + step.timeout_us
@@ -444,7 +452,7 @@ class Dialogue:
         return self._step is not None
 
     def _request(self, step: SdoRequest) -> None:
-        """Send the request of a step; if necessary, send a fence or wait before it."""
+        """Send the request of a step. If necessary, send a fence or wait before the request."""
         at = step.index, step.sub
         self._step = step
         if not step.goes_on and at in self._unanswered:
@@ -473,4 +481,4 @@ _NAMING: Final = (
     sdo_frame.BlockDownloadInitiateResponse,
     sdo_frame.BlockUploadInitiateResponse,
 )
-"""Responses that name an object, the most frequent one first."""
+"""Responses that name an object. The most frequent response is first."""

@@ -14,7 +14,10 @@ MOST_BYTES: Final = 32_000_000
 
 
 def read_eds_bytes(path: Path) -> bytes:
-    """Read a file; OSError if it cannot be read, EdsError if it is too large for an EDS."""
+    """Read a file.
+
+    OSError is raised if it cannot be read, EdsError if it is too large for an EDS.
+    """
     with path.open("rb") as file:
         data = file.read(MOST_BYTES + 1)
     if len(data) > MOST_BYTES:
@@ -28,11 +31,11 @@ _OTHER_FILES: Final = {
     ".toml": "TOML, not an EDS; for a rig file use: tickrig check",
     ".dbc": "a DBC file, not an EDS; use: canmon dump LOG --dbc",
 }
-"""Files that users pass in place of an EDS, by suffix, and the command that accepts them."""
+"""Suffixes of files that users pass in place of an EDS, with the command that accepts them."""
 
 
 def _check_kind(path: Path, data: bytes) -> None:
-    """Raise EdsError if a file is of another kind by its name and is not an EDS by its sections."""
+    """Raise EdsError if the name of a file indicates another kind and its sections are no EDS."""
     other = _OTHER_FILES.get(path.suffix.lower())
     if other and b"[deviceinfo]" not in data.lower():
         raise EdsError([Finding(str(path), "", f"{other} {path}")])
@@ -42,8 +45,8 @@ def open_eds(path: Path) -> EdsFile:
     """Return the sections of a file.
 
     Raises:
-        OSError: it cannot be read.
-        EdsError: it is too large for an EDS, or a file of another kind.
+        OSError: the file cannot be read.
+        EdsError: the file is too large for an EDS, or is of another kind.
     """
     data = read_eds_bytes(path)
     _check_kind(path, data)
@@ -51,14 +54,14 @@ def open_eds(path: Path) -> EdsFile:
 
 
 def read_sheet(path: Path) -> tuple[EdsFile, EdsDevice]:
-    """Return the sections of a file and the device they describe; equal bytes are parsed only once.
+    """Return the sections of a file and the device they describe. Equal bytes are parsed only once.
 
     The sections and the device are shared between callers. Only read them, and do not add findings
     to the file.
 
     Raises:
         OSError: the file cannot be read.
-        EdsError: it is too large for an EDS, or a file of another kind.
+        EdsError: the file is too large for an EDS, or is of another kind.
     """
     data = read_eds_bytes(path)
     _check_kind(path, data)
@@ -67,20 +70,20 @@ def read_sheet(path: Path) -> tuple[EdsFile, EdsDevice]:
 
 @lru_cache(maxsize=16)  # all nodes of a bus, and each test of a bench, have the same few files
 def sheet_of(name: str, data: bytes) -> tuple[EdsFile, EdsDevice]:
-    """Return the sections of these bytes, and their device; see `read_sheet`."""
+    """Return the sections of these bytes and the device they describe; see `read_sheet`."""
     file = EdsFile(name, decode_text(data))
     return file, read_device(file)
 
 
 def read_sound(path: Path) -> tuple[EdsDevice, tuple[Finding, ...]]:
-    """Read the valid parts of such a file, for a host that displays or manages a device.
+    """Read the valid parts of an EDS, for a host that displays or manages a device.
 
     Returns:
         The device without its unusable objects, and all findings in the file.
 
     Raises:
         OSError: the file cannot be read.
-        EdsError: it has no usable object, or is too large.
+        EdsError: the file has no usable object, or is too large.
     """
     file, device = read_sheet(path)
     if not device.entries:

@@ -28,7 +28,7 @@ class SdoAborted(SdoFailed):
     """A transfer that was aborted.
 
     Attributes:
-        code: an AbortCode; an unknown code stays a number.
+        code: code as an AbortCode. An unknown code stays a number.
     """
 
     def __init__(self, index: int, sub: int, code: int) -> None:
@@ -41,7 +41,7 @@ class SdoTimeout(SdoFailed, TimeoutError):  # noqa: N818 - a timeout, as the bui
     """A transfer that the device did not answer.
 
     Attributes:
-        timeout_us: how long the host waited for an answer.
+        timeout_us: time that the host waited for an answer.
     """
 
     def __init__(self, index: int, sub: int, timeout_us: int = 0) -> None:

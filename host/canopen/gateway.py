@@ -1,6 +1,6 @@
 r"""A gateway for one client: SDO, NMT and its own settings (CiA 309-3, ASCII mapping).
 
-Lines that a client of a gateway sends (CiA 309-3, syntax of commands).
+The module reads lines that a client of a gateway sends (CiA 309-3, syntax of commands).
 
 >>> request = parse_request('[7] 1 4 w 0x2000 3 vs "Don said ""go"" # 1"  # a comment')
 >>> request.sequence, request.numbers, request.verb, request.words
@@ -8,7 +8,8 @@ Lines that a client of a gateway sends (CiA 309-3, syntax of commands).
 >>> parse_request("# nothing") is None
 True
 
-Data types of a gateway: what a client writes for the bytes of an object (CiA 309-3).
+It also converts the data types of a gateway, which a client writes for the bytes of an object (CiA
+309-3).
 
 >>> encode("i16", ["-2"]).hex(), decode("i16", b"\xfe\xff"), decode("x16", b"\x92\x01")
 ('feff', '-2', '0x0192')
@@ -42,7 +43,7 @@ from tickrig.wire.errors import FieldError
 
 
 class _GatewayErrorCode(IntEnum):
-    """Internal error code."""
+    """Internal error code of a gateway."""
 
     NOT_SUPPORTED = 100
     SYNTAX = 101
@@ -77,11 +78,11 @@ _TEXTS: Final = {
 
 
 class GatewayError(Exception):
-    """A command that is not executed.
+    """A command that the gateway does not execute.
 
     Args:
         code: error code of the reason.
-        text: the reason in words; the text of the code if empty.
+        text: reason in words. If it is empty, the text of the code is used.
     """
 
     def __init__(self, code: _GatewayErrorCode, text: str = "") -> None:
@@ -96,13 +97,13 @@ _MOST_NUMBERS: Final = 2
 
 
 class _GatewayRequest(NamedTuple):
-    """A command.
+    """A command of a client.
 
     Attributes:
-        sequence: number that its answer repeats.
-        numbers: the numbers before the verb: none, a node, or a net and a node.
-        verb: in lower case.
-        words: the words after the verb; strings without their quotes.
+        sequence: number that the answer to the command repeats.
+        numbers: numbers before the verb: none, a node, or a net and a node.
+        verb: verb in lower case.
+        words: words after the verb. Strings have no quotes.
     """
 
     sequence: int
@@ -112,16 +113,16 @@ class _GatewayRequest(NamedTuple):
 
 
 def _sequence_of(line: str) -> int:
-    """Return the sequence number of a line, 0 if it has none."""
+    """Return the sequence number of a line, or 0 if the line has none."""
     found = _SEQUENCE.match(line)
     return int(found[1]) if found and int(found[1]) <= _MAX_NUMBER else 0
 
 
 def parse_request(line: str) -> _GatewayRequest | None:
-    """Read a line; None for an empty one and for a comment.
+    """Read a line. Return None for an empty line and for a comment.
 
     Raises:
-        GatewayError: it is not a command.
+        GatewayError: the line is not a command.
     """
     if not line.strip() or line.lstrip().startswith("#"):
         return None
@@ -143,7 +144,7 @@ def parse_request(line: str) -> _GatewayRequest | None:
 
 
 def number(word: str, most: int, what: str, least: int = 0) -> int:
-    """Read a decimal or hexadecimal number; GatewayError names the quantity."""
+    """Read a decimal or hexadecimal number. The text of a GatewayError names the quantity."""
     try:
         value = int(word, 16) if word[:2].lower() == "0x" else int(word)
     except ValueError:
@@ -161,7 +162,7 @@ def _one_of(word: str, words: Collection[str], what: str) -> str:
 
 
 def _check_count(request: _GatewayRequest, least: int, most: int | None) -> None:
-    """Refuse a command with fewer words behind it than `least`, or more than `most`."""
+    """Refuse a command whose number of words after the verb is not from `least` to `most`."""
     count = len(request.words)
     if count < least or (most is not None and count > most):
         raise GatewayError(
@@ -184,7 +185,7 @@ def _words(text: str) -> list[str]:
 
 
 HEX: Final = "hex"
-"""Bytes: the type of CANopenNode, and the format if no type is given."""
+"""Data type for bytes. It is the type of CANopenNode, and the format if no type is given."""
 
 NUMBERS: Final = {
     "b": DataType.BOOLEAN,
@@ -219,7 +220,7 @@ _UNSHOWN: Final = str.maketrans("", "", "\0\r\n")
 
 
 def _data_type(word: str) -> str:
-    """Return the name of a data type, in lower case; GatewayError if it is unknown."""
+    """Return the name of a data type in lower case. Raise GatewayError if the type is unknown."""
     return _one_of(word, _NAMES, "data type")
 
 
@@ -227,11 +228,11 @@ def encode(name: str, words: Sequence[str]) -> bytes:
     """Return the bytes of a value.
 
     Args:
-        name: of `_NAMES`.
-        words: the value as the client wrote it; a single word except for `hex`.
+        name: name of a data type in `_NAMES`.
+        words: value as the client wrote it. It is a single word except for `hex`.
 
     Raises:
-        GatewayError: it is not a value of this type.
+        GatewayError: the words are not a value of this type.
     """
     text = " ".join(words)
     try:
@@ -250,11 +251,11 @@ def encode(name: str, words: Sequence[str]) -> bytes:
 
 
 def decode(name: str, data: bytes) -> str:
-    """Return the text for the bytes of an object; hexadecimal if they do not fit the type.
+    """Return the text for the bytes of an object, in hexadecimal if they do not fit the type.
 
     Args:
-        name: of `_NAMES`, empty if the client names none.
-        data: the bytes.
+        name: name of a data type in `_NAMES`, empty if the client names no type.
+        data: bytes of the object.
     """
     if name == _STRING:
         return '"' + data.decode("latin-1").translate(_UNSHOWN).replace('"', '""') + '"'
@@ -385,7 +386,7 @@ def _scan(lss: LssMaster, request: _GatewayRequest) -> str:
 
 
 def _all_nodes(lss: LssMaster, request: _GatewayRequest) -> str:
-    """Assign a node-ID to each slave without one; list the node-IDs before OK."""
+    """Assign a node-ID to each slave without one. List the node-IDs before OK."""
     words = _numbers(request, 0, 3)
     if len(words) == 2:
         raise GatewayError(
@@ -465,15 +466,15 @@ vs: visible string, in double quotes; os, us, d: base64; hex: bytes as 01 AB"""
 
 
 class Gateway:
-    """Answers the lines of one client; each client has its own settings.
+    """Gateway that answers the lines of one client. Each client has its own settings.
 
     Not emulated: PDO and emergency commands, device commands such as `set heartbeat`, unsolicited
     events, SDO block transfer.
 
     Args:
-        bus: the net.
+        bus: bus of the net.
         net: number of the net.
-        version: version of the gateway, for `info version`.
+        version: version of the gateway, used for `info version`.
     """
 
     def __init__(self, bus: NodeBus, net: int, version: str) -> None:
@@ -491,7 +492,7 @@ class Gateway:
         }
 
     def answer(self, line: str) -> str:
-        """Answer a line without its line end; the answer to an empty line or a comment is empty."""
+        """Answer a line without its line end. An empty line or a comment gets an empty answer."""
         try:
             request = parse_request(line)
             return "" if request is None else _numbered(request, self._carry_out(request))
@@ -514,7 +515,7 @@ class Gateway:
         return verb(request)
 
     def _node_of(self, request: _GatewayRequest, least: int) -> int:
-        """Return the node that a command addresses; 0 stands for all nodes."""
+        """Return the node-ID that a command addresses. 0 stands for all nodes."""
         *net, node = request.numbers or (-1,)
         self._check_net(net)
         if node == -1:
@@ -591,7 +592,7 @@ class Gateway:
 
 
 def _numbered(request: _GatewayRequest, text: str) -> str:
-    """Return an answer with its number; remarks are separate lines before the answer."""
+    """Return an answer with its number. Remarks are separate lines before the answer."""
     remarks, end, value = text.rpartition("\n") if text.startswith("#") else ("", "", text)
     return f"{remarks}{end}[{request.sequence}] {value}"
 

@@ -1,4 +1,4 @@
-"""One node of a network, as the host sees it: requests to it, and its frames."""
+"""One node of a network as the host sees it, with requests to the node and frames of the node."""
 
 # Theory of operation.
 #
@@ -52,11 +52,11 @@ _STATE_BITS: Final = 0x7F
 _TOGGLE: Final = 0x80
 
 _Listen = Callable[[int], tuple[int, StampedFrames]]
-"""Waits for a first frame until a time; returns a time, and all frames that had arrived by then."""
+"""Function that waits for a first frame until a time. It returns a time, and all frames so far."""
 
 
 def state_of(frame: CanFrame) -> NmtState | None:
-    """Return the state that an error control frame reports; None if it reports none."""
+    """Return the state that an error control frame reports, or None if it reports none."""
     try:
         return NmtState(frame.data[0] & _STATE_BITS) if len(frame.data) == 1 else None
     except ValueError:
@@ -64,17 +64,17 @@ def state_of(frame: CanFrame) -> NmtState | None:
 
 
 class ErrorControl:
-    """Detects the loss of a node: by its heartbeat, or by node guarding.
+    """Error control that detects the loss of a node by its heartbeat or by node guarding.
 
     Args:
-        heartbeat_us: consumer heartbeat time, 0 for none.
-        guard_us: guard time, 0 for none.
+        heartbeat_us: consumer heartbeat time, or 0 for none.
+        guard_us: guard time, or 0 for none.
         life_time_factor: number of requests without an answer after which the node is lost.
-        request: sends a request of node guarding.
+        request: function that sends a request of node guarding.
 
     Attributes:
-        due_us: when to call `tick` next.
-        what: `heartbeat` or `guarding`.
+        due_us: time of the next call of `tick`.
+        what: name of the protocol, `heartbeat` or `guarding`.
         silence_us: time without a frame of the node after which the node is lost.
     """
 
@@ -93,7 +93,7 @@ class ErrorControl:
         self.due_us = NEVER
 
     def begin(self, now_us: int) -> None:
-        """Begin to guard; the supervision of a heartbeat starts with the first heartbeat."""
+        """Begin to guard. The supervision of a heartbeat starts with the first heartbeat."""
         if self._guard_us:
             self.due_us, self._unanswered = now_us + self._guard_us, 0
 
@@ -106,7 +106,7 @@ class ErrorControl:
             self._toggle, self._unanswered = toggle, 0
 
     def tick(self, now_us: int) -> bool:
-        """Do the work that is due; return True if the node is now lost."""
+        """Do the work that is due. Return True if the node is now lost."""
         if now_us < self.due_us:
             return False
         if self._heartbeat_us:
@@ -125,16 +125,16 @@ class NodeSession:
     """The requests of a host to one node, and the frames of this node.
 
     Args:
-        node_id: the node, 1..127.
-        send: sends a data frame; takes CAN-ID and data.
-        guard: sends a remote frame; takes the CAN-ID.
-        sdo_timeout_us: how long to wait for an SDO response.
-        on_misnamed: see `Dialogue`.
+        node_id: node-ID of the node, 1..127.
+        send: function that sends a data frame. Its arguments are CAN-ID and data.
+        guard: function that sends a remote frame. Its argument is the CAN-ID.
+        sdo_timeout_us: time to wait for an SDO response.
+        on_misnamed: function that is called with answers that name another object; see `Dialogue`.
 
     Attributes:
-        node_id: as given.
-        dialogue: runs the scripts.
-        state: last reported state, None until the first report.
+        node_id: node-ID of the node.
+        dialogue: dialogue that runs the scripts.
+        state: last reported state, or None until the first report.
     """
 
     def __init__(
@@ -152,7 +152,10 @@ class NodeSession:
         self._error_control = ERROR_CONTROL_COB_ID + node_id
 
     def receive(self, now_us: int, frame: CanFrame) -> NmtState | None:
-        """Process a frame of the bus; return the state that it reports, None if it reports none."""
+        """Process a frame of the bus.
+
+        Return the state that it reports, or None if it reports none.
+        """
         can_id, data, remote, extended, _ = frame
         if remote or extended:
             return None
@@ -168,8 +171,8 @@ class NodeSession:
         """Run a script to its end, and return its result or raise its error.
 
         Args:
-            script: the script; no other script runs at the same time.
-            listen: waits for frames.
+            script: script to run. No other script runs at the same time.
+            listen: function that waits for frames.
 
         Raises:
             LinkClosed: the bus is gone.

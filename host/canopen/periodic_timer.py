@@ -1,4 +1,4 @@
-"""A timer for periods, based on regular polling."""
+"""A timer for periods that is polled regularly."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ from tickrig.wire.instant import NEVER
 
 
 class PeriodicTimer:
-    """Reports the end of each period; after a pause it reports once, not for each missed period.
+    """Timer that reports the end of each period.
+
+    After a pause, the timer reports once, not for each missed period.
 
     >>> timer = PeriodicTimer(100)
     >>> timer.start(0)
@@ -14,10 +16,10 @@ class PeriodicTimer:
     [False, True, False, True, False, True]
 
     Args:
-        period_us: the period, 0 for none.
+        period_us: period, or 0 for none.
 
     Attributes:
-        due_us: end of the current period; `NEVER` before the start, or if the period is 0.
+        due_us: end of the current period. It is `NEVER` before the start, or if the period is 0.
     """
 
     def __init__(self, period_us: int) -> None:
@@ -29,7 +31,7 @@ class PeriodicTimer:
             self.due_us = now_us + self._period_us
 
     def advance(self, now_us: int) -> bool:
-        """Start the next period if the current one has ended; return whether it has ended.
+        """Start the next period if the current period has ended. Return whether it has ended.
 
         The end of the next period is the same as without a pause.
         """

@@ -1,4 +1,4 @@
-"""SDO transfers as scripts: expedited and segmented (CiA 301, SDO protocols).
+"""SDO transfers as scripts, either expedited or segmented (CiA 301, SDO protocols).
 
 The client of the canopen library blocks in its own thread until the answer arrives. The code here
 must not block, and runs in virtual time. Therefore tickrig has its own client. Block transfer is
@@ -23,10 +23,10 @@ def upload(index: int, sub: int, size: int = 0) -> Script[bytes]:
     """Read an object.
 
     Args:
-        index: of the object.
-        sub: its sub-index.
-        size: size of the object in bytes, 0 if unknown. It is used for an expedited answer that
-            does not indicate how many of its four bytes are data (CiA 301, 7.2.4.3.5).
+        index: index of the object.
+        sub: sub-index of the object.
+        size: size of the object in bytes, or 0 if unknown. The size is used for an expedited answer
+            that does not indicate how many of its four bytes are data (CiA 301, 7.2.4.3.5).
 
     Raises:
         SdoAborted: the device refuses, or sends an unexpected answer.
@@ -42,7 +42,7 @@ def upload(index: int, sub: int, size: int = 0) -> Script[bytes]:
 
 
 def download(index: int, sub: int, data: bytes) -> Script[None]:
-    """Write an object; raises as `upload`."""
+    """Write an object. Raises as `upload` does."""
     if 1 <= len(data) <= EXPEDITED_BYTES:
         request = sdo.DownloadInitiateRequest(index, sub, data, len(data))
     else:
@@ -93,7 +93,7 @@ def _download_segments(index: int, sub: int, data: bytes) -> Script[None]:
 
 
 def _fail(index: int, sub: int, answer: Answer) -> Script[bytes]:
-    """Raise the error of an unexpected answer; abort the transfer unless the device aborted it."""
+    """Raise the error of an unexpected answer. Abort the transfer unless the device aborted it."""
     if isinstance(answer, sdo.Abort):
         raise SdoAborted(index, sub, answer.code)
     toggled = isinstance(answer, sdo.Segment | sdo.DownloadSegmentResponse)

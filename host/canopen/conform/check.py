@@ -18,14 +18,14 @@ Address = tuple[int, int]
 """Index and sub-index."""
 
 ANSWER_MS: Final = 1_000
-"""How long a check waits for an answer if it gives no time: CiA 301 defines none."""
+"""Time that a check waits for an answer if the check sets no time. CiA 301 defines none."""
 
 # What a step does on the bus.
 
 
 @dataclass(frozen=True, slots=True)
 class Send:
-    """Send a frame, as candump writes it."""
+    """Step that sends a frame, given in candump notation."""
 
     frame: str
     extended: bool = False
@@ -33,7 +33,10 @@ class Send:
 
 @dataclass(frozen=True, slots=True)
 class Expect:
-    """Wait for the next frame with a CAN-ID; it must match one of the patterns."""
+    """Step that waits for the next frame with a CAN-ID.
+
+    The frame must match one of the patterns.
+    """
 
     patterns: tuple[str, ...]
     within_ms: int = ANSWER_MS
@@ -41,7 +44,7 @@ class Expect:
 
 @dataclass(frozen=True, slots=True)
 class ExpectNone:
-    """Wait; no frame with this CAN-ID may come."""
+    """Step that waits. No frame with this CAN-ID may come."""
 
     can_id: str
     for_ms: int
@@ -49,7 +52,7 @@ class ExpectNone:
 
 @dataclass(frozen=True, slots=True)
 class Count:
-    """Wait; between `least` and `most` matching frames must come."""
+    """Step that waits. Between `least` and `most` matching frames must come."""
 
     pattern: str
     for_ms: int
@@ -59,7 +62,7 @@ class Count:
 
 @dataclass(frozen=True, slots=True)
 class Period:
-    """Wait; matching frames must come with a period of `each_ms`."""
+    """Step that waits. Matching frames must come with a period of `each_ms`."""
 
     pattern: str
     each_ms: int
@@ -68,26 +71,26 @@ class Period:
 
 @dataclass(frozen=True, slots=True)
 class Wait:
-    """Let time pass."""
+    """Step that lets time pass."""
 
     for_ms: int
 
 
 @dataclass(frozen=True, slots=True)
 class Forget:
-    """Drop the frames of a CAN-ID that have come."""
+    """Step that drops the received frames of a CAN-ID."""
 
     can_id: str
 
 
 @dataclass(frozen=True, slots=True)
 class Act:
-    """Operate an input of the device, compare an output, or switch the power.
+    """Step that operates an input of the device, compares an output, or switches the power.
 
     Attributes:
         words: arguments of the stimulus, such as `input`, `6000:01`, `01`.
-        within_ms: time limit of the action; if the action takes longer, the check is inconclusive.
-            None allows any time.
+        within_ms: time limit of the action, or None for any time. If the action takes longer, the
+            check is inconclusive.
     """
 
     words: tuple[str, ...]
@@ -96,10 +99,10 @@ class Act:
 
 @dataclass(frozen=True, slots=True)
 class Macro:
-    """Do an operation of many frames.
+    """Step that performs an operation of many frames.
 
     Attributes:
-        words: texts, and addresses of objects once the check is bound.
+        words: texts, and also addresses of objects once the check is bound.
     """
 
     name: str
@@ -111,28 +114,32 @@ class OfObject:
     """A step about one object.
 
     Attributes:
-        at: the object: a name, or `1017:00`; once it is bound, index and sub-index.
+        at: object as a name or as `1017:00`. Once the step is bound, it is an index and a
+            sub-index.
     """
 
     at: str | Address
 
     @property
     def address(self) -> Address:
-        """Index and sub-index of a bound step."""
+        """Index and sub-index of the object of a bound step."""
         assert not isinstance(self.at, str)
         return self.at
 
 
 @dataclass(frozen=True, slots=True)
 class Write(OfObject):
-    """Write an object; the node must accept the value."""
+    """Step that writes an object. The node must accept the value."""
 
     data: str
 
 
 @dataclass(frozen=True, slots=True)
 class RefuseWrite(OfObject):
-    """Write an object; the node must refuse it with one of the SDO abort codes."""
+    """Step that writes an object.
+
+    The node must refuse the value with one of the SDO abort codes.
+    """
 
     data: str
     codes: tuple[str, ...]
@@ -140,40 +147,40 @@ class RefuseWrite(OfObject):
 
 @dataclass(frozen=True, slots=True)
 class Read(OfObject):
-    """Read an object; its value must match the pattern."""
+    """Step that reads an object. The value must match the pattern."""
 
     data: str
 
 
 @dataclass(frozen=True, slots=True)
 class ReadOther(OfObject):
-    """Read an object; it must not have this value."""
+    """Step that reads an object. The object must not have this value."""
 
     data: str
 
 
 @dataclass(frozen=True, slots=True)
 class RefuseRead(OfObject):
-    """Read an object; the node must refuse it with one of the SDO abort codes."""
+    """Step that reads an object. The node must refuse with one of the SDO abort codes."""
 
     codes: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Keep(OfObject):
-    """Declare that the check changes an object by other means; it is restored at the end."""
+    """Step that marks an object as changed by other means. The object is restored at the end."""
 
 
 @dataclass(frozen=True, slots=True)
 class Hold(OfObject):
-    """Read an object; it must have a value of its data type.
+    """Step that reads an object. The object must have a value of its data type.
 
     Attributes:
         kind: name of the data type.
-        low: its lowest value, None for that of the type.
-        high: its highest.
-        value: the value in hex, None for any.
-        codes: SDO abort codes with which the node may refuse instead.
+        low: lowest value of the object, or None for the lowest value of the type.
+        high: highest value of the object, or None for the highest value of the type.
+        value: value in hex, or None for any value.
+        codes: SDO abort codes with which the node may refuse the read instead.
     """
 
     kind: str
@@ -185,7 +192,10 @@ class Hold(OfObject):
 
 @dataclass(frozen=True, slots=True)
 class RefuseRewrite(OfObject):
-    """Read an object and write it back, longer by `grow` bytes; the node must refuse that."""
+    """Step that reads an object and writes it back, longer by `grow` bytes.
+
+    The node must refuse.
+    """
 
     grow: int
     codes: tuple[str, ...]
@@ -217,8 +227,8 @@ class Step(NamedTuple):
 
     Attributes:
         action: the action of the step.
-        given: whether the step is a preparation; if it fails, the check is inconclusive.
-        at_end: whether the step is always done at the end; such a step cannot fail the check.
+        given: whether the step is a preparation. If a preparation fails, the check is inconclusive.
+        at_end: whether the step is always done at the end. Such a step cannot fail the check.
     """
 
     action: Action
@@ -227,23 +237,29 @@ class Step(NamedTuple):
 
 
 class Level(IntEnum):
-    """What a run may do to the node; each level includes the levels before it."""
+    """The actions that a run may do to the node. Each level includes the levels before it."""
 
     READ_ONLY = 0
-    """SDO uploads and listening; no downloads, not even a download that the node must refuse."""
+    """SDO uploads and listening.
+
+    There are no downloads, not even a download that the node must refuse.
+    """
     COMMUNICATION = 1
-    """Communication objects, refused downloads, NMT, SYNC, PDO, error control; all restored."""
+    """Communication objects, refused downloads, NMT, SYNC, PDO and error control.
+
+    All are restored.
+    """
     INTRUSIVE = 2
-    """Reset node, LSS, store and restore, further objects of the manufacturer."""
+    """Reset node, LSS, store and restore, and further objects of the manufacturer."""
 
     @property
     def word(self) -> str:
-        """Name of the option on the command line."""
+        """Name of the level in the option on the command line."""
         return self.name.lower().replace("_", "-")
 
 
 STIMULUS: Final = "stimulus"
-"""Need of a check that operates the inputs of the device."""
+"""Name of the feature that operates the inputs of the device."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -251,14 +267,15 @@ class Check:
     """One question to a node.
 
     Attributes:
-        id: for example `NMT-03`; `OD-2000.00-type` for checks of an object of the EDS.
-        group: for example `NMT`.
-        title: what a conforming node does.
-        source: document, version and clause; `practice` if no clause is certain.
+        id: name of the check, such as `NMT-03`, or `OD-2000.00-type` for checks of an object of the
+            EDS.
+        group: group of the check, such as `NMT`.
+        title: sentence that states what a conforming node does.
+        source: document, version and clause, or `practice` if no clause is certain.
         level: the lowest level that the check needs.
-        needs: features without which the check is not applicable; `STIMULUS` is one of them.
-        choice: why the device may choose the answer; empty if the clause decides.
-        steps: what the tester sends, expects, counts and waits for.
+        needs: features without which the check is not applicable. `STIMULUS` is one of them.
+        choice: reason why the device may choose the answer, empty if the clause decides.
+        steps: steps that send, expect, count or wait.
     """
 
     id: str
@@ -274,13 +291,13 @@ class Check:
 # The options of a run of the tester.
 
 _WILD: Final = re.compile(r"[*?[]")
-"""The first character of a pattern part that is not fixed."""
+"""Pattern for the first character that is not fixed in a part of a frame pattern."""
 
 Stimulus = Callable[..., str]
-"""Operates the inputs of the device.
+"""Function that operates the inputs of the device.
 
-Takes words such as `input 6000:01 01`, and returns the answer. Raises ValueError if it cannot do
-the operation.
+The function takes words such as `input 6000:01 01`, and returns the answer. It raises ValueError if
+it cannot do the operation.
 """
 
 
@@ -289,20 +306,21 @@ class ConformancePlan:
     """The options of a run.
 
     Attributes:
-        level: what the run may do to the node.
-        only: names of groups or checks, with * and ?, in any case; all if empty.
+        level: highest level of the actions that the run may do to the node.
+        only: names of groups or checks, with * and ?, in upper or lower case. If it is empty, all
+            checks are selected.
         allow: indices of profile objects (6000h to 9FFFh) that may be written.
-        never: indices of objects that are never written, even if another option allows it.
-        bit_rate: of the bus in bit/s, None if unknown.
+        never: indices of objects that are never written, even if another option allows the write.
+        bit_rate: bit rate of the bus in bit/s, or None if unknown.
         max_load: share of the bit rate that the tester may use, above 0 to 1.
-        seed: seed for the order of the objects; 0 keeps the order of the dictionary.
-        stimulus: operates the inputs of the device, None if there is none.
-        confirm: called before actions that concern other nodes or cannot be undone; returns whether
-            to do them.
-        longest_s: after this time no further check starts.
-        resolution_us: resolution of the adapter's time stamps.
-        shared_host: whether the node may be a process of this machine, which is delayed together
-            with the tester.
+        seed: seed for the order of the objects. 0 keeps the order of the dictionary.
+        stimulus: function that operates the inputs of the device, or None if there is none.
+        confirm: function that is called before actions that concern other nodes or cannot be
+            undone. It returns whether to do them.
+        longest_s: time in seconds after which no further check starts.
+        resolution_us: resolution of the time stamps of the adapter.
+        shared_host: whether the node may be a process of this machine. Such a node is delayed
+            together with the tester.
     """
 
     level: Level = Level.READ_ONLY
@@ -319,7 +337,7 @@ class ConformancePlan:
     shared_host: bool = False
 
     def chooses(self, check: Check) -> bool:
-        """Return whether a check is selected: by its level, and by its name or group."""
+        """Return whether a check is selected by its level, and by its name or group."""
         if check.level > self.level:
             return False
         named = (check.id.upper(), check.group)
@@ -328,11 +346,12 @@ class ConformancePlan:
         )
 
     def may_choose(self, group: str, place: str = "") -> bool:
-        """Return whether a check of a group may be selected; used before the check is made.
+        """Return whether a check of a group may be selected. This is used before the check is made.
 
         Args:
-            group: of the check.
-            place: the part of its id after the group: `1017.00` for checks of this object.
+            group: group of the check.
+            place: part of the check's id after the group, such as `1017.00` for checks of this
+                object.
         """
         begun = f"{group}-{place}".upper()
         for pattern in map(str.upper, self.only):

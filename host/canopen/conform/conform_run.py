@@ -1,4 +1,4 @@
-"""A run of the tester: selection and order of the checks, and their verdicts."""
+"""A run of the tester, with selection and order of the checks, and their verdicts."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def _describe_settings(plan: ConformancePlan, others: Collection[int]) -> dict[s
 
     Args:
         plan: options of the run.
-        others: node-IDs that were on the bus.
+        others: node-IDs of other nodes that were on the bus.
     """
     rate = f"{plan.bit_rate} bit/s" if plan.bit_rate else f"{ASSUMED_BIT_RATE} bit/s, assumed"
     nodes = ", ".join(str(node) for node in sorted(set(others) - {0})) or "none"
@@ -69,21 +69,20 @@ def _describe_settings(plan: ConformancePlan, others: Collection[int]) -> dict[s
 
 _SPARE_MS: Final = 1_000
 _MISSED: Final = 3
-"""Periods without a heartbeat after which it counts as gone."""
+"""Number of periods without a heartbeat after which the heartbeat counts as gone."""
 
 
 class _StrayHeartbeat:
     """The heartbeat of a node before the run.
 
     Args:
-        exchange: the bus.
-        node_id: of the node, 1..127.
+        exchange: bus of the node.
+        node_id: node-ID of the node, 1..127.
 
     Attributes:
         stamps: times at which heartbeats arrived before the run, in bus time.
-        finding: the contradiction to 1017h, in words; empty if there is none.
-        unrestored: the message that the heartbeat is missing after the run; empty if it is not
-            missing.
+        finding: contradiction between the heartbeat and 1017h in words, empty if there is none.
+        unrestored: message that the heartbeat is missing after the run, empty if it is not missing.
     """
 
     def __init__(self, exchange: BusExchange, node_id: int) -> None:
@@ -94,13 +93,13 @@ class _StrayHeartbeat:
         self.finding = self.unrestored = ""
 
     def hear(self) -> None:
-        """Read the received heartbeats; responses to node guarding do not count."""
+        """Read the received heartbeats. Responses to node guarding do not count."""
         heard = self._exchange.unread(self._can_id)
         if not any(frame.remote for _, frame in heard):
             self.stamps = [at_us for at_us, frame in heard if matches(self._pattern, str(frame))]
 
     def compare(self, period_ms: int | None) -> None:
-        """Compare the heartbeat with 1017h; None if the node has no 1017h."""
+        """Compare the heartbeat with 1017h. The value is None if the node has no 1017h."""
         self._period_ms = period_ms
         if not period_ms:
             self.finding = f"{self._text()}, but {self._said()}"
@@ -130,32 +129,32 @@ class _StrayHeartbeat:
 
 
 _LISTEN_MS: Final = 1_000
-"""Listening time at the start: which other nodes are on the bus?"""
+"""Time at the start in which the tester listens for other nodes on the bus."""
 
 _EXAMINE_US: Final = 120_000_000
-"""The longest time to read the node before the first check."""
+"""The longest time for reading the node before the first check."""
 
 _INTEGERS: Final = {1: "u8", 2: "u16", 3: "u24", 4: "u32", 5: "u40", 6: "u48", 7: "u56", 8: "u64"}
-"""Types by the size of a value in bytes."""
+"""Names of integer types by the size of a value in bytes."""
 
 _MOST_CRASHES: Final = 20
 """Number of different crashes of the node's program to report."""
 
 Crash = Callable[[str, list[str]], object]
-"""Called with the error of the node's program in one line, and the source lines that raised it."""
+"""Function called with an error of the node's program and the source lines that raised it."""
 
 
 class ConformRun:
-    """Tests one node.
+    """A run that tests one node.
 
     Args:
-        link: the bus; no other code may read from this link.
-        node_id: of the node, 1..127.
+        link: connection to the bus. No other code may read from this link.
+        node_id: node-ID of the node, 1..127.
         plan: options of the run.
-        device: the device of the EDS, None to query the node.
-        claims: what the EDS says besides the objects.
-        source: the bus, as the user named it.
-        on_result: called with each result.
+        device: device that the EDS describes, or None to query the node.
+        claims: statements of the EDS besides the objects.
+        source: name of the bus, as the user entered it.
+        on_result: function that is called with each result.
     """
 
     def __init__(  # noqa: PLR0913 - a run, by keyword
@@ -200,15 +199,15 @@ class ConformRun:
         """Make the running check fail, because the program of the node crashed and starts again.
 
         Args:
-            reason: the error in one line.
-            where: the source lines that raised it.
+            reason: error in one line.
+            where: source lines that raised the error.
         """
         if len(self._crashes) < _MOST_CRASHES:
             self._crashes[reason] = None
         self._exchange.crash(reason, where)
 
     def run(self) -> Report:
-        """Test the node and return the report; in any case, restore what was changed.
+        """Test the node and return the report. In any case, restore what was changed.
 
         Ctrl-C ends the run with a report of the checks that have ended. A second Ctrl-C, while the
         node is being restored, ends the restoring.
@@ -225,7 +224,7 @@ class ConformRun:
         return self._report(aborted)
 
     def _run(self) -> str:
-        """Run the checks; return why no check could be judged, empty if a check was judged."""
+        """Run the checks. Return why no check could be judged, or an empty text."""
         self._exchange.begin(min(_EXAMINE_US, self._longest_us))
         self._exchange.wait(_LISTEN_MS)
         self._stray.hear()
@@ -240,7 +239,7 @@ class ConformRun:
         return ""
 
     def _give_up(self, error: Exception) -> str:
-        """Return why no check can run, because no node, or more than one, has the node-ID."""
+        """Return why no check can run: no node has the node-ID, or more than one."""
         presence = self._exchange.presence
         crashed = next(iter(self._crashes), "")
         if crashed or presence is Presence.ONE:
@@ -273,7 +272,7 @@ class ConformRun:
         self._care.prepare(subject.restorable(self._plan.level), subject.binding.reader.held)
 
     def _object_checks(self) -> list[Check]:
-        """Make the selected checks of the objects of the EDS; without an EDS there are none."""
+        """Return the selected checks of the objects of the EDS; none without an EDS."""
         plan = self._plan
         if self._device is None or not plan.may_choose(OBJECTS):
             return []
@@ -313,7 +312,7 @@ class ConformRun:
         self._on_result(result)
 
     def _restore(self, *, patient: bool) -> None:
-        """Restore the node; the first Ctrl-C of a run does not prevent it."""
+        """Restore the node. The first Ctrl-C of a run does not prevent this."""
         try:
             self._care.restore()
         except KeyboardInterrupt:

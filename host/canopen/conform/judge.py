@@ -1,4 +1,4 @@
-"""Runs one check: permission, verdict, and a repetition after a failure."""
+"""Judge of one check: permission, verdict, and a repetition after a failure."""
 
 # Theory of operation.
 #
@@ -73,13 +73,13 @@ from tickrig.host.canopen.conform.subject import Subject
 from tickrig.host.canopen.conform.verdict import CheckOutcome, CheckVerdict, FrameLine, Result
 
 _LSS_ANSWER: Final = "7E4#"
-"""CAN-ID of all LSS slaves; a frame does not show which slave sent it."""
+"""CAN-ID that all LSS slaves share. A frame does not show which slave sent it."""
 _HISTORY: Final = (0x1003, 0)
 _PDO_PARAMETERS: Final = (*range(0x1400, 0x1600), *range(0x1800, 0x1A00))
 _EMPTIED: Final = "empty the error history 1003h, which cannot be written back"
 _START: Final = "000#01"
 _UPLOADS: Final = ("UE", "US", "BU", "OD")
-"""Groups that judge uploads; the checks of other groups only use them to read values."""
+"""Groups that judge uploads. The checks of other groups only use uploads to read values."""
 _UNSEEN: Final = "could not be read back, see the checks of group US"
 _UNPREPARED: Final = "could not be prepared"
 _MAY_BE_CONSTANT: Final = frozenset(
@@ -102,7 +102,7 @@ def _is_segment(command: str) -> bool:
 
 
 def _enables(action: Action) -> bool:
-    """Return whether a step sets the COB-ID of a PDO; every device accepts its own COB-ID."""
+    """Return whether a step sets the COB-ID of a PDO. Every device accepts its own COB-ID."""
     index, sub = action.address if isinstance(action, Write) else (0, 0)
     return isinstance(action, Macro) or (index in _PDO_PARAMETERS and sub == 1)
 
@@ -119,14 +119,14 @@ def _starts(step: Step) -> bool:
 
 
 class Judge:
-    """Plays checks on a node that is in the state in which every check begins.
+    """Judge that plays checks on a node in the state in which every check begins.
 
     Args:
         plan: options of the run.
-        exchange: the bus.
-        player: plays steps on it.
-        care: restores the node after a check.
-        permission: decides what may be written.
+        exchange: bus of the node.
+        player: player that plays steps on the bus.
+        care: object that restores the node after a check.
+        permission: permission that decides which objects may be written.
     """
 
     def __init__(
@@ -141,7 +141,7 @@ class Judge:
         self._care, self._permission = care, permission
 
     def result(self, check: Check, subject: Subject) -> Result:
-        """Judge a check; repeat one that failed, and report both attempts."""
+        """Judge a check. Repeat a check that failed, and report both attempts."""
         bound = self._bind(check, subject)
         if isinstance(bound, str):
             return Result(check, CheckOutcome(CheckVerdict.NOT_APPLICABLE, bound))
@@ -161,7 +161,7 @@ class Judge:
         return Result(check, again, first)
 
     def _bind(self, check: Check, subject: Subject) -> BoundCheck | str:
-        """Return the check with the numbers of the node, or why it cannot be played."""
+        """Return the check with the numbers of the node, or the reason why it cannot be played."""
         for word in sorted(check.needs - subject.features.words):
             if word != STIMULUS:
                 return subject.features.reasons.get(word, f"the node has no {word}")
@@ -186,7 +186,7 @@ class Judge:
         return bound
 
     def _as_found(self, step: Step) -> Step:
-        """Omit the value of an object before the run, if the tester has written another value."""
+        """Omit an object's value from before the run, if the tester has written another one."""
         action = step.action
         if not isinstance(action, Hold) or action.value is None:
             return step
@@ -196,7 +196,7 @@ class Judge:
         return step._replace(action=replace(action, value=None))
 
     def _unread(self, bound: BoundCheck, subject: Subject) -> str:
-        """Return why the objects of a check could not be restored; empty if they can be."""
+        """Return why the objects of a check could not be restored, or an empty text."""
         written = bound.changed & subject.has | bound.written & subject.values
         if self._plan.level is Level.READ_ONLY or not (unread := self._care.unread(written)):
             return ""

@@ -1,4 +1,4 @@
-"""Prepares the node for checks, recovers it, and restores its initial state."""
+"""Preparation of the node for checks, its recovery, and restoring its initial state."""
 
 from __future__ import annotations
 
@@ -32,30 +32,31 @@ _QUIET: Final = (
     (0x1019, 0),
     (0x1029, 1),
 )
-"""Objects that are 0 when a check begins: no SYNC, guarding or heartbeat."""
+"""Objects that are 0 when a check begins, so that there is no SYNC, guarding or heartbeat."""
 _CONSUMERS: Final = 0x1016
 _PDOS: Final = (*range(0x1400, 0x1600), *range(0x1800, 0x1A00))
 INHIBIT_TIME, EVENT_TIMER = 3, 5
 _TIMERS: Final = (INHIBIT_TIME, EVENT_TIMER)
-"""These let PDOs be sent, or held back, or missed, by themselves."""
+"""Timers by which PDOs are sent, held back, or missed without a request of the tester."""
 _TEXTS: Final = range(0x1008, 0x100B)
 _NONE: Final[Mapping[Address, bytes]] = MappingProxyType({})
 _NUMBERS: Final = range(9)
-"""A value of at most this size is a number, not a text."""
+"""Sizes of a value that is a number. A longer value is a text."""
 
 
 class KnownState:
-    """Values of the node before the run, and in the state in which checks begin.
+    """Values of the node before the run, and values in the state in which checks begin.
 
     Args:
-        exchange: the bus.
-        client: reads and writes the node.
+        exchange: bus of the node.
+        client: client that reads and writes the node.
 
     Attributes:
         original: values of objects before the run.
         written: objects that may have changed and have not been verified since.
         all_written: objects written in this run.
-        stored: objects written by checks that store parameters: a reset may bring the values back.
+        stored: objects written by checks that store parameters. A reset may bring these values
+            back.
         unrestored: objects that could not be restored, one per line.
         repairs: writes that restore the remaining objects, in this order.
     """
@@ -76,11 +77,11 @@ class KnownState:
         self._silent = 0
 
     def learn(self, addresses: Iterable[Address], held: Mapping[Address, bytes] = _NONE) -> None:
-        """Read objects that are not known yet; objects that cannot be read are not restored.
+        """Read objects that are not known yet. Objects that cannot be read are not restored.
 
         Args:
             addresses: addresses of the objects.
-            held: values that were just read; these objects are not read again.
+            held: values that were just read. Their objects are not read again.
         """
         for at in addresses:
             if at in self.original:
@@ -107,7 +108,7 @@ class KnownState:
             self._begin[at] = self.original[at]
 
     def is_quieted(self, at: Address) -> bool:
-        """Return whether checks begin with another value than the one before the run."""
+        """Return whether an object has another value in checks than before the run."""
         return self._begin.get(at) != self.original.get(at)
 
     def write(self, addresses: Collection[Address]) -> None:
@@ -137,7 +138,7 @@ class KnownState:
         time took half the processor time of a run.
 
         Args:
-            resets: kinds of the resets; empty if it is unknown how the node was reset.
+            resets: kinds of the resets, empty if the kind of reset is unknown.
             written: objects that may have been written since the last reset.
         """
         touched: Iterable[Address] = self._begin
@@ -151,7 +152,7 @@ class KnownState:
         self._is_reset = False
 
     def restore(self) -> None:
-        """Restore all objects to their values before the run, and report those that failed."""
+        """Restore all objects to their values before the run. Report the objects that failed."""
         left = self._write_back(self.original, self.original)
         for at in left:
             self.unrestored[self._was(at)] = None
@@ -183,7 +184,10 @@ class KnownState:
     def _write_back(
         self, target: Values, addresses: Iterable[Address], moved: Iterable[set[Address]] = ()
     ) -> list[Address]:
-        """Write the values that differ, and add them to sets; return values that still differ."""
+        """Write the values that differ, and add them to sets.
+
+        Return the values that still differ.
+        """
         wrong = self._differing(target, addresses)
         for each in moved:
             each.update(wrong)
@@ -211,9 +215,9 @@ class KnownState:
         return left
 
     def _number(self, at: Address, target: Values) -> int | None:
-        """Return the value of an object, or the value it should have if it cannot be read.
+        """Return the value of an object, or the wanted value if the object cannot be read.
 
-        Returns None if neither value is known; the object is then not changed.
+        The result is None if neither value is known. The object is then not changed.
         """
         if at not in target or not is_standard(at, target[at]):
             return None
@@ -221,7 +225,7 @@ class KnownState:
         return number_of(held if held and is_standard(at, held) else target[at])
 
     def _read(self, at: Address) -> bytes | None:
-        """Return the value of an object; None if the node refuses to read it, or does not answer.
+        """Return the value of an object, or None if the node refuses to read it or does not answer.
 
         Objects that were read since the last check are not read again. Two full checks of the
         dictionary in a row took a fifth of the frames of a short run.
@@ -240,7 +244,10 @@ class KnownState:
         return value
 
     def _patiently(self, attempt: Callable[[], T]) -> T | None:
-        """Read an object; None if only this one has no answer; SdoTimeout if the node is gone."""
+        """Read an object.
+
+        The result is None if only this object has no answer. Raise SdoTimeout if the node is gone.
+        """
         try:
             answer = attempt()
         except SdoTimeout:
@@ -269,7 +276,7 @@ _RETURN_MS: Final = 3_000
 """The longest time that a node may take to answer after a reset."""
 
 _GONE_MS: Final = 10_000
-"""How long to wait at the end for a lost node, to restore it."""
+"""Time to wait at the end for a lost node, in order to restore it."""
 
 _PROBE_MS: Final = 50
 HEARTBEAT: Final = (0x1017, 0)
@@ -280,27 +287,27 @@ _STORAGE: Final = frozenset((0x1010, 0x1011))
 _STORE: Final = (0x1010, 1)
 _SAVE: Final = b"save"
 _RESET_COMMUNICATION: Final = f"{NMT_COB_ID:03X}#{NmtCommand.RESET_COMMUNICATION:02X}"
-"""A value of `BoundCheck.resets`."""
+"""A value of `BoundCheck.resets` that stands for NMT reset communication."""
 
 _RECOVERY: Final[dict[Level, tuple[NmtCommand | None, ...]]] = {
     Level.READ_ONLY: (None,),
     Level.COMMUNICATION: (NmtCommand.RESET_COMMUNICATION,),
     Level.INTRUSIVE: (NmtCommand.RESET_COMMUNICATION, NmtCommand.RESET_NODE),
 }
-"""Attempts to recover a node that does not answer."""
+"""Attempts to recover a node that does not answer, in order."""
 
 _RESETS: Final = (NmtCommand.RESET_NODE, NmtCommand.RESET_COMMUNICATION)
 _TO_STATE: Final = {NmtState.OPERATIONAL: NmtCommand.START, NmtState.STOPPED: NmtCommand.STOP}
 
 
 class NodeCare:
-    """Recovers and restores one node during a run.
+    """Care for one node during a run: recovering and restoring it.
 
     Args:
-        exchange: the bus.
-        client: reads and writes the node.
-        node_id: of the node, 1..127.
-        level: of the run; READ_ONLY only reads.
+        exchange: bus of the node.
+        client: client that reads and writes the node.
+        node_id: node-ID of the node, 1..127.
+        level: level of the run. On READ_ONLY, the node is only read.
 
     Attributes:
         lost: whether the node no longer answers.
@@ -322,10 +329,10 @@ class NodeCare:
         return tuple(self._state.unrestored)
 
     def prepare(self, addresses: Iterable[Address], held: Mapping[Address, bytes] = _NONE) -> None:
-        """Record the state of the node, and bring it into the state in which checks begin.
+        """Record the state of the node. Bring the node into the state in which checks begin.
 
         Args:
-            addresses: of the objects that may change in the run.
+            addresses: addresses of the objects that may change in the run.
             held: values that were just read.
         """
         if self._level is Level.READ_ONLY:
@@ -339,7 +346,7 @@ class NodeCare:
         self._errors = self._client.number(*_ERROR_REGISTER) or 0
 
     def begin(self, bound: BoundCheck) -> None:
-        """Record the values that a check may change, unless known; set `lost` if that fails."""
+        """Record unknown values that a check may change. Set `lost` if that fails."""
         if self._level is Level.READ_ONLY:
             return
         self._exchange.begin(_CARE_US)
@@ -354,7 +361,7 @@ class NodeCare:
             self._recover()
 
     def unread(self, addresses: Set[Address]) -> list[Address]:
-        """Return the objects that could not be read, so that they cannot be restored."""
+        """Return the objects that could not be read, and therefore cannot be restored."""
         self._exchange.begin(_CARE_US)
         known = self._state.original
         try:
@@ -370,15 +377,15 @@ class NodeCare:
 
     @property
     def errors(self) -> int:
-        """The bits of the error register that were set before the run, and still are."""
+        """The bits of the error register that were set before the run and are still set."""
         return self._errors
 
     def is_quieted(self, at: Address) -> bool:
-        """Return whether the tester has replaced the original value for its checks."""
+        """Return whether the tester has replaced the original value of an object for its checks."""
         return self._state.is_quieted(at)
 
     def held(self, at: Address) -> bytes:
-        """Return the value of an object before the run; nothing if it is unknown."""
+        """Return the value of an object before the run; empty if it is unknown."""
         return self._state.original.get(at, b"")
 
     def give_up(self) -> None:
@@ -386,7 +393,7 @@ class NodeCare:
         self._state.give_up()
 
     def tidy(self, bound: BoundCheck, boots_before: int) -> bool:
-        """Restore the node after a check; return False if that fails; the node is then lost."""
+        """Restore the node after a check. Return False if that fails. The node is then lost."""
         booted, crashed = self._exchange.boots - boots_before, bool(self._exchange.crashes)
         storing = {f"{index:04X}" for index, _ in bound.changed if index in _STORAGE}
         if storing:
@@ -402,7 +409,7 @@ class NodeCare:
         return not self.lost
 
     def restore(self) -> None:
-        """Restore the state of the node before the run, as far as possible."""
+        """Restore the state that the node had before the run, as far as possible."""
         if self._level is Level.READ_ONLY:
             return
         self._exchange.begin(_CARE_US)
@@ -412,7 +419,7 @@ class NodeCare:
                 self._state.give_up()
 
     def _put_back(self) -> bool:
-        """Restore all values; return False if the node does not answer."""
+        """Restore all values. Return False if the node does not answer."""
         try:
             self._client.abort()
             if self._moved:
@@ -427,14 +434,14 @@ class NodeCare:
         return True
 
     def _store(self) -> None:
-        """Store the previous values, in place of those that a check stored."""
+        """Store the previous values, in place of the values that a check stored."""
         try:
             self._client.download(*_STORE, _SAVE)
         except (SdoAborted, SdoMisnamed) as error:
             self._state.unrestored[f"what a check stored is still stored: {error}"] = None
 
     def _tidy(self, written: Collection[Address], resets: Collection[str] | None = None) -> None:
-        """Recover the node; `resets` as `KnownState.tidy_after` takes them, None without any."""
+        """Recover the node. `resets` has the meaning of `KnownState.tidy_after`, or is None."""
         self._client.abort()
         if self._level is Level.READ_ONLY:
             self._exchange.wait(_SETTLE_MS)
@@ -451,7 +458,7 @@ class NodeCare:
             self._state.tidy_after({_RESET_COMMUNICATION}, written)
 
     def _has_errors(self) -> bool:
-        """Return whether a check caused a new error; earlier errors may have disappeared."""
+        """Return whether a check caused a new error. Earlier errors may have disappeared."""
         number = self._client.number(*_ERROR_REGISTER)
         if number is None:
             self._probe()  # is the object absent, or the node gone?
@@ -461,7 +468,7 @@ class NodeCare:
         return bool(new)
 
     def _probe(self) -> None:
-        """Raise SdoTimeout if the node is gone; a node without 1000h is not."""
+        """Raise SdoTimeout if the node is gone. A node without 1000h is not gone."""
         with suppress(SdoAborted, SdoMisnamed):
             self._client.upload(*_DEVICE_TYPE)
 

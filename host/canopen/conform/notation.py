@@ -1,4 +1,4 @@
-"""A check with the numbers of one node in place of names.
+"""A check in which numbers of one node replace the names.
 
 `parse_step` reads the steps of a check, one step per line, in the notation of
 docs/reference/canopen/conform.md.
@@ -51,15 +51,15 @@ from tickrig.wire.canopen.sdo_frame import SPECIFIER, ClientCommand
 # Names in place of numbers: the value of `$heartbeat` or `$rw_u8.new` for one node.
 
 NAME: Final = re.compile(r"\$(?:\{([a-z][a-z0-9_]*)\}|([a-z][a-z0-9_]*)(?:\.([a-z]+))?)")
-"""`$name`, `$name.attribute`, or `${name}` if a digit follows."""
+"""Pattern of `$name`, `$name.attribute`, or `${name}` if a digit follows."""
 _ADDRESS: Final = re.compile(r"([0-9A-F]{4}):([0-9A-F]{2})")
 
 
 class Unbound(Exception):  # noqa: N818 - what the name is
-    """A name for which this node has no object or value.
+    """A name for which the tested node has no object or value.
 
     Attributes:
-        reason: why, in words.
+        reason: reason in words.
     """
 
     def __init__(self, name: str, reason: str) -> None:
@@ -68,13 +68,14 @@ class Unbound(Exception):  # noqa: N818 - what the name is
 
 
 class _Names(Protocol):
-    """What stands for the names in checks on one node."""
+    """The values that stand for the names in checks on one node."""
 
     def text(self, name: str, attribute: str, /) -> str:
-        """Return the value of `$name.attribute`; the attribute may be empty.
+        """Return the value of `$name.attribute`. The attribute may be empty.
 
-        For an object: its multiplexer; `new` and `other`, two allowed values; `old`, the value
-        before the run; `map`, its mapping entry. All are in hex, in the byte order of the bus.
+        The attributes of an object are: none for its multiplexer, `new` and `other` for two allowed
+        values, `old` for the value before the run, and `map` for its mapping entry. All values are
+        in hex, in the byte order of the bus.
 
         Raises:
             Unbound: the node has no such object or value.
@@ -82,12 +83,12 @@ class _Names(Protocol):
         ...
 
     def address(self, name: str, /) -> Address:
-        """Return index and sub-index of an object; raises Unbound if the node has none."""
+        """Return index and sub-index of an object. Raise Unbound if the node has no such object."""
         ...
 
 
 def _resolve(text: str, names: _Names) -> str:
-    """Replace all names in a text; raises Unbound if a name has no value."""
+    """Replace all names in a text. Raise Unbound if a name has no value."""
     if "$" not in text:
         return text
     return NAME.sub(lambda match: names.text(match[1] or match[2], match[3] or ""), text)
@@ -144,7 +145,7 @@ def longest_ms(name: str, words: Sequence[Any]) -> int:
 
 
 def _transfer(words: Sequence[Any]) -> int:
-    """Return the duration of a transfer of the pattern whose size is the second word."""
+    """Return the duration of a transfer of the test pattern. Its size is the second word."""
     return _TRANSFER_MS + int(words[1]) * _PER_BYTE_US // 1_000
 
 
@@ -169,17 +170,17 @@ _LONGEST_MS: Final[dict[str, Callable[[Sequence[Any]], int]]] = {
 
 
 _FINALLY: Final = "finally "
-"""Prefix of a step that is always done at the end; it cannot fail the check."""
+"""Prefix of a step that is always done at the end. Such a step cannot fail the check."""
 
 _GIVEN: Final = "given "
-"""Prefix of a preparing step; if the node does not do the step, the check is inconclusive."""
+"""Prefix of a preparing step. If the node does not do the step, the check is inconclusive."""
 
 
 def parse_step(line: str) -> Step:
     """Parse a line.
 
     Raises:
-        ValueError: it is not in the notation.
+        ValueError: the line is not in the notation.
     """
     if line.startswith(_FINALLY):
         return parse_step(line.removeprefix(_FINALLY))._replace(at_end=True)
@@ -242,7 +243,7 @@ def step_words(step: Step) -> str:
 
 
 def step_head(step: Step) -> str:
-    """Return a step as text, without its expected codes; empty if it is about frames.
+    """Return a step as text, without its expected codes; empty if the step is about frames.
 
     The failure of such a step names the expected frames.
     """
@@ -306,13 +307,13 @@ _MARGIN_US: Final = 2_000_000
 """Time in addition to the sum of all waits, for sending at a low bus load."""
 
 _STIMULUS_MS: Final = 60_000
-"""How long the operation of an input may take; a person is slow."""
+"""Longest time that the operation of an input may take. A person is slow."""
 
 _LONGEST_TRANSFER_MS: Final = 2_000
-"""How long the transfer of a few bytes may take."""
+"""Longest time that the transfer of a few bytes may take."""
 
 _BLOCK_ENDS: Final = 1
-"""Bit of a block download request that marks later requests."""
+"""Bit that later requests of a block download have."""
 _BEGIN_DOWNLOAD: Final = frozenset(
     command
     for command in range(0x100)
@@ -328,7 +329,7 @@ NMT_TO_ALL: Final = "send NMT commands to all nodes of the bus"
 LSS_TO_ALL: Final = "send LSS requests, which every node of the bus takes"
 SYNC_TO_ALL: Final = "send SYNC, which every node of the bus takes"
 _STORED: Final = "store parameters in the node, in place of those stored before"
-"""Questions to the user."""
+"""Texts of questions to the user."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -336,16 +337,16 @@ class BoundCheck:
     """A check for one node.
 
     Attributes:
-        check: the check as written.
-        steps: the steps with numbers; an object is given by its index and sub-index.
+        check: check with its names.
+        steps: steps with numbers. An object is given by its index and sub-index.
         changed: objects that the check changes.
         used: objects that the node must have.
-        written: the changed objects, and objects whose writing the node must or may refuse.
+        written: changed objects, and objects whose writing the node must or may refuse.
         questions: questions to the user before the check.
         can_ids: CAN-IDs of the frames that the check judges.
-        within_us: its longest duration.
-        resets: how the check may reset the node, which changes all values of the node. These are
-            frames without the node-ID, and the first word of each stimulus.
+        within_us: longest duration of the check.
+        resets: kinds of resets of the node, which change all values of the node. A kind is a frame
+            without the node-ID, or the first word of a stimulus.
     """
 
     check: Check
@@ -360,7 +361,7 @@ class BoundCheck:
 
 
 def bind_check(check: Check, names: _Names) -> BoundCheck:
-    """Replace names by numbers; raises Unbound if the node has no object or value for a name."""
+    """Replace names by numbers. Raise Unbound if the node has no object or value for a name."""
     steps = tuple(_bind_step(step, names) for step in check.steps)
     actions = [step.action for step in steps]
     request, sync = _resolve("$request", names), _resolve("$sync", names)
@@ -405,7 +406,7 @@ def _bind_value(value: Any, names: _Names) -> Any:
 
 
 def _bind_word(word: Any, names: _Names) -> Any:
-    """Bind words of a macro: an address, or a name without attribute, is an object."""
+    """Bind a word of a macro. An address, or a name without attribute, is an object."""
     if isinstance(word, tuple):
         return tuple(_bind_word(each, names) for each in word)
     if _ADDRESS.fullmatch(word):
@@ -470,7 +471,7 @@ def begins_download(command: int) -> bool:
 
 
 def _questions(action: Action, sync: str) -> Iterator[str]:
-    """Yield what concerns other nodes, or cannot be undone."""
+    """Yield the actions that concern other nodes or cannot be undone."""
     match action:
         case Send(frame):
             can_id, _, data = frame.partition("#")

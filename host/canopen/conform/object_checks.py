@@ -26,7 +26,7 @@ _TOO_SHORT: Final = ("06070013", "06070010", "08000000")
 _TOO_HIGH: Final = ("06090031", "06090030")
 _TOO_LOW: Final = ("06090032", "06090030")
 _NO_VALUE_YET: Final = ("08000024", "08000000", "06090011")
-"""Objects that may have no value: an error that never occurred, an empty domain."""
+"""Objects that may have no value, such as an error that never occurred, or an empty domain."""
 
 
 # Checks of 1000h: a device must have the objects of the profile that it declares.
@@ -40,18 +40,18 @@ _IO_BLOCKS: Final[Mapping[int, tuple[int, ...]]] = {
     18: (0x6401, 0x6400, 0x6402, 0x6403, 0x6404),
     19: (0x6411, 0x6410, 0x6412, 0x6413, 0x6414),
 }
-"""Bits of 1000h of a CiA 401 device, and objects of which one must exist if a bit is set."""
+"""Bits of 1000h of a CiA 401 device, and the objects of which one must exist if the bit is set."""
 
 _DRIVE_OBJECTS: Final = (0x6040, 0x6041)
-"""Controlword and statusword: every drive has them."""
+"""Controlword and statusword, which every drive has."""
 
 
 def _profile_checks(device: EdsDevice, node_id: int) -> Iterator[check.Check]:
-    """Yield the check of 1000h, if the EDS gives its value.
+    """Yield the check of 1000h if the EDS gives the value of this object.
 
     Args:
-        device: the device of the EDS.
-        node_id: of the node, 1..127.
+        device: device that the EDS describes.
+        node_id: node-ID of the node, 1..127.
     """
     entries = {(entry.index, entry.sub): entry for entry in device.entries}
     head = entries.get((_DEVICE_TYPE, 0))
@@ -68,7 +68,10 @@ def _profile_checks(device: EdsDevice, node_id: int) -> Iterator[check.Check]:
 
 
 def _wanted(number: int, present: set[int]) -> tuple[tuple[int, ...], str]:
-    """Return the objects that a device type requires; of alternatives, the one in the EDS."""
+    """Return the objects that a device type requires.
+
+    Of several alternatives, return the one in the EDS.
+    """
     match number & _PROFILE_MASK:
         case 401:
             blocks = [objects for bit, objects in _IO_BLOCKS.items() if number >> bit & 1]
@@ -99,21 +102,21 @@ _DEFAULTS: Final = "CiA 306-1, DefaultValue; CiA 301 v4.2.0, 7.5.2"
 _COMMUNICATION_AREA: Final = range(0x1000, 0x2000)
 _PROFILE_AREA: Final = range(0x6000, 0xA000)
 _NEVER_WRITTEN: Final = (0x1010, 0x1011, *range(0x1F50, 0x1F5A))
-"""Store, restore and program download: not written, not even to provoke a refusal."""
+"""Objects of store, restore and program download. They are not even written to test a refusal."""
 
 _ERROR_FIELD: Final = 0x1003
 _CONSTANTS: Final = (0x1000, 0x1018)
-"""Objects that have the value of the EDS unless the bus can write them."""
+"""Objects that have the value in the EDS unless the bus can write them."""
 _PDO_PARAMETERS: Final = (*range(0x1400, 0x1600), *range(0x1800, 0x1A00))
 _IN_USE: Final = (*(0x1005, 0x1006, 0x1012, 0x1014), *range(0x1200, 0x1300), *range(0x1400, 0x1C00))
-"""Objects that CiA 301 protects from changes while the function they configure is enabled."""
+"""Objects that CiA 301 protects from changes while the function that they configure is enabled."""
 _KEPT: Final = (
     *("06010000", "06010001", "06010002", "06040041", "06040042", "06040043", "06040047"),
     *("06090030", "08000000", "08000021", "08000022"),
 )
-"""Abort codes of this protection; a server need not check the value before it refuses."""
+"""Abort codes of this protection. A server may refuse a write before it checks the value."""
 _RESERVED_SUB: Final = 4
-"""Reserved sub-index of a PDO parameter; some files describe it."""
+"""Reserved sub-index of a PDO parameter. Some EDS files describe it."""
 _SERIAL_NUMBER: Final = (0x1018, 4)
 _DATA_TYPES: Final = range(0x0001, 0x1000)
 _HIGHEST_SUB: Final = 0xFF
@@ -121,10 +124,10 @@ _CONFIGURED: Final = "the node may have been configured: stored, or written sinc
 
 
 class _Maker:
-    """Makes the object checks of one node.
+    """Factory for the object checks of one node.
 
     Args:
-        node_id: of the node, 1..127.
+        node_id: node-ID of the node, 1..127.
         allow: indices of the profile area that may be written.
         never: indices that are never written.
     """
@@ -133,7 +136,10 @@ class _Maker:
         self._node_id, self._allow, self._never = node_id, allow, never
 
     def of_entry(self, entry: EntryDescription, counts: bool) -> Iterator[check.Check]:
-        """Make the checks of one entry; `counts` is whether it is the sub-index 0 of a record."""
+        """Make the checks of one entry.
+
+        `counts` is whether the entry is the sub-index 0 of a record.
+        """
         if entry.readable:
             constant = self._power_on(entry) if _is_constant(entry, counts) else None
             yield _holds(entry, constant)
@@ -186,12 +192,13 @@ def object_checks(
     - after every row of objects, the next index
 
     Args:
-        device: the device of the EDS.
-        node_id: of the node, 1..127; for defaults with $NODEID.
+        device: device that the EDS describes.
+        node_id: node-ID of the node, 1..127, for defaults with $NODEID.
         allow: indices of the profile area, 6000h to 9FFFh, that may be written.
         never: indices that are never written.
-        may_choose: whether a check of this group whose id continues with this text may be selected.
-            Other checks may be omitted, which does not change the remaining checks.
+        may_choose: function that returns whether a check of a group may be selected, if the id of
+            the check continues with a text. Other checks may be omitted, which does not change the
+            remaining checks.
     """
     maker, checks = _Maker(node_id, allow, never), list[check.Check]()
     entries = sorted(device.entries, key=attrgetter("key"))
@@ -238,7 +245,7 @@ def _holds(entry: EntryDescription, constant: str | None) -> check.Check:
 
 
 def _hold(entry: EntryDescription, value: str | None) -> check.Hold:
-    """Make the step that reads an entry; a value is hexadecimal."""
+    """Make the step that reads an entry. A value is hexadecimal."""
     codes = _NO_VALUE_YET if _may_have_none(entry) else ()
     at, kind = (entry.index, entry.sub), entry.data_type.name
     return check.Hold(at, kind, entry.low, entry.high, value, codes)
@@ -247,7 +254,10 @@ def _hold(entry: EntryDescription, value: str | None) -> check.Hold:
 def _refused(
     entry: EntryDescription, suffix: str, title: str, grow: int, codes: Sequence[str]
 ) -> check.Check:
-    """Make a check that writes the read value back, longer by `grow`: the node must refuse."""
+    """Make a check that writes the read value back, longer by `grow`.
+
+    The node must refuse the write.
+    """
     action = check.RefuseRewrite((entry.index, entry.sub), grow, _codes(entry, codes))
     return _check(entry, suffix, title, _ABORTS, action, check.Level.COMMUNICATION)
 
@@ -260,7 +270,7 @@ def _of_sizes(entry: EntryDescription) -> Iterator[check.Check]:
 
 
 def _of_limits(entry: EntryDescription) -> Iterator[check.Check]:
-    """Write the numbers just outside of the limits, if the data type has them."""
+    """Write the numbers just beyond the limits, if the data type has such numbers."""
     lowest, highest = entry.data_type.limits
     for suffix, limit, beyond, codes in (
         ("high", entry.high, 1, _TOO_HIGH),
@@ -275,7 +285,7 @@ def _of_limits(entry: EntryDescription) -> Iterator[check.Check]:
 
 
 def _codes(entry: EntryDescription, codes: Sequence[str]) -> tuple[str, ...]:
-    """Return the codes that refuse a write, because of the value or of an object in use."""
+    """Return the codes that refuse a write because of the value or because the object is in use."""
     return (*dict.fromkeys([*codes, *(_KEPT if entry.index in _IN_USE else ())]),)
 
 
@@ -284,7 +294,7 @@ def _refuse_read(entry: EntryDescription) -> check.RefuseRead:
 
 
 def _absent_subs(index: int, rows: list[EntryDescription], share: Collection[int]) -> check.Check:
-    """Read sub-indices that are not described."""
+    """Read sub-indices that the EDS does not describe."""
     known = {row.sub for row in rows}
     behind = max(known) + 1
     asked = {*range(behind + 1), _HIGHEST_SUB - 1, *share} - known
@@ -305,7 +315,7 @@ def _absent_subs(index: int, rows: list[EntryDescription], share: Collection[int
 
 
 def _absent_objects(indices: Collection[int]) -> check.Check:
-    """Read the index after each row of objects, and the last one of each area."""
+    """Read the index after each row of objects, and the last index of each area."""
     ends = (0x1FFF, 0x5FFF, 0x9FFF, 0xFFFF)
     behind = {index + 1 for index in indices if index < 0xFFFF} | set(ends)
     asked = sorted(behind - set(indices) - set(_DATA_TYPES))
@@ -326,6 +336,6 @@ def _is_constant(entry: EntryDescription, counts: bool) -> bool:
 
 
 def _may_have_none(entry: EntryDescription) -> bool:
-    """Return whether an entry may have no value: no error yet, an empty domain or string."""
+    """Return whether an entry may have no value, such as an error history or an empty string."""
     reserved = entry.index in _PDO_PARAMETERS and entry.sub == _RESERVED_SUB
     return reserved or entry.index == _ERROR_FIELD or not entry.size

@@ -25,10 +25,10 @@ _UPLOADS: Final = frozenset(
 PROFILE: Final = 0x6000
 MANUFACTURER: Final = 0x2000
 PROGRAMS: Final = range(0x1F50, 0x1F5A)
-"""Program download and control: the tester never uses them."""
+"""Indices of program download and control, which the tester never uses."""
 SWITCH_GLOBAL, CONFIGURATION = 0x04, 0x01
 _CONFIGURES: Final = (0x11, 0x13, 0x15, 0x17)
-"""LSS services that change a node: node-ID, bit timing, its activation, storing."""
+"""LSS services that change a node: node-ID, bit timing, activation of bit timing, and storing."""
 STORAGE: Final = (0x1010, 0x1011)
 _FRAME_BYTES: Final = 8
 
@@ -36,14 +36,14 @@ _Confirm = Callable[[str], bool]
 
 
 class Permission:
-    """Checks each frame before it is sent.
+    """Permission that checks each frame before it is sent.
 
     Args:
-        level: of the run.
+        level: level of the run.
         allow: indices of the profile area that may be written.
-        node_id: of the node under test.
-        confirm: called once before each kind of action that concerns other nodes or cannot be
-            undone.
+        node_id: node-ID of the node under test.
+        confirm: function that is called once before each kind of action that concerns other nodes
+            or cannot be undone.
         never: indices that are never written.
 
     Attributes:
@@ -66,10 +66,10 @@ class Permission:
         self._all_configured = False
 
     def check(self, frame: CanFrame) -> None:
-        """Return if a frame may be sent.
+        """Return if a frame may be sent. Raise an error otherwise.
 
         Raises:
-            NotAllowed: the level does not allow it.
+            NotAllowed: the level does not allow the frame.
             Disturbed: the frame would also change other nodes.
         """
         is_request = frame.can_id == self._request and not frame.extended
@@ -87,10 +87,10 @@ class Permission:
             self._check_lss(frame.data)
 
     def check_write(self, index: int, *, refused: bool = False) -> None:
-        """Return if an object may be written, else raise NotAllowed.
+        """Return if an object may be written. Raise NotAllowed otherwise.
 
         Args:
-            index: of the object.
+            index: index of the object.
             refused: whether the node must refuse the write.
         """
         self._check_never(index)
@@ -103,7 +103,7 @@ class Permission:
             raise NotAllowed(f"{index:04X}h would be written with a valid value: --intrusive")
 
     def check_confirmed(self, question: str) -> None:
-        """Ask the user, once; NotAllowed if the answer is no.
+        """Ask the user once. Raise NotAllowed if the answer is no.
 
         SYNC needs no confirmation if no other node is on the bus.
         """
@@ -129,7 +129,7 @@ class Permission:
             self.check_confirmed(NMT_TO_ALL)
 
     def _check_lss(self, data: bytes) -> None:
-        """Raise if other nodes would execute LSS commands for all slaves in configuration."""
+        """Raise an error if other nodes would execute an LSS command to all configuring slaves."""
         if data[:1] == bytes([SWITCH_GLOBAL]):
             self._all_configured = data[1:2] == bytes([CONFIGURATION])
         elif self._all_configured and self.others and data[:1] and data[0] in _CONFIGURES:

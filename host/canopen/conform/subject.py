@@ -30,19 +30,19 @@ from tickrig.wire.canopen.pdo import fields
 from tickrig.wire.canopen.sdo_frame import REQUEST_COB_ID, RESPONSE_COB_ID
 
 _BIT_7: Final = 0x80
-"""A bit that no node-ID has: they end at 127."""
+"""Bit 7, which no node-ID has because node-IDs end at 127."""
 
 # Whether an EDS describes the device that answers, or another one.
 
 TOLD: Final = {"device type": (0x1000, 0), "vendor": (0x1018, 1), "product": (0x1018, 2)}
-"""Properties that tell devices apart, as `Subject.about` names them."""
+"""Properties that distinguish devices, under the names in `Subject.about`."""
 
 
 def other_device(device: EdsDevice | None, about: Mapping[str, str]) -> str:
-    """Return how an EDS differs from the node; empty if the EDS describes this device.
+    """Return how an EDS differs from the node, or an empty text if the EDS describes this device.
 
     Args:
-        device: the device of the EDS, None without one; a value of 0 is not compared.
+        device: device that the EDS describes, or None without an EDS. A value of 0 is not compared.
         about: properties that the node reports.
     """
     entries = device.entries if device else ()
@@ -64,7 +64,7 @@ _PATTERNS: Final = tuple(
         ("A5345678F1E2D3C4", "5AC3877A1E2D3C4B", "694B9621D2A57896", "962D4BE127C3B45A"),
     )
 )
-"""Values that share no byte: swapped or truncated values are detected."""
+"""Values that share no byte, so that swapped or truncated values are detected."""
 _SAMPLE_TEXTS: Final = (b"conformance", b"tested node")
 _BOOLEANS: Final = (b"\x01", b"\x00")
 _REALS: Final = (1.5, -2.25)
@@ -75,14 +75,16 @@ def _sample_value(name: str, attribute: str, bound: BoundObject) -> str:
     """Return a value in hex, in the byte order of the bus.
 
     Args:
-        name: in the check, for the message.
-        attribute: `new` or `other`, two allowed values, if possible neither the original value nor
-            that at the begin of checks; `old`, the original value; `low` and `high`, its limits;
-            `below` and `above` them; `map`, its mapping entry; `longmap`, one twice as long.
-        bound: the object.
+        name: name of the object in the check, used in the message.
+        attribute: name of the wanted value. `new` and `other` are two allowed values, if possible
+            neither the original value nor the value at the begin of checks. `old` is the original
+            value. `low` and `high` are the limits of the object, `below` and `above` are values
+            beyond them. `map` is the mapping entry of the object, `longmap` is a mapping entry of
+            twice the length.
+        bound: object of the node.
 
     Raises:
-        Unbound: it has no such value.
+        Unbound: the object has no such value.
     """
     entry = bound.entry
     match attribute:
@@ -146,27 +148,27 @@ _TPDO2: Final = 0x280
 _FREE_CAN_ID: Final = 0x6A2
 """A CAN-ID that is neither restricted nor in the pre-defined connection set."""
 _DRIVE: Final = range(0x603F, 0x6100)
-"""Objects of CiA 402: modes, states and positions."""
+"""Indices of CiA 402 objects, such as modes, states and positions."""
 _HIGHEST_NODE_ID: Final = 127
 _HEARTBEAT: Final = (0x1017, 0)
 _BEATS_MS: Final = (100, 90, 110)
 _IDENTITY_NAMES: Final = ("vendor", "product", "revision", "serial")
 
 _ReadNumber = Callable[[int, int], int | None]
-"""Reads an unsigned number of the node by index and sub-index, None if it has none."""
+"""Function that reads an unsigned number of the node by index and sub-index, or returns None."""
 
 
 class _NodeNames:
     """The `Names` of a node.
 
     Args:
-        node_id: of the node, 1..127.
+        node_id: node-ID of the node, 1..127.
         binding: objects and PDOs by name.
-        number: reads the node.
+        number: function that reads a number of the node.
         others: node-IDs of other nodes on the bus.
 
     Attributes:
-        peer: a node-ID that no node has, None if all are taken.
+        peer: node-ID that no node has, or None if all are taken.
     """
 
     def __init__(
@@ -241,7 +243,7 @@ def _can_id(cob_id: int | None) -> int:
 
 
 def _free_id(node_id: int, others: Collection[int]) -> int | None:
-    """Choose a node-ID that no node has, for a node that the tester simulates."""
+    """Choose a node-ID that no node has. The tester simulates a node with it."""
     free = (n for n in range(_HIGHEST_NODE_ID - 1, 0, -1) if n != node_id and n not in others)
     return next(free, None)
 
@@ -257,7 +259,10 @@ def _peer(peer: int | None) -> dict[str, str]:
 
 
 def _heartbeat_time(binding: Binding, number: _ReadNumber) -> str:
-    """Choose a heartbeat time, in hex, other than the original one and the one of the checks."""
+    """Choose a heartbeat time in hex.
+
+    It differs from the original time and the time of the checks.
+    """
     bound = binding.bound.get("heartbeat")
     default = bound.entry.default if isinstance(bound, BoundObject) else b""
     taken = {number(*_HEARTBEAT), int.from_bytes(default, "little")}
@@ -297,7 +302,7 @@ def _pdo_text(name: str, attribute: str, pdo: BoundPdo) -> str:
 
 
 def _first(name: str, attribute: str, pdo: BoundPdo) -> str:
-    """Return the first object that a PDO carries, as `6000:01`, or the zeros after its byte 0."""
+    """Return the first object in a PDO as `6000:01`, or the zeros after byte 0 of the PDO."""
     mapped, _ = next(fields(pdo.mapping or (0,)))
     index, sub, bits = mapped.index, mapped.sub, mapped.bits
     if index in _DRIVE:
@@ -313,7 +318,7 @@ def _u32(number: int) -> str:
 _TEXTS: Final = {0x1008: "name", 0x1009: "hardware version", 0x100A: "software version"}
 _IDENTITY: Final = ("vendor", "product", "revision", "serial")
 _MANDATORY: Final = {(0x1000, 0): "UE-01", (0x1001, 0): "UE-02", (0x1018, 0): "UE-05"}
-"""Mandatory objects of each node, and the check that fails if one is missing."""
+"""Mandatory objects of each node, and the check that fails if the object is missing."""
 _INDICES: Final = {index for index, _ in _MANDATORY}
 _COMMUNICATION: Final = 0x1000
 _READ_ONLY: Final = "06010002"
@@ -321,14 +326,15 @@ _READ_ONLY: Final = "06010002"
 
 @dataclass(frozen=True, slots=True)
 class Subject:
-    """The node as found before the first check.
+    """The node under test, as found before the first check.
 
     Attributes:
-        binding: its objects by name.
-        features: its capabilities.
+        binding: objects of the node by name.
+        features: features of the node.
         names: the values of the names in checks.
-        about: properties that it reports, by name, in words.
-        has: its objects by index and sub-index; computed once, because it takes a tenth of a run.
+        about: properties that the node reports, by name, in words.
+        has: objects of the node by index and sub-index. The mapping is computed once, because this
+            takes a tenth of a run.
         values: objects that can be read and written.
         refused: the mandatory objects that the node refuses to read.
     """
@@ -342,7 +348,7 @@ class Subject:
     refused: frozenset[check.Address]
 
     def missing(self, bound: BoundCheck) -> str | None:
-        """Return why not all objects of a check can be used; None if they can.
+        """Return why not all objects of a check can be used, or None if all can be used.
 
         If the node lacks a mandatory object, one check fails, and the other checks do not use it.
         """
@@ -355,9 +361,9 @@ class Subject:
         return None
 
     def fixed(self, steps: Collection[check.Step]) -> str | None:
-        """Return why not all written objects accept the value: CiA 301 allows them to be constant.
+        """Return why not all written objects accept the value. CiA 301 allows constant objects.
 
-        None if they do.
+        The result is None if all written objects accept the value.
         """
         for step in steps:
             for at in _takes(step):
@@ -374,18 +380,21 @@ class Subject:
 
     @property
     def entries(self) -> Mapping[check.Address, EntryDescription]:
-        """The descriptions of its objects."""
+        """The descriptions of the node's objects."""
         return self.binding.entries
 
     def _where(self, index: int) -> str:
-        """Return which object is missing where; without an EDS, only those of CiA 301 were read."""
+        """Return which object is missing and where.
+
+        Without an EDS, only objects of CiA 301 were read.
+        """
         if self.binding.known:
             return "the EDS has no"
         asked = _COMMUNICATION <= index < MANUFACTURER
         return "the node has no" if asked else "without an EDS there is no known"
 
     def restorable(self, level: check.Level) -> list[check.Address]:
-        """Return objects that a run may change, directly or by a reset.
+        """Return the objects that a run may change, either directly or by a reset.
 
         They are read before the run, and written after it.
         """
@@ -403,7 +412,7 @@ class Subject:
 
 
 def _takes(step: check.Step) -> Iterator[check.Address]:
-    """Yield the objects that a step writes, and that must accept it or refuse it by their kind."""
+    """Yield the written objects that must accept or refuse the value because of their kind."""
     match step.action:
         case check.Write() as action:
             yield action.address
@@ -414,7 +423,7 @@ def _takes(step: check.Step) -> Iterator[check.Address]:
 
 
 def _within(entry: EntryDescription, data: bytes) -> bool:
-    """Return whether a value lies within the limits of an object, if it has any."""
+    """Return whether a value lies within the limits of an object, if the object has limits."""
     if not entry.data_type.is_integer or len(data) != entry.size:
         return True
     value = int.from_bytes(data, "little", signed=entry.signed)
@@ -429,10 +438,10 @@ def examine(  # noqa: PLR0913, PLR0917 - all that is known
     claims: EdsClaims | None,
     others: Collection[int],
 ) -> Subject:
-    """Find out what a node has; only read it.
+    """Find out the properties of a node. The node is only read.
 
     Raises:
-        SdoTimeout: it does not answer.
+        SdoTimeout: the node does not answer.
     """
     client.size_of = _standard_size if device is None else _sizes(device)
     binding = bind(device, client.upload, allow=plan.allow, never=plan.never)
@@ -446,7 +455,7 @@ def examine(  # noqa: PLR0913, PLR0917 - all that is known
 
 
 def _sizes(device: EdsDevice) -> SizeOf:
-    """Take the sizes of the EDS; those of texts from their defaults."""
+    """Return the sizes in the EDS. The sizes of texts come from their defaults."""
     return {(entry.index, entry.sub): len(entry.default) for entry in device.entries}.get
 
 

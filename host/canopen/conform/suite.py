@@ -1,4 +1,4 @@
-"""The written checks: one file per group, in `checks/`."""
+"""The checks of the suite, with one file per group in `checks/`."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ ORDER: Final = (
     *("UE", "US", "BU", "DE", "DS", "BD", "SG", "NMT", "HB", "NG"),
     *("PC", "PR", "SY", "EM", "IO", "D4", "ST", "LS"),
 )
-"""Groups in the order in which they run; the groups that may disturb most run last."""
+"""Groups in the order in which they run. The groups that may disturb most run last."""
 
 
 OBJECTS: Final = "OD"
@@ -29,7 +29,7 @@ _OF_EACH_OBJECT: Final = "each object of the EDS"
 
 
 class _Group(NamedTuple):
-    """Checks that belong together."""
+    """A group of checks that belong together."""
 
     name: str
     title: str
@@ -53,7 +53,7 @@ def suite_checks() -> list[Check]:
 
 
 def chosen_checks(plan: ConformancePlan) -> Iterator[Check]:
-    """Yield the checks of the suite that a plan selects; the files of other groups are not read."""
+    """Yield the checks of the suite that a plan selects. The files of other groups are not read."""
     for name in ORDER:
         if plan.may_choose(name):
             yield from filter(plan.chooses, _read_group(name).checks)
@@ -61,7 +61,7 @@ def chosen_checks(plan: ConformancePlan) -> Iterator[Check]:
 
 @cache
 def group_titles() -> Mapping[str, str]:
-    """Return the topics of the groups, by name; the last one is that of objects."""
+    """Return the topics of the groups by name. The last topic is that of object checks."""
     titles = {name: _head(_text(name).split("\n", 1)[0])[2] for name in ORDER}
     return {**titles, OBJECTS: _OF_EACH_OBJECT}
 
@@ -71,10 +71,10 @@ def _text(name: str) -> str:
 
 
 def parse_group(text: str) -> _Group:
-    """Read a file of checks, separated by empty lines; a line that begins with # is a comment.
+    """Read a file of checks, which empty lines separate. A line that begins with # is a comment.
 
     Raises:
-        ValueError: a line is not in the notation; the message names it.
+        ValueError: a line is not in the notation. The message contains the line.
     """
     blocks = re.split(r"\n\s*\n", re.sub(r"^#.*\n", "", text, flags=re.MULTILINE).strip())
     match = _head(blocks[0])

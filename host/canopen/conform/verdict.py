@@ -18,7 +18,7 @@ class CheckVerdict(StrEnum):
     NOT_APPLICABLE = "not applicable"
     IMPLEMENTATION_DEFINED = "implementation-defined"
     INCONCLUSIVE = "inconclusive"
-    """The bus or this host was too slow, lost frames, or another node interfered."""
+    """The bus or this host was too slow or lost frames, or another node interfered."""
     BLOCKED = "blocked"
     """The node did not answer again."""
 
@@ -36,8 +36,9 @@ class FrameLine(NamedTuple):
 
     Attributes:
         at_us: bus time since the start of the run.
-        direction: to the node, from the bus, or a remark of the tester.
-        text: the frame in candump's notation, or the remark.
+        direction: direction of the frame: to the node, or from the bus. A remark of the tester has
+            its own value.
+        text: frame in candump notation, or remark.
     """
 
     at_us: int
@@ -50,14 +51,14 @@ class CheckOutcome:
     """One attempt at a check.
 
     Attributes:
-        verdict: its verdict.
-        reason: the reason in one line, with the received and the allowed frames; empty if it
-            passed.
-        evidence: the frames on the bus.
-        start_us: bus time since the start of the run.
+        verdict: verdict of the attempt.
+        reason: reason in one line, with the received and the allowed frames. It is empty if the
+            check passed.
+        evidence: frames on the bus.
+        start_us: bus time of the start, since the start of the run.
         end_us: bus time of the end, since the start of the run.
-        wanted: patterns of the expected frame, one of which must match, if the attempt failed
-            because of a frame.
+        wanted: patterns of the expected frame, one of which must match. They are set if the attempt
+            failed because of a frame.
     """
 
     verdict: CheckVerdict
@@ -73,9 +74,9 @@ class Result:
     """A check with its result.
 
     Attributes:
-        check: the check.
-        outcome: the attempt that counts.
-        first: the attempt before it, if a failure was repeated.
+        check: check that was judged.
+        outcome: attempt that counts.
+        first: attempt before `outcome`, if a failure was repeated.
     """
 
     check: Check
@@ -85,23 +86,23 @@ class Result:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """A whole run.
+    """The report of a whole run.
 
     Attributes:
-        source: the bus, as the user named it.
-        node_id: of the node, 1..127.
-        level: what the run was allowed to do.
-        results: in the order of the run.
+        source: name of the bus, as the user entered it.
+        node_id: node-ID of the node, 1..127.
+        level: highest level of the actions that the run was allowed to do.
+        results: results in the order of the run.
         node: properties that the node reports (1000h, 1008h to 100Ah, 1018h), by name, in words.
         settings: adapter, bit rate, tolerances, seed, versions and so on, by name, in words.
-        findings: of the EDS, and contradictions between it and the node, one per line.
+        findings: findings in the EDS, and contradictions between EDS and node, one per line.
         unrestored: objects that could not be restored, one per line.
         repairs: writes that restore these objects, in this order, as arguments of `canmon net
             SOURCE write NODE`.
-        duration_us: of the run, in bus time.
-        aborted: why the run ended early; empty if the run was complete.
-        doubt: reason to doubt that the report is about the node; empty without a doubt.
-        absent: whether no check was judged, because no node, or more than one, answers to the
+        duration_us: duration of the run, in bus time.
+        aborted: reason why the run ended early, empty if the run was complete.
+        doubt: reason to doubt that the report is about the node, empty without a doubt.
+        absent: whether no check was judged, because no node, or more than one node, answers to the
             node-ID.
     """
 
@@ -125,7 +126,10 @@ class Report:
 
     @property
     def exit_status(self) -> int:
-        """0 all pass, 1 a failure, 4 inconclusive or blocked, 5 nothing judged (conform.md 5)."""
+        """Exit status of the run (conform.md 5).
+
+        0: all pass, 1: a failure, 4: inconclusive or blocked, 5: nothing judged.
+        """
         if self.count(CheckVerdict.FAIL):
             return FAILED
         if (
@@ -143,4 +147,4 @@ NOTHING_JUDGED: Final = 5
 BUS_FAILED: Final = 3
 CTRL_C: Final = 130
 INTERRUPTED: Final = "interrupted"
-"""Why a run was ended early, if a person ended it."""
+"""Reason why a run ended early, if the user ended it."""

@@ -25,15 +25,15 @@ _COB_ID_BYTES: Final = 4
 
 
 def in_order(values: Mapping[Address, bytes], number: _Number) -> Iterator[Write]:
-    """Yield the writes, in order, that bring objects to their values.
+    """Yield the writes that bring objects to their values, in order.
 
     A PDO is disabled while its parameters change, and its mapping is emptied first. SYNC is stopped
-    while its parameters change; EMCY and SDO servers are disabled while their COB-ID changes.
+    while its parameters change. EMCY and SDO servers are disabled while their COB-ID changes.
 
     Args:
         values: the wanted values of the objects.
-        number: reads an object of the node, as an unsigned number of its size; None if its value
-            was unknown, so that it could not be restored.
+        number: function that reads an object of the node, as an unsigned number of the object's
+            size. It returns None if the value was unknown, so that it could not be restored.
     """
     left = {at: value for at, value in values.items() if is_standard(at, value)}
     odd = {at: value for at, value in values.items() if at not in left}
@@ -48,7 +48,7 @@ def in_order(values: Mapping[Address, bytes], number: _Number) -> Iterator[Write
 
 
 def is_standard(at: Address, value: bytes) -> bool:
-    """Return whether a COB-ID or a number of mapped objects has the length of CiA 301."""
+    """Return whether a COB-ID or a number of mapped objects has the length that CiA 301 defines."""
     return len(value) == (_bytes_of(at) or len(value))
 
 
@@ -58,7 +58,7 @@ def is_too_long(at: Address, value: bytes) -> bool:
 
 
 def _bytes_of(at: Address) -> int:
-    """Return the length of a COB-ID or a number of mapped objects, 0 for other objects."""
+    """Return the length of a COB-ID or a number of mapped objects, or 0 for other objects."""
     index, sub = at
     if any(index in area for area in _MAPPINGS) and not sub:
         return 1
@@ -71,7 +71,7 @@ def _is_server(at: Address) -> bool:
 
 
 def _pdo_of(index: int) -> int:
-    """Return the communication parameter of a PDO to which an index belongs, 0 for none."""
+    """Return the communication parameter of the PDO to which an index belongs, or 0 for none."""
     if any(index in area for area in PDOS):
         return index
     return index - _TO_MAPPING if any(index in area for area in _MAPPINGS) else 0
@@ -100,7 +100,7 @@ def _pdo(pdo: int, left: Values, number: _Number) -> Iterator[Write]:
 
 
 def _sync(left: Values, number: _Number) -> Iterator[Write]:
-    """Stop the producer, write counter and period, and restart it if it is enabled."""
+    """Stop the SYNC producer, write counter and period, and restart it if it is enabled."""
     given, before, cycle = (
         left.pop((_SYNC, 0), None),
         number((_SYNC, 0)),

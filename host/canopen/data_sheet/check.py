@@ -1,4 +1,4 @@
-"""All findings of a file."""
+"""All findings in an EDS file."""
 
 from __future__ import annotations
 
@@ -42,11 +42,11 @@ _CHECKS: Final[tuple[Callable[[Document], Iterator[RuleFinding]], ...]] = (
     *(profile_rules.mandatory, profile_rules.communication, profile_rules.profile),
 )
 _UNREADABLE: Final = frozenset({"xml", "no-objects"})
-"""If one of these rules is broken, missing parts are not reported in addition."""
+"""Rules that hide missing parts. If one of them is broken, missing parts are not reported."""
 
 
 def check(document: Document) -> list[RuleFinding]:
-    """Return all findings of a file, by line."""
+    """Return all findings in a file, by line."""
     if document.findings is None:  # `fix` and its caller call this again: a quarter of their time
         document.findings = _check(document)
     return list(document.findings)
@@ -66,6 +66,6 @@ def severities(findings: Iterable[RuleFinding]) -> str:
 
 
 def failing(findings: Iterable[RuleFinding], *, strict: bool = False) -> list[RuleFinding]:
-    """Return the findings that make a check fail: errors, and with `strict` warnings."""
+    """Return the findings that make a check fail: errors, and warnings if `strict` is set."""
     count = (Severity.ERROR, Severity.WARNING) if strict else (Severity.ERROR,)
     return [one for one in findings if one.rule.severity in count]

@@ -1,4 +1,4 @@
-"""An EDS as the bytes of its lines, and as the device that the reader makes of it."""
+"""An EDS as the bytes of its lines, and as the device that the reader makes from them."""
 
 from __future__ import annotations
 
@@ -18,24 +18,25 @@ _END: Final = re.compile(r"(\r\n|\r|\n)")
 
 
 class Document:
-    """A file as lines and as a device.
+    """An EDS file as lines and as a device.
 
     Args:
         name: name of the file in findings.
-        data: the whole file.
-        encoding: Python name of its encoding; empty to detect it from the bytes.
+        data: bytes of the whole file.
+        encoding: Python name of the file's encoding, or empty to detect the encoding from the
+            bytes.
 
     Attributes:
-        name: as given.
-        data: as given.
-        encoding: Python name of the encoding.
+        name: name of the file in findings.
+        data: bytes of the whole file.
+        encoding: Python name of the file's encoding.
         has_bom: whether the file begins with a byte order mark.
-        texts: the lines, without line ends.
-        ends: the end of each line, empty for the last one.
-        file: its sections.
-        device: the device that they describe.
-        rows: the entries of the device by index and sub-index.
-        findings: result of `check`, None before the first call.
+        texts: lines of the file, without line ends.
+        ends: end of each line, empty for the last line.
+        file: sections of the file.
+        device: device that the sections describe.
+        rows: entries of the device by index and sub-index.
+        findings: result of `check`, or None before the first call.
     """
 
     def __init__(self, name: str, data: bytes, encoding: str = "") -> None:
@@ -74,7 +75,7 @@ class Document:
         return eds_file.encoding_of(self.data) not in eds_file.CODE_PAGES
 
     def letters(self, line: int) -> str:
-        """Return what the first non-ASCII byte of a line means in each possible encoding."""
+        """Return the meanings of the first non-ASCII byte of a line in each possible encoding."""
         byte = next(letter for letter in self.texts[line - 1] if not letter.isascii())
         coded = byte.encode(self.encoding, "surrogateescape")
         pages = dict.fromkeys((self.encoding, *eds_file.CODE_PAGES))
@@ -82,7 +83,7 @@ class Document:
         return f"byte {coded.hex().upper()}h is {', '.join(said)}"
 
     def keyword(self, section: str, key: str) -> EdsLine | None:
-        """Return the line that sets a keyword, None if there is none."""
+        """Return the line that sets a keyword, or None if no line sets it."""
         return self._keywords.get((section, key.lower()))
 
     def subs(self, index: int) -> list[int]:
@@ -90,7 +91,7 @@ class Document:
         return self._subs.get(index, [])
 
     def entries(self, index: int) -> list[EntryDescription]:
-        """Return the entries of an object, by sub-index; empty if it does not exist."""
+        """Return the entries of an object by sub-index; empty if the object does not exist."""
         return self._entries.get(index, [])
 
     def found(
@@ -99,18 +100,18 @@ class Document:
         """Create a finding.
 
         Args:
-            rule: its name.
-            text: the value in the file, and the allowed values.
-            section: the section; empty for the file as a whole.
-            line: the line number, or the keyword of the line; by default the line of the section.
-            edits: the edits that fix the finding.
+            rule: name of the rule.
+            text: value in the file, and the allowed values.
+            section: title of the section, empty for the file as a whole.
+            line: line number, or keyword of the line. By default, it is the line of the section.
+            edits: edits that fix the finding.
         """
         number = line if isinstance(line, int) else self.file.line(section, line)
         kept = () if self.file.is_xml else edits
         return RuleFinding(RULES[rule], self.name, number, eds_file.shorten(section), text, kept)
 
     def changes(self, edits: Sequence[Edit]) -> bool:
-        """Return whether edits would change the file, with letters that its encoding has."""
+        """Return whether edits would change the file, using only letters that its encoding has."""
         added = "".join(text for edit in edits for text in edit.lines)
         return self._can_hold(added) and any(
             place is not EditPlace.REPLACE or lines != (self.texts[line - 1],)
@@ -118,7 +119,7 @@ class Document:
         )
 
     def _can_hold(self, text: str) -> bool:
-        """Return whether a text can be encoded; a byte without a letter cannot."""
+        """Return whether a text can be encoded. A byte that is not a letter cannot be encoded."""
         if self.encoding.startswith("utf-16"):
             return True
         try:
@@ -128,7 +129,7 @@ class Document:
         return True
 
     def with_value(self, line: EdsLine, value: str) -> Edit:
-        """Return the edit that gives a keyword another value; blanks and the comment are kept."""
+        """Return the edit that gives a keyword another value. Blanks and comment are kept."""
         text = self.texts[line.number - 1]
         begin = text.index("=") + 1
         at = text.index(line.value, begin) if line.value in text[begin:] else begin
@@ -144,7 +145,7 @@ class Document:
         return Edit(max(numbers, default=0), EditPlace.AFTER, tuple(texts))
 
     def is_again(self, line: EdsLine) -> bool:
-        """Return whether a line is in a section whose title occurred before."""
+        """Return whether a line is in a section whose title has occurred before."""
         return line.number not in self._first
 
     @cached_property
@@ -153,7 +154,7 @@ class Document:
         return any("[" in line.content for line in self._blocks[""] if not line.title)
 
     def lines_of(self, section: str) -> list[EdsLine]:
-        """Return the keywords of a section; if several sections have this name, use the first."""
+        """Return the keywords of a section. If several sections have this name, use the first."""
         return [line for line in self._blocks.get(section, ()) if line.is_keyword]
 
     def _read_blocks(self) -> dict[str, list[EdsLine]]:

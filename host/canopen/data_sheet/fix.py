@@ -1,4 +1,4 @@
-"""Fixes of an EDS that need no knowledge of the device."""
+"""Fixes of an EDS that do not require knowledge about the device."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _WRITTEN_AS: Final = {
     **dict.fromkeys("\u2013\u2014", "-"),
     **dict.fromkeys("\u2018\u2019", "'"),
 }
-"""ASCII replacements that removing the accents does not give."""
+"""ASCII replacements for letters that do not become ASCII by removing accents."""
 _CUT: Final = "truncated"
 _NO_LETTER: Final = re.compile("[\udc80-\udcff]")
 """Bytes that have no letter in their encoding."""
@@ -35,7 +35,7 @@ class _Fixed:
         document: the fixed document.
         mended: fixed findings, with their lines in the original file.
         left: remaining errors and warnings, with their lines in the fixed file.
-        origins: for each line, its line in the original file.
+        origins: line number in the original file, for each line.
     """
 
     document: Document
@@ -44,18 +44,18 @@ class _Fixed:
     origins: tuple[int, ...]
 
     def before(self, one: RuleFinding) -> RuleFinding:
-        """Return the remaining findings, with their lines in the original file."""
+        """Return the remaining findings with their lines in the original file."""
         return replace(one, line=_origin(self.origins, one.line))
 
 
 def fix(document: Document, *, ascii_only: bool = False) -> _Fixed:
-    """Fix a file until no fix changes it; all bytes of lines without findings are kept.
+    """Fix a file until no fix changes it. All bytes of lines without findings are kept.
 
     A file that looks truncated is not changed, because it would look complete after a fix. Files in
     other encodings than Unicode are converted to UTF-8.
 
     Args:
-        document: the file.
+        document: file to fix.
         ascii_only: whether to replace non-ASCII letters by ASCII ones.
     """
     mended: list[RuleFinding] = []
@@ -76,7 +76,7 @@ def fix(document: Document, *, ascii_only: bool = False) -> _Fixed:
 
 
 def _beyond_ascii(document: Document) -> Iterator[RuleFinding]:
-    """Find lines with non-ASCII letters, with the edits that replace them."""
+    """Find lines with non-ASCII letters, and the edits that replace these letters."""
     for number, text in enumerate(document.texts, 1):
         if text.isascii():
             continue
@@ -89,7 +89,7 @@ def _beyond_ascii(document: Document) -> Iterator[RuleFinding]:
 
 
 def _in_ascii(letter: str) -> str:
-    """Return a letter in ASCII, `?` if there is no similar one.
+    """Return an ASCII letter for a letter, or `?` if there is no similar letter.
 
     >>> [_in_ascii(letter) for letter in "öéß°Ω²✓"]
     ['oe', 'e', 'ss', 'deg', 'Ohm', '2', '?']
@@ -107,7 +107,7 @@ def _origin(origins: Sequence[int], line: int) -> int:
 
 
 class _Plan:
-    """Edits without conflicts."""
+    """Edits that do not conflict with each other."""
 
     def __init__(self) -> None:
         self._lines: dict[int, tuple[str, ...]] = {}
@@ -115,7 +115,7 @@ class _Plan:
         self._places: set[EditPlace] = set()
 
     def take(self, edits: tuple[Edit, ...]) -> bool:
-        """Add edits; if they conflict with others, add none and return False."""
+        """Add edits. If they conflict with planned edits, add none and return False."""
         for line, place, lines in edits:
             if place is EditPlace.REPLACE and self._lines.get(line, lines) != lines:
                 return False
@@ -166,11 +166,11 @@ class _Plan:
 
 
 def _usual_end(ends: list[str]) -> str:
-    """Return the most frequent line end; CR alone does not count."""
+    """Return the most frequent line end. CR alone does not count."""
     return "\r\n" if ends.count("\r\n") > ends.count("\n") else "\n"
 
 
 def _padded(origins: list[int], length: int) -> list[int]:
-    """Return as many origins as there are lines."""
+    """Return one origin for each line."""
     last = origins[-1] if origins else 1
     return (origins + [last] * (length - len(origins)))[:length]

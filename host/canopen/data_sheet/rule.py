@@ -9,25 +9,25 @@ from typing import Final, NamedTuple
 
 
 class Severity(Enum):
-    """How severe a finding is."""
+    """Severity of a finding."""
 
     ERROR = "error"
     """A tool misreads or refuses the file."""
     WARNING = "warning"
-    """Tools interpret it differently."""
+    """Tools interpret the file differently."""
     NOTE = "note"
-    """Style, or something optional."""
+    """The finding is about style or something optional."""
 
 
 class _EdsRule(NamedTuple):
-    """One rule.
+    """One rule for EDS files.
 
     Attributes:
-        name: as findings show it.
-        severity: severity of its findings.
-        clause: the document and clause that requires it; `practice` if there is none.
-        breaks: the consequence of breaking it.
-        fix: what to do.
+        name: name of the rule, as findings show it.
+        severity: severity of the rule's findings.
+        clause: document and clause that requires the rule, or `practice` if there is none.
+        breaks: consequence of breaking the rule.
+        fix: instruction that fixes a finding.
     """
 
     name: str
@@ -38,11 +38,11 @@ class _EdsRule(NamedTuple):
 
 
 def read_rules(path: Path) -> dict[str, _EdsRule]:
-    """Return the rules of a file by name, in its order.
+    """Return the rules of a file by name, in the order of the file.
 
     Args:
-        path: a text file with a heading for each severity, as `[error]`, followed by one rule per
-            line: name, clause, consequence and fix, separated by ` | `.
+        path: text file with a heading for each severity, such as `[error]`. The heading is followed
+            by one rule per line: name, clause, consequence and fix, separated by ` | `.
     """
     rules: dict[str, _EdsRule] = {}
     severity = Severity.ERROR
@@ -56,7 +56,7 @@ def read_rules(path: Path) -> dict[str, _EdsRule]:
 
 
 class EditPlace(Enum):
-    """What an edit does."""
+    """The effect of an edit on a line."""
 
     REPLACE = "replace"
     AFTER = "after"
@@ -68,10 +68,10 @@ class Edit(NamedTuple):
     """One edit of a file.
 
     Attributes:
-        line: its number; 0 is before the first line.
-        place: whether to replace the line, to insert lines after it, or to change the file as a
-            whole.
-        lines: the new lines, without line ends.
+        line: number of the line. 0 is before the first line.
+        place: effect of the edit: replacing the line, inserting lines after it, or changing the
+            whole file.
+        lines: new lines, without line ends.
     """
 
     line: int
@@ -84,12 +84,12 @@ class RuleFinding:
     """A violation of a rule.
 
     Attributes:
-        rule: the rule.
+        rule: rule that is violated.
         file: name of the file.
-        line: its number, 0 for the file as a whole.
-        section: empty outside of sections.
-        text: the value in the file, and the allowed values.
-        edits: the edits that fix the violation; empty if a fix needs knowledge of the device.
+        line: line number, or 0 for the file as a whole.
+        section: title of the section, empty outside of sections.
+        text: value in the file, and the allowed values.
+        edits: edits that fix the violation. They are empty if a fix needs knowledge of the device.
     """
 
     rule: _EdsRule
@@ -108,4 +108,4 @@ class RuleFinding:
 
 
 RULES: Final = read_rules(Path(__file__).with_name("rules.txt"))
-"""The rules of `canmon eds check` by name, errors first."""
+"""Rules of `canmon eds check` by name. Rules for errors come first."""

@@ -16,7 +16,7 @@ from tickrig.wire.canopen.eds.object_table import Access, DeviceInfo, EntryDescr
 
 
 def _access_text(row: EntryDescription) -> str:
-    """Return the access of an entry, and which PDOs may carry it.
+    """Return the access of an entry, and the PDOs that may carry the entry.
 
     >>> from tickrig.wire.canopen.eds.object_table import ROT, RW, DataType
     >>> [_access_text(EntryDescription(1, 0, "", DataType.UNSIGNED8, each)) for each in (ROT, RW)]
@@ -31,7 +31,7 @@ def _access_text(row: EntryDescription) -> str:
 
 
 def _default_text(row: EntryDescription) -> str:
-    """Return the default of an entry in EDS notation; empty without one."""
+    """Return the default of an entry in EDS notation, empty without a default."""
     if not row.has_default:
         return ""
     text = format_value(row.data_type, row.default, relative=row.relative)
@@ -39,7 +39,7 @@ def _default_text(row: EntryDescription) -> str:
 
 
 def _limit_text(limit: int | float | None) -> str:
-    """Return a limit, empty without one."""
+    """Return a limit, empty without a limit."""
     return "" if limit is None else str(limit)
 
 
@@ -60,7 +60,7 @@ _CAN_ID: Final = 0x1FFF_FFFF
 
 
 def head(document: Document) -> dict[str, Any]:
-    """Return device, identity and capabilities."""
+    """Return device, identity and capabilities of the head."""
     info = document.device.info
     return {
         "vendor": info.vendor_name,
@@ -77,7 +77,7 @@ def head(document: Document) -> dict[str, Any]:
 
 
 def _identity(document: Document, sub: int, key: str) -> str:
-    """Return a number of the identity object; that of DeviceInfo if the object lacks it."""
+    """Return a number of the identity object, or of DeviceInfo if the object lacks it."""
     text = _hex(document, 0x1018, sub)
     if text or not key:
         return text
@@ -122,8 +122,8 @@ def pdos(document: Document, node_id: int) -> list[dict[str, Any]]:
     """Return the PDOs of a node with their power-on values.
 
     Args:
-        document: the file.
-        node_id: 1 to 127.
+        document: document of the EDS file.
+        node_id: node-ID of the node, 1 to 127.
     """
     return [
         _pdo(document, f"{kind}{at + 1}", first + at, node_id)
@@ -167,7 +167,7 @@ def _mapped(document: Document, index: int) -> Iterator[dict[str, Any]]:
 
 
 def table(rows: list[dict[str, Any]], columns: tuple[str, ...]) -> list[str]:
-    """Return rows as lines in columns, with a head; the last column is not padded."""
+    """Return rows as lines in columns, with a head. The last column is not padded."""
     lines = [[str(row[column]) for column in columns] for row in rows]
     all_lines = [list(columns), *lines]
     widths = [max(len(line[at]) for line in all_lines) for at in range(len(columns))]
@@ -181,13 +181,13 @@ def table(rows: list[dict[str, Any]], columns: tuple[str, ...]) -> list[str]:
 
 
 class _Change(NamedTuple):
-    """One difference.
+    """One difference between two files.
 
     Attributes:
-        place: `DeviceInfo`, `2000h` or `2000h:01`.
-        what: the field, or `object` or `entry` if it exists in one file only.
-        old: value in the first file, empty if it has none.
-        new: value in the second file, empty if it has none.
+        place: place of the difference, such as `DeviceInfo`, `2000h` or `2000h:01`.
+        what: name of the field, or `object` or `entry` if it exists in one file only.
+        old: value in the first file, empty if there is none.
+        new: value in the second file, empty if there is none.
     """
 
     place: str
@@ -207,7 +207,7 @@ _WHOLE: Final = ("object", "entry")
 
 
 def diff(one: Document, other: Document) -> list[_Change]:
-    """Return all differences: device, identity, bit rates, then objects by index.
+    """Return all differences, first of device, identity and bit rates, then of objects by index.
 
     The order of sections and the notation of numbers are ignored. Dates, file names and comments
     are also ignored, because they do not concern the device.

@@ -1,4 +1,4 @@
-"""The configuration of a master: network and slaves, 1016h and 1F80h to 1F8Ah as values."""
+"""The configuration of a master with network and slaves, from objects 1016h and 1F80h to 1F8Ah."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class ObjectWrite:
-    """A value of the concise DCF, 1F22h.
+    """A value of the concise DCF (object 1F22h).
 
     Attributes:
-        index: of the object.
-        sub: of the object.
-        data: the bytes, little endian.
+        index: index of the object.
+        sub: sub-index of the object.
+        data: bytes to write, little endian.
     """
 
     index: int
@@ -22,33 +22,35 @@ class ObjectWrite:
 
 @dataclass(frozen=True, slots=True)
 class SlaveAssignment:
-    """What the master expects of a slave and does for the slave (CiA 302-2).
+    """The values that the master expects of a slave, and its actions for the slave (CiA 302-2).
 
     An identity, version, date or time of 0 is not checked.
 
     Attributes:
-        node_id: 1..127.
-        name: its name in messages.
-        boots: whether the master boots and starts it (1F81h, bit 2).
-        mandatory: whether the network must not start without the slave (bit 3).
-        reset_communication: whether the master resets the slave at the start; otherwise the master
-            does not touch a slave that is Operational (bit 4).
-        device_type: 1F84h.
-        vendor_id: 1F85h.
-        product_code: 1F86h.
-        revision: 1F87h.
-        serial: 1F88h.
-        software_version: 1F55h; checked unless it is 0 (bit 5).
-        program: software to download if its version differs (1F58h, bit 6).
-        restore_sub: sub-index of 1011h that is written before the configuration (1F8Ah, bit 7).
-        configuration_date: 1F26h; the configuration is skipped if date and time equal those in
-            1020h.
-        configuration_time: 1F27h.
-        writes: 1F22h, in this order.
-        heartbeat_us: consumer heartbeat time (1016h), 0 for none.
-        guard_us: guard time, 0 for no node guarding (1F81h, bits 16 to 31).
+        node_id: node-ID of the slave, 1..127.
+        name: name of the slave in messages.
+        boots: whether the master boots and starts the slave (1F81h, bit 2).
+        mandatory: whether the network must not start without the slave (1F81h, bit 3).
+        reset_communication: whether the master resets the slave at the start (1F81h, bit 4).
+            Otherwise the master does not touch a slave that is Operational.
+        device_type: expected device type (object 1F84h).
+        vendor_id: expected vendor-ID (object 1F85h).
+        product_code: expected product code (object 1F86h).
+        revision: expected revision number (object 1F87h).
+        serial: expected serial number (object 1F88h).
+        software_version: expected version of the software (object 1F55h), which is checked unless
+            it is 0 (1F81h, bit 5).
+        program: software to download if the version in the slave differs (1F58h; 1F81h, bit 6).
+        restore_sub: sub-index of 1011h that is written before the configuration (1F8Ah; 1F81h, bit
+            7).
+        configuration_date: expected date of the configuration (object 1F26h). The configuration is
+            skipped if date and time equal those in 1020h.
+        configuration_time: expected time of the configuration (object 1F27h).
+        writes: values of the concise DCF (object 1F22h), in the order of writing.
+        heartbeat_us: consumer heartbeat time (1016h), or 0 for none.
+        guard_us: guard time, or 0 for no node guarding (1F81h, bits 16 to 31).
         life_time_factor: number of guard requests without an answer after which the slave is lost
-            (bits 8 to 15).
+            (1F81h, bits 8 to 15).
     """
 
     node_id: int
@@ -74,22 +76,23 @@ class SlaveAssignment:
 
 @dataclass(frozen=True, slots=True)
 class MasterPlan:
-    """The behaviour of the master itself (CiA 302-2, NMT start-up 1F80h).
+    """The behaviour of the master (CiA 302-2, NMT start-up 1F80h).
 
     Attributes:
-        slaves: its slaves.
-        node_id: its own node-ID.
-        starts: whether it enters Operational by itself (bit 2 is 0).
-        starts_nodes: whether it starts slaves (bit 3 is 0).
-        starts_all: whether it starts all slaves at once, after all mandatory slaves have booted
-            (bit 1).
+        slaves: slaves of the master.
+        node_id: node-ID of the master.
+        starts: whether the master enters Operational by itself (bit 2 is 0).
+        starts_nodes: whether the master starts slaves (bit 3 is 0).
+        starts_all: whether the master starts all slaves at once, after all mandatory slaves have
+            booted (bit 1).
         resets_all: whether the loss of a mandatory slave resets all nodes (bit 4).
         stops_all: whether the loss of a mandatory slave stops all nodes (bit 6).
-        boot_time_us: how long it tries to boot a mandatory slave, 0 for no limit (1F89h).
-        heartbeat_us: producer heartbeat time (1017h), 0 for none.
-        sync_us: communication cycle period (1006h), 0 for no SYNC.
-        sync_overflow: last value of the counter of SYNC, 0 for none (1019h).
-        sdo_timeout_us: how long it waits for an SDO response.
+        boot_time_us: time that the master tries to boot a mandatory slave, or 0 for no limit
+            (1F89h).
+        heartbeat_us: producer heartbeat time (1017h), or 0 for none.
+        sync_us: communication cycle period (1006h), or 0 for no SYNC.
+        sync_overflow: last value of the counter of SYNC, or 0 for none (1019h).
+        sdo_timeout_us: time that the master waits for an SDO response.
     """
 
     slaves: tuple[SlaveAssignment, ...]

@@ -57,7 +57,7 @@ from tickrig.wire.canopen.nmt import NmtCommand, NmtState
 
 
 class BootStatus(Enum):
-    """The error status by its letter; `BOOTED` has none."""
+    """The error status by letter. `BOOTED` has no letter."""
 
     BOOTED = ""
     NOT_LISTED = "A"
@@ -117,12 +117,12 @@ _U32: Final = 4
 
 @dataclass(frozen=True, slots=True)
 class BootStep:
-    """One step of a boot-up, in words.
+    """One step of a boot-up in words.
 
     Attributes:
-        request: what the master sent, or waited for.
-        answer: the answer of the slave.
-        meaning: the consequence.
+        request: request that the master sent, or event that the master waited for.
+        answer: answer of the slave.
+        meaning: consequence of the answer.
     """
 
     request: str
@@ -138,10 +138,10 @@ _OnStep = Callable[[BootStep], None]
 
 
 class BootEnded(Exception):  # noqa: N818 - how a boot-up ends, in the middle of it
-    """The slave cannot be booted.
+    """Error that ends a boot-up, because the slave cannot be booted.
 
     Attributes:
-        status: why.
+        status: error status with the reason.
     """
 
     def __init__(self, status: BootStatus) -> None:
@@ -150,10 +150,10 @@ class BootEnded(Exception):  # noqa: N818 - how a boot-up ends, in the middle of
 
 
 class BootTalk:
-    """Reads, writes and waits; reports each step.
+    """Requests and waits of a boot-up. Each step is reported.
 
     Args:
-        on_step: called with each step.
+        on_step: function that is called with each step.
     """
 
     def __init__(self, on_step: _OnStep) -> None:
@@ -162,7 +162,7 @@ class BootTalk:
     def report(
         self, what: str, wait_us: int, status: BootStatus, *, boot_up: bool = True
     ) -> Script[NmtState]:
-        """Wait for a boot-up or a state; end the procedure if it does not arrive."""
+        """Wait for a boot-up or a state. End the procedure if it does not arrive."""
         state: NmtState | None = yield AwaitReport(wait_us, boot_up)
         if state is None:
             self.record(what, f"none within {wait_us // 1_000} ms", status.text)
@@ -173,7 +173,7 @@ class BootTalk:
     def read(
         self, index: int, sub: int, name: str, status: BootStatus, tries: int = 1
     ) -> Script[bytes]:
-        """Read an object; end the procedure if it cannot be read."""
+        """Read an object. End the procedure if it cannot be read."""
         what = f"{index:04X}h:{sub:02X} {name}"
         data = yield from self.attempt(index, sub, what, tries)
         if isinstance(data, SdoFailed):
@@ -182,7 +182,7 @@ class BootTalk:
         return data
 
     def attempt(self, index: int, sub: int, what: str, tries: int) -> Script[bytes | SdoFailed]:
-        """Read an object, with one repetition after a time-out; return the last error."""
+        """Read an object, with one repetition after a time-out. Return the last error."""
         for _ in range(tries - 1):
             try:
                 return (yield from upload(index, sub))
@@ -204,12 +204,12 @@ class BootTalk:
         tries: int = 1,
         answered: bool = True,
     ) -> Script[None]:
-        """Write an object; end the procedure if the slave refuses or does not answer.
+        """Write an object. End the procedure if the slave refuses or does not answer.
 
         Args:
-            write: what to write.
+            write: object and value to write.
             status: error status if the procedure ends.
-            what: text for the step; by default object and value.
+            what: text for the step. By default it is object and value.
             tries: number of attempts while there is no answer.
             answered: whether an answer is required.
         """
@@ -233,7 +233,7 @@ class BootTalk:
         return (yield from download(write.index, write.sub, write.data))
 
     def compare(self, what: str, data: bytes, expected: int, status: BootStatus) -> None:
-        """End the procedure if a number differs from the expected one; skip an expected 0."""
+        """End the procedure if a number differs from the expected one. Skip an expected 0."""
         if expected and not _is_value(data, expected):
             self.record(what, _as_hex(data), f"not {expected:08X}h: {status.text}")
             raise BootEnded(status)
@@ -263,7 +263,7 @@ def _is_value(data: bytes, expected: int) -> bool:
 
 
 def _as_hex(data: bytes) -> str:
-    """Return a value as a number; if it is longer than eight bytes, return its length."""
+    """Return a value as a number. If it is longer than eight bytes, return its length."""
     return f"{data[::-1].hex().upper()}h" if 0 < len(data) <= 8 else f"{len(data)} bytes"
 
 
@@ -277,28 +277,28 @@ FLASH_STATUS: Final = 0x1F57
 STOP: Final = 0
 _START: Final = 1
 _CLEAR: Final = 3
-"""Program control, 1F51h:01."""
+"""Command of program control (1F51h:01) that clears the program."""
 
 LOOK_US: Final = 100_000
 _LOOKS: Final = 600
-"""Flash status and program control are polled this often, in total for a minute."""
+"""Number of times that flash status and program control are polled, in total for a minute."""
 
 BUSY: Final = 0x01
-"""Bit of the flash status; bits 1 to 7 are an error code."""
+"""Busy bit of the flash status. Bits 1 to 7 are an error code."""
 
 _FAILED: Final = BootStatus.UPDATE_FAILED
 
 
 def _update_program(talk: BootTalk, program: bytes, expected: int) -> Script[None]:
-    """Stop and clear the program, download another, verify it, start it.
+    """Stop and clear the program, download another program, verify it, and start it.
 
     Args:
-        talk: the requests to the slave.
-        program: the program, downloaded in segments.
-        expected: its identification.
+        talk: requests to the slave.
+        program: program to download, in segments.
+        expected: expected identification of the program.
 
     Raises:
-        BootEnded: it failed.
+        BootEnded: the update failed.
     """
     yield from _stop(talk)
     yield from talk.write(_control(_CLEAR), _FAILED, what="1F51h:01 := clear", tries=_TRIES)
@@ -356,22 +356,22 @@ def _await_start(talk: BootTalk) -> Script[None]:
 
 _GUARD_ANSWER_US: Final = 100_000
 _BOOT_UP_US: Final = 1_000_000
-"""How long to wait for an answer to guarding, and for a boot-up after a reset."""
+"""Time to wait for an answer to guarding, and for a boot-up after a reset."""
 
 _LOAD: Final = b"load"
-"""The signature of 1011h."""
+"""Signature that 1011h requires."""
 
 _COMMUNICATION: Final = 2
-"""Sub-index of 1011h for communication parameters only; a reset communication loads them."""
+"""Sub-index of 1011h for communication parameters only, which a reset communication loads."""
 
 
 @dataclass(frozen=True, slots=True)
 class BootOutcome:
-    """How a boot-up ended.
+    """The outcome of a boot-up.
 
     Attributes:
-        status: the error status.
-        state: last reported state of the slave, None if it reported none.
+        status: error status of the boot-up.
+        state: last reported state of the slave, or None if the slave reported none.
     """
 
     status: BootStatus
@@ -387,8 +387,8 @@ class SlaveBoot:
     - the boot-up of a slave that another node configures (1F25h)
 
     Args:
-        slave: what the master expects of it.
-        on_step: called with each step.
+        slave: values that the master expects of the slave.
+        on_step: function that is called with each step.
     """
 
     def __init__(self, slave: SlaveAssignment, on_step: _OnStep) -> None:
@@ -396,7 +396,7 @@ class SlaveBoot:
         self._state: NmtState | None = None
 
     def script(self) -> Script[BootOutcome]:
-        """Boot the slave; errors are in the outcome."""
+        """Boot the slave. Errors are in the outcome."""
         try:
             if self._slave.boots:
                 yield from self._boot()
@@ -434,7 +434,7 @@ class SlaveBoot:
                 self._talk.compare(f"1018h:{sub:02X} {name}", data, expected, status)
 
     def _is_at_work(self) -> Script[bool]:
-        """Return whether the slave is Operational; reset its communication if it is not."""
+        """Return whether the slave is Operational. Reset its communication if it is not."""
         slave, status = self._slave, BootStatus.NO_HEARTBEAT
         wait_us, what = slave.heartbeat_us, "heartbeat"
         if not wait_us:
@@ -448,7 +448,7 @@ class SlaveBoot:
         return False
 
     def _check_software(self) -> Script[bool]:
-        """Compare the software; return True if it was updated."""
+        """Compare the software. Return True if the software was updated."""
         expected = self._slave.software_version
         data = yield from self._talk.read(
             0x1F56, 1, "software identification", BootStatus.NO_PROGRAM_OBJECTS, _TRIES

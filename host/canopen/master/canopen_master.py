@@ -21,21 +21,21 @@ from tickrig.host.text.names import known, near
 from tickrig.host.text.values import us_of
 
 _Duration = int | str
-"""Microseconds, or a text such as `"100ms"`."""
+"""Duration in microseconds, or as a text such as `"100ms"`."""
 
 _STARTED_US: Final = 2_000
-"""Within this time, a start command has been received."""
+"""Time within which slaves have received a start command."""
 
 
 V = TypeVar("V")
 
 
 class _Named(dict[str, V]):
-    """A mapping by name; for an unknown name, the error lists the known ones.
+    """A mapping by name. For an unknown name, the error lists the known names.
 
     Args:
         kind: kind of the items, such as `joint`.
-        items: the items by name.
+        items: items by name.
     """
 
     def __init__(self, kind: str, items: Mapping[str, V]) -> None:
@@ -43,23 +43,24 @@ class _Named(dict[str, V]):
         self._kind = kind
 
     def __missing__(self, name: str) -> V:
-        """Raise KeyError with the name that may be meant."""
+        """Raise KeyError with the name that the caller may mean."""
         raise KeyError(f"no {self._kind} {name!r}; {near(str(name), self)}")
 
 
 class CanopenMaster(Closing):
-    """A master; time passes only in its methods, which do the work that is due.
+    """A CANopen master. Time passes only in its methods, which do the work that is due.
 
     Args:
-        link: the bus, such as `bench.link` or a `CanLink`; the master closes it.
-        plan: its behaviour, and its slaves.
+        link: connection to the bus, such as `bench.link` or a `CanLink`. The master closes this
+            link.
+        plan: behaviour of the master, with its slaves.
 
     Attributes:
-        nmt: the NMT master that it runs.
+        nmt: NMT master that the master runs.
         joints: axes of drives by name.
 
     Raises:
-        TypeError: a link to a serial line.
+        TypeError: the link is a serial line.
     """
 
     def __init__(self, link: Link[Any], plan: MasterPlan) -> None:
@@ -72,7 +73,7 @@ class CanopenMaster(Closing):
         self._by_name = _Named("slave", slaves)
 
     def close(self) -> None:
-        """Close the bus; the slaves keep their state."""
+        """Close the bus. The slaves keep their state."""
         self._link.close()
 
     @property
@@ -81,7 +82,7 @@ class CanopenMaster(Closing):
         return self._link.now_us
 
     def slave(self, name: str | int) -> NetworkSlave:
-        """Return a slave by its name or node-ID; KeyError if there is none."""
+        """Return a slave by its name or node-ID. Raise KeyError if there is none."""
         if not isinstance(name, int):
             return self._by_name[name]
         if name not in self.nmt.slaves:
@@ -89,19 +90,20 @@ class CanopenMaster(Closing):
         return self.nmt.slaves[name]
 
     def attach(self, process_data: ProcessData) -> None:
-        """Make the master exchange process data and drive the drives from now on."""
+        """Make the master exchange process data and operate the drives from now on."""
         self.nmt.process_data = process_data
         drivers = [driver for node in process_data.drives for driver in node.drivers]
         self.joints = _Named("joint", {driver.name: driver for driver in drivers})
 
     def boot(self, within: _Duration = "10s") -> None:
-        """Start the network: let time pass until each slave has booted.
+        """Start the network. Time passes until each slave has booted.
 
         Args:
-            within: time limit in microseconds, or a text such as `"100ms"`.
+            within: time limit in microseconds, or as a text such as `"100ms"`.
 
         Raises:
-            BootFailed: some slaves have not booted; the message gives these slaves and the reasons.
+            BootFailed: some slaves have not booted. The message contains these slaves and the
+                reasons.
         """
         self.wait_until(self._all_booted, within)
         if failed := [slave for slave in self.nmt.slaves.values() if not slave.good]:
@@ -109,23 +111,23 @@ class CanopenMaster(Closing):
         self.run_for(_STARTED_US)
 
     def run_for(self, duration: _Duration) -> None:
-        """Let time pass: microseconds, or a text such as `"100ms"`."""
+        """Let time pass, given in microseconds or as a text such as `"100ms"`."""
         self.wait_until(lambda: False, duration)
 
     def wait_until(self, done: Callable[[], bool], within: _Duration) -> bool:
         """Let time pass until a condition holds.
 
         Args:
-            done: returns whether it holds.
-            within: time limit in microseconds, or a text such as `"100ms"`.
+            done: function that returns whether the condition holds.
+            within: time limit in microseconds, or as a text such as `"100ms"`.
 
         Returns:
-            False if the time limit came first.
+            True if the condition holds, or False if the time limit came first.
 
         Raises:
             LinkClosed: the bus is gone.
-            TypeError: a time that is neither a whole number nor a text.
-            ValueError: a text that is not a time, or a negative time.
+            TypeError: the time is neither a whole number nor a text.
+            ValueError: the text is not a time, or the time is negative.
         """
         until_us = self.now_us + us_of(within)
         while not done():
@@ -151,7 +153,7 @@ class CanopenMaster(Closing):
     def explain(self, name: str | int) -> str:
         """Return the latest boot-up of a slave and its losses, line by line.
 
-        For the boot-up, the lines give the requests, the answers and the outcome. Losses, and
+        The lines on the boot-up contain the requests, the answers and the outcome. Losses, and
         messages after a loss, are listed in the order of time, before or after the boot-up.
         """
         slave = self.slave(name)
@@ -172,7 +174,7 @@ class CanopenMaster(Closing):
         return all(slave.outcome is not None for slave in self.nmt.slaves.values())
 
     def _step(self, until_us: int) -> None:
-        """Wait for the next frame or the next due time; process it."""
+        """Wait for the next frame or the next due time. Process the frame and the due work."""
         wait_us = min(self.nmt.due_us, until_us) - self.now_us
         now_us, received = self._link.receive_stamped(max(0, wait_us))
         if sent := self.nmt.tick(now_us, received):
@@ -223,27 +225,27 @@ def _failure(slave: NetworkSlave) -> str:
 # The master that a bus.yml describes, on a bus.
 
 SDO_TIMEOUT_US: Final = 100_000
-"""The default of Lely's master."""
+"""Default time to wait for an SDO response, as in Lely's master."""
 
 
 def open_master(
     link: Link[Any], path: Path | str, *, sdo_timeout_us: int = SDO_TIMEOUT_US
 ) -> CanopenMaster:
-    """Return the master of a bus.yml; it has not sent anything yet.
+    """Return the master of a bus.yml. The master has not sent anything yet.
 
     Args:
-        link: the bus, such as `bench.link` or `CanLink.open("can0", "socketcan")`.
-        path: the bus.yml.
-        sdo_timeout_us: how long to wait for an SDO response; use more on a loaded machine.
+        link: connection to the bus, such as `bench.link` or `CanLink.open("can0", "socketcan")`.
+        path: path of the bus.yml.
+        sdo_timeout_us: time to wait for an SDO response. Use a longer time on a loaded machine.
 
     Returns:
-        A master; close it, or use it in a `with` block.
+        The master. Close it, or use it in a `with` block.
 
     Raises:
-        OSError: the file cannot be read, or a software file that it names cannot be read.
+        OSError: the bus.yml cannot be read, or a software file that it names cannot be read.
         ImportError: PyYAML is not installed.
-        ValueError: the file has errors; the message lists all errors, each with its line.
-        TypeError: a link to a serial line.
+        ValueError: the file has errors. The message lists all errors, each with its line.
+        TypeError: the link is a serial line.
     """
     bus = read_bus_file(Path(path))
     if bus.errors:

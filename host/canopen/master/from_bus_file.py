@@ -13,8 +13,8 @@ def plan_of(bus: BusFile) -> MasterPlan:
     """Return the behaviour of the master in a bus.yml.
 
     Raises:
-        ValueError: it has no master.
-        OSError: software that it names cannot be read.
+        ValueError: the bus.yml has no master.
+        OSError: software that the bus.yml names cannot be read.
     """
     master = bus.master
     if master is None:
@@ -59,7 +59,7 @@ def _assignment(slave: BusSlave, master: BusMaster, folder: Path) -> SlaveAssign
 
 
 def _program(slave: BusSlave, folder: Path) -> bytes:
-    """Return the software of a slave, empty if it is not compared."""
+    """Return the software of a slave, empty if the software is not compared."""
     if not (slave.software_file and slave.software_version):
         return b""
     return (folder / slave.software_file).read_bytes()

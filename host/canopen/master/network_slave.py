@@ -18,25 +18,26 @@ _AGAIN_US: Final = 1_000_000
 
 
 class NetworkSlave:
-    """A slave; it sends the frames of its dialogue, and never blocks.
+    """A slave of the master. It sends the frames of its dialogue, and never blocks.
 
     Args:
-        assignment: what the master expects of it.
-        send: takes CAN-ID and data.
-        guard: takes the CAN-ID of a remote frame.
+        assignment: values that the master expects of the slave.
+        send: function that sends a data frame. Its arguments are CAN-ID and data.
+        guard: function that sends a remote frame. Its argument is the CAN-ID.
         plan: behaviour of the master.
-        booted: called when a boot-up has ended.
+        booted: function that is called when a boot-up has ended.
 
     Attributes:
-        assignment: as given.
+        assignment: values that the master expects of the slave.
         session: the session of the slave.
         dialogue: dialogue of the session.
-        outcome: how its latest boot-up ended, None before that and during one.
-        steps: of its latest boot-up, each with its time.
-        emergencies: error codes of its EMCYs, the first one first.
-        began_us: when its latest boot-up began.
-        lost: number of failures of its error control.
-        events: its losses, and its messages afterwards, each with its time.
+        outcome: outcome of the latest boot-up, or None before the first boot-up and during a
+            boot-up.
+        steps: steps of the latest boot-up, each with its time.
+        emergencies: error codes of the slave's EMCY messages, in the order of arrival.
+        began_us: begin of the latest boot-up.
+        lost: number of failures of error control.
+        events: losses of the slave, and its messages after a loss, each with its time.
     """
 
     def __init__(
@@ -65,17 +66,17 @@ class NetworkSlave:
 
     @property
     def state(self) -> NmtState | None:
-        """Last reported state, or the state commanded since; None if unknown."""
+        """Last reported state, or the state commanded since; None if the state is unknown."""
         return self.session.state
 
     @property
     def good(self) -> bool:
-        """Whether its latest boot-up succeeded."""
+        """Whether the latest boot-up succeeded."""
         return self.outcome is not None and self.outcome.status.good
 
     @property
     def due_us(self) -> int:
-        """When to call `tick` next."""
+        """Time of the next call of `tick`."""
         return min(self.dialogue.due_us, self._again_us, self._control.due_us)
 
     def forget(self) -> None:
@@ -86,7 +87,7 @@ class NetworkSlave:
         self._again_us = NEVER
 
     def boot(self, now_us: int) -> None:
-        """Start a boot-up, unless one is running."""
+        """Start a boot-up, unless a boot-up is running."""
         if not self.booting:
             self.began_us = now_us
             self._boot(now_us)
@@ -99,7 +100,7 @@ class NetworkSlave:
         self.dialogue.start(now_us, QueuedScript("boot-up", script, self._end, self._never))
 
     def expect(self, state: NmtState) -> None:
-        """Record a state that was commanded."""
+        """Record a state that the master commanded."""
         if self.state is not None:
             self.session.state = state
 
@@ -120,7 +121,7 @@ class NetworkSlave:
             self._control.hear(at_us, frame)
 
     def tick(self, now_us: int) -> bool:
-        """Do the work that is due; return True if the slave is now lost."""
+        """Do the work that is due. Return True if the slave is now lost."""
         self._now_us = now_us
         self.dialogue.tick(now_us)
         if now_us >= self._again_us:
@@ -131,12 +132,12 @@ class NetworkSlave:
         return True
 
     def note_loss(self, following: str) -> None:
-        """Record its loss, and the reaction of the master."""
+        """Record the loss of the slave, and the reaction of the master."""
         within = f"none within {self._control.silence_us // 1_000} ms"
         self._happened(self._control.what, within, f"lost; {following}")
 
     def _return(self, state: NmtState) -> None:
-        """Record that a lost slave sends again; only a boot-up starts a new boot procedure."""
+        """Record that a lost slave sends again. Only a boot-up starts a new boot procedure."""
         if state is NmtState.INITIALISING:
             self._happened("boot-up", "received", "booting again")
         else:
@@ -168,7 +169,7 @@ class NetworkSlave:
     def _may_try_again(self) -> bool:
         """Return whether a boot-up may be repeated.
 
-        The boot time of a mandatory slave must not have ended; other slaves have no limit.
+        The boot time of a mandatory slave must not have ended. Other slaves have no limit.
         """
         if not self.assignment.mandatory or not self._boot_time_us:
             return True

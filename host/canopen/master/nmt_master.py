@@ -1,4 +1,4 @@
-"""The NMT master: boots, starts and monitors its slaves (CiA 302-2, NMT start-up)."""
+"""The NMT master, which boots, starts and monitors its slaves (CiA 302-2, NMT start-up)."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from tickrig.wire.instant import NEVER
 
 
 class ProcessData:
-    """Passes frames and SYNCs to the process images and drives of the nodes.
+    """Distributor of frames and SYNCs to the process images and drives of the nodes.
 
     Args:
-        images: by node-ID.
-        drives: nodes with axes.
+        images: process images by node-ID.
+        drives: nodes with the axes of drives.
     """
 
     def __init__(
@@ -38,11 +38,11 @@ class ProcessData:
 
     @property
     def due_us(self) -> int:
-        """When to call `tick` next."""
+        """Time of the next call of `tick`."""
         return min((drive.due_us for drive in self.drives), default=NEVER)
 
     def receive(self, frame: CanFrame) -> None:
-        """Process a data frame; ignore frames that are not TPDOs of a slave."""
+        """Process a data frame. Ignore frames that are not TPDOs of a slave."""
         if (image := self._by_cob_id.get(frame.can_id)) is not None:
             image.receive(frame.can_id, frame.data)
 
@@ -52,7 +52,7 @@ class ProcessData:
             image.sync()
 
     def tick(self, now_us: int, *, sync: bool) -> None:
-        """Start the periods that are due; `sync` is whether a SYNC was just sent.
+        """Start the periods that are due. `sync` is whether a SYNC was just sent.
 
         No period starts while slaves boot at the start, because the drivers of ros2_canopen wait
         for the slaves.
@@ -67,7 +67,7 @@ class ProcessData:
 
 _SYNC_COB_ID: Final = 0x080
 _EMCY_COB_ID: Final = 0x080
-"""CAN-ID base of EMCY; the node-ID is added."""
+"""CAN-ID base of EMCY messages, to which the node-ID is added."""
 
 _NODE_IDS: Final = range(1, 128)
 _FUNCTION: Final = 0x780
@@ -75,22 +75,24 @@ _FUNCTION: Final = 0x780
 
 
 class NmtMaster:
-    """Boots and starts slaves as Lely's master does; without a clock or bus, driven by `tick`.
+    """NMT master that boots and starts slaves as Lely's master does.
 
-    Not emulated: flying master, LSS, TIME, the inhibit time of NMT (102Ah), an object dictionary
-    that other nodes could read.
+    The master has no clock and no bus. It is driven by `tick`.
+
+    Not emulated: flying master, LSS, TIME, the inhibit time of NMT (102Ah), and an object
+    dictionary that other nodes can read.
 
     Args:
-        plan: its behaviour, and its slaves.
+        plan: behaviour of the master, with its slaves.
 
     Attributes:
-        plan: as given.
-        slaves: by node-ID.
-        state: its own NMT state.
-        halted: whether a mandatory slave could not be booted; the master then starts no more
+        plan: behaviour of the master.
+        slaves: slaves by node-ID.
+        state: NMT state of the master.
+        halted: whether a mandatory slave could not be booted. The master then starts no more
             slaves.
         strangers: node-IDs that booted but do not belong to a slave (error status A).
-        process_data: receives all other data frames, and works in periods.
+        process_data: receiver of all other data frames, which also works in periods.
         now_us: time of the last `tick`.
     """
 
@@ -108,7 +110,7 @@ class NmtMaster:
 
     @property
     def due_us(self) -> int:
-        """When to call `tick` next."""
+        """Time of the next call of `tick`."""
         if self._out or self.state is nmt.NmtState.INITIALISING:
             return self.now_us
         slaves = min((slave.due_us for slave in self.slaves.values()), default=NEVER)
@@ -143,7 +145,7 @@ class NmtMaster:
         self._out.append(CanFrame(can_id, remote=True, remote_length=1))
 
     def _start_up(self) -> None:
-        """Boot the master, reset the slaves, boot those that it does not wait for."""
+        """Boot the master, reset the slaves, and boot slaves for which the master does not wait."""
         self.send(nmt.ERROR_CONTROL_COB_ID + self.plan.node_id, bytes((nmt.NmtState.INITIALISING,)))
         self.state = nmt.NmtState.PRE_OPERATIONAL
         self._heartbeat.start(self.now_us)
@@ -156,7 +158,7 @@ class NmtMaster:
         self._go_on()
 
     def _reset_slaves(self) -> None:
-        """Reset the communication of all nodes; one by one if a slave must not be reset."""
+        """Reset the communication of all nodes, one by one if a slave must not be reset."""
         slaves = self.plan.slaves
         kept = {slave.node_id for slave in slaves if not slave.reset_communication}
         if not kept:
@@ -192,7 +194,7 @@ class NmtMaster:
         self._go_on()
 
     def _go_on(self) -> None:
-        """Enter Operational once no mandatory slave is awaited any more."""
+        """Enter Operational when the master waits for no more mandatory slaves."""
         waits = any(slave.booting and slave.assignment.mandatory for slave in self._slaves())
         if self.halted or waits or self.state is not nmt.NmtState.PRE_OPERATIONAL:
             return
@@ -202,7 +204,7 @@ class NmtMaster:
                 self._start_all()
 
     def _start_all(self) -> None:
-        """Start all slaves at once if none must be booted, else each booted one, as Lely does."""
+        """Start all slaves at once if none must be booted, else each booted slave, as Lely does."""
         slaves = self._slaves()
         if all(slave.good and not slave.assignment.boots for slave in slaves):
             self.command(nmt.NmtCommand.START)
@@ -216,7 +218,7 @@ class NmtMaster:
                 self.command(nmt.NmtCommand.START, slave.assignment.node_id)
 
     def _lose(self, slave: NetworkSlave) -> None:
-        """React to the loss of a slave as 1F80h says (CiA 302-2, error handling)."""
+        """React to the loss of a slave as 1F80h requires (CiA 302-2, error handling)."""
         mandatory = slave.assignment.mandatory
         if mandatory and self.plan.stops_all:
             slave.note_loss("all nodes are stopped")
@@ -231,7 +233,7 @@ class NmtMaster:
             self.command(nmt.NmtCommand.RESET_NODE, slave.assignment.node_id)
 
     def _produce(self) -> bool:
-        """Send due heartbeat and SYNC, each once after a pause; return True after a SYNC."""
+        """Send due heartbeat and SYNC, each once after a pause. Return True after a SYNC."""
         if self._heartbeat.advance(self.now_us):
             self.send(nmt.ERROR_CONTROL_COB_ID + self.plan.node_id, bytes((self.state,)))
         if self._sync.advance(self.now_us):
@@ -242,7 +244,7 @@ class NmtMaster:
         return False
 
     def _count(self) -> bytes:
-        """Return the counter of a SYNC, nothing if it has none."""
+        """Return the counter of a SYNC, or nothing if the SYNC has no counter."""
         if not self.plan.sync_overflow:
             return b""
         self._sync_count = self._sync_count % self.plan.sync_overflow + 1

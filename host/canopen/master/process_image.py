@@ -15,23 +15,23 @@ Key = tuple[int, int]
 """Index and sub-index."""
 
 EVENT_DRIVEN: Final = 0xFE
-"""The lowest transmission type with which a PDO is sent when one of its objects is written."""
+"""The lowest transmission type whose PDOs are sent when one of their objects is written."""
 
 _SYNC_ACYCLIC: Final = 0
-"""Sent with the SYNC after an object was written."""
+"""Transmission type of a PDO that is sent with the SYNC after an object was written."""
 
 
 class ProcessImage:
-    """Values by index and sub-index; a value is 0 until it is received or written.
+    """Values by index and sub-index. A value is 0 until it is received or written.
 
     An RPDO of the slave is sent when an object in it is written. A synchronous RPDO is sent with
     each n-th SYNC. As in Lely's master, objects that have not been written are 0.
 
-    Not emulated: inhibit times, event timers and deadlines on the master's side.
+    Not emulated: inhibit times, event timers and deadlines of the master.
 
     Args:
-        pdos: the existing PDOs of the slave.
-        send: takes CAN-ID and data.
+        pdos: existing PDOs of the slave.
+        send: function that sends a data frame. Its arguments are CAN-ID and data.
     """
 
     def __init__(self, pdos: Iterable[BusPdo], send: Send) -> None:
@@ -49,23 +49,23 @@ class ProcessImage:
 
     @property
     def cob_ids(self) -> Iterable[int]:
-        """The CAN-IDs on which the slave sends."""
+        """The CAN-IDs that the slave sends."""
         return self._received
 
     def receives(self, key: Key) -> bool:
-        """Whether a TPDO of the slave carries an object."""
+        """Return whether a TPDO of the slave carries an object."""
         return key in self._inputs
 
     def sends(self, key: Key) -> bool:
-        """Whether an RPDO of the slave carries an object."""
+        """Return whether an RPDO of the slave carries an object."""
         return key in self._outputs
 
     def is_fresh(self, key: Key) -> bool:
-        """Whether an object was received or read since it was marked as outdated."""
+        """Return whether an object was received or read since it was marked as outdated."""
         return key in self._seen
 
     def doubt(self, key: Key) -> None:
-        """Mark the value of an object as outdated; the value is kept."""
+        """Mark the value of an object as outdated. The value is kept."""
         self._seen.discard(key)
 
     def count(self, key: Key) -> int:
@@ -77,7 +77,7 @@ class ProcessImage:
         return self._values.get(key, 0)
 
     def write(self, key: Key, bits: int) -> None:
-        """Change an object; send the event-driven PDOs that carry it."""
+        """Change an object. Send the event-driven PDOs that carry it."""
         self._values[key] = bits
         for pdo in self._sent:
             if key in keys(pdo):
@@ -93,7 +93,7 @@ class ProcessImage:
         self._counts[key] += 1
 
     def receive(self, can_id: int, data: bytes) -> None:
-        """Process a TPDO; ignore one that is too short."""
+        """Process a TPDO. Ignore a TPDO that is too short."""
         pdo = self._received[can_id]
         widths = [mapped.bits for mapped in pdo.mapping]
         if 8 * len(data) < sum(widths):

@@ -1,4 +1,4 @@
-"""Operations that wait for conditions, several at once."""
+"""Operations that wait for conditions, with several operations at once."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ class Until:
     """Wait until a condition holds.
 
     Attributes:
-        done: returns whether it holds.
+        done: function that returns whether the condition holds.
         within_us: time limit.
-        complaint: message of the `DriveFailed` after this time.
+        complaint: message of the `DriveFailed` error that is raised after this time.
     """
 
     done: Callable[[], bool]
@@ -22,12 +22,12 @@ class Until:
     complaint: str
 
     def __await__(self) -> Generator[Until, None, None]:
-        """Wait; raises DriveFailed if the condition does not hold in time."""
+        """Wait. Raise DriveFailed if the condition does not hold in time."""
         yield self
 
 
 Operation = Coroutine[Until, None, Any]
-"""An operation that takes time: it awaits `Until` and other operations; `perform` runs it."""
+"""An operation that takes time. It awaits `Until` and other operations. `perform` runs it."""
 
 
 class DriveFailed(Exception):  # noqa: N818 - what the drive did
@@ -44,15 +44,15 @@ class _Wait:
         self._take(now_us, None)
 
     def due(self, now_us: int) -> bool:
-        """Whether it can continue."""
+        """Whether the operation can continue."""
         return self.step is not None and (self.step.done() or now_us >= self._deadline_us)
 
     def left_us(self, now_us: int) -> int:
-        """Return the time limit of its wait."""
+        """Return the remaining time of the wait."""
         return max(0, self._deadline_us - now_us)
 
     def go_on(self, now_us: int) -> None:
-        """Run the next steps of the operation; raises the errors of the operation."""
+        """Run the next steps of the operation. Errors of the operation are raised."""
         step = self.step
         assert step is not None
         self._take(now_us, None if step.done() else DriveFailed(step.complaint))
@@ -77,7 +77,7 @@ def perform(
     """Run operations to their ends, in parallel.
 
     Raises:
-        DriveFailed: a condition did not hold in time; the other operations stop where they are.
+        DriveFailed: a condition did not hold in time. The other operations stop where they are.
     """
     waits = [_Wait(operation, now_us()) for operation in operations]
     while waits := [wait for wait in waits if wait.step is not None]:
@@ -89,7 +89,7 @@ def _wait(
     now_us: Callable[[], int],
     wait_until: Callable[[Callable[[], bool], int], object],
 ) -> None:
-    """Wait until an operation can continue; continue all operations that can."""
+    """Wait until an operation can continue. Continue all operations that can."""
     left_us = min(wait.left_us(now_us()) for wait in waits)
     wait_until(lambda: any(wait.due(now_us()) for wait in waits), left_us)
     for wait in waits:

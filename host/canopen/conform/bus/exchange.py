@@ -28,8 +28,8 @@ class StepFailed(Exception):  # noqa: N818 - what the step did
     The message gives the received frame and the allowed frames.
 
     Attributes:
-        got: the received frame, as candump writes it; empty if there was none.
-        wanted: patterns of the expected frame, one of which must match; empty if no frame was
+        got: received frame in candump notation, empty if no frame was received.
+        wanted: patterns of the expected frame, one of which must match. It is empty if no frame was
             expected.
     """
 
@@ -46,14 +46,14 @@ class NotAllowed(Exception):  # noqa: N818 - what the step is
 
 
 class Disturbed(Exception):  # noqa: N818 - what the check was
-    """A check that cannot be judged; the message gives the reason."""
+    """A check that cannot be judged. The message contains the reason."""
 
 
 # The evidence of a check: the frames on the bus, with their times.
 
 FIRST_LINES: Final = 40
 LAST_LINES: Final = 160
-"""Number of lines that are kept of a long check."""
+"""Number of lines that are kept as evidence of a long check."""
 LEFT_OUT: Final = "lines left out"
 """The end of the remark that replaces the omitted lines."""
 
@@ -62,7 +62,9 @@ _Line = tuple[int, Direction, CanFrame | str]
 
 
 class Evidence:
-    """The lines of one attempt at a check: if there are many, the first and the last ones.
+    """The lines of one attempt at a check.
+
+    If there are many, only the first and last lines are kept.
 
     Frames are formatted only when the lines are read.
     """
@@ -94,17 +96,20 @@ class Evidence:
 
 MS_US: Final = 1_000
 PERIOD_TOLERANCE: Final = 0.05
-"""Allowed relative error of the mean period; CiA 301 gives no limit; crystals are far better."""
+"""Allowed relative error of the mean period.
+
+CiA 301 gives no limit, and crystals are far better.
+"""
 
 
 def _off_period(stamps: Sequence[int], each_ms: int, times: int, resolution_us: int) -> str:
-    """Return the error in the mean period or the number of periods; empty if both are right.
+    """Return the error in the mean period or the number of periods, or an empty text without error.
 
     Args:
-        stamps: when frames came, in microseconds; surplus stamps at the end are ignored.
+        stamps: arrival times of frames in microseconds. Surplus times at the end are ignored.
         each_ms: the expected period.
         times: the expected number of periods, which is one less than the number of frames.
-        resolution_us: resolution of the stamps.
+        resolution_us: resolution of the arrival times.
 
     >>> _off_period([0, 53_000, 106_000], 50, 2, 0)
     'each 53.0 ms, want 50 ms, 5 % off at most'
@@ -125,14 +130,14 @@ def _off_period(stamps: Sequence[int], each_ms: int, times: int, resolution_us: 
 # How many nodes answer to one node-ID, determined from the answers to their requests.
 
 _LEAST: Final = 3
-"""Number of requested objects from which the count is significant."""
+"""Number of requested objects from which the number of answers is significant."""
 _ANSWERS: Final = (sdo_frame.ServerCommand.UPLOAD, sdo_frame.ServerCommand.ABORT)
 _MULTIPLEXER: Final = slice(1, 4)
 """The bytes of an SDO frame that hold index and sub-index."""
 
 
 class Presence(Enum):
-    """How many nodes there are."""
+    """The number of nodes with the node-ID under test."""
 
     NONE = 0
     ONE = 1
@@ -142,27 +147,27 @@ class Presence(Enum):
 # How much of the bus the tester may use, and how much others use.
 
 ASSUMED_BIT_RATE: Final = 125_000
-"""Default bit rate in bit/s; it is low, so that the load limit holds on any faster bus."""
+"""Default bit rate in bit/s. The low value keeps the load limit valid on any faster bus."""
 
 _WINDOW_US: Final = 100_000
-"""Window over which the load is limited."""
+"""Length of the window over which the load is limited."""
 
 _LONGEST_WAIT_US: Final = 1_000_000
-"""A node that floods the bus with answers does not stop the tester from sending."""
+"""Longest wait before a frame, so that a node that floods the bus cannot stop the tester."""
 
 _PLENTY_BIT_S: Final = 12_500
-"""With a smaller share than this, in bit/s, everything takes longer, so a check may too."""
+"""Share of the bus in bit/s below which a check may take longer, because everything is slower."""
 
 _FOREIGN_LOAD: Final = 0.5
-"""With a higher load by other nodes, a late or missing answer says nothing about the node."""
+"""Load by other nodes above which a late or missing answer proves nothing about the node."""
 
 
 class _Allowance:
-    """Limits the tester to its share of the bit rate, in windows of `_WINDOW_US`.
+    """A limit that keeps the tester within its share of the bit rate, in windows of `_WINDOW_US`.
 
     Args:
-        bit_rate: of the bus in bit/s.
-        max_load: allowed share of it, above 0 to 1.
+        bit_rate: bit rate of the bus in bit/s.
+        max_load: allowed share of the bit rate, above 0 to 1.
 
     Attributes:
         slowness: factor by which everything may take longer than usual.
@@ -174,16 +179,16 @@ class _Allowance:
         self.slowness = max(1.0, _PLENTY_BIT_S / (bit_rate * max_load))
 
     def use(self, now_us: int, frame: CanFrame) -> None:
-        """Count a frame of the tester, or an answer to one."""
+        """Count a frame of the tester, or an answer to a frame of the tester."""
         bits = kept_bits(frame) if type(frame[1]) is bytes else frame_bits(frame)
         self.from_us = max(self.from_us, now_us - _WINDOW_US) + bits / self._bits_us
 
 
 class _ForeignLoad:
-    """The load by other nodes, in windows of `_WINDOW_US`.
+    """The load by other nodes, measured in windows of `_WINDOW_US`.
 
     Args:
-        bit_rate: of the bus in bit/s.
+        bit_rate: bit rate of the bus in bit/s.
     """
 
     def __init__(self, bit_rate: int) -> None:
@@ -191,7 +196,7 @@ class _ForeignLoad:
         self._window = self._bits = 0
 
     def add(self, at_us: int, frame: CanFrame) -> bool:
-        """Count a frame; return True if the bus is too loaded to judge the node."""
+        """Count a frame. Return True if the bus is too loaded to judge the node."""
         window = at_us // _WINDOW_US
         if window != self._window:
             self._window, self._bits = window, 0
@@ -200,13 +205,13 @@ class _ForeignLoad:
 
 
 _SLICE_US: Final = 20_000
-"""The longest single wait; a wait that lasts longer shows that the host was stopped."""
+"""The longest single wait. A wait that lasts longer shows that the host was stopped."""
 
 HOST_GAP_US: Final = 10_000
-"""How much longer a wait, or the time between two, may last before the host counts as late."""
+"""Excess duration of a wait, or of a pause between waits, above which the host counts as late."""
 
 _HELD_US: Final = 20_000
-"""A frame sent later than this may change what the node does, so the check is inconclusive."""
+"""Delay of a sent frame that may change what the node does, so that the check is inconclusive."""
 _PAUSE_US: Final = 10_000
 """Pause after an SDO request that has no answer.
 
@@ -229,37 +234,37 @@ _BEGINNING: Final = (
     sdo_frame.ClientCommand.BLOCK_UPLOAD,
     sdo_frame.ClientCommand.BLOCK_DOWNLOAD,
 )
-"""Requests that name an object; some block segments look like such requests, which does no harm."""
+"""Requests that name an object. Some block segments look the same, which does no harm."""
 
 _NAMING: Final = frozenset((*range(0x40, 0x50), 0x60, 0x80, 0xA0, 0xA4, 0xC0, 0xC2, 0xC4, 0xC6))
-"""Commands of answers that name an object; block segments may look like them without harm."""
+"""Commands of answers that name an object. Some block segments look the same, without harm."""
 
 _UNREAD_FRAMES: Final = 2_000
-"""Unread frames kept per CAN-ID; if a node floods the bus, the oldest are lost."""
+"""Number of unread frames kept per CAN-ID. If a node floods the bus, the oldest frames are lost."""
 
 
 class BusExchange:
-    """The bus as a check sees it: frames are text; each CAN-ID has a queue of unread frames.
+    """The bus as a check sees it. Frames are text, and each CAN-ID has a queue of unread frames.
 
     Args:
-        link: the bus; checks use its time stamps.
-        node_id: of the node under test, 1..127.
-        bit_rate: of the bus in bit/s.
-        max_load: share of the bit rate that may be used, above 0 to 1.
-        permit: checks each frame before it is sent; raises NotAllowed.
-        resolution_us: resolution of the time stamps; a frame may be late by this time.
+        link: connection to the bus. Checks use the time stamps of this bus.
+        node_id: node-ID of the node under test, 1..127.
+        bit_rate: bit rate of the bus in bit/s.
+        max_load: share of the bit rate that the tester may use, above 0 to 1.
+        permit: function that checks each frame before it is sent, and raises NotAllowed.
+        resolution_us: resolution of the time stamps. A frame may be late by this time.
         shared_host: whether the node may be a process of this machine.
 
     Attributes:
         evidence: the evidence of the running check.
         disturbances: reasons why the running check cannot fail, without duplicates.
         crashes: reasons why the running check fails in any case, without duplicates.
-        boots: number of boot-up messages of the node since the start of the run.
-        others: node-IDs of other nodes seen on the bus; 0 stands for frames that belong to no node.
+        boots: number of boot-up messages that the node has sent since the start of the run.
+        others: node-IDs of other nodes seen on the bus. 0 stands for frames that belong to no node.
         deadline_us: time at which the running check must have ended.
-        transfer: the answer of the node to the last SDO request that names an object.
-        played: a node-ID that no other node has. The tester simulates a node with it, or assigns it
-            to the node under test.
+        transfer: answer of the node to the last SDO request that names an object.
+        played: node-ID that no other node has. The tester simulates a node with this node-ID, or
+            assigns it to the node under test.
         unanswered: requests that name an object and were not answered, in the order of sending.
     """
 
@@ -299,16 +304,16 @@ class BusExchange:
 
     @property
     def now_us(self) -> int:
-        """Bus time."""
+        """Bus time in microseconds."""
         return self._link.now_us
 
     def begin(self, within_us: int, watched: frozenset[str] | None = None) -> None:
-        """Begin a check, or the work between two checks; drop all earlier frames.
+        """Begin a check, or the work between two checks. Drop all earlier frames.
 
         Args:
-            within_us: how long it may last.
-            watched: CAN-IDs whose frames are kept, in addition to the CAN-IDs of the node. It is
-                None between checks, when no evidence is kept.
+            within_us: longest duration of the check or the work.
+            watched: CAN-IDs whose frames are kept, in addition to the CAN-IDs of the node. The
+                value is None between checks, when no evidence is kept.
         """
         self.deadline_us = NEVER
         self._listen(self.now_us)
@@ -321,7 +326,10 @@ class BusExchange:
 
     @property
     def presence(self) -> Presence:
-        """Number of nodes that have answered: two if most objects were answered twice each time."""
+        """Number of nodes that have answered.
+
+        Two nodes answered if most objects were answered twice.
+        """
         if self._is_silent:
             return Presence.NONE
         told = self._answered
@@ -330,7 +338,7 @@ class BusExchange:
         return Presence.TWO if many else Presence.ONE
 
     def end_listening(self) -> None:
-        """Allow the node to use any CAN-ID; from now on only heartbeats reveal other nodes."""
+        """Allow the node to use any CAN-ID. From now on, only heartbeats reveal other nodes."""
         self._others_by = _HEARTBEATS
 
     def remark(self, text: str) -> None:
@@ -385,10 +393,10 @@ class BusExchange:
         link.send((frame,))
 
     def expect(self, patterns: Sequence[str], within_ms: int) -> str:
-        """Wait for the next frame on a CAN-ID, which must match one of the patterns.
+        """Wait for the next frame with a CAN-ID. The frame must match one of the patterns.
 
         Returns:
-            The frame.
+            The received frame.
 
         Raises:
             StepFailed: no frame arrived in time, or a frame arrived that does not match.
@@ -410,7 +418,7 @@ class BusExchange:
         return got
 
     def none(self, can_id: str, for_ms: int) -> None:
-        """Wait; raises StepFailed if a frame with the CAN-ID arrives or is unread."""
+        """Wait. Raise StepFailed if a frame with the CAN-ID arrives or is unread."""
         until_us = self.now_us + for_ms * MS_US
         self._listen_until(until_us)
         unread = self._unread[can_id]
@@ -418,18 +426,18 @@ class BusExchange:
             raise StepFailed(f"unexpected {unread[0][1]}, want none on {can_id} for {for_ms} ms")
 
     def count(self, pattern: str, for_ms: int, least: int, most: int) -> None:
-        """Wait; raises StepFailed unless `least` to `most` matching frames arrive."""
+        """Wait. Raise StepFailed unless `least` to `most` matching frames arrive."""
         got = len(self.collect(pattern, for_ms))
         if not least <= got <= most:
             raise StepFailed(f"{got} x {pattern} in {for_ms} ms, want {least}..{most}")
 
     def period(self, pattern: str, each_ms: int, times: int) -> None:
-        """Wait; raises StepFailed unless matching frames arrive with a period of `each_ms`.
+        """Wait. Raise StepFailed unless matching frames arrive with a period of `each_ms`.
 
         Args:
             pattern: pattern of the frames.
-            each_ms: their period.
-            times: how many periods are measured.
+            each_ms: expected period of the frames.
+            times: number of periods to measure.
         """
         stamps = self.collect(pattern, each_ms * (times + 2))
         if wrong := _off_period(stamps, each_ms, times, self.resolution_us):
@@ -444,7 +452,7 @@ class BusExchange:
             raise StepFailed(f"{pattern} {wrong}")
 
     def collect(self, pattern: str, for_ms: int) -> list[int]:
-        """Wait; return the times of the matching frames that come."""
+        """Wait. Return the arrival times of the matching frames."""
         unread = self._unread[can_id_of(pattern)]
         unread.clear()
         until_us = self.now_us + for_ms * MS_US
@@ -454,17 +462,17 @@ class BusExchange:
         return times
 
     def forget(self, can_id: str) -> None:
-        """Drop the frames of a CAN-ID that have come."""
+        """Drop the received frames of a CAN-ID."""
         self._listen(self.now_us)
         self._unread[can_id].clear()
 
     def forget_all(self) -> None:
-        """Drop all frames that have come."""
+        """Drop all received frames."""
         self._listen(self.now_us)
         self._unread.clear()
 
     def excuse(self) -> None:
-        """Do not count the time since the last poll as a delay of the host: a person was asked."""
+        """Do not count the time since the last poll as a host delay, because the user was asked."""
         self._busy_us = self.now_us
 
     def wait(self, for_ms: int) -> None:
@@ -472,7 +480,7 @@ class BusExchange:
         self._listen_until(self.now_us + for_ms * MS_US)
 
     def unread(self, can_id: str) -> deque[tuple[int, CanFrame]]:
-        """Return the unread frames of a CAN-ID, with their times."""
+        """Return the unread frames of a CAN-ID with their arrival times."""
         return self._unread[can_id]
 
     def _listen_until(self, until_us: int) -> None:
@@ -480,7 +488,7 @@ class BusExchange:
             self._listen(until_us)
 
     def listen(self, until_us: int) -> tuple[int, StampedFrames]:
-        """Wait for a first frame; return a time, and all frames that had arrived by then."""
+        """Wait for a first frame. Return a time, and all frames that had arrived by that time."""
         if until_us <= self._known_us == self._link.now_us:
             return self._known_us, ()  # in virtual time; a poll costs as much as a request
         received = self._listen(until_us)
@@ -489,7 +497,7 @@ class BusExchange:
         return self._known_us, received
 
     def _listen(self, until_us: int) -> StampedFrames:
-        """Receive frames, at most until a time, and detect whether the host was late."""
+        """Receive frames until a time at the latest. Detect whether the host was late."""
         link = self._link
         before_us = link.now_us
         if before_us > self.deadline_us:
@@ -528,7 +536,10 @@ class BusExchange:
             self.disturb("other nodes load the bus too much")
 
     def _origin(self, frame: CanFrame) -> tuple[str, bool]:
-        """Return the CAN-ID of a frame in text, and whether the node sent it; cached."""
+        """Return the CAN-ID of a frame in text, and whether the node sent it.
+
+        Results are cached.
+        """
         can_id = can_id_of(str(frame))
         own = frame.can_id & _NODE_ID_MASK == self._node_id and not frame.extended
         origin = can_id, own and can_id not in self._reserved

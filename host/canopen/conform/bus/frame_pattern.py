@@ -1,7 +1,7 @@
 """Frames in text, and patterns that they match.
 
-The difference between a frame and the expected patterns, in words; SDO answers differ by their
-meaning.
+The module also describes the difference between a frame and the expected patterns in words. SDO
+answers are described by their meaning.
 
 >>> unlike("585#6000160100000000", ["585#8000160141000406", "585#8000160142000406"])
 'got OK (60h), want abort 0604 0041h or 0604 0042h'
@@ -33,7 +33,7 @@ def can_id_of(pattern: str) -> str:
 
 
 def matches(pattern: str, text: str) -> bool:
-    """Match a frame; a dot stands for any digit, [..] for one of some, * for any rest.
+    """Match a frame. A dot stands for any digit, [..] for one of some digits, * for any rest.
 
     >>> matches("585#4F011000........", "585#4F01100003000000"), matches("185#*", "185#0100")
     (True, True)
@@ -52,15 +52,15 @@ _VALUE: Final = re.compile(r"5[89A-F][0-9A-F]#4[0-9A-F]([0-9A-F]{6})[0-9A-F]{8}"
 _WANTED_VALUE: Final = re.compile(r"(5.*?#4(?:[0-9A-F]|\[\w+\])[0-9A-F]{6})([0-9A-F]+)\.*")
 _ANY_OBJECT: Final = "......"
 _DIGITS: Final = 8
-"""Digits of the data after index and sub-index."""
+"""Number of data digits after index and sub-index."""
 
 
 def unlike(got: str, wanted: Sequence[str]) -> str:
     """Return the difference between a frame and the expected frames.
 
     Args:
-        got: a frame as candump writes it.
-        wanted: patterns, none of which it matches.
+        got: frame in candump notation.
+        wanted: patterns of the expected frames. The frame matches none of them.
     """
     if len(wanted) == 1 and (values := _values(got, wanted[0])):
         return f"got {values[0]}, want {values[1]}"
@@ -76,7 +76,7 @@ def unlike(got: str, wanted: Sequence[str]) -> str:
 
 
 def abort_of(got: str) -> int | None:
-    """Return the abort code of a frame, None if it is not an SDO abort.
+    """Return the abort code of a frame, or None if the frame is not an SDO abort.
 
     >>> f"{abort_of('585#8000100002000106'):08X}", abort_of("705#00")
     ('06010002', None)
@@ -86,7 +86,7 @@ def abort_of(got: str) -> int | None:
 
 
 def wanted_text(wanted: Sequence[str]) -> str:
-    """Return the expected frames in words; aborts by their codes.
+    """Return the expected frames in words. SDO aborts are given by their codes.
 
     >>> wanted_text(["585#8000100002000106"]), wanted_text(["705#00", "705#7F"])
     ('abort 0601 0002h', '705#00 or 705#7F')
@@ -108,7 +108,7 @@ def codes_text(codes: Iterable[str]) -> str:
 
 
 def _values(got: str, wanted: str) -> tuple[str, str] | None:
-    """Return the data of two upload answers that differ in nothing else."""
+    """Return the data of two upload answers that differ only in these data."""
     match = _WANTED_VALUE.fullmatch(wanted)
     if match is None or _VALUE.fullmatch(got) is None:
         return None
@@ -128,7 +128,7 @@ def _words(got: str) -> str:
 
 
 def _object(got: str) -> str:
-    """Return the index and sub-index that an answer names; dots if it names none."""
+    """Return the index and sub-index that an answer names, or dots if it names no object."""
     match = _ABORT.fullmatch(got) or _OK.fullmatch(got) or _VALUE.fullmatch(got)
     return match[1] if match else _ANY_OBJECT
 
@@ -139,5 +139,5 @@ def _place(name: str) -> str:
 
 
 def _code(data: str) -> str:
-    """Return a code with the highest byte first; a frame has the lowest byte first."""
+    """Return an abort code with the highest byte first. A frame has the lowest byte first."""
     return bytes.fromhex(data)[::-1].hex().upper()

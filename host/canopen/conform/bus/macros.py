@@ -1,4 +1,4 @@
-"""Macros of the checks: whole transfers, SYNC periods, re-mapping, fastscan."""
+"""Macros of the checks, such as whole transfers, SYNC periods, re-mapping and fastscan."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from tickrig.wire.canopen.sdo_frame import SEGMENT_BYTES, AbortCode
 
 _POLL_MS: Final = 20
 _NOISE: Final = 1
-"""Position tolerance of a drive that stands, in counts."""
+"""Position tolerance of a drive that stands still, in counts."""
 _POSITION_BYTES: Final = 4
-"""Positions are INTEGER32 (CiA 402-2, 607Ah and 6064h)."""
+"""Size of a position, which is an INTEGER32 (CiA 402-2, 607Ah and 6064h)."""
 
 
 def follow(  # noqa: PLR0913, PLR0917 - the words of the macro
@@ -29,15 +29,17 @@ def follow(  # noqa: PLR0913, PLR0917 - the words of the macro
     """Set a target near the actual position, and wait until the drive reaches it.
 
     Args:
-        sdo: the drive.
-        target: 607Ah.
-        actual: 6064h.
-        step: distance from the actual position, in counts; small, so that no drive makes a jump.
+        sdo: SDO client of the drive.
+        target: target position (object 607Ah).
+        actual: actual position (object 6064h).
+        step: distance from the actual position in counts. It is small, so that no drive makes a
+            jump.
         tolerance: allowed distance from the target, in counts.
-        within_ms: how long the move may take, and how long the drive may move before it.
+        within_ms: longest duration of the move, and longest time that the drive may move before the
+            macro.
 
     Raises:
-        StepFailed: the drive does not reach it in time.
+        StepFailed: the drive does not reach the target in time.
         Disturbed: the drive moves all the time, because something else moves it.
     """
     wanted = _rest(sdo, actual, int(within_ms)) + int(step)
@@ -52,7 +54,7 @@ def follow(  # noqa: PLR0913, PLR0917 - the words of the macro
 
 
 def _rest(sdo: SdoFrames, actual: Address, within_ms: int) -> int:
-    """Wait until the drive stands still; return its position."""
+    """Wait until the drive stands still. Return the position of the drive."""
     before = _position(sdo, actual)
     for _ in range(0, within_ms, _POLL_MS):
         sdo.exchange.wait(_POLL_MS)
@@ -68,24 +70,24 @@ def _position(sdo: SdoFrames, at: Address) -> int:
 
 
 _MOST_BYTES: Final = 20_000
-"""A transfer of more bytes than this fails, so that an endless one is detected."""
+"""Number of bytes above which a transfer fails, so that an endless transfer is detected."""
 
 _STATE_MS: Final = 20
 """Time after an NMT command until a node is in its new state."""
 
 _TOO_LONG: Final = ("12000706", "10000706", "05000405")
-"""Codes that refuse a download longer than the object can hold."""
+"""Abort codes that refuse a download that is longer than the object can hold."""
 
 _SCAN_MS: Final = 10
 _FOUND: Final = "7E4#4F00000000000000"
 _STORE_LSS: Final = "7E5#1700000000000000"
 _LSS_STORED: Final = "7E4#1700000000000000"
 _LSS_STORES_NOTHING: Final = "7E4#1701000000000000"
-"""CiA 305, store configuration, error code 1: the device does not support it."""
+"""Error code 1 of "store configuration" (CiA 305): the device does not support this command."""
 
 
 def _pattern(size: int) -> bytes:
-    """Return the bytes of a transfer: (7k + n) mod 256, 1 for 0."""
+    """Return the bytes of a transfer: (7k + n) mod 256, with 1 in place of 0."""
     return bytes((7 * k + size) % 256 or 1 for k in range(size))
 
 
@@ -97,7 +99,7 @@ def sync(sdo: SdoFrames, can_id: str, count: str) -> None:
 
 
 def _sync_period(sdo: SdoFrames, can_id: str, tpdo: str, period: str) -> None:
-    """Send SYNCs until the first TPDO; then a TPDO must come with every n-th SYNC."""
+    """Send SYNCs until the first TPDO. After that, a TPDO must come with every n-th SYNC."""
     every, seen = int(period), sdo.exchange.unread(tpdo)
     for number in range(1, every + 1):
         _sync_and_wait(sdo, can_id)
@@ -126,18 +128,18 @@ def _sync_and_wait(sdo: SdoFrames, can_id: str) -> None:
 
 
 def _wait_for(sdo: SdoFrames, seen: Sized) -> None:
-    """Wait for a late TPDO: CiA 301 does not say how soon it must follow the SYNC."""
+    """Wait for a late TPDO. CiA 301 does not define how soon a TPDO must follow the SYNC."""
     for _ in range(_LATE_MS // _PDO_MS):
         if not seen:
             sdo.exchange.wait(_PDO_MS)
 
 
 _PDO_MS: Final = 5
-"""How long to wait for a TPDO after a SYNC that need not bring one."""
+"""Time to wait for a TPDO after a SYNC that need not trigger a TPDO."""
 _LATE_MS: Final = 100
-"""How long to wait for a TPDO after a SYNC that must bring one."""
+"""Time to wait for a TPDO after a SYNC that must trigger a TPDO."""
 _FEW: Final = 10
-"""Number of SYNCs after which to wait for a TPDO; it is unknown which SYNC triggers the first."""
+"""Number of SYNCs after which to wait for a TPDO. The SYNC that triggers it is unknown."""
 
 
 def _download_segmented(sdo: SdoFrames, at: Address, size: str) -> None:
@@ -149,7 +151,7 @@ def _download_segmented(sdo: SdoFrames, at: Address, size: str) -> None:
 
 
 def room(sdo: SdoFrames, at: Address, size: str) -> None:
-    """Start a download of this size, and finish it; NotAllowed if the object is too short.
+    """Start a download of this size and finish it. NotAllowed is raised if the object is too short.
 
     An EDS does not give the length that a string can hold.
     """
@@ -162,12 +164,12 @@ def room(sdo: SdoFrames, at: Address, size: str) -> None:
 
 
 def _upload_pattern(sdo: SdoFrames, at: Address, size: str) -> None:
-    """Read in segments; the data must be the pattern."""
+    """Read an object in segments. The data must be the test pattern."""
     _compare(_upload_segmented(sdo, at), _pattern(int(size)))
 
 
 def _upload_segmented(sdo: SdoFrames, at: Address) -> bytes:
-    """Read in segments with alternating toggle bit; return the data."""
+    """Read an object in segments with alternating toggle bit. Return the data."""
     sdo.say(bytes([0x40, *_mux(at), *bytes(4)]))
     size = int.from_bytes(sdo.answer(f"41{multiplexer(at)}........")[4:], "little")
     data, toggle, last = b"", 0, False
@@ -185,7 +187,7 @@ def _upload_segmented(sdo: SdoFrames, at: Address) -> bytes:
 
 
 def _download_block(sdo: SdoFrames, at: Address, size: str) -> None:
-    """Write the pattern in blocks with CRC."""
+    """Write the test pattern in blocks with CRC."""
     data, done = _pattern(int(size)), 0
     sdo.say(bytes([0xC6, *_mux(at)]) + len(data).to_bytes(4, "little"))
     block = sdo.answer(f"A[04]{multiplexer(at)}..000000")[4]
@@ -205,23 +207,24 @@ def _download_block(sdo: SdoFrames, at: Address, size: str) -> None:
 
 
 def _upload_block_pattern(sdo: SdoFrames, at: Address, size: str, block: str) -> None:
-    """Read in blocks with CRC; the data must be the pattern."""
+    """Read an object in blocks with CRC. The data must be the test pattern."""
     _compare(_upload_block(sdo, at, block), _pattern(int(size)))
 
 
 def _upload_same(sdo: SdoFrames, at: Address, block: str = "127", crc: str = "") -> None:
-    """Read in blocks, and in segments; the data must be the same."""
+    """Read an object in blocks and in segments. The data must be the same."""
     _compare(_upload_block(sdo, at, block, crc), _upload_segmented(sdo, at))
 
 
 def _upload_block(sdo: SdoFrames, at: Address, block: str, crc: str = "") -> bytes:
-    """Read in blocks; return the data.
+    """Read an object in blocks. Return the data.
 
     Args:
-        sdo: the server.
-        at: the object.
-        block: segments of a block; `1,2`: of the first block, and of each later one.
-        crc: `without-crc`, or nothing.
+        sdo: frames to and from the SDO server.
+        at: index and sub-index of the object.
+        block: number of segments of a block. `1,2` gives the size of the first block and of each
+            later block.
+        crc: `without-crc`, or an empty text for a transfer with CRC.
     """
     most, following = int(block.split(",", maxsplit=1)[0]), int(block.rsplit(",", maxsplit=1)[-1])
     sdo.say(bytes([0xA0 if crc else 0xA4, *_mux(at), most, 0, 0, 0]))
@@ -252,7 +255,7 @@ def _upload_block(sdo: SdoFrames, at: Address, block: str, crc: str = "") -> byt
 
 
 def _remap(sdo: SdoFrames, pdo: Address, on: str, kind: str, *entries: str) -> None:
-    """Map objects by the procedure of CiA 301, and set type and COB-ID of the PDO."""
+    """Map objects by the procedure of CiA 301. Set transmission type and COB-ID of the PDO."""
     head, body, cob_id = pdo[0], pdo[0] + TO_MAPPING, bytes.fromhex(on)
     off = cob_id[:3] + bytes([cob_id[3] | 0x80])
     sdo.write((head, 1), off)
@@ -265,7 +268,7 @@ def _remap(sdo: SdoFrames, pdo: Address, on: str, kind: str, *entries: str) -> N
 
 
 def enable(sdo: SdoFrames, pdo: Address, on: str, *entries: str) -> None:
-    """Enable a PDO; if it has no mapping, map objects first.
+    """Enable a PDO. If the PDO has no mapping, map objects first.
 
     The node may refuse to enable a PDO without a mapping.
     """
@@ -279,7 +282,7 @@ def enable(sdo: SdoFrames, pdo: Address, on: str, *entries: str) -> None:
 
 
 def _refuse_segments(sdo: SdoFrames, at: Address, size: str, *codes: str) -> None:
-    """Write `size` bytes in segments; the node must refuse at once, or at the end."""
+    """Write `size` bytes in segments. The node must refuse the transfer at once or at the end."""
     mux = multiplexer(at)
     aborts = [f"80{mux}{bytes.fromhex(code)[::-1].hex().upper()}" for code in codes]
     sdo.say(bytes([0x21, *_mux(at)]) + int(size).to_bytes(4, "little"))
@@ -291,13 +294,13 @@ def _refuse_segments(sdo: SdoFrames, at: Address, size: str, *codes: str) -> Non
 
 
 def guard(sdo: SdoFrames, can_id: str, *words: str) -> None:
-    """Guard a node: it reports the states in turn, with an alternating toggle bit.
+    """Guard a node. The node must report the states in turn, with an alternating toggle bit.
 
     Args:
-        sdo: the server, for its bus.
-        can_id: of error control.
-        words: states in hex, each requested once; `=7F` expects a toggle bit of 0; a word with # is
-            a frame that is sent before.
+        sdo: frames to and from the SDO server, used for their bus.
+        can_id: CAN-ID of error control.
+        words: states in hex, each requested once. `=7F` expects a toggle bit of 0. A word with # is
+            a frame that is sent before the request.
     """
     toggle: int | None = None
     for word in words:
@@ -360,7 +363,7 @@ def _compare(got: bytes, wanted: bytes) -> None:
 
 
 def _lss_store(sdo: SdoFrames) -> None:
-    """Store the LSS configuration; NotAllowed if the node answers that it cannot store."""
+    """Store the LSS configuration. Raise NotAllowed if the node answers that it cannot store."""
     sdo.exchange.send(CanFrame.parse(_STORE_LSS))
     if sdo.exchange.expect([_LSS_STORED, _LSS_STORES_NOTHING], ANSWER_MS) == _LSS_STORES_NOTHING:
         raise NotAllowed("the node does not store the LSS configuration: error code 1")

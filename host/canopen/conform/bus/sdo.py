@@ -20,32 +20,33 @@ from tickrig.wire.canopen.sdo import Abort
 T = TypeVar("T")
 
 SizeOf = Callable[[Address], int | None]
-"""Returns the size of an object in bytes by index and sub-index, 0 or None if unknown."""
+"""Function that returns an object's size in bytes by index and sub-index; 0 or None if unknown."""
 
 
 _NUMBER_BYTES: Final = range(1, 5)
-"""The longest number that the tester requests; a node may send anything."""
+"""Sizes of a number that the tester requests. A node may send anything."""
 _MOST_MISNAMED: Final = 20
-"""Number of answers that name another object to keep."""
+"""Number of answers to keep that name another object."""
 
 
 def number_of(data: bytes) -> int | None:
-    """Return an unsigned number of at most 32 bits, None if the bytes are not one."""
+    """Return an unsigned number of at most 32 bits, or None if the bytes are not such a number."""
     return int.from_bytes(data, "little") if len(data) in _NUMBER_BYTES else None
 
 
 class SdoClient:
-    """The client of the default SDO server of a node; it blocks until the transfer ends.
+    """The client of the default SDO server of a node. Its methods block until the transfer ends.
 
-    It ignores frames that are not answers of the node.
+    The client ignores frames that are not answers of the node.
 
     Args:
-        exchange: the bus.
-        node_id: of the node, 1..127.
+        exchange: bus of the node.
+        node_id: node-ID of the node, 1..127.
 
     Attributes:
         misnamed: answers that name another object than the requested one, one per line.
-        size_of: the number of bytes of an answer that does not indicate its size.
+        size_of: function that returns the size of an object, used for answers that do not indicate
+            their size.
     """
 
     def __init__(self, exchange: BusExchange, node_id: int) -> None:
@@ -55,12 +56,12 @@ class SdoClient:
         self.size_of: SizeOf = dict[Address, int]().get
 
     def upload(self, index: int, sub: int) -> bytes:
-        """Read an object; repeat an unanswered request once.
+        """Read an object. Repeat an unanswered request once.
 
         Raises:
             SdoAborted: the node refuses.
-            SdoTimeout: it does not answer.
-            SdoMisnamed: it answers, and names another object.
+            SdoTimeout: the node does not answer.
+            SdoMisnamed: the answer of the node names another object.
             LinkClosed: the bus is gone.
         """
         size = self.size_of((index, sub)) or 0
@@ -77,20 +78,23 @@ class SdoClient:
             self.run(download(index, sub, data))
 
     def number(self, index: int, sub: int) -> int | None:
-        """Return an unsigned number of at most 32 bits, None if the node gives none."""
+        """Return an unsigned number of at most 32 bits, or None if the node does not give one."""
         try:
             return number_of(self.upload(index, sub))
         except SdoFailed:
             return None
 
     def abort(self) -> None:
-        """End a transfer that a check left open; stacks check which object the abort names."""
+        """End a transfer that a check left open. Some stacks check which object the abort names."""
         at = sdo_frame.index_sub(self._exchange.transfer)
         frame = Abort(*at, sdo_frame.AbortCode.GENERAL).encode()
         self._send(sdo_frame.REQUEST_COB_ID + self._node_id, frame)
 
     def run(self, script: Script[T]) -> T:
-        """Run a script, and return its result or raise its error; LinkClosed if the bus is gone."""
+        """Run a script, and return its result or raise its error.
+
+        LinkClosed is raised without a bus.
+        """
         exchange, talk = self._exchange, self._session.dialogue
         for request in exchange.unanswered:  # by the check, which talks for itself
             talk.remember(sdo_frame.index_sub(request))
@@ -122,8 +126,8 @@ class SdoFrames:
     """The default SDO server of a node, as a check sees it.
 
     Args:
-        exchange: the bus.
-        node_id: of the node, 1..127.
+        exchange: bus of the node.
+        node_id: node-ID of the node, 1..127.
     """
 
     def __init__(self, exchange: BusExchange, node_id: int) -> None:
@@ -138,24 +142,24 @@ class SdoFrames:
         self.exchange.send(data_frame(self._request, data))
 
     def answer(self, *patterns: str) -> bytes:
-        """Wait for a response that matches one of the patterns; return its data."""
+        """Wait for a response that matches one of the patterns. Return the data of the response."""
         wanted = [f"{self._response}#{pattern}" for pattern in patterns]
         return bytes.fromhex(self.exchange.expect(wanted, ANSWER_MS)[4:])
 
     def write(self, at: Address, data: bytes) -> None:
-        """Write an object; StepFailed if the node does not confirm it."""
+        """Write an object. Raise StepFailed if the node does not confirm the write."""
         self.download(at, data)
         self.answer(f"60{multiplexer(at)}00000000")
         if len(data) > sdo_frame.EXPEDITED_BYTES:
             self.download_segments(data)
 
     def refuse_write(self, at: Address, data: bytes, codes: Sequence[str]) -> None:
-        """Write an object; StepFailed unless the node refuses with one of the codes."""
+        """Write an object. Raise StepFailed unless the node refuses with one of the codes."""
         self.download(at, data)
         self.answer(*_aborts(at, codes))
 
     def read(self, at: Address, data: str) -> None:
-        """Read an object; StepFailed unless its value matches the pattern."""
+        """Read an object. Raise StepFailed unless the value matches the pattern."""
         size = len(data) // 2
         self.say(bytes([_UPLOAD, *bytes.fromhex(multiplexer(at)), *bytes(4)]))
         if 1 <= size <= sdo_frame.EXPEDITED_BYTES:
@@ -173,7 +177,7 @@ class SdoFrames:
             self.answer(f"{head:02X}{part:.<14}")
 
     def read_other(self, at: Address, data: str) -> None:
-        """Read an object of at most 4 bytes; StepFailed if it has this value."""
+        """Read an object of at most 4 bytes. Raise StepFailed if the object has this value."""
         if self.read_data(at, len(data) // 2) == bytes.fromhex(data):
             raise StepFailed(f"{at[0]:04X}h:{at[1]:02X} is still {data}")
 
@@ -183,12 +187,12 @@ class SdoFrames:
         return self.answer(f"{_uploaded(size)}{multiplexer(at)}........")[4 : 4 + size]
 
     def refuse_read(self, at: Address, codes: Sequence[str]) -> None:
-        """Read an object; StepFailed unless the node refuses with one of the codes."""
+        """Read an object. Raise StepFailed unless the node refuses with one of the codes."""
         self.say(bytes([_UPLOAD, *bytes.fromhex(multiplexer(at)), *bytes(4)]))
         self.answer(*_aborts(at, codes))
 
     def download(self, at: Address, data: bytes) -> None:
-        """Send the request to write an object: expedited, or with the number of bytes to follow."""
+        """Send the request to write an object, expedited or with the number of bytes to follow."""
         mux = bytes.fromhex(multiplexer(at))
         if 1 <= len(data) <= sdo_frame.EXPEDITED_BYTES:
             self.say(bytes([_sized(_DOWNLOAD, len(data)), *mux]) + data.ljust(4, b"\0"))
@@ -196,7 +200,10 @@ class SdoFrames:
             self.say(bytes([0x21, *mux]) + len(data).to_bytes(4, "little"))
 
     def download_segments(self, data: bytes) -> None:
-        """Send the segments of a started download, each after the one before is confirmed."""
+        """Send the segments of a started download.
+
+        Each segment follows the response to the one before.
+        """
         for number, start in enumerate(range(0, len(data), sdo_frame.SEGMENT_BYTES)):
             part, toggle = data[start : start + sdo_frame.SEGMENT_BYTES], (number & 1) << 4
             last = start + sdo_frame.SEGMENT_BYTES >= len(data)
@@ -225,7 +232,10 @@ def _aborts(at: Address, codes: Sequence[str]) -> list[str]:
 
 
 def _uploaded(size: int) -> str:
-    """Return a pattern: a server may omit the number of data bytes (CiA 301, 7.2.4.3.5)."""
+    """Return a pattern for an answer.
+
+    A server may omit the number of data bytes (CiA 301, 7.2.4.3.5).
+    """
     return f"4[2{_sized(_UPLOADED, size) & 0xF:X}]"
 
 

@@ -27,13 +27,13 @@ _POWER_OFF_MS: Final = 200
 
 
 class StepPlayer:
-    """Plays bound steps.
+    """Player for bound steps.
 
     Args:
-        exchange: the bus.
-        node_id: of the node, 1..127.
-        stimulus: operates the inputs of the device, None if there is none.
-        client: reads and writes objects when a check does not judge the frames.
+        exchange: bus of the node.
+        node_id: node-ID of the node, 1..127.
+        stimulus: function that operates the inputs of the device, or None if there is none.
+        client: client that reads and writes objects when a check does not judge the frames.
     """
 
     def __init__(
@@ -43,7 +43,7 @@ class StepPlayer:
         self._sdo = SdoFrames(exchange, node_id)
 
     def play(self, step: check.Step) -> None:
-        """Do one step; raises StepFailed if the node does not react as the step requires."""
+        """Do one step. Raise StepFailed if the node does not react as the step requires."""
         action, bus = step.action, self._exchange
         match action:
             case check.OfObject():
@@ -91,7 +91,7 @@ class StepPlayer:
                 raise AssertionError(action)
 
     def _act_within(self, within_ms: int, *words: str) -> None:
-        """Run the stimulus; Disturbed if it took longer than the check allows."""
+        """Run the stimulus. Raise Disturbed if the stimulus took longer than the check allows."""
         start_us = self._exchange.now_us
         self._act(*words)
         took_ms = (self._exchange.now_us - start_us) // MS_US
@@ -130,7 +130,7 @@ class StepPlayer:
 
 
 def _value(text: str) -> float | str:
-    """Read a number in any notation; return other texts unchanged."""
+    """Read a number in any notation. Return other texts unchanged."""
     try:
         return float(text)
     except ValueError:

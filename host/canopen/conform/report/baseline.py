@@ -1,6 +1,6 @@
 """Known failures, to tell new failures from known ones.
 
-A baseline is a text file with the id of one check per line; `#` starts a comment.
+A baseline is a text file with the id of one check per line. `#` starts a comment.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from tickrig.host.text.page_text import one_line
 _HEAD: Final = "# known failures of a conformance run (canmon conform --baseline)"
 _MOST_BYTES: Final = 10_000_000
 _LONGEST: Final = 80
-"""The longest id; those of the suite are at most half as long."""
+"""Length of the longest id. The ids of the suite are at most half as long."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,11 +30,11 @@ class Baseline:
 
     @classmethod
     def read(cls, path: Path) -> Baseline:
-        """Read a file.
+        """Read a baseline from a file.
 
         Raises:
-            OSError: it cannot be read.
-            ValueError: it is not a baseline; the message names the line and the reason.
+            OSError: the file cannot be read.
+            ValueError: the file is not a baseline. The message contains the line and the reason.
         """
         with path.open("rb") as file:
             data = file.read(_MOST_BYTES + 1)
@@ -51,7 +51,7 @@ class Baseline:
         return result.outcome.verdict is verdict.CheckVerdict.FAIL and result.check.id in self.known
 
     def new(self, report: verdict.Report) -> list[verdict.Result]:
-        """Return the new failures."""
+        """Return the failures that are not in the baseline."""
         failed = (
             result
             for result in report.results
@@ -85,7 +85,7 @@ class Baseline:
         )
 
     def ends_with(self, report: verdict.Report) -> int:
-        """Return the exit status of the command; of a run that was ended, by the reason."""
+        """Return the exit status of the command. The reason decides if the run was ended early."""
         if report.aborted and not report.absent:
             return verdict.CTRL_C if report.aborted == verdict.INTERRUPTED else verdict.BUS_FAILED
         return self.exit_status(report)

@@ -17,11 +17,11 @@ _LABEL: Final = "CANopen"
 _COLOURS: Final = {0: "#2e7d32", FAILED: "#c62828", UNDECIDED: "#8a6100"}
 _GREY: Final = "#616161"
 _CHARACTER: Final = 7
-"""Approximate width of a character in pixels; `textLength` scales the text to fit."""
+"""Approximate width of a character in pixels. `textLength` scales the text to fit."""
 
 
 def badge(report: Report, baseline: Baseline = NONE_KNOWN) -> str:
-    """Return the SVG: how many judged checks pass; red if a failure is new."""
+    """Return an SVG badge with the number of passed checks. It is red if a failure is new."""
     judged = [report.count(verdict) for verdict in (CheckVerdict.PASS, CheckVerdict.FAIL)]
     text = f"{judged[0]} of {sum(judged)} pass" if any(judged) else "nothing judged"
     if report.aborted:
@@ -42,7 +42,7 @@ role="img" aria-label="{_LABEL}: {text}">
 
 
 _MOST_LINES: Final = 200
-"""Lines shown of one case."""
+"""Number of lines that are shown of one case."""
 
 _TAGS: Final[Mapping[CheckVerdict, str]] = {
     CheckVerdict.FAIL: junit.FAILURE,
@@ -58,12 +58,12 @@ def report_junit(
     baseline: Baseline = NONE_KNOWN,
     show: overview.ShowFrames = overview.plain_frames,
 ) -> str:
-    """Return the report; a known failure is skipped, a check without a verdict is an error.
+    """Return the JUnit report. A known failure is skipped. A check without a verdict is an error.
 
     Args:
-        report: the run.
-        baseline: failures that are known.
-        show: formats frames.
+        report: report of the run.
+        baseline: baseline of known failures.
+        show: function that formats frames.
     """
     suites = [
         junit.JunitSuite(row.name, [_case(result, baseline, show) for result in row.results])
@@ -100,7 +100,7 @@ def _lines(result: Result, show: overview.ShowFrames) -> list[str]:
 
 
 def _properties(report: Report) -> dict[str, str]:
-    """Return the judged node and the settings of the run."""
+    """Return properties: the judged node and the settings of the run."""
     told = {"level": report.level.word, **report.node, **report.settings}
     told |= {"doubt": report.doubt} if report.doubt else {}
     told |= {f"finding {number}": text for number, text in enumerate(report.findings, 1)}

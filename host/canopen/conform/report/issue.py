@@ -1,7 +1,8 @@
-"""Failures as a page in Markdown that the maintainer of a stack can file: clause, frames, script.
+"""Failures as a Markdown page that you can file with the maintainer of a stack.
 
-A script is a sequence for `canmon seq`: what the tester sent in the check, at the same times and
-after the same answers, and at the end the frame that the standard requires.
+The page contains clause, frames and a script for each failure. A script is a sequence for `canmon
+seq`. It sends what the tester sent in the check, at the same times and after the same answers. At
+the end, it expects the frame that the standard requires.
 """
 
 from __future__ import annotations
@@ -20,9 +21,9 @@ from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID
 from tickrig.wire.canopen.sdo_frame import REQUEST_COB_ID, RESPONSE_COB_ID
 
 _LEAST_WAIT_US: Final = 2_000
-"""Frames with a shorter pause are sent without a pause."""
+"""Shortest pause between frames. Frames with a shorter pause are sent without a pause."""
 _MULTIPLEXER_END: Final = len("585#60171000")
-"""The compared part of an SDO response: command, index and sub-index."""
+"""End of the compared part of an SDO response, which is command, index and sub-index."""
 _UNEXPECTED: Final = re.compile(r"unexpected (\S+),")
 _CLASS: Final = re.compile(r"\[[0-9A-F]+\]")
 _GROUP: Final = re.compile(r"\(.*\)")
@@ -31,12 +32,12 @@ _GROUP: Final = re.compile(r"\(.*\)")
 def issue_text(
     report: verdict.Report, baseline: Baseline = NONE_KNOWN, show: ShowFrames = plain_frames
 ) -> str:
-    """Return the page: for each failure the requirement, the answer, the frames and a script.
+    """Return the page. It contains requirement, answer, frames and a script for each failure.
 
     Args:
-        report: the run.
-        baseline: known failures; they are omitted.
-        show: formats frames.
+        report: report of the run.
+        baseline: baseline of known failures, which are omitted.
+        show: function that formats frames.
     """
     failed = [
         result
@@ -73,8 +74,8 @@ def _sequence(outcome: verdict.CheckOutcome, node_id: int) -> list[str]:
     """Return the lines of a sequence that repeats a check up to its failure.
 
     Args:
-        outcome: of the check.
-        node_id: of the node.
+        outcome: outcome of the check.
+        node_id: node-ID of the node.
     """
     request, response = REQUEST_COB_ID + node_id, f"{RESPONSE_COB_ID + node_id:03X}#"
     boot_up = f"{ERROR_CONTROL_COB_ID + node_id:03X}#00"

@@ -1,6 +1,6 @@
-"""A report by groups and by clauses, and the order in which it lists checks.
+"""A report by groups and by clauses, and the order in which a report lists checks.
 
-The frames of a check, as `canmon dump` shows them.
+The module also formats the frames of a check as `canmon dump` shows them.
 
 >>> from tickrig.host.canopen.conform.verdict import Direction
 >>> lines = FrameLine(1_250, Direction.SENT, "605#40"), FrameLine(2_000, Direction.REMARK, "?")
@@ -52,11 +52,11 @@ _HINTS: Final[Mapping[str, str]] = {
     "D4": "the state machine of CiA 402: controlword, statusword, modes",
     "OD": "this object in the EDS, and its row in the object dictionary of the firmware",
 }
-"""Hints by group."""
+"""Hints for failures by group."""
 
 
 def hint(result: Result) -> str:
-    """Return where to look, without a full stop; empty if unknown."""
+    """Return a hint where to look, without a full stop; empty if there is no hint."""
     match result.outcome.verdict:
         case CheckVerdict.BLOCKED:
             return "the node: it no longer answers; switch it off and on, then run the check alone"
@@ -67,14 +67,14 @@ def hint(result: Result) -> str:
 
 
 ShowFrames = Callable[[Sequence[FrameLine]], list[str]]
-"""Formats the lines of a check."""
+"""Function that formats the lines of a check."""
 
 
 _DATA_WIDTH: Final = len("[8]  00 11 22 33 44 55 66 77")
 
 
 def plain_frames(lines: Sequence[FrameLine]) -> list[str]:
-    """Format lines with their bytes only."""
+    """Format lines with the bytes of frames only."""
     return [plain_frame(line) for line in lines]
 
 
@@ -82,8 +82,8 @@ def plain_frame(line: FrameLine, meaning: str = "") -> str:
     """Format a line.
 
     Args:
-        line: a frame, or a remark.
-        meaning: text after a frame; empty if unknown.
+        line: line of the evidence, which is a frame or a remark.
+        meaning: text after a frame, empty if the meaning is unknown.
     """
     seconds, micros = divmod(line.at_us, 1_000_000)
     head = f" ({seconds:03}.{micros:06})  {line.direction}  "
@@ -98,7 +98,7 @@ def plain_frame(line: FrameLine, meaning: str = "") -> str:
 
 
 def frame_of(line: FrameLine) -> CanFrame | None:
-    """Return the frame of a line; None for a remark."""
+    """Return the frame of a line, or None for a remark."""
     try:
         return CanFrame.parse(line.text)
     except (ValueError, WireError):
@@ -119,7 +119,10 @@ def cut(lines: list[str], most: int) -> list[str]:
 
 
 def all_goes(outcome: CheckOutcome, first: CheckOutcome | None, show: ShowFrames) -> list[str]:
-    """Return the lines of a check, preceded by those of its first attempt if they differ."""
+    """Return the lines of a check.
+
+    The lines of the first attempt come before them if they differ.
+    """
     if first is None:
         return show(outcome.evidence)
     if same_go(first, outcome):
@@ -138,15 +141,15 @@ def same_go(first: CheckOutcome, again: CheckOutcome) -> bool:
 
 
 UNWELL: Final = (CheckVerdict.FAIL, CheckVerdict.BLOCKED, CheckVerdict.INCONCLUSIVE)
-"""Verdicts that need attention, the worst first."""
+"""Verdicts that need attention. The worst verdict is first."""
 
 
 class _GroupRow(NamedTuple):
-    """Checks that belong together.
+    """Results of checks that belong together.
 
     Attributes:
-        name: of the group, or the clause.
-        results: in the order in which they were judged.
+        name: name of the group, or the clause.
+        results: results in the order in which the checks were judged.
     """
 
     name: str
@@ -154,12 +157,12 @@ class _GroupRow(NamedTuple):
 
     @property
     def counts(self) -> dict[CheckVerdict, int]:
-        """Number of results per verdict, without those that do not occur."""
+        """Number of results by verdict, without verdicts that do not occur."""
         return verdict_counts(self.results)
 
 
 def verdict_counts(results: Iterable[Result]) -> dict[CheckVerdict, int]:
-    """Count verdicts, in their own order, without those that do not occur."""
+    """Count verdicts in the order of `CheckVerdict`, without verdicts that do not occur."""
     counts = Counter(result.outcome.verdict for result in results)
     return {verdict: counts[verdict] for verdict in CheckVerdict if counts[verdict]}
 
@@ -174,7 +177,7 @@ def counts_text(counts: dict[CheckVerdict, int]) -> str:
 
 
 def by_group(report: Report) -> list[_GroupRow]:
-    """Return the groups, in the order in which they were met."""
+    """Return the groups in the order in which they first occur."""
     return _rows(report, lambda result: result.check.group)
 
 
@@ -185,13 +188,16 @@ def by_clause(report: Report) -> list[_GroupRow]:
 
 
 def unwell(report: Report) -> list[Result]:
-    """Return the results that need attention, the worst first."""
+    """Return the results that need attention. The worst results are first."""
     found = [result for result in report.results if result.outcome.verdict in UNWELL]
     return sorted(found, key=lambda result: UNWELL.index(result.outcome.verdict))
 
 
 def causes(results: Iterable[Result]) -> list[list[Result]]:
-    """Group object checks that fail in the same way: one stands for all of its kind."""
+    """Group object checks that fail in the same way.
+
+    One check stands for all checks of its kind.
+    """
     found: dict[tuple[str, ...], list[Result]] = {}
     for number, each in enumerate(results):
         kind = _OF_OBJECT.fullmatch(each.check.id)
@@ -203,11 +209,11 @@ def causes(results: Iterable[Result]) -> list[list[Result]]:
 
 _OF_OBJECT: Final = re.compile(r"OD-.*-(\w+)")
 _PLACE: Final = re.compile(r"step \d+|\b[0-9A-F]{4}h?:[0-9A-F]{2}\b|\b\d+ bytes")
-"""The parts of a reason that differ between objects that fail in the same way."""
+"""Pattern for parts of a reason that differ between objects that fail in the same way."""
 
 
 def repair_commands(report: Report) -> tuple[str, ...]:
-    """Return the commands that restore the remaining objects, in their order."""
+    """Return the commands that restore the remaining objects, in the order of execution."""
     head = f"canmon net {shlex.quote(report.source)} write {report.node_id}"
     return tuple(f"{head} {shlex.quote(words)} --yes" for words in report.repairs)
 

@@ -27,7 +27,7 @@ from tickrig.host.canopen.conform.verdict import CheckOutcome, CheckVerdict, Rep
 from tickrig.host.text.html_page import PageTemplate
 
 _MOST_LINES: Final = 200
-"""Lines shown of one attempt at a check."""
+"""Number of lines that are shown of one attempt at a check."""
 _MOST_OPEN: Final = 12
 """Number of failures that are unfolded at once."""
 
@@ -35,12 +35,12 @@ _MOST_OPEN: Final = 12
 def html_page(
     report: Report, baseline: Baseline = NONE_KNOWN, show: ShowFrames = plain_frames
 ) -> str:
-    """Return the page; the same run gives the same bytes.
+    """Return the page. The same run gives the same bytes.
 
     Args:
-        report: the run.
-        baseline: known failures.
-        show: formats frames.
+        report: report of the run.
+        baseline: baseline of known failures.
+        show: function that formats frames.
     """
 
     def frames(outcome: CheckOutcome) -> str:
@@ -64,7 +64,7 @@ def html_page(
 
 @cache
 def _template() -> PageTemplate:
-    """Return the template; it is compiled once."""
+    """Return the template. The template is compiled once."""
     names = {
         "counts": counts_text,
         "slug": lambda verdict: verdict.name.lower(),

@@ -12,17 +12,17 @@ from tickrig.host.canopen.conform.suite import group_titles
 from tickrig.host.canopen.conform.verdict import CheckOutcome, CheckVerdict, Report, Result
 
 _VERSION: Final = 1
-"""It changes when a field changes its meaning or disappears."""
+"""Version of the format. It changes when a field changes its meaning or disappears."""
 
 _Object = dict[str, object]
 
 
 def report_json(report: Report, baseline: Baseline = NONE_KNOWN) -> str:
-    """Return the report; the same run gives the same bytes.
+    """Return the report. The same run gives the same bytes.
 
     Args:
-        report: the run.
-        baseline: known failures.
+        report: report of the run.
+        baseline: baseline of known failures.
     """
     said: _Object = {
         "v": _VERSION,

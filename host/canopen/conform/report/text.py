@@ -17,7 +17,7 @@ _MOST_SHOWN: Final = 20
 """Number of failures that are shown with their frames."""
 _ELSEWHERE: Final = "more, without their frames; --html FILE and --json have them:"
 _MOST_LINES: Final = 40
-"""Lines shown of one failure."""
+"""Number of lines that are shown of one failure."""
 _MOST_REASONS: Final = 12
 
 
@@ -27,13 +27,14 @@ def text_report(
     show: overview.ShowFrames = overview.plain_frames,
     again: str = "",
 ) -> str:
-    """Return the text.
+    """Return the report as text.
 
     Args:
-        report: the run.
-        baseline: known failures; they are only named.
-        show: formats frames.
-        again: the command that runs one check alone, without its id; empty if there is none.
+        report: report of the run.
+        baseline: baseline of known failures. Only their names are shown.
+        show: function that formats frames.
+        again: command that runs one check alone, without the id of the check. It is empty if there
+            is none.
     """
     parts = [_head(report), _groups(report), _not_applicable(report)]
     found = [result for result in overview.unwell(report) if not baseline.knows(result)]
@@ -70,7 +71,7 @@ def _groups(report: Report) -> list[str]:
 
 
 def _not_applicable(report: Report) -> list[str]:
-    """Return why checks were not applicable, the most frequent reason first."""
+    """Return why checks were not applicable. The most frequent reason is first."""
     reasons = Counter(
         one_line(result.outcome.reason)
         for result in report.results
@@ -99,7 +100,7 @@ def _never_begun(results: list[Result]) -> list[str]:
 
 
 def _failure(alike: list[Result], show: overview.ShowFrames | None, again: str) -> list[str]:
-    """Return the text of a failure and similar failures; hints are given only with frames."""
+    """Return the text of a failure and of similar failures. Hints are given only with frames."""
     result = alike[0]
     clause = f"  {one_line(result.check.source)}"
     reason = [f"  {one_line(result.outcome.reason)}"] if result.outcome.reason else []

@@ -1,4 +1,4 @@
-"""Rules over the head of a file: FileInfo, DeviceInfo, DummyUsage, Comments, commissioning."""
+"""Rules for the head of a file: FileInfo, DeviceInfo, DummyUsage, Comments, commissioning."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _IDENTITY: Final = (("VendorNumber", 1), ("ProductNumber", 2), ("RevisionNumber"
 
 
 def number(document: Document, section: str, key: str) -> int | None:
-    """Return the number of a keyword; None if it is not a 32-bit number."""
+    """Return the number of a keyword, or None if it is not a 32-bit number."""
     try:
         found = eds_value.parse_number(eds_value.plain_numbers(document.file.value(section, key)))
     except ValueError:
@@ -78,7 +78,7 @@ def file_info(document: Document) -> Iterator[RuleFinding]:
 
 
 def device_info(document: Document) -> Iterator[RuleFinding]:
-    """Check [DeviceInfo] by itself."""
+    """Check [DeviceInfo] without other sections."""
     file, title = document.file, "DeviceInfo"
     if title not in file.sections:
         return
@@ -107,7 +107,7 @@ def device_info(document: Document) -> Iterator[RuleFinding]:
 
 
 def _missing(document: Document, key: str) -> str:
-    """Return the value that a missing keyword of [DeviceInfo] stands for."""
+    """Return the value that a missing keyword of [DeviceInfo] implies."""
     row = document.rows.get((_IDENTITY_OBJECT, dict(_IDENTITY).get(key, 0)))
     if key in dict(_IDENTITY) and row is not None and row.has_default:
         return f"0x{int.from_bytes(row.default, 'little'):08X}"
@@ -138,7 +138,7 @@ def counts(document: Document) -> Iterator[RuleFinding]:
 
 
 def features(document: Document) -> Iterator[RuleFinding]:
-    """Check that the objects exist which [DeviceInfo] promises."""
+    """Check that the objects exist that [DeviceInfo] announces."""
     title, rows = "DeviceInfo", document.rows
     if number(document, title, "LSS_Supported") and any(
         (0x1018, sub) not in rows for sub in (2, 4)
@@ -186,7 +186,7 @@ def comment_lines(document: Document) -> Iterator[RuleFinding]:
 
 
 def commissioning(document: Document) -> Iterator[RuleFinding]:
-    """Find what a DCF needs and this one lacks, and what an EDS must not have."""
+    """Find keywords that a DCF needs but lacks, and keywords that an EDS must not have."""
     file, title = document.file, "DeviceComissioning"
     if document.name.lower().endswith(".dcf") and title not in file.sections:
         yield document.found("commissioning-missing", f"the DCF has no [{title}]")
@@ -202,4 +202,4 @@ def commissioning(document: Document) -> Iterator[RuleFinding]:
 
 
 _DCF_KEYS: Final = frozenset(key.lower() for key in known_keys.OF_DCF if key != "ParameterValue")
-"""Keywords that the reader reports."""
+"""Keywords of commissioning that the reader reports."""

@@ -34,7 +34,7 @@ _ENTRY: Final = (
 )
 OF_DCF: Final = ("ParameterValue", "Denotation", "UploadFile", "DownloadFile", "ParamRefd")
 _OURS: Final = ("MaxBytes", "DefaultBytes", "Unit", "Factor")
-"""Not in CiA 306; this reader, and partly the canopen library, accept them."""
+"""Keywords that are not in CiA 306. This reader, and partly the canopen library, accept them."""
 
 _LIST: Final = re.compile(r"SupportedObjects|NrOfEntries|[0-9]+", re.IGNORECASE)
 _KEYS: Final = {
@@ -109,7 +109,7 @@ def is_number(section: str, key: str) -> bool:
 
 
 def keys_of(section: str) -> dict[str, str] | None:
-    """Return the keywords of a section by their lower case; None if any is allowed."""
+    """Return the keywords of a section by their lower case, or None if any keyword is allowed."""
     if object_section(section) is not None:
         return _OBJECT
     if is_module_object(section):
@@ -118,7 +118,7 @@ def keys_of(section: str) -> dict[str, str] | None:
 
 
 def numbered(section: str, key: str) -> str | None:
-    """Return the spelling of a numbered keyword, as `Line3`, `Dummy001B` or `12`; None for others.
+    """Return the spelling of a numbered keyword, such as `Line3`, `Dummy001B` or `12`, or None.
 
     >>> numbered("Comments", "line5"), numbered("DummyUsage", "dummy001b"), numbered("Tools", "x")
     ('Line5', 'Dummy001B', None)

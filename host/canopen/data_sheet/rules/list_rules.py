@@ -1,4 +1,4 @@
-"""Rules over the three lists of objects: each object is in one, numbers start at 1.
+"""Rules for the three lists of objects. Each object is in one list, and numbers start at 1.
 
 The description of a listed object may have been lost. Therefore a listed object without a
 description stays in its list, and no count is lowered.
@@ -26,11 +26,12 @@ _INDICES: Final = range(0x1000, 0x10000)
 
 
 class ObjectList:
-    """One list.
+    """One list of objects.
 
     Attributes:
-        title: of its section.
-        entries: index by line, in file order; None if it is not an index.
+        title: title of the list's section.
+        entries: index by line, in the order of the file. The value is None if the text is not an
+            index.
     """
 
     def __init__(self, document: Document, title: str) -> None:
@@ -42,7 +43,7 @@ class ObjectList:
 
     @property
     def indices(self) -> list[int]:
-        """The valid indices."""
+        """The valid indices of the list."""
         return [index for _, index in self.entries if index is not None]
 
 
@@ -83,7 +84,7 @@ def are_whole(document: Document) -> bool:
 
 
 def lists(document: Document) -> Iterator[RuleFinding]:
-    """Check the three lists; each finding fixes its whole list."""
+    """Check the three lists. Each finding fixes a whole list."""
     if document.file.is_xml:
         return
     found = [ObjectList(document, title) for title in LISTS]
@@ -135,7 +136,7 @@ def _faults(
 
 
 def _is_wrong(title: str, index: int) -> bool:
-    """Return whether an object is in the wrong list; profiles define mandatory objects too."""
+    """Return whether an object is in the wrong list. Profiles define mandatory objects too."""
     if title == _MANDATORY:
         return _home(index) == _MANUFACTURER
     return title != _home(index)
@@ -144,7 +145,7 @@ def _is_wrong(title: str, index: int) -> bool:
 def _mended(
     document: Document, found: list[ObjectList], title: str, present: set[int]
 ) -> tuple[Edit, ...]:
-    """Return the edits that correct a list; another list has its own finding."""
+    """Return the edits that correct a list. Another list has its own finding."""
     each = next(one for one in found if one.title == title)
     if title not in document.file.sections:
         return (
@@ -165,12 +166,12 @@ def _mended(
 
 
 def _may_be_set(said: int | None, listed: int, wanted: int) -> bool:
-    """Return whether a count is wrong and does not indicate lost entries."""
+    """Return whether a count is wrong but does not indicate lost entries."""
     return said is None or (said != wanted and (said <= listed or said < wanted))
 
 
 def _rewritten(document: Document, each: ObjectList, wanted: list[int]) -> Iterator[Edit]:
-    """Yield the edits of the lines of a list that change."""
+    """Yield the edits for the lines of a list that change."""
     lines = [line for line, _ in each.entries]
     for at, index in enumerate(wanted[: len(lines)]):
         if (lines[at].key, each.entries[at][1]) != (str(at + 1), index):

@@ -1,4 +1,4 @@
-"""Rules over the sections of objects: mandatory keywords, and number of sub-indices."""
+"""Rules for the sections of objects: mandatory keywords, and number of sub-indices."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def kinds(document: Document) -> Iterator[RuleFinding]:
 
 
 def sub_numbers(document: Document) -> Iterator[RuleFinding]:
-    """Compare SubNumber with the existing sub-indices; a missing sub-index stays visible."""
+    """Compare SubNumber with the existing sub-indices. A missing sub-index stays visible."""
     file = document.file
     for section, index, sub in file.objects():
         described = document.device.objects.get(index)
@@ -73,7 +73,7 @@ def sub_numbers(document: Document) -> Iterator[RuleFinding]:
 
 
 def _is_whole(document: Document, section: str, index: int) -> bool:
-    """Return whether all but SubNumber agree that no sub-index is missing."""
+    """Return whether everything except SubNumber indicates that no sub-index is missing."""
     if document.device.objects[index].code in VARIABLES:
         return document.file.has(section, "ObjectType")
     subs, row = sorted(document.subs(index)), document.rows.get((index, 0))
@@ -112,7 +112,7 @@ def _highest(document: Document, index: int, section: str, said: int) -> Iterato
 
 
 def _section_of(row: EntryDescription) -> Iterator[str]:
-    """Yield the section of an entry; without DefaultValue if it has no default."""
+    """Yield the section of an entry. DefaultValue is omitted if the entry has no default."""
     yield ""
     for line in entry_lines(row):
         yield "DefaultValue=" if line.startswith("DefaultValue=") and not row.has_default else line

@@ -1,4 +1,4 @@
-"""Rules over PDOs and COB-IDs, with the defaults of the file."""
+"""Rules for PDOs and COB-IDs, applied to the defaults of the file."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ _RESTRICTED: Final = (
 _SYNC: Final = 0x1005
 _EMCY: Final = 0x1014
 _SDO: Final = range(0x1200, 0x1300)
-"""Servers, and clients from 1280h on; sub-indices 1 and 2 are COB-IDs."""
+"""Indices of SDO servers, and of clients from 1280h on. Sub-indices 1 and 2 are COB-IDs."""
 _DEFAULT_SERVER: Final = {(0x1200, 1): 0x600, (0x1200, 2): 0x580}
-"""The lowest CAN-ID of each type, to which the node-ID is added."""
+"""The lowest CAN-ID of each type of COB-ID. The node-ID is added to this number."""
 _ALL_SUBS: Final = (1 << len(ELEMENTS)) - 1
 _NEEDED_SUBS: Final = 0b11
-"""COB-ID and transmission type."""
+"""Bits of the required sub-indices, which are COB-ID and transmission type."""
 _RESERVED: Final = 4
 _NODE: Final = 5
 """The node-ID for which CAN-IDs are compared."""
@@ -93,7 +93,10 @@ def _cob_id(
 
 
 def _is_of_server(document: Document, row: EntryDescription, base: int) -> bool:
-    """Return whether a default is that of the first server; in a DCF it is that of one node."""
+    """Return whether a default is that of the first server.
+
+    In a DCF it is the one of a single node.
+    """
     default = int.from_bytes(row.default, "little")
     if document.file.is_dcf and not row.relative:
         return default in range(base + _LOWEST_NODE, base + _HIGHEST_NODE + 1)
@@ -101,7 +104,7 @@ def _is_of_server(document: Document, row: EntryDescription, base: int) -> bool:
 
 
 def compact(document: Document) -> Iterator[RuleFinding]:
-    """Check what CompactPDO implies."""
+    """Check the objects that CompactPDO implies."""
     title, key = "DeviceInfo", "CompactPDO"
     mask = number(document, title, key)
     if not mask or document.file.is_xml:
@@ -118,7 +121,7 @@ def compact(document: Document) -> Iterator[RuleFinding]:
 
 
 def halves(document: Document) -> Iterator[RuleFinding]:
-    """Find PDOs without their communication parameter or their mapping."""
+    """Find PDOs that lack their communication parameter or their mapping."""
     objects = document.device.objects
     for index in objects:
         if (index in _RPDO or index in _TPDO) and index + _MAPPING not in objects:
@@ -131,7 +134,7 @@ def halves(document: Document) -> Iterator[RuleFinding]:
 
 
 def reserved(document: Document) -> Iterator[RuleFinding]:
-    """Find sub-index 4 of communication parameters: a device must refuse it."""
+    """Find sub-index 4 of communication parameters, which a device must refuse."""
     described = set[int]()
     for section, index, sub in document.file.objects():
         described.add(index)

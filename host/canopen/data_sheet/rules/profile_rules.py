@@ -1,4 +1,4 @@
-"""Rules over mandatory objects: communication area, profiles."""
+"""Rules for mandatory objects of the communication area and of profiles."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _DEVICE_TYPE: Final = (0x1000, 0)
 _IDENTITY: Final = 0x1018
 _COMMUNICATION: Final = range(0x1000, 0x2000)
 _WRITE_ONLY: Final = (0x1024, 0x1026, *range(0x1F50, 0x1F60))
-"""Write-only objects: commands, programs."""
+"""Write-only objects, which hold commands or programs."""
 _PROFILE_AREA: Final = range(0x6000, 0xA000)
 _TEXTS: Final = (
     *(DataType.VISIBLE_STRING, DataType.UNICODE_STRING, DataType.OCTET_STRING, DataType.DOMAIN),
@@ -37,11 +37,11 @@ _GUESSED: Final = (
     *("data-type-missing", "data-type-unknown", "empty-value", "no-number"),
     *("access-missing", "access-form"),
 )
-"""If one of these rules is broken, the reader assumed a value that the file lacks."""
+"""Rules that, if broken, mean that the reader assumed a value that the file lacks."""
 
 
 def mandatory(document: Document) -> Iterator[RuleFinding]:
-    """Find objects that each CANopen device must have, and this one lacks."""
+    """Find missing objects that each CANopen device must have."""
     objects = document.device.objects
     if not objects:
         return

@@ -1,4 +1,4 @@
-"""Rules over the text: encoding, line ends, titles, keywords, comments."""
+"""Rules for the text: encoding, line ends, titles, keywords, comments."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def titles(document: Document) -> Iterator[RuleFinding]:
 
 
 def _title(document: Document, line: EdsLine) -> Iterator[RuleFinding]:
-    """Check the title of a known section; hexadecimal digits may have either case."""
+    """Check the title of a known section. Hexadecimal digits may be upper or lower case."""
     wanted = f"[{line.section}]"
     named = line.section in KNOWN_SECTIONS.values()
     plain = not named and _PLAIN.fullmatch(line.content)
@@ -102,7 +102,7 @@ def keywords(document: Document) -> Iterator[RuleFinding]:
 
 
 def comments(document: Document) -> Iterator[RuleFinding]:
-    """Find comments that some readers take for something else."""
+    """Find comments that some readers do not recognise as comments."""
     for line in () if document.file.is_xml else document.file.lines:
         text = line.text.strip()
         raw = document.texts[line.number - 1]
@@ -123,7 +123,7 @@ def comments(document: Document) -> Iterator[RuleFinding]:
 
 
 def _is_word(document: Document, line: EdsLine) -> bool:
-    """Return whether a line holds a number or an access type: not a text that may contain `#`."""
+    """Return whether a line holds a number or an access type. Other texts may contain `#`."""
     if line.key.lower() == "accesstype" or is_number(line.section, line.key):
         return line.key.lower() != "count"
     return kind_of(document, line) is not None

@@ -13,11 +13,14 @@ from tickrig.wire.canopen.eds.eds_file import shorten
 from tickrig.wire.canopen.eds.eds_value import object_section
 
 _SIGNS: Final = 2
-"""A single sign may be a slip: a missing line end, or one object that is only listed."""
+"""Number of signs that prove a truncation.
+
+A single sign may be a slip, such as one missing object.
+"""
 
 
 def truncated(document: Document) -> Iterator[RuleFinding]:
-    """Find a file that ends before everything that it announces."""
+    """Find a file that ends before everything that the file announces."""
     lines = [line for line in document.file.lines if line.content]
     if document.file.is_xml or not lines:
         return
@@ -44,7 +47,7 @@ def _listed_behind(document: Document, last: str) -> list[int]:
 
 
 def _is_short(document: Document, last: str) -> int:
-    """Count the missing parts of the last section: its entries, entries of its object, keywords."""
+    """Count the missing parts of the last section: entries, entries of the object, and keywords."""
     if last in LISTS:
         said = number(document, last, "SupportedObjects") or 0
         return int(said > len(ObjectList(document, last).entries))

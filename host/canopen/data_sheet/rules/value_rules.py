@@ -1,4 +1,4 @@
-"""Rules over values: numbers, node-IDs, defaults, limits; and fixes for findings of the reader."""
+"""Rules for values (numbers, node-IDs, defaults, limits), and fixes for findings of the reader."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _OF_ELEMENTS: Final = re.compile(r"([0-9A-F]{4})(Value|Name|Denotation)")
 
 
 def numbers(document: Document) -> Iterator[RuleFinding]:
-    """Find numbers that some readers take for octal and others for decimal, and odd node-IDs."""
+    """Find odd node-IDs, and numbers that some readers read as octal and others as decimal."""
     for line in document.file.lines:
         if not _CANDIDATE.search(line.value):  # most lines have none
             continue
@@ -50,7 +50,7 @@ def numbers(document: Document) -> Iterator[RuleFinding]:
 
 
 def list_numbers(document: Document) -> Iterator[RuleFinding]:
-    """Find numbered keywords with leading zeros: other readers do not find them."""
+    """Find numbered keywords with leading zeros, which other readers do not find."""
     for line in () if document.file.is_xml else document.file.lines:
         zeros = _NUMBERED.fullmatch(line.key) if line.is_keyword else None
         if zeros is None or eds_value.object_section(line.section) is not None:
@@ -63,7 +63,7 @@ def list_numbers(document: Document) -> Iterator[RuleFinding]:
 
 
 def kind_of(document: Document, line: eds_value.EdsLine) -> DataType | None:
-    """Return the data type of the value in a line, None if it is not a number."""
+    """Return the data type of the value in a line, or None if the value is not a number."""
     of_elements = _OF_ELEMENTS.fullmatch(line.section)
     place = eds_value.object_section(line.section)
     if of_elements is not None and of_elements[2] == "Value" and line.key.isdecimal():
@@ -78,7 +78,7 @@ def kind_of(document: Document, line: eds_value.EdsLine) -> DataType | None:
 
 
 def _leading_zero(document: Document, line: eds_value.EdsLine, terms: list[str]) -> RuleFinding:
-    """Check a number, or a sum with the node-ID; fix a value that is a number in both readings."""
+    """Check a number or a sum with the node-ID. Fix a value that is a number in both readings."""
     octal = [term for term in terms if _OCTAL.fullmatch(term)]
     first = octal[0]
     what = f"{shorten(line.content)} is {int(first, 8)} in octal, {int(first)} in decimal"
@@ -93,7 +93,7 @@ def _leading_zero(document: Document, line: eds_value.EdsLine, terms: list[str])
 
 
 def _node_id(document: Document, section: str, line: eds_value.EdsLine) -> Iterator[RuleFinding]:
-    """Check the number that is added to the node-ID; blanks are not fixed."""
+    """Check the number that is added to the node-ID. Blanks are not fixed."""
     plain = line.value.replace(" ", "")
     if _NODE_ID.fullmatch(plain) and plain.startswith("$NODEID"):
         return
@@ -203,7 +203,7 @@ def _word(document: Document, finding: Finding, line: eds_value.EdsLine) -> tupl
 
 
 def _taken(finding: Finding) -> str:
-    """Return the value that the reader says it uses."""
+    """Return the value that the reader reports to use."""
     return finding.reason.rpartition(": ")[2].partition(" ")[0]
 
 
@@ -213,7 +213,7 @@ def _access(document: Document, finding: Finding, line: eds_value.EdsLine) -> tu
 
 
 def _empty(document: Document, finding: Finding, line: eds_value.EdsLine) -> tuple[Edit, ...]:
-    """Set an empty keyword to its implied value; a DataType only if CiA 301 defines one."""
+    """Set an empty keyword to its implied value. A DataType is set only if CiA 301 defines it."""
     if line.key.lower() == "datatype" and _taken(finding) == str(int(DataType.DOMAIN)):
         return ()
     return (document.with_value(line, _taken(finding)),)
@@ -230,14 +230,14 @@ def _standard_type(
 
 
 def _bytes(document: Document, finding: Finding, line: eds_value.EdsLine) -> tuple[Edit, ...]:
-    """Write the bytes that are used; only the author of the file knows the meaning of a text."""
+    """Write the bytes that are used. Only the author of the file knows the meaning of a text."""
     taken = finding.reason.rpartition(": ")[2].removesuffix(" is taken").replace(" ", "")
     is_plain = eds_value.is_hex_bytes(taken) and eds_value.without_comment(line.value) == line.value
     return (document.with_value(line, taken),) if is_plain else ()
 
 
 def _bit_rate(document: Document, finding: Finding, line: eds_value.EdsLine) -> tuple[Edit, ...]:
-    """Write kbit/s if bit/s are meant."""
+    """Write the bit rate in kbit/s if the value seems to be in bit/s."""
     taken = _taken(finding)
     return (document.with_value(line, taken),) if taken.isdecimal() else ()
 
@@ -252,7 +252,7 @@ def _kind(document: Document, finding: Finding, line: eds_value.EdsLine) -> tupl
 
 
 def _comment(document: Document, finding: Finding, line: eds_value.EdsLine) -> tuple[Edit, ...]:
-    """Turn the line into a comment; if it is before the first section, all lines there.
+    """Turn a line into a comment. Before the first section, turn all lines into comments.
 
     Lines of a section that lost its title are not changed. As comments, their keywords would be
     lost without a message.
@@ -271,7 +271,7 @@ def _comment(document: Document, finding: Finding, line: eds_value.EdsLine) -> t
 def _doubled_key(document: Document, finding: Finding, line: eds_value.EdsLine) -> tuple[Edit, ...]:
     """Drop a keyword that repeats the same value.
 
-    Of two different values, the right one is unknown; both are kept.
+    If the two values differ, the right value is unknown, and both are kept.
     """
     first = document.keyword(line.section, line.key)
     same = first is not None and first.value == line.value
@@ -281,7 +281,7 @@ def _doubled_key(document: Document, finding: Finding, line: eds_value.EdsLine) 
 def _doubled_section(
     document: Document, finding: Finding, line: eds_value.EdsLine
 ) -> tuple[Edit, ...]:
-    """Move keywords to the first section, and remove the title, unless they contradict it."""
+    """Move keywords to the first section and remove the title, unless they contradict it."""
     if _contradicting(document, line):
         return ()
     moved: list[str] = []
@@ -298,7 +298,7 @@ def _doubled_section(
 def _again(
     document: Document, title: eds_value.EdsLine
 ) -> Iterator[tuple[eds_value.EdsLine, eds_value.EdsLine | None]]:
-    """Yield the keywords after a title, each with the line that counts."""
+    """Yield the keywords after a title, each with the line whose value counts."""
     lines = document.file.lines  # a slice would copy the whole rest, for each title
     behind = (lines[at] for at in range(title.number, len(lines)))
     for line in takewhile(lambda other: not other.title, behind):
@@ -332,12 +332,12 @@ _MENDS: Final[dict[str, Callable[[Document, Finding, eds_value.EdsLine], tuple[E
 }
 
 _OF_LINES: Final = ("inline-comment", "sub0-missing")
-"""Rules of the reader that a rule over lines or objects also reports."""
+"""Rules of the reader whose violations a rule for lines or objects also reports."""
 _OF_ONE_ENTRY: Final = ("data-type-missing", "access-missing")
 
 
 def stray_lines(document: Document) -> Iterator[RuleFinding]:
-    """Find lines without a meaning, and duplicates, where the reader does not look."""
+    """Find lines without a meaning, and duplicates, in places that the reader skips."""
     seen: set[tuple[str, str]] = set()
     for line in () if document.file.is_xml else document.file.lines:
         if line.title:

@@ -25,16 +25,16 @@ from tickrig.wire.canopen.sdo import (
 from tickrig.wire.canopen.sdo_frame import REQUEST_COB_ID, RESPONSE_COB_ID
 
 _MOST: Final = 0.8
-"""Bus load from which on periods are skipped, because answers do not arrive in time."""
+"""Bus load above which periods are skipped, because answers do not arrive in time."""
 
 _Load = float
-"""Bits per microsecond."""
+"""Bus load in bits per microsecond."""
 
 
 def check_load(bus: BusFile) -> tuple[RuleFinding, ...]:
     """Return a finding if the periods of the drives load the bus too much.
 
-    The length of the frames is computed exactly in bits, for data bytes of 0.
+    The length of the frames is computed exactly in bits, with data bytes of 0.
     """
     notes, master = BusFileNotes(), bus.master
     if master is not None:
@@ -49,7 +49,7 @@ def check_load(bus: BusFile) -> tuple[RuleFinding, ...]:
 
 
 def _said(drives: int, sdo: _Load, pdos: _Load) -> str:
-    """Return the shares of the load, and how many drives the bus can carry."""
+    """Return the shares of the load, and the number of drives that the bus can carry."""
     text = f"{sdo + pdos:.0%} of the bus in each period"
     if not drives:
         return f"{text} for PDOs"

@@ -1,4 +1,4 @@
-"""One axis of a drive, operated as by ros2_canopen's 402 driver."""
+"""One axis of a drive, operated as ros2_canopen's 402 driver does."""
 
 from __future__ import annotations
 
@@ -42,10 +42,10 @@ class DriveSettings:
     """The settings of an axis.
 
     Attributes:
-        channel: its name, its scales and offsets.
-        axis: 0 for the first axis of the device.
-        switching_state: the state in which the mode is changed.
-        homing_us: how long homing may take.
+        channel: channel with name, scales and offsets of the axis.
+        axis: number of the axis. 0 is the first axis of the device.
+        switching_state: state in which the mode is changed.
+        homing_us: longest duration of homing.
     """
 
     channel: DriveChannel
@@ -55,7 +55,7 @@ class DriveSettings:
 
 
 def is_drive(slave: BusSlave) -> bool:
-    """Return whether a slave is operated as a drive: by its driver, or else its device type."""
+    """Return whether a slave is operated as a drive, by its driver or else by its device type."""
     if slave.driver:
         return "402" in slave.driver
     return slave.identity.device_type & 0xFFFF == _DRIVE_PROFILE
@@ -72,14 +72,14 @@ def axes_of(slave: BusSlave) -> tuple[DriveSettings, ...]:
 
 
 def period_us_of(slave: BusSlave) -> int:
-    """Return the period in which ros2_canopen polls a node, 0 if it polls with each SYNC."""
+    """Return the period in which ros2_canopen polls a node, or 0 if it polls with each SYNC."""
     if not _number(slave, "polling", 1):
         return 0
     return 1_000 * _number(slave, "period", _PERIOD_MS)
 
 
 def _number(slave: BusSlave, key: str, default: int) -> int:
-    """Return a setting, the default if the driver does not accept the value."""
+    """Return a setting, or the default if the driver does not accept the value."""
     item = slave.settings.get(key)
     value = None if item is None else SETTINGS[key].value_of(item)
     return default if value is None else value
@@ -91,7 +91,7 @@ _START_US: Final = 1_000_000
 """Time limit for the drive to be at rest before homing, and for the start of homing."""
 
 _SEEN_US: Final = 100_000
-"""Within this time, a drive that has homed before shows that it homes again."""
+"""Time within which a drive that has homed before shows that it homes again."""
 
 _REACHED: Final = Statusword.TARGET_REACHED
 _ATTAINED: Final = Statusword.MODE_12
@@ -101,16 +101,16 @@ _ERROR: Final = Statusword.MODE_13
 async def home(
     name: str, mode: drive_mode.HomingMode, within_us: int, caught_up: Callable[[], Operation]
 ) -> None:
-    """Start homing in a drive that is in homing mode, and wait for its end.
+    """Start homing in a drive that is in homing mode. Wait for the end of homing.
 
     Args:
-        name: of the joint.
-        mode: the mode of the drive.
-        within_us: how long homing may take.
-        caught_up: waits for a statusword sent after the controlword.
+        name: name of the joint.
+        mode: mode object of the drive.
+        within_us: longest duration of homing.
+        caught_up: operation that waits for a statusword that was sent after the controlword.
 
     Raises:
-        DriveFailed: it does not start, does not end in time, or reports an error.
+        DriveFailed: homing does not start, does not end in time, or ends with an error.
     """
     try:
         await _home(name, mode, within_us, caught_up)
@@ -137,7 +137,7 @@ async def _home(
 async def _await(  # noqa: PLR0913, PLR0917 - a row of what is awaited
     name: str, mode: drive_mode.HomingMode, mask: int, before: int, within_us: int, complaint: str
 ) -> None:
-    """Wait until some bits have changed; raise DriveFailed if they report an error."""
+    """Wait until some bits have changed. Raise DriveFailed if they report an error."""
     await Until(lambda: mode.status & mask != before, within_us, f"{name}: homing {complaint}")
     if mode.status & _ERROR:
         raise DriveFailed(f"{name}: homing error (bit 13 of the statusword)")
@@ -157,36 +157,36 @@ _HOMING_METHOD: Final = drive_mode.DriveObject(0x6098, 1)
 _SUPPORTED: Final = drive_mode.DriveObject(0x6502, 4, signed=False)
 
 AXIS: Final = 0x800
-"""Offset from the objects of an axis to those of the next."""
+"""Offset from the objects of an axis to those of the next axis."""
 
 _CAUGHT_UP: Final = 3
-"""After this many statuswords following an answer, one was sent after all earlier requests."""
+"""Number of statuswords after an answer of which one was sent after all earlier requests."""
 
 _SWITCH_US: Final = 5_000_000
-"""How long a change of state or of mode may take."""
+"""Longest duration of a change of state or of mode."""
 
 T = TypeVar("T")
 
 
 class DriveDriver:
-    """Reads and writes an axis in each period; has async operations that wait for their results.
+    """Driver that reads and writes an axis in each period. Its async operations wait for results.
 
-    `CanopenMaster.perform` runs them: `master.perform(arm.init())`.
+    `CanopenMaster.perform` runs the operations: `master.perform(arm.init())`.
 
     `halt` is a quick stop. While the mode has no set-point, bit 8 halts the drive.
 
     Args:
         settings: settings of the axis.
-        image: the values in PDOs; all other values are transferred by SDO.
-        talk: takes SDO scripts for the node.
+        image: values in PDOs. All other values are transferred by SDO.
+        talk: function that takes SDO scripts for the node.
 
     Attributes:
-        name: of the joint.
-        statusword: the last statusword that was read.
-        controlword: the last controlword that was written.
-        mode: the mode that the drive reports, by number.
+        name: name of the joint.
+        statusword: last statusword that was read.
+        controlword: last controlword that was written.
+        mode: number of the mode that the drive reports.
         cycles: number of read and write cycles.
-        refusals: SDO requests that the drive refused, the oldest first.
+        refusals: SDO requests that the drive refused. The oldest request is first.
     """
 
     def __init__(
@@ -204,7 +204,7 @@ class DriveDriver:
 
     @property
     def state(self) -> DriveState | None:
-        """The state in the statusword; None until a statusword was read after the node booted.
+        """The state in the statusword, or None until a statusword was read after the node booted.
 
         The state becomes None when the node is lost, until a statusword arrives.
         """
@@ -217,22 +217,22 @@ class DriveDriver:
 
     @property
     def position(self) -> float:
-        """Position of the joint, in the user's units."""
+        """Position of the joint, in units of the user."""
         channel = self._channel
         return self._value(_POSITION) * channel.scale_pos_from_dev + channel.offset_pos_from_dev
 
     @property
     def velocity(self) -> float:
-        """Speed of the joint, in the user's units."""
+        """Speed of the joint, in units of the user."""
         return self._value(_VELOCITY) * self._channel.scale_vel_from_dev
 
     @property
     def effort(self) -> float:
-        """Actual torque, 0 if the drive does not report it."""
+        """Actual torque, or 0 if the drive does not report it."""
         return self._value(_TORQUE) * self._channel.scale_eff_from_dev
 
     def set_target(self, target: float) -> None:
-        """Set a set-point for the current mode, in the user's units; a torque in per mille.
+        """Set a set-point for the current mode, in units of the user. A torque is in per mille.
 
         Raises:
             DriveFailed: the drive is not in Operation enabled.
@@ -250,7 +250,7 @@ class DriveDriver:
         self._mode.set_target(target)
 
     def cycle(self) -> Script[None]:
-        """Read, then write; called in each period."""
+        """Read values, then write values. This is called in each period."""
         for item in READ:
             yield from self._read(item)
         self.statusword, self.mode = self._value(_STATUSWORD), self._value(_MODE_DISPLAY)
@@ -279,10 +279,10 @@ class DriveDriver:
         yield from self._write(CONTROLWORD, word)
 
     async def init(self) -> None:
-        """Enable the drive, and home it if its homing method is not 0; afterwards it has no mode.
+        """Enable the drive, and home it if its homing method is not 0. Afterwards it has no mode.
 
         Raises:
-            DriveFailed: it does not complete in time.
+            DriveFailed: the drive does not complete in time.
         """
         await Until(lambda: self.cycles > 0, _SWITCH_US, f"{self.name}: the node has not booted")
         self.controlword, self._reset_fault, self._unseen = 0, True, True
@@ -293,7 +293,7 @@ class DriveDriver:
             await self.choose(drive_mode.ModeNumber.NONE)
 
     async def recover(self) -> None:
-        """Reset a fault, and enable the drive again; the target is dropped."""
+        """Reset a fault, and enable the drive again. The target is dropped."""
         self._reset_fault = True
         self._mode.begin()
         await self.switch_to(DriveState.OPERATION_ENABLED)
@@ -304,7 +304,7 @@ class DriveDriver:
         await self.switch_to(DriveState.SWITCH_ON_DISABLED)
 
     def halt(self) -> None:
-        """Do a quick stop; a drive that is not in Operation enabled stays as it is."""
+        """Do a quick stop. A drive that is not in Operation enabled stays as it is."""
         state = state_of(self.statusword)
         if (
             word := drive_state.lead(self.controlword, state, DriveState.QUICK_STOP_ACTIVE)
@@ -312,14 +312,16 @@ class DriveDriver:
             self.controlword, self._unseen = word, True
 
     async def switch_to(self, goal: DriveState | str) -> None:
-        """Bring the drive to a state: to Operation enabled step by step, to other states directly.
+        """Bring the drive to a state.
+
+        Operation enabled is reached step by step, other states directly.
 
         Args:
-            goal: a state, or its name: `Switched on`.
+            goal: state, or name of the state, such as `Switched on`.
 
         Raises:
-            ValueError: there is no such state.
-            DriveFailed: no transition leads there, or it takes too long.
+            ValueError: the state does not exist.
+            DriveFailed: no transition leads to the state, or the change takes too long.
         """
         goal = drive_state.state_named(goal)
         silent = f"{self.name}: no statusword since the node was lost, or booted"
@@ -339,14 +341,14 @@ class DriveDriver:
         await Until(lambda: self.state is not state, _SWITCH_US, complaint)
 
     async def choose(self, mode: int | str) -> None:
-        """Change the mode of operation; the drive then has no target, and is halted.
+        """Change the mode of operation. The drive then has no target, and is halted.
 
         Args:
-            mode: its number or its abbreviation: `pp`, `vl`, `pv`, `tq`, `hm`, `ip`, `csp`,
-                `csv`, `cst`, `none`.
+            mode: number of the mode, or its abbreviation: `pp`, `vl`, `pv`, `tq`, `hm`, `ip`,
+                `csp`, `csv`, `cst`, `none`.
 
         Raises:
-            ValueError: there is no such mode.
+            ValueError: the mode does not exist.
             DriveFailed: the drive does not have this mode, or does not report it in time.
         """
         number = drive_mode.ModeNumber.of(mode)
@@ -370,12 +372,12 @@ class DriveDriver:
         await self.switch_to(DriveState.OPERATION_ENABLED)
 
     async def _supports(self, number: drive_mode.ModeNumber) -> bool:
-        """Return whether 6502h has a mode."""
+        """Return whether 6502h reports that the drive supports a mode."""
         modes = await self._exchange(self._read(_SUPPORTED))
         return bool(modes >> number - 1 & 1)
 
     async def _home(self) -> None:
-        """Home, unless the homing method is 0."""
+        """Home the drive, unless the homing method is 0."""
         method = await self._exchange(self._read(_HOMING_METHOD))
         if method and isinstance(self._mode, drive_mode.HomingMode):
             await home(self.name, self._mode, self._settings.homing_us, self._catch_up)
@@ -399,12 +401,12 @@ class DriveDriver:
         await Until(lambda: self.cycles > cycles, _SWITCH_US, f"{self.name}: the node was lost")
 
     def _request(self, key: Key) -> Script[None]:
-        """Make the drive answer; the answer does not matter."""
+        """Make the drive answer. The content of the answer does not matter."""
         with suppress(SdoAborted):
             yield from upload(*key)
 
     async def _exchange(self, script: Script[T]) -> T:
-        """Send something to the drive between two periods; return the result."""
+        """Send something to the drive between two periods. Return the result."""
         ended: list[T | Exception] = []
         lost = DriveFailed(f"{self.name}: the node was lost")
         self._talk(QueuedScript("", script, ended.append, ended.append, lambda: ended.append(lost)))
@@ -432,7 +434,7 @@ class DriveDriver:
         return self._value(item)
 
     def _write(self, item: drive_mode.DriveObject, value: int) -> Script[None]:
-        """Write an object by RPDO, or by SDO if none carries it."""
+        """Write an object by RPDO, or by SDO if no RPDO carries the object."""
         key, bits = self._key(item), item.bits_of(value)
         if self._image.sends(key):
             self._image.write(key, bits)
@@ -452,22 +454,22 @@ class DriveDriver:
 # The axes of one node, driven in its period.
 
 _AWAITED_US: Final = 3_000_000
-"""How long a driver of ros2_canopen waits for the boot-up of its node: three times 1 s."""
+"""Time that a ros2_canopen driver waits for the boot-up of its node, which is three times 1 s."""
 
 
 class DriveNode:
-    """Drives its axes, one after the other, in each period while the node is booted.
+    """Drive node that runs its axes in turn, in each period while the node is booted.
 
-    A period is skipped while the SDO transfers of the last one still run.
+    A period is skipped while SDO transfers of the previous period still run.
 
     Args:
-        slave: the node.
-        image: the values in its PDOs.
+        slave: slave that is the node.
+        image: values in the PDOs of the node.
         axes: settings of each axis.
-        period_us: 0 for once with each SYNC.
+        period_us: period, or 0 for once with each SYNC.
 
     Attributes:
-        drivers: one per axis.
+        drivers: drivers of the axes, one per axis.
     """
 
     def __init__(
@@ -484,24 +486,24 @@ class DriveNode:
 
     @property
     def due_us(self) -> int:
-        """When to call `tick` next."""
+        """Time of the next call of `tick`."""
         return self._timer.due_us if self._slave.good else NEVER
 
     @property
     def is_booted(self) -> bool:
-        """Whether its node has booted."""
+        """Whether the node has booted."""
         return self._slave.good
 
     def is_awaited(self, now_us: int) -> bool:
-        """Whether its node boots, and the driver still waits for it."""
+        """Whether the node boots and the driver still waits for it."""
         return self._slave.booting and now_us - self._slave.began_us < _AWAITED_US
 
     def tick(self, now_us: int, *, sync: bool) -> None:
-        """Start a period, if one is due.
+        """Start a period, if a period is due.
 
         Args:
-            now_us: the time.
-            sync: a SYNC was sent just now.
+            now_us: current time.
+            sync: whether a SYNC was sent just now.
         """
         self._now_us = now_us
         if self._lost != self._slave.lost or not self._slave.good:

@@ -1,4 +1,4 @@
-"""Modes of operation, each with its set-point and its handshake (CiA 402-2)."""
+"""Modes of operation with their set-points and handshakes (CiA 402-2)."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from tickrig.host.text.names import near
 from tickrig.wire.canopen.drive import Controlword, Statusword
 
 _START: Final = Controlword.START
-"""New set-point, start homing, interpolate."""
+"""Start bit of a mode: new set-point, start homing, or interpolate."""
 
 _AT_ONCE: Final = Controlword.CHANGE_AT_ONCE
 
 
 class ModeNumber(IntEnum):
-    """Modes of operation, 6060h."""
+    """Numbers of modes of operation (object 6060h)."""
 
     NONE = 0
     PROFILE_POSITION = 1
@@ -34,7 +34,10 @@ class ModeNumber(IntEnum):
 
     @classmethod
     def of(cls, mode: int | str) -> ModeNumber:
-        """Return a mode by its usual abbreviation, as `pp`; ValueError if there is none."""
+        """Return a mode by its usual abbreviation, such as `pp`.
+
+        Raise ValueError if there is none.
+        """
         if isinstance(mode, int) and mode in list(cls):
             return cls(mode)
         mode = str(mode)
@@ -62,10 +65,10 @@ class DriveObject:
     """An object of a drive.
 
     Attributes:
-        index: index for the first axis.
-        size: in bytes.
+        index: index of the object for the first axis.
+        size: size in bytes.
         sub: sub-index of the object.
-        signed: whether it is an INTEGER.
+        signed: whether the data type of the object is a signed INTEGER.
     """
 
     index: int
@@ -96,37 +99,40 @@ _Write = Callable[[DriveObject, int], Script[None]]
 
 
 class DriveMode:
-    """What a mode does in each period; it is used while the drive is in it.
+    """The actions of a mode in each period. They are used while the drive is in the mode.
 
     Attributes:
-        controlword: its bits of 6040h.
+        controlword: bits of the mode in the controlword (6040h).
     """
 
     def __init__(self) -> None:
         self.controlword = 0
 
     def begin(self) -> None:
-        """Clear the set-point, as when the mode is selected."""
+        """Clear the set-point, as after a selection of the mode."""
 
     def set_target(self, value: float) -> None:
-        """Set a set-point in units of the device; ValueError if the mode has none."""
+        """Set a set-point in units of the device. Raise ValueError if the mode has no set-point."""
         raise ValueError("this mode has no target")
 
     def read(self, statusword: int) -> None:
         """Process the statusword of this period."""
 
     def write(self, write: _Write) -> Script[bool]:
-        """Write the set-point; return whether it exists; without one, the drive is halted."""
+        """Write the set-point. Return whether it exists.
+
+        Without a set-point, the drive is halted.
+        """
         yield from ()
         return False
 
 
 class _TargetMode(DriveMode):
-    """Writes its target in each period.
+    """Mode that writes its target in each period.
 
     Args:
-        target: the object.
-        bits: of the controlword, set while there is a target.
+        target: object of the target.
+        bits: bits of the controlword that are set while there is a target.
     """
 
     def __init__(self, target: DriveObject, bits: int = 0) -> None:
@@ -139,10 +145,10 @@ class _TargetMode(DriveMode):
         self._target = None
 
     def set_target(self, value: float) -> None:
-        """Set a target; a value too large for the object is limited.
+        """Set a target. A value that is too large for the object is limited.
 
         Raises:
-            ValueError: it is not a number.
+            ValueError: the value is not a number.
         """
         if not math.isfinite(value):
             raise ValueError(f"{value} is not a target")
@@ -159,7 +165,7 @@ class _TargetMode(DriveMode):
 
 
 class _ProfilePositionMode(_TargetMode):
-    """Writes each new target once, with the handshake of bits 4 and 12."""
+    """Mode that writes each new target once, with the handshake of bits 4 and 12."""
 
     def begin(self) -> None:
         """Clear the current and the pending target."""
@@ -172,7 +178,7 @@ class _ProfilePositionMode(_TargetMode):
         self._acknowledged = bool(statusword & Statusword.MODE_12)
 
     def write(self, write: _Write) -> Script[bool]:
-        """Set bit 4 for a new target, clear it when the target is acknowledged."""
+        """Set bit 4 for a new target. Clear bit 4 when the target is acknowledged."""
         self.controlword |= _AT_ONCE
         if self._target is None:
             return False
@@ -189,11 +195,13 @@ class _ProfilePositionMode(_TargetMode):
 
 
 class HomingMode(DriveMode):
-    """Starts homing by bit 4; bits 10, 12 and 13 of the statusword report its course.
+    """Mode that starts homing by bit 4.
+
+    Statusword bits 10, 12 and 13 report the progress of homing.
 
     Attributes:
         runs: whether homing should run.
-        status: the bits 10, 12 and 13.
+        status: bits 10, 12 and 13 of the statusword.
     """
 
     MASK: Final = Statusword.TARGET_REACHED | Statusword.MODE_12 | Statusword.MODE_13
@@ -203,7 +211,7 @@ class HomingMode(DriveMode):
         self.runs, self.status = False, 0
 
     def read(self, statusword: int) -> None:
-        """Process the bits of homing."""
+        """Process the bits of homing in the statusword."""
         self.status = statusword & self.MASK
 
     def write(self, write: _Write) -> Script[bool]:
@@ -220,7 +228,7 @@ _FREQUENCY: Final = DriveObject(0x6042, 2)
 _INTERPOLATED: Final = DriveObject(0x60C1, 4, sub=1)
 
 TARGETS: Final = (_POSITION, _SPEED, _TORQUE, _FREQUENCY, _INTERPOLATED)
-"""The set-points of all modes."""
+"""Objects of the set-points of all modes."""
 
 MODES: Final[Mapping[ModeNumber, Callable[[], DriveMode]]] = {
     ModeNumber.PROFILE_POSITION: lambda: _ProfilePositionMode(_POSITION),
@@ -240,4 +248,4 @@ POSITIONS: Final = (
     ModeNumber.CYCLIC_POSITION,
 )
 SPEEDS: Final = (ModeNumber.VELOCITY, ModeNumber.PROFILE_VELOCITY, ModeNumber.CYCLIC_VELOCITY)
-"""Modes whose targets are scaled; torques go to the device as they are."""
+"""Modes whose targets are scaled. Torques go to the device without scaling."""

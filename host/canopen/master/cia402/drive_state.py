@@ -1,4 +1,4 @@
-"""The controlwords that lead a drive from state to state (CiA 402-2).
+"""The controlwords that bring a drive from state to state (CiA 402-2).
 
 >>> f"{lead(0x0100, DriveState.SWITCH_ON_DISABLED, DriveState.READY_TO_SWITCH_ON):04X}h"
 '0106h'
@@ -17,7 +17,7 @@ MODE_BITS: Final = 0x0270
 
 
 def state_named(state: DriveState | str) -> DriveState:
-    """Return a state by its name, as `Switched on`; ValueError if there is none."""
+    """Return a state by its name, such as `Switched on`. Raise ValueError if there is none."""
     by_words = {each.words: each for each in DriveState}
     if isinstance(state, DriveState):
         return state
@@ -38,10 +38,10 @@ _SHUTDOWN: Final = (_NO_STOP | _VOLTAGE, _RESET | _ON)
 _SWITCH_ON: Final = (_NO_STOP | _VOLTAGE | _ON, _RESET | _ENABLE)
 _ENABLE_OPERATION: Final = (_NO_STOP | _VOLTAGE | _ON | _ENABLE, _RESET)
 _QUICK_STOP: Final = (_VOLTAGE, _RESET | _NO_STOP)
-"""Bits to set, and bits to clear; all others stay."""
+"""Bits to set, and bits to clear. All other bits keep their value."""
 
 _ALONE: Final = (_NOTHING, _NOTHING)
-"""The drive makes this transition by itself."""
+"""Marks of a transition that the drive makes by itself."""
 
 TRANSITIONS: Final = {
     (DriveState.NOT_READY_TO_SWITCH_ON, DriveState.SWITCH_ON_DISABLED): _ALONE,  # transition 1
@@ -74,11 +74,11 @@ _ENABLING: Final[Mapping[DriveState | None, DriveState]] = {
 
 
 def next_state(state: DriveState | None, goal: DriveState) -> DriveState:
-    """Return the next state on the way: the state itself, except for Operation enabled."""
+    """Return the next state on the way to Operation enabled. Other states are reached directly."""
     return _ENABLING.get(state, goal) if goal is DriveState.OPERATION_ENABLED else goal
 
 
 def lead(controlword: int, state: DriveState | None, following: DriveState) -> int | None:
-    """Return the controlword that leads from a state to another, None if there is none."""
+    """Return the controlword that leads from a state to another, or None if there is none."""
     bits = None if state is None else TRANSITIONS.get((state, following))
     return None if bits is None else controlword & ~int(bits[1]) | int(bits[0])
